@@ -368,6 +368,13 @@ def test_classes_that_fill_no_slot(rule):
             },
             "has states that add up to 0.*at V_[*]",
         ),
+        (
+            {
+                "evolution": lambda x, state, p: state + 0.9 * p[LAW] * x,
+                "steady_states": lambda x, shift, p: (shift - 0.9 * p[LAW] * x,),
+            },
+            "moves away from steady sliding at .* by 1 per D_c",
+        ),
     ],
 )
 def test_a_law_rests_in_its_steady_states(body, complaint):

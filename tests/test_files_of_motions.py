@@ -12,6 +12,7 @@ from scipy.io import loadmat
 
 import rsfstudy
 from rsfstudy import Scene
+from rsfstudy.api import exchange
 from rsfstudy.compute import provenance
 from rsfstudy.errors import DataError
 from rsfstudy.files import store
@@ -104,7 +105,16 @@ def test_other_programs_read_what_is_exported(place, tmp_path):
     assert (tmp_path / "both.csv").read_bytes() == (tmp_path / "motion.csv").read_bytes()
     assert loadmat(tmp_path / "both.mat").keys() == mat.keys()
     one = call("export", place / "rig.nc", "--csv", "--mat", "--output", tmp_path / "one.csv")
-    assert "is one file" in one.stderr
+    assert one.returncode == 0, one.stderr
+    assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "motion.csv").read_bytes()
+    assert (tmp_path / "one.mat").exists()
+
+
+def test_codes_are_words_in_a_table(tmp_path):
+    values = xr.DataArray([20, 0], dims="time", attrs={"flag_values": [0, 20]})
+    values.attrs["flag_meanings"] = "ok work_budget_spent"
+    exchange.to_csv(xr.Dataset({"status": values}, {"time": [0.0, 1.0]}), tmp_path / "it.csv")
+    assert pd.read_csv(tmp_path / "it.csv")["status"].tolist() == ["work_budget_spent", "ok"]
 
 
 def test_a_table_has_no_columns_that_never_change():

@@ -10,7 +10,7 @@ import xarray as xr
 from running import call, called, run
 
 import rsfstudy
-from rsfstudy import Axis, Laboratory, Scene, Study, protocol, read_protocol, simulate
+from rsfstudy import Axis, Laboratory, Scene, Study, limit_cycle, protocol, read_protocol, simulate
 from rsfstudy.errors import DataError, InvalidValue, NoAnswer
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.plots._motion import picture
@@ -226,6 +226,17 @@ def test_the_picture_of_a_motion(laboratory, against):
     expected = scene.mu_star + (scene.a - scene.b) * np.log(np.asarray(rates))
     np.testing.assert_allclose(friction, expected, rtol=1e-12)
     assert np.asarray(path.get_xdata()).max() > 2.5
+
+
+def test_a_limit_cycle_has_a_picture():
+    """A closed curve, in units of the rig."""
+    scene = RIG.scene(**LAW, load_velocity_ratio=2.0).with_(stiffness_ratio=0.8, inertia=True)
+    cycle = limit_cycle(scene, rtol=1e-4)
+    upper, lower, plane = cycle.rsf.plot(RIG).axes
+    assert (upper.get_ylabel(), lower.get_xlabel()) == ("Shear stress (MPa)", "Time (s)")
+    rates, friction = np.array(plane.get_lines()[0].get_data())
+    assert friction[0] == pytest.approx(friction[-1], abs=1e-6)
+    assert rates[0] == pytest.approx(2.0, rel=1e-6)  # um/s
 
 
 def test_the_picture_of_steady_sliding_has_limits_about_its_slip_rate():

@@ -227,3 +227,15 @@ def test_a_slow_peak_is_slow_by_the_norm_where_nothing_radiates():
             scene.with_(instability_norm=norm), rtol=1e-4, engine="compiled"
         )
         assert float(again.slip_mode) == mode
+
+
+def test_a_spring_that_is_critical_is_told_from_one_that_takes_its_time():
+    """Mass lowers critical stiffness by 6e-6 of itself, which leaves swings as they are."""
+    spring = {"stiffness": 0.006, "period": 0.02, "inertia": True}
+    kind = {"law": "slowness", "normal_stress": "constant"}
+    slow = Scene(**kind, a=0.01, b_over_a=1.6, reference_rate=1.0, **spring)
+    outcome = LimitCycle(events=10)(slow, Accuracy(1e-8))
+    assert outcome.status is Status.WORK_BUDGET_SPENT
+    assert "for ever to grow or to die out" in outcome.message
+    near = LimitCycle(events=10)(slow.with_(stiffness=0.00594), Accuracy(1e-8))
+    assert "waits for more" in near.message

@@ -54,6 +54,17 @@ def test_units_beside_headings_and_a_stated_normal_stress(tmp_path: Path) -> Non
     np.testing.assert_allclose(both.columns["friction"], FRICTION, rtol=1e-15)
 
 
+def test_one_column_is_named_and_the_others_are_known() -> None:
+    """Those that a record needs; normal stress that was recorded too is not asked for here."""
+    arrays = {"Time (s)": TIME, "ram (um)": MOVED, "Disp (um)": 2.0 * MOVED, "mu": FRICTION}
+    arrays["Normal stress (MPa)"] = NORMAL
+    told = rsfstudy.read_record(arrays, {"displacement": "ram (um)"}).columns
+    np.testing.assert_allclose(told["displacement"], MOVED, rtol=1e-15)
+    np.testing.assert_allclose(told["friction"], FRICTION, rtol=1e-15)
+    told = rsfstudy.read_record(arrays, {"displacement": "ram (um)", "friction": "mu"}).columns
+    assert "normal_stress" not in told
+
+
 def test_a_table_in_memory_is_read_as_its_file(tmp_path: Path) -> None:
     headings = ["Time (min)", "LP disp (mm)", "mu"]
     path = written(tmp_path / "run.csv", headings, [TIME / 60.0, MOVED * 1e-3, FRICTION], ",")

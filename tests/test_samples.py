@@ -19,6 +19,7 @@ from rsfstudy.files import restore
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import (
+    Logarithm,
     Mean,
     Quantile,
     SobolIndices,
@@ -250,7 +251,7 @@ def test_statistics_with_the_errors_of_sampling():
 def test_failed_samples_are_refused_and_shares_tell_of_them():
     status = np.zeros(20, dtype=np.int8)
     status[3], status[5:8] = Status.CELL_RAISED, Status.NO_LIMIT_CYCLE
-    kinds = (*STATISTICS, StatusShares("share", "y"))
+    kinds = (*STATISTICS, Logarithm("log", "y"), StatusShares("share", "log"))
     lattice = measured(np.arange(20.0), status)
     found = reduced(lattice, kinds)
     for name in ("mean", "sd", "low"):

@@ -36,6 +36,7 @@ from rsfstudy.analysis.return_map import CLOSED, Orbit, ReturnMap, section
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.stability import critical_stiffness
 from rsfstudy.status import Status
 
 #: Part of their distance to the limit that cycles keep each time: above the first they are leapt
@@ -52,6 +53,9 @@ _FIRST_LOOK = 8
 #: Size of a multiplier from which an orbit repels beyond doubt, and how far off its like a cycle is
 #: that repeats none, over how far ln V swings.
 _REPELS, _OFF = 1.01, 0.02
+#: Part by which stiffness differs from the critical one where swings take for ever to grow or to
+#: die out.
+_CRITICAL = 1e-5
 
 
 class Approach:
@@ -109,12 +113,22 @@ class Approach:
                 if self._repeats():
                     return True
                 if len(self.seen) >= events:
-                    text = f"no cycle repeats within {events} events; {more_events(events)}"
+                    remedy = self._is_critical or more_events(events)
+                    text = f"no cycle repeats within {events} events; {remedy}"
                     raise Halt(Status.WORK_BUDGET_SPENT, text)
                 if self._may_leap():
                     self._left_at_leap = abs(cycle.end.spring_stress - cycle.begin.spring_stress)
                     start = self._by.point(section(cycle.begin) + np.array(self._ahead))
                     break
+
+    @property
+    def _is_critical(self) -> str:
+        """Why no number of events would do, if stiffness is the critical one."""
+        critical = critical_stiffness(self._scene, self._scene.log_load_rate)
+        off = abs(self._scene.stiffness / critical - 1.0) if critical else math.inf
+        if off > _CRITICAL:
+            return ""
+        return f"stiffness is critical to {off:.0e}: swings take for ever to grow or to die out"
 
     @property
     def orbit(self) -> Orbit:

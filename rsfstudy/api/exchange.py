@@ -40,10 +40,10 @@ def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
 
 def to_csv(dataset: xr.Dataset, path: Path) -> None:
     """Write the table of a dataset, whose header names units as `read_table` reads them; numbers
-    keep all their digits, and codes are words.
+    keep all their digits, and codes of cells are words.
     """
     table = to_dataframe(dataset)
-    for name in table:
+    for name in table if "status" in dataset else ():
         if meanings := str(dataset[name].attrs.get("flag_meanings", "")):
             values = map(float, np.atleast_1d(dataset[name].attrs["flag_values"]))
             table[name] = table[name].map(dict(zip(values, meanings.split(), strict=True)))

@@ -72,7 +72,9 @@ def reduced(
         leaves_out = despite and not reduction.of_failures
         support = without_failures(dataset) if leaves_out else dataset
         own = worst(support["status"], support[reduction.of].dims)
-        support = known(support, reduction.of, drawn.get(reduction.of, own))
+        if not reduction.of_failures:
+            own = drawn.get(reduction.of, own)
+        support = known(support, reduction.of, own)
         made = carried(reduction, support, reduction(support))
         stated = {q.name: q for q in reduction.quantities}
         _check_new(reduction, made, dataset)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from functools import cache
 
+import numpy as np
+
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.parts import Function, Numbers, Scene
 from rsfstudy.slider.places import A, B
@@ -124,7 +126,8 @@ def states_at_of(count: int) -> Function:
 
 def check_steady_states(scene: Scene) -> None:
     """Raise InvalidValue where the law of a scene still changes in the states that it states, or is
-    given, as those of steady sliding: critical stiffness and cycles would contradict each other.
+    given, as those of steady sliding, or moves away from them: critical stiffness and cycles would
+    contradict each other.
     """
     law, p, still = scene.parts.law, scene.numbers, _AT_REST * scene.a
     evolutions = law.evolutions or evolutions_of_one_state(law.evolution)
@@ -138,3 +141,22 @@ def check_steady_states(scene: Scene) -> None:
         if rate == 0.0 and not abs(sum(psis)) <= still:
             rule = f"has states that add up to {sum(psis):.3g} at V_*, where friction is mu_*"
             raise InvalidValue("law", law.name, rule, remedy="Measure them from V_*.")
+        away = np.linalg.eigvals(_slopes(evolutions, rate, psis, scene.a, p)).real.max()
+        if away > _AT_REST:
+            rule = f"moves away from steady sliding at ln(V/V_*) = {rate:g}, by {away:.3g} per D_c"
+            remedy = "See whether its evolution has the sign of dPsi/d(delta)."
+            raise InvalidValue("law", law.name, rule, remedy=remedy)
+
+
+def _slopes(
+    evolutions: Function, rate: float, psis: Numbers, size: float, p: Numbers
+) -> list[list[float]]:
+    """Derivatives of the change of each state by each, central differences of 1e-4 of a size."""
+    step, rows = 1e-4 * size, list[list[float]]()
+    for n, psi in enumerate(psis):
+        ahead, behind = (
+            evolutions(rate, (*psis[:n], psi + off, *psis[n + 1 :]), 0.0, 1.0, p)
+            for off in (step, -step)
+        )
+        rows.append([(x - y) / (2.0 * step) for x, y in zip(ahead, behind, strict=True)])
+    return rows
