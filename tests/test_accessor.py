@@ -75,7 +75,7 @@ def test_an_answer_knows_its_scene_and_why_it_has_no_number():
     for ask in (lambda: step.rsf.study, step.rsf.check):
         with pytest.raises(DataError, match="is of one scene"):
             ask()
-    with pytest.raises(DataError, match="only motions have a picture"):
+    with pytest.raises(DataError, match="no motion as simulate gives it"):
         step.rsf.plot()
 
 
