@@ -112,7 +112,7 @@ def coefficient(g: float, excess: float, change: float, p: Numbers) -> tuple[flo
     ratio, mu_star = 1.0 + excess, p[MU_STAR]
     bend = excess - change * g
     support = 1.0 - mu_star * change
-    return (g * support - mu_star * bend) / ratio, (support + bend) / ratio**2
+    return (g * support - mu_star * bend) / ratio, (support + bend) / (ratio * ratio)
 
 
 def constant(g: float, p: Numbers) -> tuple[float, float]:

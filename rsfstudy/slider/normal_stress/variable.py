@@ -29,7 +29,9 @@ def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
     """
     cot_phi = p[NORMAL_STRESS + 1]
     excess = cot_phi * friction + p[IMPOSED]
-    return min(max(excess, SMALLEST_RATIO - 1.0), LARGEST_RATIO), cot_phi
+    if not SMALLEST_RATIO - 1.0 <= excess <= LARGEST_RATIO:
+        excess = min(max(excess, SMALLEST_RATIO - 1.0), LARGEST_RATIO)
+    return excess, cot_phi
 
 
 @dataclass(frozen=True, kw_only=True)
