@@ -113,7 +113,7 @@ class Approach:
                 if self._repeats():
                     return True
                 if len(self.seen) >= events:
-                    remedy = self._is_critical or more_events(events)
+                    remedy = self._hopeless or more_events(events)
                     text = f"no cycle repeats within {events} events; {remedy}"
                     raise Halt(Status.WORK_BUDGET_SPENT, text)
                 if self._may_leap():
@@ -122,8 +122,8 @@ class Approach:
                     break
 
     @property
-    def _is_critical(self) -> str:
-        """Why no number of events would do, if stiffness is the critical one."""
+    def _hopeless(self) -> str:
+        """Why no number of events would do, where stiffness is the critical one; else empty."""
         critical = critical_stiffness(self._scene, self._scene.log_load_rate)
         off = abs(self._scene.stiffness / critical - 1.0) if critical else math.inf
         if off > _CRITICAL:
