@@ -119,8 +119,9 @@ def events(
     Parameters
     ----------
     record : xarray.Dataset, str or Path, optional
-        ``time``, ``shear_stress`` and, where it was measured, ``displacement``, with units; or a
-        CSV file of these, whose first line names columns and units (`read_table`).
+        ``time``, ``shear_stress`` and, where it was measured, ``displacement`` of the fault (that
+        of the load point is no slip), with units; or a CSV file of these, whose first line names
+        columns and units (`read_table`).
     time, displacement, shear_stress : array_like
         The same as arrays; one with the attribute ``units`` keeps them, and numbers that are read
         of others have no attribute ``units``.
