@@ -31,10 +31,10 @@ from typing import NamedTuple
 
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.places import (
-    LARGEST_RATIO,
+    LARGEST_EXCESS,
     LOADING,
     MU_STAR,
-    SMALLEST_RATIO,
+    SMALLEST_EXCESS,
     STRESS_DEPENDENCE,
     A,
 )
@@ -103,18 +103,6 @@ class Friction(NamedTuple):
 # ---- the friction relation -----------------------------------------------------------------------
 
 
-def coefficient(g: float, excess: float, change: float, p: Numbers) -> tuple[float, float]:
-    """``tau/sigma - mu_*`` and its derivative with respect to g, at s = 1 + `excess`.
-
-    Written so that digits are kept where s is proportional to g, however large it is: with the bend
-    s - 1 - s' g, ``[g (1 - mu_* s') - mu_* bend]/s`` and ``(1 - mu_* s' + bend)/s**2``.
-    """
-    ratio, mu_star = 1.0 + excess, p[MU_STAR]
-    bend = excess - change * g
-    support = 1.0 - mu_star * change
-    return (g * support - mu_star * bend) / ratio, (support + bend) / (ratio * ratio)
-
-
 def constant(g: float, p: Numbers) -> tuple[float, float]:
     """No excess of normal stress over its reference value, and no slope."""
     return 0.0, 0.0
@@ -131,7 +119,7 @@ def stress_of(normal_stress: Function, place: int) -> Function:
 
     def effective_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
         excess, change = normal_stress(g, p)
-        return min(max(excess - psis[place], SMALLEST_RATIO - 1.0), LARGEST_RATIO), change
+        return min(max(excess - psis[place], SMALLEST_EXCESS), LARGEST_EXCESS), change
 
     return effective_stress if place else total_stress
 
@@ -159,26 +147,29 @@ def at_constant_stress(g: float, psis: Numbers, p: Numbers) -> Relation:
     return g, 1.0, 0.0, 0.0
 
 
-def strength_of(stress: Function, state_effect: Function | None) -> Function:
+def no_state_effect(g: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
+    """The shift and its slope where stress does not change the state."""
+    return 0.0, 0.0
+
+
+def strength_of(stress: Function, state_effect: Function) -> Function:
     """The friction relation ``(g, psis, p) -> (strength, its slope, shift, its slope)``, of normal
-    stress that changes, and of the effect of stress on the state, if there is one.
+    stress that changes, and of the effect of stress on the state.
+
+    ``tau/sigma - mu_*`` keeps its digits where s is proportional to g, however large it is: with
+    the bend s - 1 - s' g it is ``[g (1 - mu_* s') - mu_* bend]/s``, its derivative with respect to
+    g ``(1 - mu_* s' + bend)/s**2``.
     """
-    if state_effect is None:
 
-        def coupled(g: float, psis: Numbers, p: Numbers) -> Relation:
-            excess, change = stress(g, psis, p)
-            value, slope = coefficient(g, excess, change, p)
-            return value, slope, 0.0, 0.0
-
-        return coupled
-
-    def coupled_with_state_effect(g: float, psis: Numbers, p: Numbers) -> Relation:
+    def coupled(g: float, psis: Numbers, p: Numbers) -> Relation:
         excess, change = stress(g, psis, p)
-        value, slope = coefficient(g, excess, change, p)
-        shift, shift_slope = state_effect(g, 1.0 + excess, change, p)
+        ratio, mu_star = 1.0 + excess, p[MU_STAR]
+        bend, support = excess - change * g, 1.0 - mu_star * change
+        value, slope = (g * support - mu_star * bend) / ratio, (support + bend) / (ratio * ratio)
+        shift, shift_slope = state_effect(g, ratio, change, p)
         return value + shift, slope + shift_slope, shift, shift_slope
 
-    return coupled_with_state_effect
+    return coupled
 
 
 def stress_dependence(g: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
@@ -234,7 +225,7 @@ def reversible(one_way: Function) -> Function:
     return either_way
 
 
-def by_pressure_of(stress: Function, state_effect: Function | None) -> Function:
+def by_pressure_of(stress: Function, state_effect: Function) -> Function:
     """Derivatives of strength, ``(mu_* + g)/s**2`` and that of the shift, and of the shift with
     respect to P, at constant frictional stress.
 
@@ -242,21 +233,13 @@ def by_pressure_of(stress: Function, state_effect: Function | None) -> Function:
     none.
     """
 
-    if state_effect is None:
-
-        def alone(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
-            ratio = 1.0 + stress(g, psis, p)[0]
-            return (p[MU_STAR] + g) / ratio**2, 0.0
-
-        return alone
-
-    def with_state_effect(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    def slopes(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
         ratio = 1.0 + stress(g, psis, p)[0]
         along = state_effect(g, ratio, -1.0, p)[1]
         shift = along - state_effect(g, ratio, 0.0, p)[1]
         return (p[MU_STAR] + g) / ratio**2 + shift, shift
 
-    return with_state_effect
+    return slopes
 
 
 def no_load_point_stress(psis: Numbers, p: Numbers) -> float:
@@ -334,11 +317,11 @@ class Parts(NamedTuple):
 @cache
 def friction_of(parts: Parts) -> Friction:
     """Friction, made of what the parts of a scene say of it."""
-    effect = reduce(added, parts.state_effects) if parts.state_effects else None
+    effect = reduce(added, parts.state_effects) if parts.state_effects else no_state_effect
     pressure, outside = parts.unknowns > 0 and not parts.displaces, parts.outside
     total = parts.normal_stress or constant
     effective, outer = stress_of(total, -1 if pressure else 0), stress_of(total, outside)
-    changes = pressure or total is not constant or effect is not None
+    changes = pressure or total is not constant or len(parts.state_effects) > 0
     strength = strength_of(effective, effect) if changes else at_constant_stress
     if parts.regularised:
         strength = reversible(strength)

@@ -38,8 +38,9 @@ BEGINS, ENDS_AT, VELOCITY, LOG_VELOCITY, RATE, RELIEF = range(6)
 LARGEST_LOG_SLIP_RATE = 300.0
 #: The same of time over slip, 1/V: slip that no load moves stops at 10^-290 V_*.
 LARGEST_SLOWNESS = 680.0
-#: Normal stress ratios outside of these only occur in trial steps; clamps keep them finite.
-SMALLEST_RATIO, LARGEST_RATIO = 1e-12, 1e12
+#: Normal stress over its reference value, less 1: outside of these in trial steps only; clamps keep
+#: it finite.
+SMALLEST_EXCESS, LARGEST_EXCESS = 1e-12 - 1.0, 1e12
 
 
 def numbers(scene: Scene) -> Numbers:

@@ -62,7 +62,7 @@ def with_auxiliary_at_rest(steady_states: Function, auxiliary: Function) -> Func
 @cache
 def sum_of(count: int) -> Function:
     """Sum of the first so many numbers."""
-    return _written("numbers", " + ".join(f"numbers[{i}]" for i in range(count)))
+    return _written("numbers", _sum("numbers", count))
 
 
 @cache
@@ -79,6 +79,11 @@ def moved(count: int) -> Function:
     return _written("psis, changes, by", f"({''.join(each)})")
 
 
+def _sum(numbers: str, count: int) -> str:
+    """Text of the sum of the first so many numbers."""
+    return " + ".join(f"{numbers}[{i}]" for i in range(count))
+
+
 def _written(arguments: str, value: str) -> Function:
     """A function without a loop, which a compiler needs for tuples."""
     function: Function = eval(f"lambda {arguments}: {value}", {"__name__": __name__})
@@ -89,13 +94,9 @@ def contribution_of(count: int, by_pressure: Function | None) -> Function:
     """``(changes, g, psis, p)``: what changes of so many states of the law take from a ln(V/V_*),
     less what the change of P, or of imposed shear stress, gives, if there is any.
     """
-    state_sum = sum_of(count)
     if by_pressure is None:
-
-        def of_states(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
-            return state_sum(changes)
-
-        return of_states
+        return _written("changes, g, psis, p", _sum("changes", count))
+    state_sum = sum_of(count)
 
     def with_pressure(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
         return state_sum(changes) - by_pressure(g, psis, p)[0] * changes[-1]

@@ -181,21 +181,26 @@ def rate_of_rigid(made: Friction) -> Function:
 
 
 def point_of(made: Friction) -> Function:
-    """``(x, growth, forces, states, p) -> Point`` at x = ln(V/V_*), which grows so: of forces, f
-    and its change, g and its change, and of states, Psi and their changes.
+    """``(x, growth, forces, states, changes, shift, p) -> Point`` at x = ln(V/V_*), which grows so:
+    of forces, f and its change, g and its change; the states, their changes, and what stress has
+    taken from them.
 
     A rig reads the friction coefficient ``(mu_* + f)/s``, s outside the fault.
     """
-    strength, effective_stress = made.strength, made.effective_stress
     steady_states, state_sum, count = made.steady_states, made.state_sum, made.states
-    stress, pressure = made.outer_stress, made.outer_pressure
-    imposed, imposed_change = made.imposed, made.imposed_change
+    effective_stress, stress = made.effective_stress, made.outer_stress
+    pressure, imposed, imposed_change = made.outer_pressure, made.imposed, made.imposed_change
 
     def point_at(
-        x: float, growth: float, forces: Numbers, psis: Numbers, changes: Numbers, p: Numbers
+        x: float,
+        growth: float,
+        forces: Numbers,
+        psis: Numbers,
+        changes: Numbers,
+        shift: float,
+        p: Numbers,
     ) -> Point:
         f, f_change, g, g_change = forces
-        _value, _slope, shift, _shift_slope = strength(g, psis, p)
         steady = steady_states(x, shift, p)
         psi, distance = state_sum(psis), 0.0
         for i in range(count):
@@ -238,9 +243,9 @@ def point_between_ruptures(
         f, psis = unknowns[0], unknowns[1:]
         x, g, _shift = balance(f, psis, p)
         x_change = growth(unknowns, rates[:end], x, g, p)
-        slope = strength(g, psis, p)[1]
+        _value, slope, shift, _shift_slope = strength(g, psis, p)
         g_change = (p[A] * x_change + contribution(changes, g, psis, p)) / slope
-        return point_at(x, x_change, (f, rates[0], g, g_change), psis, changes, p)
+        return point_at(x, x_change, (f, rates[0], g, g_change), psis, changes, shift, p)
 
     return point
 
@@ -251,8 +256,9 @@ def point_in_rupture(made: Friction, point_at: Function) -> Function:
 
     def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
         f, x, g, others = state[0], state[1], state[2], state[3:end]
-        psis = states_at(strength(g, others, p)[0], x, others, p)
-        return point_at(x, rates[1], (f, rates[0], g, rates[2]), psis, rates[:end], p)
+        value, _slope, shift, _shift_slope = strength(g, others, p)
+        psis = states_at(value, x, others, p)
+        return point_at(x, rates[1], (f, rates[0], g, rates[2]), psis, rates[:end], shift, p)
 
     return point
 
@@ -263,8 +269,9 @@ def point_of_rigid(made: Friction, point_at: Function) -> Function:
 
     def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
         g, others, x = state[0], state[1:], p[-1]
-        psis = states_at(strength(g, others, p)[0], x, others, p)
-        return point_at(x, 0.0, (g, rates[0], g, rates[0]), psis, rates, p)
+        value, _slope, shift, _shift_slope = strength(g, others, p)
+        psis = states_at(value, x, others, p)
+        return point_at(x, 0.0, (g, rates[0], g, rates[0]), psis, rates, shift, p)
 
     return point
 

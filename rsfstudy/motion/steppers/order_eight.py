@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from scipy.integrate import DOP853
 
 from rsfstudy.motion.calls import evaluate, moved
@@ -25,7 +24,7 @@ from rsfstudy.motion.workspace import rate_of_step, spend
 from rsfstudy.slider.equations import LONGEST_STEP
 
 #: Weights of the stages of dense output, and of all stages in its rows.
-_EXTRA_WEIGHTS, _DENSE_WEIGHTS = map(np.ascontiguousarray, (DOP853.A_EXTRA, DOP853.D))
+_EXTRA_WEIGHTS, _DENSE_WEIGHTS = (tuple(x.ravel().tolist()) for x in (DOP853.A_EXTRA, DOP853.D))
 #: Weights of the stages before each stage, of which the last is the end of the step, and in its
 #: errors of fifth and third order.
 _STAGE_WEIGHTS = tuple(map(tuple, [*DOP853.A[:STAGES, :STAGES].tolist(), DOP853.B.tolist()]))
@@ -175,7 +174,7 @@ def prepare_interpolation(motion, space, length):
         for i in range(count):
             together = 0.0
             for j in range(STAGES + 1 + s):
-                together += _EXTRA_WEIGHTS[s, j] * stages[j * count + i]
+                together += _EXTRA_WEIGHTS[s * ALL_STAGES + j] * stages[j * count + i]
             space.within[i] = y[i] + length * together
         rates = moved(stages, (STAGES + 1 + s) * count)
         rate_of_step(motion, space, space.within, rates)
@@ -188,7 +187,7 @@ def prepare_interpolation(motion, space, length):
         for r in range(ROWS - 3):
             together = 0.0
             for j in range(ALL_STAGES):
-                together += _DENSE_WEIGHTS[r, j] * stages[j * count + i]
+                together += _DENSE_WEIGHTS[r * ALL_STAGES + j] * stages[j * count + i]
             rows[(3 + r) * count + i] = length * together
 
 

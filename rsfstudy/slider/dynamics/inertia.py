@@ -58,13 +58,16 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
     contribution, ahead = friction.contribution, moved(friction.states)
 
     def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
-        g = spring_stress - resistance(spring_stress, psis, p)
+        alone = without_mass(spring_stress, psis, p)
+        g = spring_stress - resistance(spring_stress, psis, alone, p)
+        if g == spring_stress:  # mass is lost to rounding
+            return alone[0], g, alone[4]
         value, _slope, shift, _shift_slope = strength(g, psis, p)
         return (value - state_sum(psis)) / p[A], g, shift
 
-    def resistance(spring_stress: float, psis: Numbers, p: Numbers) -> float:
-        """The stress that accelerates the mass, over sigma_*."""
-        x, growing, slope, weight = without_mass(spring_stress, psis, p)
+    def resistance(spring_stress: float, psis: Numbers, alone: Numbers, p: Numbers) -> float:
+        """The stress that accelerates the mass, over sigma_*, from what is so without mass."""
+        x, growing, slope, weight, _shift = alone
         first = resisted(weight, growing, p)
         if weight <= LIGHT:
             return first
@@ -74,17 +77,15 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
         loading = p[STIFFNESS] * (slower - 1.0) * fraction
         changes = evolutions(slowed, psis, shift, fraction, p)
         growing = (slope * loading - contribution(changes, spring_stress, psis, p)) / p[A]
-        _x, growing_ahead, slope_ahead, weight_ahead = without_mass(
+        _x, growing_ahead, slope_ahead, weight_ahead, _shift = without_mass(
             spring_stress + AHEAD * loading, ahead(psis, changes, AHEAD), p
         )
         trails_ahead = slope_ahead * resisted(weight_ahead, growing_ahead, p) / p[A]
         return resisted(weight_at(slowed, slower, p), growing - (trails_ahead - trails) / AHEAD, p)
 
-    def without_mass(
-        spring_stress: float, psis: Numbers, p: Numbers
-    ) -> tuple[float, float, float, float]:
-        """ln(V/V_*) and its growth, both quasi-static, the slope of strength, and the weight of
-        mass there.
+    def without_mass(spring_stress: float, psis: Numbers, p: Numbers) -> Numbers:
+        """ln(V/V_*) and its growth, both quasi-static, the slope of strength, the weight of mass
+        there, and the state lost to stress.
         """
         a = p[A]
         value, slope, shift, _shift_slope = strength(spring_stress, psis, p)
@@ -93,13 +94,13 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
         loading = p[STIFFNESS] * (slower - 1.0) * fraction
         changes = evolutions(clamped, psis, shift, fraction, p)
         growing = (slope * loading - contribution(changes, spring_stress, psis, p)) / a
-        return x, growing, slope, weight_at(x, slower, p)
+        return x, growing, slope, weight_at(x, slower, p), shift
 
     def trailing(spring_stress: float, psis: Numbers, p: Numbers) -> float:
         """ln V on the slow manifold less its quasi-static value; a difference of both would leave
         rounding errors that show in its growth.
         """
-        taken = resistance(spring_stress, psis, p)
+        taken = resistance(spring_stress, psis, without_mass(spring_stress, psis, p), p)
         return -strength(spring_stress - 0.5 * taken, psis, p)[1] * taken / p[A]
 
     def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:

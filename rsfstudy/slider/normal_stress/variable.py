@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from rsfstudy.slider.normal_stress._state_effect import StateEffect
 from rsfstudy.slider.parts import POSITIVE, Numbers, Scene, number
-from rsfstudy.slider.places import IMPOSED, LARGEST_RATIO, NORMAL_STRESS, SMALLEST_RATIO
+from rsfstudy.slider.places import IMPOSED, LARGEST_EXCESS, NORMAL_STRESS, SMALLEST_EXCESS
 
 
 def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
@@ -29,8 +29,8 @@ def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
     """
     cot_phi = p[NORMAL_STRESS + 1]
     excess = cot_phi * friction + p[IMPOSED]
-    if not SMALLEST_RATIO - 1.0 <= excess <= LARGEST_RATIO:
-        excess = min(max(excess, SMALLEST_RATIO - 1.0), LARGEST_RATIO)
+    if not SMALLEST_EXCESS <= excess <= LARGEST_EXCESS:
+        excess = min(max(excess, SMALLEST_EXCESS), LARGEST_EXCESS)
     return excess, cot_phi
 
 
