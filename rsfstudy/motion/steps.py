@@ -17,7 +17,7 @@ from rsfstudy.motion.layout import (
 )
 from rsfstudy.motion.steppers import attempt, reach, retake, unknowns_at
 from rsfstudy.motion.workspace import rate_of_step, spend
-from rsfstudy.slider.equations import LONGEST_STEP, stride
+from rsfstudy.slider.equations import LONGEST_STEP, longest_step
 from rsfstudy.slider.places import LOG_LOAD_RATE
 
 #: What slopes of dense output may differ by from rates over a step, in local tolerances; how often
@@ -48,7 +48,7 @@ def take_step(motion, space):
     """Take a step whose local error is allowed; why not, where there is none."""
     longest = LONGEST_STEP
     if motion.limits_steps:
-        longest = stride(space.before[LOG_RATE], space.before[RATIO], space.p[LOG_LOAD_RATE])
+        longest = longest_step(space.before[LOG_RATE], space.before[RATIO], space.p[LOG_LOAD_RATE])
     longest *= motion.finer
     if motion.records:
         longest = min(longest, motion.resolved)

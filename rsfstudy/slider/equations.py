@@ -20,13 +20,13 @@ LONGEST_STEP = 1e9
 #: Longest step along the path, as far as slip of D_c is: longer ones may pass a turn of the motion
 #: that none of their stages sees. Stationary contact has no turns, up to a few units of ln V before
 #: slip takes up again; and normal stress stretches them all.
-LONGEST_STRIDE, FEW = 3.0, 10.0
+LONGEST_ALONG_PATH, FEW = 3.0, 10.0
 
 
-def stride(log_slip_rate: float, normal_stress: float, log_load_rate: float) -> float:
+def longest_step(log_slip_rate: float, normal_stress: float, log_load_rate: float) -> float:
     """Longest step of a form whose clock is length along the path."""
     stationary = max(1.0, (log_load_rate - log_slip_rate) / FEW)
-    return min(LONGEST_STRIDE * stationary * max(1.0, normal_stress), LONGEST_STEP)
+    return min(LONGEST_ALONG_PATH * stationary * max(1.0, normal_stress), LONGEST_STEP)
 
 
 class Equations(NamedTuple):
