@@ -259,11 +259,21 @@ class Study:
     def _shared(self) -> dict[str, Any]:
         return self.base.as_dict()
 
+    @cached_property
+    def _meaningless(self) -> frozenset[str]:
+        """Fields without meaning where no axis decides what fills a slot."""
+        parts = self.own_parts
+        return without_meaning(by_class(self._shared, parts), parts.values())
+
     def _changes(self, rows: Sequence[Row]) -> Changes:
         given, of_measure = self.split(rows)
+        of_scene = self.fields_of(given)
+        if _CHOOSING.isdisjoint(of_scene) and _CHOOSING.isdisjoint(given):
+            kept = {n: value for n, value in of_scene.items() if n not in self._meaningless}
+            return Changes(kept, of_measure)
         # a row that states a choice together with a field it makes meaningless must be refused
         stated = {name for row in rows if not _CHOOSING.isdisjoint(row) for name in row}
-        of_scene, parts = self.fields_of(given), self.own_parts
+        parts = self.own_parts
         values = by_class({**self._shared, **of_scene}, parts)
         meaningless = without_meaning(values, parts.values()) - stated
         return Changes({n: values[n] for n in of_scene if n not in meaningless}, of_measure)

@@ -74,6 +74,8 @@ def with_numbers(parts: Parts, changes: Mapping[str, Any]) -> Parts:
     """
     made: list[Any] = list(parts)
     for place, values in _by_place(changes, layout_of(tuple(map(type, parts[1:])))).items():
+        if any(name in values for name in SPRING):
+            values = {**dict.fromkeys(SPRING), **with_spring(values)}
         made[place] = replace(made[place], **values)
     return Parts._make(made)
 
@@ -181,7 +183,7 @@ def layout_of(chosen: tuple[type[Part], ...]) -> Layout:
                     foreign.add(name)
     named = tuple(slot.name for slot in SLOTS if slot in NAMED or slot.name in owned)
     fields = tuple(fields_with(owned.values()))
-    plain = frozenset(fields) - {*SLOT_NAMES, *CALLERS, *SPRING}
+    plain = frozenset(fields) - {*SLOT_NAMES, *CALLERS}
     return Layout(kinds, places, refusing, idle, frozenset(foreign), named, fields, plain)
 
 
