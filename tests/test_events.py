@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import InvalidValue, NoAnswer
 
 STICK_SLIP = Scene(b_over_a=2.0, stiffness_ratio=0.5, load_velocity_ratio=10.0, inertia=True)
 
@@ -139,3 +139,37 @@ def test_a_record_tells_slip_rate_and_dynamic_drop(tmp_path):
     xr.testing.assert_identical(rsfstudy.events(file), rsfstudy.events(record))
     plain = rsfstudy.events(**{name: values.values for name, values in record.items()})
     assert not any("units" in plain[name].attrs for name in ("slip", "peak_slip_rate", "noise"))
+
+
+def test_a_load_point_moves_on_through_drops(motion):
+    """Its displacement is no slip: it is refused, or read with the stiffness as that of the fault.
+    Both displacements smear slip over windows of four samples alike, but for noise.
+    """
+    rng = np.random.default_rng(8)
+    time = np.linspace(0.0, 32.0, 10_000)
+    stress = np.interp(time, motion.time, motion.shear_stress) + rng.normal(0.0, 1e-4, 10_000)
+    slip, load_point = (
+        np.interp(time, motion.time, motion[name]) + rng.normal(0.0, 1e-2, 10_000)
+        for name in ("slip", "load_point_displacement")
+    )
+    with pytest.warns(NoAnswer, match="no faster during the drops.*stiffness of the rig"):
+        refused = rsfstudy.events(time=time, displacement=load_point, shear_stress=stress)
+    for name in ("slip", "slip_error", "peak_slip_rate", "dynamic_stress_drop"):
+        assert refused[name].isnull().all(), name
+    assert refused.slip.attrs["comment"]
+    fault = rsfstudy.events(time=time, displacement=slip, shear_stress=stress)
+    stiffness = STICK_SLIP.stiffness
+    read = rsfstudy.events(
+        time=time, displacement=load_point, shear_stress=stress, stiffness=stiffness
+    )
+    assert fault.sizes["event"] == 4
+    np.testing.assert_allclose(read.slip, fault.slip, rtol=0.02)
+    dynamic = motion.rsf.events().dynamic_stress_drop
+    assert (abs(read.dynamic_stress_drop - dynamic) <= read.dynamic_stress_drop_error).all()
+    units = {"time": "s", "displacement": "um", "shear_stress": "MPa"}
+    arrays = {"time": time, "displacement": load_point, "shear_stress": stress}
+    record = xr.Dataset({n: ("sample", arrays[n], {"units": unit}) for n, unit in units.items()})
+    stated = rsfstudy.events(record, stiffness=f"{1e3 * stiffness!r} MPa/mm")
+    np.testing.assert_allclose(stated.slip, read.slip, rtol=1e-12)
+    with pytest.raises(InvalidValue, match="stiffness = '1 MPa/um': the record states no units"):
+        rsfstudy.events(time=time, displacement=slip, shear_stress=stress, stiffness="1 MPa/um")

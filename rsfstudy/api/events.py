@@ -5,6 +5,7 @@ stress that its noise does not explain.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,9 +15,10 @@ import xarray as xr
 from scipy.ndimage import find_objects, label
 from scipy.stats import norm
 
-from rsfstudy.doors import door
-from rsfstudy.errors import InvalidValue
+from rsfstudy.doors import door, outside
+from rsfstudy.errors import InvalidValue, NoAnswer
 from rsfstudy.rig.table import read_table
+from rsfstudy.rig.units import factor, in_si
 
 #: The numbers of an event, each with its error, and which part of it is missing, by its flag.
 Found = tuple[dict[str, tuple[float, float]], int]
@@ -51,6 +53,8 @@ _SHORTEST, _SAMPLES = 4, 100
 _FOUND = 3.1
 #: Standard deviations down to which an event is followed from where it is found.
 _FOLLOWED = 2.0
+#: Standard deviations by which slip exceeds what moves on anyway, and its least excess over that.
+_FASTER, _LEAST_EXCESS = 3.0, 0.1
 #: Standard deviation over the median of absolute deviations of Gaussian noise.
 _NORMAL = 1.4826
 
@@ -100,6 +104,7 @@ def events(
     time: Any = None,
     displacement: Any = None,
     shear_stress: Any = None,
+    stiffness: Any = None,
 ) -> xr.Dataset:
     """The events of a record: drops of shear stress that its noise does not explain.
 
@@ -116,15 +121,23 @@ def events(
     the noise from 3,200 samples on; correlated noise asks for more. Glitches of single samples are
     no Gaussian noise. Stress that relaxes by as much within a window, as in a hold, is a drop too.
 
+    Slip is that of the fault: displacement less shear stress over `stiffness`, that of what lies
+    between the fault and where displacement is measured. Without it displacement is taken for that
+    of the fault, if it moves faster during the drops than before them, by three standard deviations
+    of its noise and by a tenth. That of a load point does not.
+
     Parameters
     ----------
     record : xarray.Dataset, str or Path, optional
-        ``time``, ``shear_stress`` and, where it was measured, ``displacement`` of the fault (that
-        of the load point is no slip), with units; or a CSV file of these, whose first line names
-        columns and units (`read_table`).
+        ``time``, ``shear_stress`` and, where it was measured, ``displacement``, with units; or a
+        CSV file of these, whose first line names columns and units (`read_table`).
     time, displacement, shear_stress : array_like
         The same as arrays; one with the attribute ``units`` keeps them, and numbers that are read
         of others have no attribute ``units``.
+    stiffness : quantity, optional
+        Shear stress over displacement, "0.05 MPa/um", or a number in units of the record: that of
+        the rig where displacement is that of the load point; ``inf`` where it is surely that of the
+        fault.
 
     Returns
     -------
@@ -139,8 +152,14 @@ def events(
     Raises
     ------
     InvalidValue
-        For records that differ in length, hold NaN, or are too short, and for times that do not
-        increase.
+        For records that differ in length, hold NaN, or are too short, for times that do not
+        increase, and for a stiffness that is not positive.
+
+    Warns
+    -----
+    NoAnswer
+        Where displacement does not move faster during the drops; ``slip``, ``peak_slip_rate`` and
+        ``dynamic_stress_drop`` are NaN, and the attribute ``comment`` of slip says why.
     """
     given = {"time": time, "displacement": displacement, "shear_stress": shear_stress}
     if isinstance(record, str | Path):
@@ -159,14 +178,42 @@ def events(
         late = int(np.argmax(np.diff(times) <= 0.0)) + 1
         raise InvalidValue("time", times[late], f"must increase, and does not at sample {late}")
     about = {name: dict(getattr(values, "attrs", {})) for name, values in given.items()}
+    if stiffness is not None and moves is not None:
+        moves = moves - stress / _stiffness(stiffness, about)
     found, noise, smallest = _drops(stress)
     rows = [_row(times, stress, moves, drop) for drop in found]
     dataset = catalogue(rows, about | {"slip": about["displacement"]})
+    if found and moves is not None and stiffness is None and not _slips(times, moves, found):
+        why = "displacement moves no faster during the drops of stress than before"
+        for name in ("slip", "peak_slip_rate", "dynamic_stress_drop"):
+            for each in (name, f"{name}_error"):
+                dataset[each] = dataset[each].copy(data=np.full(len(found), math.nan))
+        dataset["slip"].attrs["comment"] = why
+        remedy = (
+            "If it is that of the load point, give the stiffness of the rig: "
+            "events(..., stiffness='0.05 MPa/um'); if it is that of the fault, stiffness=math.inf"
+        )
+        warnings.warn(f"slip has no number: {why}. {remedy}", NoAnswer, stacklevel=outside())
     units = {key: value for key, value in about["shear_stress"].items() if key == "units"}
     dataset["noise"] = ((), noise, {"long_name": "standard deviation of the noise", **units})
     words = "drop of shear stress that is found but once in 1,000"
     dataset["smallest_drop"] = ((), smallest, {"long_name": words, **units})
     return dataset
+
+
+def _stiffness(stated: Any, about: Mapping[str, Mapping[Any, Any]]) -> float:
+    """Shear stress over displacement, in the units of the record."""
+    found = stated
+    if isinstance(stated, str):
+        stress, length = (about[n].get("units") for n in ("shear_stress", "displacement"))
+        if not (stress and length):
+            remedy = "Give it as a number in the units of the record."
+            raise InvalidValue("stiffness", stated, "the record states no units", remedy=remedy)
+        ours = factor("shear_stress", stress, "Pa") / factor("displacement", length, "m")
+        found = in_si("stiffness", stated, "Pa/m") / float(ours)
+    if not found > 0.0:
+        raise InvalidValue("stiffness", stated, "must be positive")
+    return float(found)
 
 
 def _samples(name: str, values: Any) -> np.ndarray:
@@ -230,6 +277,27 @@ def _drops(stress: np.ndarray) -> tuple[list[tuple[int, int, int, float]], float
     return sorted(taken), _spread(apart) / math.sqrt(2.0), smallest
 
 
+def _slips(
+    times: np.ndarray, moves: np.ndarray, found: Sequence[tuple[int, int, int, float]]
+) -> bool:
+    """True where displacement moves faster during the drops than for as long before them."""
+    excess = usual = variance = 0.0
+    steps = np.abs(np.diff(moves))
+    quantum = float(steps[steps > 0.0].min(initial=math.inf))
+    noises = {n: max(_spread(_falls(moves, n)), quantum) for n in {drop[2] for drop in found}}
+    for begin, end, window, _error in found:
+        first = max(0, begin - window - (end + window - begin))
+        parts = [slice(at, at + window) for at in (first, begin - window, end)]
+        (before, lasts), (moved, slip) = (
+            np.diff([of[part].mean() for part in parts]) for of in (times, moves)
+        )
+        if before > 0.0:  # not at the very begin of the record
+            ratio = lasts / before
+            excess, usual = excess + slip - ratio * moved, usual + abs(ratio * moved)
+            variance += 0.5 * noises[window] ** 2 * (1.0 + (1.0 + ratio) ** 2 + ratio**2)
+    return bool(excess >= max(_FASTER * math.sqrt(variance), _LEAST_EXCESS * usual))
+
+
 def _row(
     times: np.ndarray,
     stress: np.ndarray,
@@ -258,6 +326,8 @@ def _row(
     row["peak_slip_rate"] = row["dynamic_stress_drop"] = math.nan, math.nan
     if rates[fastest] > noise * norm.isf(_CHANCE / len(rates)):
         row["peak_slip_rate"] = rates[fastest], noise
-        drop_error = error + _spread(np.diff(stress))
-        row["dynamic_stress_drop"] = before - stress[fastest + 1], drop_error
+        # stress then lies between that of the two samples
+        ends = stress[fastest : fastest + 2]
+        reading = 0.5 * float(np.ptp(ends)) + _spread(np.diff(stress))
+        row["dynamic_stress_drop"] = before - ends.mean(), error + reading
     return row, 0
