@@ -123,8 +123,8 @@ def events(
 
     Slip is that of the fault: displacement less shear stress over `stiffness`, that of what lies
     between the fault and where displacement is measured. Without it displacement is taken for that
-    of the fault, if it moves faster during the drops than before them, by three standard deviations
-    of its noise and by a tenth. That of a load point does not.
+    of the fault, if it moves faster during the drops than before and after, by three standard
+    deviations of its noise and by a tenth. That of a load point does not.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def events(
     rows = [_row(times, stress, moves, drop) for drop in found]
     dataset = catalogue(rows, about | {"slip": about["displacement"]})
     if found and moves is not None and stiffness is None and not _slips(times, moves, found):
-        why = "displacement moves no faster during the drops of stress than before"
+        why = "displacement moves no faster during the drops of stress than before and after"
         for name in ("slip", "peak_slip_rate", "dynamic_stress_drop"):
             for each in (name, f"{name}_error"):
                 dataset[each] = dataset[each].copy(data=np.full(len(found), math.nan))
@@ -280,22 +280,24 @@ def _drops(stress: np.ndarray) -> tuple[list[tuple[int, int, int, float]], float
 def _slips(
     times: np.ndarray, moves: np.ndarray, found: Sequence[tuple[int, int, int, float]]
 ) -> bool:
-    """True where displacement moves faster during the drops than for as long before them."""
+    """True where displacement moves faster during the drops than for as long before and after."""
     excess = usual = variance = 0.0
     steps = np.abs(np.diff(moves))
     quantum = float(steps[steps > 0.0].min(initial=math.inf))
     noises = {n: max(_spread(_falls(moves, n)), quantum) for n in {drop[2] for drop in found}}
     for begin, end, window, _error in found:
-        first = max(0, begin - window - (end + window - begin))
-        parts = [slice(at, at + window) for at in (first, begin - window, end)]
-        (before, lasts), (moved, slip) = (
-            np.diff([of[part].mean() for part in parts]) for of in (times, moves)
+        far = end + window - begin
+        places = (begin - window - far, begin - window, end, end + far)
+        starts = np.clip(places, 0, len(moves) - window)
+        lasts, slips = (
+            np.diff([of[at : at + window].mean() for at in starts]) for of in (times, moves)
         )
-        if before > 0.0:  # not at the very begin of the record
-            ratio = lasts / before
-            excess, usual = excess + slip - ratio * moved, usual + abs(ratio * moved)
-            variance += 0.5 * noises[window] ** 2 * (1.0 + (1.0 + ratio) ** 2 + ratio**2)
-    return bool(excess >= max(_FASTER * math.sqrt(variance), _LEAST_EXCESS * usual))
+        # nothing is before the very begin of the record, nor after its end
+        ratios = (lasts[1] / np.where(lasts > 0.0, lasts, math.inf))[::2]
+        moved, ratio = float((ratios * slips[::2]).max()), float(ratios.max())
+        excess, usual = excess + float(slips[1]) - moved, usual + abs(moved)
+        variance += 0.5 * noises[window] ** 2 * (1.0 + (1.0 + ratio) ** 2 + ratio**2)
+    return bool(excess > max(_FASTER * math.sqrt(variance), _LEAST_EXCESS * usual))
 
 
 def _row(
