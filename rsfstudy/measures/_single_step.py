@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Outcome
 from rsfstudy.slider.scene import Scene
+from rsfstudy.status import Status
 
 
 def check_single_step(scene: Scene) -> None:
@@ -14,6 +16,25 @@ def check_single_step(scene: Scene) -> None:
         rule = "is no single step, after which a motion decides"
         remedy = "Read its peaks by step_response, or by simulate."
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)
+
+
+def reached_by_loading(scene: Scene, load_velocity: float = 0.0) -> Outcome:
+    """The outcome where steady sliding before the step, or the load point after it, has the norm
+    already.
+
+    Parameters
+    ----------
+    scene : Scene
+    load_velocity : float
+        That after the step, over V_*.
+    """
+    norm, least = scene.instability_norm, scene.inertial_time * max(1.0, abs(load_velocity))
+    return Outcome(
+        Status.NORM_BELOW_LOADING_RATE,
+        message=f"norm {norm:g} is reached by the loading alone, whose norm is {least:.3g}: give "
+        f"instability_norm= well above that, or period= (here {scene.period:g} s) well below "
+        f"{scene.period * norm / least:.3g} s",
+    )
 
 
 def check_leaves_alone(scene: Scene) -> None:

@@ -25,7 +25,7 @@ from rsfstudy.analysis.kinds_of_steps import DisplacementSteps, NormalStressStep
 from rsfstudy.analysis.search_of_steps import Steps
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._single_step import check_single_step
+from rsfstudy.measures._single_step import check_single_step, reached_by_loading
 from rsfstudy.motion.accuracy import ROUNDING, TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.handover import mass_acts
 from rsfstudy.motion.meter import Halt, Meter
@@ -135,10 +135,8 @@ class CriticalStep(Measure):
         sign = 1 if self.direction == "up" else -1
         steps = KINDS[self.of](scene, sign)
         if steps.largest <= steps.smallest:
-            return Outcome(
-                Status.NORM_BELOW_LOADING_RATE,
-                message=f"norm {scene.instability_norm:g} is reached by the loading alone",
-            )
+            rate = 0.0 if self.of == "load_velocity_ratio" else steps.scene.load_velocity
+            return reached_by_loading(scene, rate)
         below = not after_step.orbits_may_close(scene) or after_step.ratio_after(scene) < 1.0
         if (
             below

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from rsfstudy.analysis.after_step import neutral, reaches_norm
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._single_step import check_single_step
+from rsfstudy.measures._single_step import check_single_step, reached_by_loading
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
@@ -40,10 +40,7 @@ class Triggered(Measure):
         """The answer, from motions followed at two tolerances until each is certain."""
         check_single_step(scene)
         if max(0.0, scene.log_load_rate) >= scene.log_norm_rate:
-            return Outcome(
-                Status.NORM_BELOW_LOADING_RATE,
-                message=f"norm {scene.instability_norm:g} is reached by the loading alone",
-            )
+            return reached_by_loading(scene, scene.load_velocity)
         if not scene.is_disturbed:
             return Outcome(Status.OK, {"unstable": 0.0, "unstable_error": 0.0}, "there is no step")
         accuracies = accuracy, accuracy.refined()
