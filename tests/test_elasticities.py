@@ -7,6 +7,7 @@ from typing import ClassVar
 import pytest
 
 from rsfstudy import Scene
+from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.elasticities import Elasticities
@@ -14,6 +15,7 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Output
+from rsfstudy.rig.quantities import of_scene
 from rsfstudy.status import Status
 
 #: Where boundaries have closed forms that the norm does not show in.
@@ -143,7 +145,9 @@ def test_ends_without_elasticities():
 
 def test_the_elasticities_that_uncertain_recurrence_states():
     """Of the interval in s on a machine whose stiffness is held: by a and b each with the other
-    held, and by D_c, with which k D_c/sigma_*, V_*/D_c and the unit of time go. Stated to 3 digits.
+    held, and by D_c, with which k D_c/sigma_*, V_*/D_c and the unit of time go. Stated to 3 digits;
+    those by numbers of the rig are differences of intervals on two rigs, too: what steps of 1 % of
+    a number leave out is 1e-4.
     """
     from rsfstudy.named_studies import uncertain_recurrence as stated
 
@@ -151,6 +155,22 @@ def test_the_elasticities_that_uncertain_recurrence_states():
     measure = Elasticities(LimitCycle(phases=2), parameters=names)
     found, _outcome = told(measure, stated.base)
     a, ratio, stiffness, rate = (elasticity for elasticity, _error in found.values())
-    exact = {"a": a - ratio, "b": ratio, "slip_distance": 1.0 + stiffness - rate}
+    by_rig = {
+        "slip_distance": 1.0 + stiffness - rate,
+        "normal_stress": -stiffness,
+        "reference_velocity": rate - 1.0,
+    }
+    exact = {"a": a - ratio, "b": ratio, **by_rig}
     for name, value in stated.ELASTICITIES.items():
         assert value == pytest.approx(exact[name], rel=2e-3, abs=0.01)
+    known = stated.rig.as_dict()
+    for name, value in by_rig.items():
+        ends = []
+        for by in (-0.01, 0.01):
+            rig = known | {name: known[name] * math.exp(by)}
+            cycle = LimitCycle(phases=2)(stated.base.with_(**of_scene(rig)), COMPILED)
+            interval = cycle.values["recurrence_interval"] * rig["slip_distance"]
+            ends.append(math.log(interval / rig["reference_velocity"]))
+        assert (ends[1] - ends[0]) / 0.02 == pytest.approx(value, abs=1e-3)
+    with pytest.raises(InvalidValue, match="b at constant a is b_over_a; D_c is stiffness"):
+        Elasticities(LimitCycle(), parameters=("slip_distance",))
