@@ -343,7 +343,8 @@ def test_sobol_indices_are_refused():
     found = reduced(lost, of)
     count = int(lost["y"].isnull().sum())
     assert np.isnan(found["share_total"]).all()
-    assert found["share_total"].attrs["refused"] == f"{count} of 320 cells have no number"
+    why = f"{count} of 320 cells have no number, and the indices need all: narrower distributions"
+    assert found["share_total"].attrs["refused"].startswith(why)
     whole = saltelli(lambda x, y, z: x, 64)
     for part in (whole.isel(draw=slice(0, 310)), whole.isel(draw=slice(0, 15))):
         with pytest.raises(InvalidValue, match="over = 'draw': was not drawn for Sobol indices"):

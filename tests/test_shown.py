@@ -9,16 +9,19 @@ import pandas as pd
 import pytest
 import xarray as xr
 from running import call, run, study_of
+from scipy.stats import norm, uniform
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.claims import Claim, verdicts
 from rsfstudy.declare.verdicts import Verdicts
+from rsfstudy.errors import Incomplete
 from rsfstudy.files import lattice, restore, store
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.quantity import symbol, table
+from rsfstudy.reduce import SobolIndices
 from rsfstudy.status import Status
 
 
@@ -138,7 +141,8 @@ def told_of(dataset, tmp_path, monkeypatch) -> str:
 
 def test_a_large_lattice_is_thinned(map_of_stiffness, tmp_path, monkeypatch):
     said = told_of(map_of_stiffness, tmp_path, monkeypatch)
-    assert "critical stiffness of steady sliding, in sigma_*/D_c (24 of 202 cells)" in said
+    caption = "critical stiffness of steady sliding, in sigma_*/D_c (24 of 202 cells; "
+    assert f"{caption}rsfstudy export --csv writes all)" in " ".join(said.split())
     lines = [line.split() for line in said.splitlines()]
     laws = ("slip", "slowness")
     rows = [line for line in lines if len(line) > 2 and line[0] in laws and line[1][0].isdigit()]
@@ -150,12 +154,28 @@ def test_a_large_lattice_is_thinned(map_of_stiffness, tmp_path, monkeypatch):
 
 
 def test_a_small_one_is_whole_and_names_how_cells_ended(map_of_stiffness, tmp_path, monkeypatch):
-    few = map_of_stiffness.isel(b_over_a=[0, 50]).copy(deep=True)
-    assert "cells)" not in told_of(few, tmp_path, monkeypatch)
+    for most in (18, 2):
+        few = map_of_stiffness.isel(b_over_a=slice(0, 51, 50 // (most - 1))).copy(deep=True)
+        assert "cells)" not in told_of(few, tmp_path, monkeypatch)
     few["status"][0, 1], few["critical_stiffness"][0, 1] = int(Status.NO_STEADY_STATE), np.nan
     rows = [line.split() for line in told_of(few, tmp_path, monkeypatch).splitlines()]
     (row,) = [row for row in rows if row[:2] == ["slip", "3.75"]]
     assert (row[2], row[-1]) == ("-", "no_steady_state")
+
+
+def test_indices_that_are_refused_say_why(tmp_path, monkeypatch):
+    """In the run's warning, and wherever numbers are shown: some samples are softer than critical,
+    where any step triggers.
+    """
+    uncertain = {"b_over_a": norm(2.0, 0.1), "stiffness_ratio": uniform(0.9, 0.2)}
+    axis = Axis.samples(uncertain, 2, seed=1, method="saltelli")
+    indices = SobolIndices("explained", "critical_velocity_ratio")
+    study = study_of("refused", CriticalStep(), axis, reductions=[indices])
+    with pytest.warns(Incomplete, match="^no explained: . of 8 cells have no number, and"):
+        done = run(study, rtol=1e-4)
+    why = "no explained: . of 8 cells have no number, and the indices need all: narrower"
+    assert re.search(why, " ".join(told_of(done, tmp_path, monkeypatch).split()))
+    assert re.search(why, done.rsf._repr_html_())
 
 
 @pytest.mark.parametrize("sizes", [{"x": 5}, {"x": 3, "y": 28}, {"x": 9, "y": 9, "z": 2, "u": 7}])

@@ -21,8 +21,8 @@ from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import coverage, quantity
 from rsfstudy.wording import counted, listed, short, stated
 
-#: Most cells of a lattice that are shown, and most that failed.
-MOST_CELLS, _MOST_FAILURES = 24, 20
+#: Most cells of a lattice that are shown, unless few more are all; and most that failed.
+MOST_CELLS, _ALL_CELLS, _MOST_FAILURES = 24, 36, 20
 #: What is told of a slope, by the ends of names: headings and formats.
 _OF_SLOPES = {
     "stderr": ("standard error", ".2g"),
@@ -121,13 +121,16 @@ def headline(dataset: xr.Dataset) -> Table:
     dims, columns = dataset["status"].dims, Columns({name: (name, number)})
     if f"{name}_error" in dataset:
         columns["error"] = f"{name}_error", partial(number, form=".1e")
-    at = lattice.sample({str(d): dataset.sizes[d] for d in dims}, MOST_CELLS)
+    size = dataset["status"].size
+    most = size if size <= _ALL_CELLS else MOST_CELLS
+    at = lattice.sample({str(d): dataset.sizes[d] for d in dims}, most)
     few = dataset[[*(n for n, _form in columns.values()), "status"]].isel(at).load()
     if (few["status"] != int(Status.OK)).any():
         columns["status"] = "status", LABELS.__getitem__
-    units, size = units_of(dataset[name]), dataset["status"].size
+    units, shown = units_of(dataset[name]), few["status"].size
     caption = dataset[name].attrs.get("long_name", name) + f", in {units}" * (units != "1")
-    caption += f" ({few['status'].size} of {size:,} cells)" * (few["status"].size < size)
+    if shown < size:
+        caption += f" ({shown} of {size:,} cells; rsfstudy export --csv writes all)"
     return Table(rows(few, dims, columns), caption)
 
 
@@ -165,9 +168,14 @@ def reductions(dataset: xr.Dataset) -> Iterator[Table]:
 
 def refused(dataset: xr.Dataset) -> dict[str, str]:
     """Why reductions refuse to draw on cells, by their names."""
-    named = [reduction["name"] for reduction in contents.declaration(dataset).reductions]
-    results = {name: dataset[name].attrs for name in named if name in dataset}
-    return {name: str(about["refused"]) for name, about in results.items() if "refused" in about}
+    named = [str(reduction["name"]) for reduction in contents.declaration(dataset).reductions]
+    named.sort(key=len, reverse=True)  # a name may begin with another
+    found: dict[str, str] = {}
+    for result, values in dataset.data_vars.items():
+        name = next((n for n in named if f"{result}_".startswith(f"{n}_")), "")
+        if name and "refused" in values.attrs:
+            found.setdefault(name, str(values.attrs["refused"]))
+    return found
 
 
 def unreduced(dataset: xr.Dataset) -> dict[str, str]:

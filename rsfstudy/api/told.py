@@ -27,6 +27,8 @@ def numbers(dataset: xr.Dataset) -> Iterator[Piece]:
     elif not contents.is_of_a_scene(dataset):
         yield tables.headline(dataset)
         yield from tables.reductions(dataset)
+        for name, why in tables.refused(dataset).items():
+            yield f"no {name}: {why}"
     elif is_motion(dataset):
         yield motion(dataset)
         yield events(dataset.rsf.events())

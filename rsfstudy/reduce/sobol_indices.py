@@ -81,7 +81,10 @@ class SobolIndices(Reduction):
         lost = int(of.isnull().sum())
         about = {"comment": f"samples drawn anew {_RESAMPLED} times for the intervals"}
         if lost:
-            about["refused"] = f"{lost} of {of.size} cells have no number"
+            about["refused"] = (
+                f"{lost} of {of.size} cells have no number, and the indices need all: narrower "
+                "distributions, away from where answers end, may have them"
+            )
         elif np.isnan(found).any():
             about["refused"] = f"cells failed, or {self.of} is the same everywhere"
         names = iter(name for name, _text in self._texts())
