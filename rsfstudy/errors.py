@@ -15,7 +15,16 @@ _MOST_CHARACTERS, _MOST_CHOICES, _FEW = 200, 60, 20
 #: Most characters of a message.
 _LONGEST = 5000
 
-_values = reprlib.Repr()
+
+class _Values(reprlib.Repr):
+    """Texts of values, of bounded length; numbers of NumPy are shown as numbers."""
+
+    def repr1(self, x: object, level: int) -> str:
+        number = type(x).__module__ == "numpy" and not getattr(x, "ndim", 1)
+        return super().repr1(x.item() if number and hasattr(x, "item") else x, level)
+
+
+_values = _Values()
 _values.maxstring = _values.maxother = _values.maxlong = 100
 _values.maxlist = _values.maxtuple = _values.maxdict = _values.maxset = 20
 

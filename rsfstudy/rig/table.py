@@ -15,7 +15,7 @@ import numpy as np
 from rsfstudy.doors import check_file, door
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.quantity import headed
-from rsfstudy.rig.units import number
+from rsfstudy.rig.units import number, number_and_units
 
 #: What numbers without surprises are made of.
 _PLAIN = frozenset("0123456789+-.eE \t\r\n")
@@ -160,7 +160,9 @@ def read_table(path: str | Path, columns: Any = None) -> dict[str, Column]:
         for n, row in rows:
             if len(row) != len(header):
                 rule = f"has {len(row)} fields, and the header {len(header)}"
-                raise InvalidValue("line", ",".join(row), rule).at(f"{path}, line {n}")
+                remedy = "Numbers have a decimal point." if len(row) > len(header) else ""
+                wrong = InvalidValue("line", between.join(row), rule, remedy=remedy)
+                raise wrong.at(f"{path}, line {n}")
     select = columns if callable(columns) else _as_headed
     if isinstance(columns, Mapping):
         wanted = {name: selected(told, headings) for name, told in columns.items()}
@@ -226,7 +228,11 @@ def _number(name: str, text: str, column: Column, row: int) -> float:
         return math.nan
     found = number(text)
     if found is None:
-        remedy = "Write a decimal point." if "," in text else "Units stand in the header."
+        remedy = "Write digits alone, as in 1.5e-3."
+        if "," in text:
+            remedy = "Write a decimal point."
+        elif number_and_units(text)[0] is not None:
+            remedy = "Units stand in the header."
         wrong = InvalidValue(name, text, "is no number", remedy=remedy)
         raise wrong.at(column.place(row))
     if not math.isfinite(found):
