@@ -25,10 +25,7 @@ class Status(IntEnum):
     LOCKED = 5, "normal stress grows faster than strength: the slider locks up"
     NORMAL_STRESS_LOST = 6, "normal stress vanishes: the fault opens"
     SHEAR_STRESS_REVERSED = 7, "shear stress reverses: friction of forward slip no longer applies"
-    NORM_BELOW_LOADING_RATE = (
-        8,
-        "the loading alone already reaches the instability norm: raise that, or shorten the period",
-    )
+    NORM_BELOW_LOADING_RATE = 8, "the loading alone already reaches the instability norm: raise it"
     NORM_UNREACHABLE = 9, "inertia keeps every slip rate below the instability norm"
     SLIP_RATE_UNBOUNDED = 10, "without mass the slip rate grows beyond 10^120 V_*"
     UNSTABLE_AT_ANY_STIFFNESS = 11, "steady sliding is unstable however stiff the spring"

@@ -172,5 +172,5 @@ def test_the_elasticities_that_uncertain_recurrence_states():
             interval = cycle.values["recurrence_interval"] * rig["slip_distance"]
             ends.append(math.log(interval / rig["reference_velocity"]))
         assert (ends[1] - ends[0]) / 0.02 == pytest.approx(value, abs=1e-3)
-    with pytest.raises(InvalidValue, match="b at constant a is b_over_a; D_c is stiffness"):
+    with pytest.raises(InvalidValue, match="D_c is 1 . stiffness - reference_rate"):
         Elasticities(LimitCycle(), parameters=("slip_distance",))

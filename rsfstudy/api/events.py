@@ -41,6 +41,8 @@ QUANTITIES = {
 }
 #: What quantities are measured in: as these variables, by their scales.
 _MEASURED_AS = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
+#: What is read of displacement.
+_OF_SLIP = ("slip", "peak_slip_rate", "dynamic_stress_drop")
 #: What part of an event is missing, by its flag.
 _CUT = ("whole", "begins_before", "lasts_beyond", "both")
 
@@ -178,22 +180,22 @@ def events(
         late = int(np.argmax(np.diff(times) <= 0.0)) + 1
         raise InvalidValue("time", times[late], f"must increase, and does not at sample {late}")
     about = {name: dict(getattr(values, "attrs", {})) for name, values in given.items()}
-    if stiffness is not None and moves is not None:
+    if stiffness is not None:
+        if moves is None:
+            raise InvalidValue("stiffness", stiffness, "needs the displacement of the load point")
         moves = moves - stress / _stiffness(stiffness, about)
     found, noise, smallest = _drops(stress)
     rows = [_row(times, stress, moves, drop) for drop in found]
+    runs_on = moves is not None and stiffness is None and not _slips(times, moves, found)
+    for row in rows if runs_on else ():
+        row[0].update(dict.fromkeys(_OF_SLIP, (math.nan, math.nan)))
     dataset = catalogue(rows, about | {"slip": about["displacement"]})
-    if found and moves is not None and stiffness is None and not _slips(times, moves, found):
+    if rows and runs_on:
         why = "displacement moves no faster during the drops of stress than before and after"
-        for name in ("slip", "peak_slip_rate", "dynamic_stress_drop"):
-            for each in (name, f"{name}_error"):
-                dataset[each] = dataset[each].copy(data=np.full(len(found), math.nan))
+        remedy = "Give stiffness='0.05 MPa/um', that of the rig, or math.inf if it is the fault's"
         dataset["slip"].attrs["comment"] = why
-        remedy = (
-            "If it is that of the load point, give the stiffness of the rig: "
-            "events(..., stiffness='0.05 MPa/um'); if it is that of the fault, stiffness=math.inf"
-        )
-        warnings.warn(f"slip has no number: {why}. {remedy}", NoAnswer, stacklevel=outside())
+        text = f"slip has no number: {why}, as that of a load point does. {remedy}"
+        warnings.warn(text, NoAnswer, stacklevel=outside())
     units = {key: value for key, value in about["shear_stress"].items() if key == "units"}
     dataset["noise"] = ((), noise, {"long_name": "standard deviation of the noise", **units})
     words = "drop of shear stress that is found but once in 1,000"
@@ -203,17 +205,16 @@ def events(
 
 def _stiffness(stated: Any, about: Mapping[str, Mapping[Any, Any]]) -> float:
     """Shear stress over displacement, in the units of the record."""
-    found = stated
     if isinstance(stated, str):
         stress, length = (about[n].get("units") for n in ("shear_stress", "displacement"))
         if not (stress and length):
             remedy = "Give it as a number in the units of the record."
             raise InvalidValue("stiffness", stated, "the record states no units", remedy=remedy)
         ours = factor("shear_stress", stress, "Pa") / factor("displacement", length, "m")
-        found = in_si("stiffness", stated, "Pa/m") / float(ours)
-    if not found > 0.0:
+        return _stiffness(in_si("stiffness", stated, "Pa/m") / float(ours), about)
+    if not stated > 0.0:
         raise InvalidValue("stiffness", stated, "must be positive")
-    return float(found)
+    return float(stated)
 
 
 def _samples(name: str, values: Any) -> np.ndarray:
@@ -237,6 +238,12 @@ def _spread(values: np.ndarray) -> float:
     return _NORMAL * float(np.median(np.abs(values - np.median(values))))
 
 
+def _quantum(values: np.ndarray) -> float:
+    """The smallest difference of neighbours."""
+    steps = np.abs(np.diff(values))
+    return float(steps[steps > 0.0].min(initial=math.inf))
+
+
 def _falls(values: np.ndarray, window: int) -> np.ndarray:
     """Mean of the samples before each place less that of as many behind it."""
     sums = np.concatenate([[0.0], np.cumsum(values - values.mean())])
@@ -252,8 +259,7 @@ def _drops(stress: np.ndarray) -> tuple[list[tuple[int, int, int, float]], float
     windows = [_SHORTEST]
     while 2 * windows[-1] * _SAMPLES <= len(stress):
         windows.append(2 * windows[-1])
-    steps = np.abs(np.diff(stress))
-    quantum = float(steps[steps > 0.0].min(initial=math.inf))
+    quantum = _quantum(stress)
     looks = float(norm.isf(_CHANCE / (len(stress) * len(windows))))
     taken: list[tuple[int, int, int, float]] = []
     smallest = math.inf
@@ -282,8 +288,7 @@ def _slips(
 ) -> bool:
     """True where displacement moves faster during the drops than for as long before and after."""
     excess = usual = variance = 0.0
-    steps = np.abs(np.diff(moves))
-    quantum = float(steps[steps > 0.0].min(initial=math.inf))
+    quantum = _quantum(moves)
     noises = {n: max(_spread(_falls(moves, n)), quantum) for n in {drop[2] for drop in found}}
     for begin, end, window, _error in found:
         far = end + window - begin

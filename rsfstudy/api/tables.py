@@ -129,8 +129,7 @@ def headline(dataset: xr.Dataset) -> Table:
         columns["status"] = "status", LABELS.__getitem__
     units, shown = units_of(dataset[name]), few["status"].size
     caption = dataset[name].attrs.get("long_name", name) + f", in {units}" * (units != "1")
-    if shown < size:
-        caption += f" ({shown} of {size:,} cells; rsfstudy export --csv writes all)"
+    caption += f" ({shown} of {size:,} cells; rsfstudy export --csv writes all)" * (shown < size)
     return Table(rows(few, dims, columns), caption)
 
 

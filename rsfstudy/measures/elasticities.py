@@ -22,8 +22,12 @@ from rsfstudy.status import Status
 
 #: Fields of a scene that hold numbers.
 NUMBERS = tuple(name for name, kind in KINDS.items() if kind in (float, float | None))
-#: What a rig has, and a scene has not.
+#: What a rig has, and a scene has not; and how elasticities by that follow.
 _OF_A_RIG = ("b", "slip_distance", "normal_stress", "sigma_star", "reference_velocity")
+_FOLLOWS = (
+    "b at constant a is b_over_a; of a time in s, D_c is 1 + stiffness - reference_rate, normal "
+    "stress is -stiffness, and V_* is reference_rate - 1."
+)
 #: Longest step of ln p.
 _LONGEST = 0.1
 #: Slopes that are none, and how much more than by curvature alone the third derivative may be.
@@ -73,17 +77,10 @@ class Elasticities(Measure):
             raise InvalidValue("measure", self.measure, rule)
         object.__setattr__(self, "parameters", tuple(self.parameters) or self._all)
         for name in self.parameters:
-            if name in _OF_A_RIG:
-                remedy = (
-                    "Ask for a, b_over_a, stiffness, reference_rate: b at constant a is b_over_a; "
-                    "D_c is stiffness - reference_rate, normal stress is -stiffness and V_* is "
-                    "reference_rate, to which the unit of the result adds 1, 0 or -1 (of a time in "
-                    "s by D_c 1, by V_* -1)."
-                )
-                raise InvalidValue("parameters", name, "is no number of a scene", remedy=remedy)
             if name not in self._all:
                 rule = f"is no number of a scene that {self.measure.name} leaves as it is"
-                raise InvalidValue("parameters", name, rule, choices=self._all)
+                choices, remedy = ((), _FOLLOWS) if name in _OF_A_RIG else (self._all, "")
+                raise InvalidValue("parameters", name, rule, choices=choices, remedy=remedy)
 
     @cached_property
     def _all(self) -> tuple[str, ...]:

@@ -189,8 +189,6 @@ def halted(end: int, normal_stress: float) -> Halt:
         return Halt(Status.LOCKED, text)
     if end == HAS_STOPPED:
         return Halt(Status.SLIP_STOPPED, "the slip rate fell below 10^-290 V_*")
-    return Halt(
-        Status.SLIP_RATE_UNBOUNDED,
-        "slip rate grew beyond 10^120 V_* without mass: inertia=True (period= or mass= of a rig) "
-        "or radiation_damping= (shear_modulus= and density= of a rig) bounds it",
-    )
+    bound = "inertia=True (a rig's period=, mass=) or radiation_damping= (shear_modulus=) bounds it"
+    text = f"slip rate grew beyond 10^120 V_* without mass: {bound}"
+    return Halt(Status.SLIP_RATE_UNBOUNDED, text)

@@ -15,7 +15,7 @@ import numpy as np
 from rsfstudy.doors import check_file, door
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.quantity import headed
-from rsfstudy.rig.units import number, number_and_units
+from rsfstudy.rig.units import number
 
 #: What numbers without surprises are made of.
 _PLAIN = frozenset("0123456789+-.eE \t\r\n")
@@ -228,11 +228,8 @@ def _number(name: str, text: str, column: Column, row: int) -> float:
         return math.nan
     found = number(text)
     if found is None:
-        remedy = "Write digits alone, as in 1.5e-3."
-        if "," in text:
-            remedy = "Write a decimal point."
-        elif number_and_units(text)[0] is not None:
-            remedy = "Units stand in the header."
+        alone = "Write digits alone, as in 1.5e-3; units stand in the header."
+        remedy = "Write a decimal point." if "," in text else alone
         wrong = InvalidValue(name, text, "is no number", remedy=remedy)
         raise wrong.at(column.place(row))
     if not math.isfinite(found):
