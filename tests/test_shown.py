@@ -173,9 +173,10 @@ def test_indices_that_are_refused_say_why(tmp_path, monkeypatch):
     study = study_of("refused", CriticalStep(), axis, reductions=[indices])
     with pytest.warns(Incomplete, match="^no explained: . of 8 cells have no number, and"):
         done = run(study, rtol=1e-4)
-    why = "no explained: . of 8 cells have no number, and the indices need all: narrower"
-    assert re.search(why, " ".join(told_of(done, tmp_path, monkeypatch).split()))
-    assert re.search(why, done.rsf._repr_html_())
+    why = "[1-7] of 8 cells have no number, and the indices need all: narrower"
+    said = " ".join(told_of(done, tmp_path, monkeypatch).split())
+    assert re.search(f"no explained {why}", said)
+    assert re.search(f"<dt>no explained</dt><dd>{why}", done.rsf._repr_html_())
 
 
 @pytest.mark.parametrize("sizes", [{"x": 5}, {"x": 3, "y": 28}, {"x": 9, "y": 9, "z": 2, "u": 7}])

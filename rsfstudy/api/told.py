@@ -27,7 +27,7 @@ def numbers(dataset: xr.Dataset) -> Iterator[Piece]:
     elif not contents.is_of_a_scene(dataset):
         yield tables.headline(dataset)
         yield from tables.reductions(dataset)
-        yield from (f"no {name}: {why}" for name, why in tables.refused(dataset).items())
+        yield {f"no {name}": why for name, why in tables.refused(dataset).items()}
     elif is_motion(dataset):
         yield motion(dataset)
         yield events(dataset.rsf.events())
