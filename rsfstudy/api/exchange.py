@@ -17,6 +17,7 @@ import xarray as xr
 from rsfstudy.api.trajectory import simulate
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import comparison
+from rsfstudy.quantity import flags_of
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.scales import SCALES
 
@@ -44,9 +45,8 @@ def to_csv(dataset: xr.Dataset, path: Path) -> None:
     """
     table = to_dataframe(dataset)
     for name in table if "status" in dataset else ():
-        if meanings := str(dataset[name].attrs.get("flag_meanings", "")):
-            values = map(float, np.atleast_1d(dataset[name].attrs["flag_values"]))
-            table[name] = table[name].map(dict(zip(values, meanings.split(), strict=True)))
+        if flags := flags_of(dataset[name].attrs):
+            table[name] = table[name].map(flags)
     headed = {n: f"{n} ({_units(dataset[n]) or 1})" for n in table if table[n].dtype.kind in "iuf"}
     table.rename(columns=headed).to_csv(path, index=False)
 

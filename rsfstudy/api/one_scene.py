@@ -174,9 +174,12 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         if values is None:
             values = np.full([len(inner[dim]) for dim in dims], np.nan)
         variables[name] = dims, values, quantity(name, own).attributes
-    variables["rhs_evaluations"] = (), outcome.rhs_evaluations
+    work = "rhs_evaluations"
+    variables[work] = (), outcome.rhs_evaluations, quantity(work).attributes
     rate = (), scene.reference_rate, {"units": "s-1"}
+    what = measure.name.replace("_", " ").capitalize()
     about = {
+        "title": f"{what} of a spring-slider, {scene.law} law",
         "scene": json.dumps(scene.describe()),
         "rtol": accuracy.rtol,
         "engine": accuracy.engine,

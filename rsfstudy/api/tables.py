@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 import shlex
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +18,7 @@ from rsfstudy.compute import runner
 from rsfstudy.declare import verdicts
 from rsfstudy.declare.claims import VERDICTS
 from rsfstudy.files import contents, lattice, restore
+from rsfstudy.quantity import flags_of
 from rsfstudy.rig.scales import in_units_of_rig, renamed
 from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import coverage, quantity
@@ -23,6 +26,8 @@ from rsfstudy.wording import counted, listed, short, stated
 
 #: Most cells of a lattice that are shown, unless few more are all; and most that failed.
 MOST_CELLS, _ALL_CELLS, _MOST_FAILURES = 24, 36, 20
+#: Digits of a float.
+_ALL_DIGITS = 15
 #: What is told of a slope, by the ends of names: headings and formats.
 _OF_SLOPES = {
     "stderr": ("standard error", ".2g"),
@@ -61,10 +66,39 @@ def number(value: float, form: str = ".8g") -> str:
     return "-" if np.isnan(value) else format(value, form)
 
 
+def to_error(value: float, error: float) -> str:
+    """A number to two digits of its error; to eight where it has none, or is all error."""
+    if not 0.0 < error < abs(value):
+        return number(value)
+    digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2
+    return format(value, f".{min(digits, _ALL_DIGITS)}g")
+
+
+def answer(dataset: xr.Dataset) -> Table:
+    """The numbers of an answer for one scene, each with its units and its error estimate; words for
+    codes.
+    """
+    rows = []
+    for name, values in dataset.data_vars.items():
+        if values.dims or str(name).removesuffix("_error") in set(dataset) - {name}:
+            continue
+        value, error = values.item(), float(dataset.get(f"{name}_error", np.nan))
+        units, flags = units_of(values), flags_of(values.attrs)
+        text = flags.get(value, to_error(value, error))
+        row = {
+            "number": str(name),
+            "value": text if units == "1" or text == "-" else f"{text} {units}",
+            "error": number(error, ".1e"),
+            "what": str(values.attrs.get("long_name", "")),
+        }
+        rows.append(row)
+    return Table(rows, prose={"what"})
+
+
 def units_of(values: xr.DataArray) -> str:
     """The units of values, or what those without units are measured in; "1" for numbers."""
     units = values.attrs.get("scale") or values.attrs.get("units", "1")
-    return str(units).replace(" s-1", "/s")
+    return re.sub(r" (s|[num]?m)-1$", r"/\1", str(units))
 
 
 def with_units(along: xr.DataArray) -> str:

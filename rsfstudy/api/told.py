@@ -13,6 +13,7 @@ from rsfstudy.api import fit_results, tables
 from rsfstudy.api.events import QUANTITIES
 from rsfstudy.api.tables import MOST_CELLS, Table, number, units_of
 from rsfstudy.files import contents
+from rsfstudy.quantity import flags_of
 from rsfstudy.wording import stated
 
 Piece = Table | Mapping[str, str] | str
@@ -32,8 +33,7 @@ def numbers(dataset: xr.Dataset) -> Iterator[Piece]:
         yield motion(dataset)
         yield events(dataset.rsf.events())
     else:
-        plain = {n: v for n, v in dataset.data_vars.items() if not v.dims}
-        yield {str(name): repr(value.item()) for name, value in plain.items()}
+        yield tables.answer(dataset)
 
 
 def is_motion(dataset: xr.Dataset) -> bool:
@@ -90,7 +90,7 @@ def events(catalogue: xr.Dataset) -> Table | str:
     for name, words in heads.items():
         unit = units_of(catalogue[name])
         heads[name] = words if unit == "1" else f"{words} ({unit})"
-    flags = catalogue["cut"].attrs["flag_meanings"].replace("whole", "-").split()
+    flags = flags_of(catalogue["cut"].attrs) | {0: "-"}
     rows = []
     for place in range(min(count, MOST_CELLS)):
         event = catalogue.isel(event=place)

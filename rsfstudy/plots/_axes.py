@@ -26,6 +26,7 @@ from rsfstudy.plots._text import (
     with_powers,
     wrapped,
 )
+from rsfstudy.quantity import flags_of
 from rsfstudy.reduce.base import stated_by
 from rsfstudy.vocabulary import coverage, quantity
 
@@ -53,8 +54,7 @@ def is_number(values: xr.DataArray) -> bool:
 
 def flag_meanings(values: xr.DataArray) -> dict[float, str]:
     """What the flags mean that a variable holds, in words; empty for one of numbers."""
-    words = [word.replace("_", " ") for word in str(values.attrs.get("flag_meanings", "")).split()]
-    return dict(zip(np.ravel(values.attrs.get("flag_values", [])).tolist(), words, strict=True))
+    return {value: word.replace("_", " ") for value, word in flags_of(values.attrs).items()}
 
 
 def measured(dataset: xr.Dataset) -> list[str]:
