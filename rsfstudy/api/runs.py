@@ -306,6 +306,8 @@ def rerun(
     """
     theirs = store.read_any(places.results(file, OUTPUT))
     if contents.is_of_a_scene(theirs):
+        if study is not None:
+            catalogue.load(str(study))  # for the parts of its scene
         return exchange.rerun(theirs)
     declared = restore.study_of(theirs, study)
     place = places.directory(output)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
@@ -37,7 +34,7 @@ def cell(dataset: xr.Dataset, study: Study) -> int:
 
 def described(dataset: xr.Dataset) -> Scene:
     """The scene that the attributes of a dataset describe."""
-    plain = dict(contents.fit(contents.from_json(dataset, "scene"), Mapping[str, Any], "scene"))
+    plain = contents.scene_of(dataset)
     segments, loading = plain.pop("segments", ()), str(plain.get("loading"))
     digest = plain.pop("samples", "")
     own: dict[str, Own] = {name: part for slot in SLOTS for name, part in slot.own.items()}
@@ -55,7 +52,10 @@ def described(dataset: xr.Dataset) -> Scene:
     for slot in SLOTS:
         name = plain.get(slot.name)
         if isinstance(name, str) and name not in {*slot.choices, *own}:
-            remedy = "Make a scene with the class itself first, so that its name is known."
+            remedy = (
+                "Make a scene with the class itself first, so that its name is known; commands are "
+                "told it by --study FILE."
+            )
             rule = "is a user's own, and not known here"
             raise InvalidValue(slot.name, name, rule, remedy=remedy)
     return contents.scene(plain, own, "scene")

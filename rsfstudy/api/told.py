@@ -12,8 +12,10 @@ import xarray as xr
 from rsfstudy.api import fit_results, tables
 from rsfstudy.api.events import QUANTITIES
 from rsfstudy.api.tables import MOST_CELLS, Table, number, units_of
+from rsfstudy.errors import InvalidValue
 from rsfstudy.files import contents
 from rsfstudy.quantity import flags_of
+from rsfstudy.slider.scene import Scene
 from rsfstudy.wording import stated
 
 Piece = Table | Mapping[str, str] | str
@@ -30,8 +32,13 @@ def numbers(dataset: xr.Dataset) -> Iterator[Piece]:
         yield from tables.reductions(dataset)
         yield {f"no {name}": why for name, why in tables.refused(dataset).items()}
     elif is_motion(dataset):
-        yield motion(dataset)
-        yield events(dataset.rsf.events())
+        try:
+            scene = dataset.rsf.scene
+        except InvalidValue as error:  # a part of it is a user's own
+            yield from (motion(dataset), f"neither its stability nor its events: {error}")
+        else:
+            yield {**motion(dataset), **stability(scene)}
+            yield events(dataset.rsf.events())
     else:
         yield tables.answer(dataset)
 
@@ -46,9 +53,9 @@ def origin(dataset: xr.Dataset) -> dict[str, str]:
     """What a dataset is of, and where it comes from, by what each is."""
     if not contents.is_of_a_scene(dataset):
         return tables.origin(dataset)
-    about = dataset.attrs
+    about, scene = dataset.attrs, contents.scene_of(dataset)
     return {
-        "scene": stated(dataset.rsf.scene.as_dict()),
+        "scene": stated({n: v for n, v in scene.items() if n not in ("segments", "samples")}),
         "made by": about.get("history", "unknown"),
         "with": about.get("source", "unknown"),
         "status": f"{about['status']} {about.get('message', '')}".strip(),
@@ -72,10 +79,14 @@ def motion(dataset: xr.Dataset) -> dict[str, str]:
         since = f"{float(dataset['instability_time']):.6g} {unit}"
         told["beyond the instability norm"] = f"no physics after {since}"
     told["friction at the end"] = f"{float(friction[-1]):.6g}"
-    ratio = dataset.rsf.scene.stiffness_ratio
-    sliding = "stable" if ratio > 1.0 else "unstable"
-    told["stiffness"] = f"{ratio:.4g} of the critical: steady sliding at V_* is {sliding}"
     return told
+
+
+def stability(scene: Scene) -> dict[str, str]:
+    """How stiff a scene is."""
+    ratio = scene.stiffness_ratio
+    sliding = "stable" if ratio > 1.0 else "unstable"
+    return {"stiffness": f"{ratio:.4g} of the critical: steady sliding at V_* is {sliding}"}
 
 
 def events(catalogue: xr.Dataset) -> Table | str:

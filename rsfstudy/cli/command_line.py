@@ -133,6 +133,7 @@ def list_studies(context: click.Context) -> None:
 @options.settings
 @options.rtol
 @options.output
+@options.study
 @options.rig
 def show() -> None:
     """Show a study before it is run, or what is in a results file.

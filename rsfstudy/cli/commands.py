@@ -50,7 +50,7 @@ def show(given: Given) -> int:
         return OK
     if given.settings or given.rtol is not None or given.rig:
         raise click.UsageError("a results file is shown as it is, without --set, --rtol or a rig")
-    return terminal.results(store.read_any(Path(given.name)), given.name)
+    return terminal.results(_read(Path(given.name), given.study), given.name)
 
 
 def run(given: Given) -> int:
@@ -172,7 +172,7 @@ def plot(given: Given) -> int:
     status, target = OK, _target(given)
     for name in _names(given):
         results = places.results(name, OUTPUT if target else given.output)
-        dataset = store.read_any(results)
+        dataset = _read(results, given.study)
         beside = results if given.output is None else given.output / results.name
         place = target or _beside(beside, given)
         if contents.is_of_a_scene(dataset):
@@ -208,6 +208,13 @@ def export(given: Given) -> int:
             raise DataError(f"{path}: cannot be written ({error})") from error
         console.print(f"{path}")
     return OK
+
+
+def _read(file: Path, study: Path | None) -> xr.Dataset:
+    """What a file holds, once the parts of its scenes are known that a study file defines."""
+    if study is not None:
+        catalogue.load(str(study))
+    return store.read_any(file)
 
 
 # ---- what options say -----------------------------------------------------------------------
@@ -282,8 +289,6 @@ def _target(given: Given) -> Path | None:
 def _own_figure(dataset: xr.Dataset, study: Path | None) -> Any:
     """What draws a figure that is not part of rsfstudy: the study file's own, or maps or lines."""
     if contents.declaration(dataset).plot in plots.NAMES:
-        if study is not None:
-            catalogue.load(str(study))  # for the parts of its scenes
         return None
     try:
         return restore.own_figure(dataset, study)

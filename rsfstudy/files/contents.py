@@ -279,6 +279,11 @@ def provenance(dataset: xr.Dataset) -> Provenance:
     return origin
 
 
+def scene_of(dataset: xr.Dataset) -> dict[str, Any]:
+    """The fields of the scene that the attributes of a dataset describe."""
+    return dict(fit(from_json(dataset, "scene"), Mapping[str, Any], "scene"))
+
+
 def from_json(dataset: xr.Dataset, name: str) -> Any:
     """Value that an attribute of a dataset holds as JSON; raises DataError where it does not."""
     if name not in dataset.attrs:
