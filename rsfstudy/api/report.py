@@ -17,9 +17,9 @@ from urllib.parse import quote
 
 import xarray as xr
 
-from rsfstudy.api import runs, tables, told
+from rsfstudy.api import fit_results, runs, tables, told
 from rsfstudy.api.tables import Table
-from rsfstudy.compute import provenance
+from rsfstudy.compute import provenance, runner
 from rsfstudy.defaults import FIGURES, OUTPUT
 from rsfstudy.doors import door, in_words
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief, spelt
@@ -41,7 +41,8 @@ class _Result:
     path: Path
     title: str = ""
     verdicts: str = ""
-    wrong: str = ""
+    status: str = Status.OK.label
+    colour: str = "green"
     shown: tuple[str, ...] = ()
 
     @property
@@ -106,11 +107,11 @@ def _page(directory: Path, found: list[_Result]) -> str:
             "results": Markup(f'<a href="#{one.anchor}">{_text(one.path.stem)}</a>'),
             "title": one.title,
             "claims": one.verdicts or "-",
-            "status": one.wrong or "ok",
+            "status": one.status,
         }
         for one in found
     ]
-    colours = ["red" if one.wrong else "green" for one in found]
+    colours = [one.colour for one in found]
     summary = Table(rows, prose={"title", "claims", "status"}, colours=colours)
     made = provenance.attributes("rsfstudy report")
     when, by = made["history"].split()[0], made["source"].partition(",")[0]
@@ -137,7 +138,7 @@ def _result(path: Path, beside: Path) -> _Result:
             found = _read(path, store.read_any(path))
         except Exception as error:  # damaged files raise almost anything
             why = str(error) if isinstance(error, RsfStudyError) else in_words(error)
-            found = _Result(path, _UNREAD, "", _UNREAD, (_said(why, "red"),))
+            found = _Result(path, _UNREAD, "", _UNREAD, "red", (_said(why, "red"),))
     remarks = {str(one.message) for one in caught if issubclass(one.category, UserWarning)}
     links = _links(path, beside)
     return replace(found, shown=(*found.shown, *map(_said, sorted(remarks)), links))
@@ -149,9 +150,10 @@ def _read(path: Path, dataset: xr.Dataset) -> _Result:
     numbers = html(dataset)
     # the accessor, which this module cannot import: it shows these tables
     if contents.is_of_a_scene(dataset):
-        figure = _figure(path, dataset.rsf.plot) if told.is_motion(dataset) else ""
-        status = str(dataset.attrs["status"]).removeprefix(Status.OK.label)
-        return _Result(path, title, "", status, (figure, numbers))
+        figure = _figure(path, dataset.rsf.plot) if "slip" in dataset.variables else ""
+        status = Status[str(dataset.attrs["status"]).upper()]
+        colour = "green" if status is Status.OK else "yellow" if status.is_answer else "red"
+        return _Result(path, title, "", _words(status.label), colour, (figure, numbers))
     about = contents.declaration(dataset)
     parts = [_shown(about.summary)] if about.summary else []
     if about.overrides:
@@ -165,7 +167,14 @@ def _read(path: Path, dataset: xr.Dataset) -> _Result:
         commands = "\n".join(tables.reproducing(dataset, path.name, cell) for cell in cells)
         parts.append(f"<h3>Failures</h3>\n{_shown(failed)}<pre>{_text(commands)}</pre>")
     parts.append(f"<h3>Provenance</h3>\n{_shown(told.origin(dataset))}")
-    return _Result(path, title, verdicts, ", ".join(wrong), tuple(parts))
+    found = _Result(path, title, verdicts, shown=tuple(parts))
+    if wrong:
+        return replace(found, status=", ".join(wrong), colour="red")
+    counts = runner.counts(dataset)
+    if (len(counts) > 1 and fit_results.is_fit(dataset)) or Status.OK.label not in counts:
+        ended = ", ".join(f"{count} {_words(label)}" for label, count in counts.items())
+        return replace(found, status=ended, colour="yellow")
+    return found
 
 
 def html(dataset: xr.Dataset) -> str:
@@ -176,6 +185,10 @@ def html(dataset: xr.Dataset) -> str:
     elif (claimed := tables.claims(runs.check(dataset))).rows:
         parts += ["<h3>Claims</h3>", _shown(claimed)]
     return "\n".join(filter(None, parts))
+
+
+def _words(label: str) -> str:
+    return label.replace("_", " ")
 
 
 # ---- pieces of HTML ------------------------------------------------------------------------------
@@ -224,8 +237,15 @@ def _figure(path: Path, draw: Callable[[], Any]) -> str:
     except Exception as error:  # of whatever kind, the numbers are there
         return _said(f"no figure: {error}", "yellow")
     data = base64.b64encode(image).decode()
-    name = _text(f"figure of {path.stem}")
-    return f'<figure><img alt="{name}" src="data:image/png;base64,{data}"></figure>'
+    about = f'alt="{_text(f"figure of {path.stem}")}" style="--inches: {_inches(image):.3g}"'
+    return f'<figure><img {about} src="data:image/png;base64,{data}"></figure>'
+
+
+def _inches(image: bytes) -> float:
+    """Width of a PNG on paper, by which letters of all figures are of one size."""
+    at = image.find(b"pHYs") + 4
+    pixels, per_metre = (int.from_bytes(image[n : n + 4]) for n in (16, at))
+    return pixels / per_metre / 0.0254 if at > 3 and per_metre else 100.0
 
 
 def _links(path: Path, beside: Path) -> str:

@@ -18,6 +18,7 @@ import xarray as xr
 
 from rsfstudy.declare.verdicts import Verdicts
 from rsfstudy.errors import InvalidValue
+from rsfstudy.rig.scales import SCALES
 from rsfstudy.status import Status
 
 REPRODUCED = "reproduced"
@@ -173,10 +174,10 @@ def verdicts(dataset: xr.Dataset, claims: list[Claim], overrides: Mapping[str, A
 
     Claims hold for a study as declared. Where a fixed value of the scene or of the measure was
     changed (`overrides` that are no dimension or coordinate along one), they are not applicable;
-    nor are claims on what was reduced along an axis that was changed.
+    nor are claims on what was reduced along an axis that was changed, and any on other units.
     """
     along = {str(name) for name in dataset.coords if dataset[name].ndim > 0}
-    moved_base = [name for name in overrides if name not in along]
+    moved_base = [name for name in overrides if name not in along] or SCALES in dataset.attrs
     rows = []
     for claim in claims:
         ours, verdict = claim.verdict(dataset)

@@ -40,7 +40,7 @@ from rsfstudy.plots._text import pretty, symbol, wrapped
 from rsfstudy.plots._text import slope_with_error as slope_with_error
 from rsfstudy.reduce.base import failed as is_failed
 from rsfstudy.reduce.base import stated_by
-from rsfstudy.rig.scales import in_units_of_rig
+from rsfstudy.rig.scales import in_units_of_rig, is_in_other_units
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED, quantity
 from rsfstudy.wording import settings
@@ -108,16 +108,18 @@ def figure(
         drawn = [figure.add_subplot(rows, columns, number + 1) for number in range(len(panels))]
         for axes, panel in zip(drawn, panels, strict=True):
             hold_ticks(axes)
-            _draw(dataset, axes, panel)
+            _panel.draw(panel, dataset, axes)
         _panel.settle(panels, drawn)
         for scale in figure.axes:
             if scale not in drawn:
                 hold_ticks(scale)
         letter(drawn)
         share_legends(figure, drawn)
-        overrides = declaration(dataset).overrides
-        if overrides:
-            figure.suptitle(_not_as_declared(dataset, columns), color="0.4")
+        lacking, overrides = _lacking(dataset), declaration(dataset).overrides
+        said = [_not_as_declared(dataset, columns)] if overrides else []
+        if said or lacking:
+            color = "tab:red" if lacking else "0.4"
+            figure.suptitle("\n".join(filter(None, (*said, lacking))), color=color)
         make_room(figure, [drawn[i : i + columns] for i in range(0, len(drawn), columns)])
         settle(figure)
     return figure
@@ -127,27 +129,23 @@ def draw(dataset: xr.Dataset, axes: Axes, panel: Panel | None = None) -> Axes:
     """Draw a results dataset as its study declares it: its main panel, or another."""
     drawing, dataset = _fitting(in_units_of_rig(dataset))
     panel = panel or drawing.panels[0]
-    _draw(dataset, axes, panel)
+    _panel.draw(panel, dataset, axes)
+    if lacking := _lacking(dataset):
+        axes.set_title(f"{axes.get_title()}\n{lacking}".strip(), color="tab:red")
     _panel.settle([panel], [axes])
     return axes
 
 
-def _draw(dataset: xr.Dataset, axes: Axes, panel: Panel) -> None:
-    _panel.draw(panel, dataset, axes)
-    lacking = _lacking(dataset)
-    if lacking:
-        axes.set_title(f"{axes.get_title()}\n[{lacking}]".strip(), color="tab:red")
-
-
 def _lacking(dataset: xr.Dataset) -> str:
-    """The cells that a figure cannot show, in words."""
+    """The cells that a figure cannot show, in brackets; nothing where it shows all."""
     completeness = dataset.attrs.get("completeness", "complete")
     failed = int((is_failed(dataset["status"]) & (dataset["status"] != Status.PENDING)).sum())
     parts = [
         "" if completeness == "complete" else completeness,
         f"{failed} cell{'s' * (failed > 1)} failed" * (failed > 0),
     ]
-    return ", ".join(filter(None, parts))
+    told = ", ".join(filter(None, parts))
+    return f"[{told}]" if told else ""
 
 
 def _not_as_declared(dataset: xr.Dataset, columns: int) -> str:
@@ -183,7 +181,8 @@ def _fitting(
     varied = {str(dimension) for dimension, points in sizes.items() if points > 1}
     further = sorted(varied - known)
     many = math.prod(sizes[dimension] for dimension in further) > _REPEATED
-    if variable is not None or own is None or isinstance(own, str) or many:
+    plain = variable is not None or own is None or isinstance(own, str)
+    if plain or many or is_in_other_units(dataset):
         return _of_any(dataset, variable), dataset
     drawing = own if isinstance(own, Declared) else Declared([getattr(own, "draw", own)])
     dataset = dataset.squeeze(sorted(set(map(str, sizes)) - known - varied), drop=False)
