@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
 
+from rsfstudy.plots import Drawing
+from rsfstudy.plots._style import legend, look, make_room, marker, settle, size
+
 Points = Sequence[tuple[float, float]]
 
 
@@ -13,11 +16,15 @@ def agreement(digits: Mapping[str, Points], label: str, enough: float) -> Figure
     """Digits that agree, of each quantity, against what stands on the abscissa; and how many make a
     pass.
     """
-    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    figure = Drawing(figsize=size(2, 1), layout="constrained")
     axes = figure.subplots()
-    for name, points in digits.items():
-        axes.plot(*zip(*points, strict=True), "o", markersize=4, label=name)
-    axes.axhline(enough, color="0.5", linewidth=0.8, linestyle="--")
-    axes.set(xlabel=label, ylabel="digits that agree")
-    axes.legend(fontsize="small", ncols=2)
+    for number, (name, points) in enumerate(digits.items()):
+        style = {"color": look(number)["color"], "marker": marker(number), "fillstyle": "none"}
+        words = name.replace("_", " ")
+        axes.plot(*zip(*points, strict=True), linestyle="none", label=words, **style)
+    axes.axhline(enough, color="0.5", linewidth=0.8, linestyle="--", label="enough to pass")
+    axes.set(xlabel=label[0].upper() + label[1:], ylabel="Digits that agree")
+    legend(axes, 5)
+    make_room(figure, [[axes]])
+    settle(figure)
     return figure
