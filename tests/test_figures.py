@@ -103,7 +103,7 @@ def test_nothing_sticks_out_or_covers_anything_else(figure):
 
 def test_a_figure_says_where_its_results_are_partial(tmp_path):
     dataset = run().assign_attrs(completeness="partial: 1 of 2 cells")
-    assert "partial: 1 of 2" in plots.figure(dataset).axes[0].get_title()
+    assert plots.figure(dataset).get_suptitle() == "[partial: 1 of 2 cells]"  # once, for all panels
     plots.save(dataset, tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000
 

@@ -26,6 +26,8 @@ from rsfstudy.wording import counted, listed, short, stated
 
 #: Most cells of a lattice that are shown, unless few more are all; and most that failed.
 MOST_CELLS, _ALL_CELLS, _MOST_FAILURES = 24, 36, 20
+#: Quantities that are set at one point beyond which fewer cells are shown.
+_MANY = 4
 #: Digits of a float.
 _ALL_DIGITS = 15
 #: What is told of a slope, by the ends of names: headings and formats.
@@ -144,19 +146,22 @@ def rows(dataset: xr.Dataset, dims: Iterable[Hashable], columns: Columns) -> lis
 
 
 def headline(dataset: xr.Dataset) -> Table:
-    """The headline along the axes, with its error estimate and how each cell ended; no row where
-    there is none.
+    """The headline along the axes, with what is set at points that only have numbers, its error
+    estimate and how each cell ended; no row where there is none.
     """
     name = restore.headline(dataset)
     if name is None:
         return Table([])
     dataset = in_units_of_rig(dataset)
     name = name if name in dataset else renamed(name)
-    dims, columns = dataset["status"].dims, Columns({name: (name, number)})
+    dims = dataset["status"].dims
+    drawn = [n for n in _numbered(dataset) if n in dataset.coords]
+    columns = Columns({with_units(dataset[n]): (n, short) for n in drawn})
+    columns[name] = name, number
     if f"{name}_error" in dataset:
         columns["error"] = f"{name}_error", partial(number, form=".1e")
-    size = dataset["status"].size
-    most = size if size <= _ALL_CELLS else MOST_CELLS
+    size, fewer = dataset["status"].size, 1 + len(drawn) // _MANY
+    most = size if size <= _ALL_CELLS // fewer else MOST_CELLS // fewer
     at = lattice.sample({str(d): dataset.sizes[d] for d in dims}, most)
     few = dataset[[*(n for n, _form in columns.values()), "status"]].isel(at).load()
     if (few["status"] != int(Status.OK)).any():
@@ -165,6 +170,15 @@ def headline(dataset: xr.Dataset) -> Table:
     caption = dataset[name].attrs.get("long_name", name) + f", in {units}" * (units != "1")
     caption += f" ({shown} of {size:,} cells; rsfstudy export --csv writes all)" * (shown < size)
     return Table(rows(few, dims, columns), caption)
+
+
+def _numbered(dataset: xr.Dataset) -> list[str]:
+    """What is set along axes whose points only have numbers: samples, and cases."""
+    axes = [axis["values"] for axis in contents.declaration(dataset).axes]
+    columns = [
+        v for v in axes if isinstance(v, Mapping) and isinstance(next(iter(v.values())), list)
+    ]
+    return [name for column in columns for name in column]
 
 
 def in_short(dataset: xr.Dataset) -> list[str]:
