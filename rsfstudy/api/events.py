@@ -192,10 +192,9 @@ def events(
     dataset = catalogue(rows, about | {"slip": about["displacement"]})
     if rows and runs_on:
         why = "displacement moves no faster during the drops of stress than before and after"
-        remedy = "Give stiffness='0.05 MPa/um', that of the rig, or math.inf if it is the fault's"
         dataset["slip"].attrs["comment"] = why
-        text = f"slip has no number: {why}, as that of a load point does. {remedy}"
-        warnings.warn(text, NoAnswer, stacklevel=outside())
+        remedy = "Give stiffness='0.05 MPa/um', that of the rig, or math.inf if it is the fault's"
+        warnings.warn(f"slip has no number: {why}. {remedy}", NoAnswer, stacklevel=outside())
     units = {key: value for key, value in about["shear_stress"].items() if key == "units"}
     dataset["noise"] = ((), noise, {"long_name": "standard deviation of the noise", **units})
     words = "drop of shear stress that is found but once in 1,000"
