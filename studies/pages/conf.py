@@ -45,6 +45,8 @@ html_theme = "furo"
 html_title = project
 html_copy_source = False
 html_show_sphinx = False
+#: Style of tables, by which seven columns fit a window of 1200 pixels.
+TABLES = "table.docutils { font-size: .78rem } table.docutils :is(td, th) { padding: .2rem .35rem }"
 #: Pages in the order of the contents, under studies/, by caption; those of no caption come last.
 CONTENTS = {
     "Use": ["pages/rig", "pages/studies", "pages/running", "pages/own_studies", "clusters/README"],
@@ -94,6 +96,11 @@ def _markdown(notebook: str) -> str:
     return "\n\n".join(parts)
 
 
+def _style(app: Any, page: str, template: str, context: dict[str, Any], tree: Any) -> None:
+    """Lay the style of tables over that of the theme."""
+    context["metatags"] = context.get("metatags", "") + f"<style>{TABLES}</style>"
+
+
 def _entrance(app: Any, error: Exception | None) -> None:
     """Send who opens the folder to the first page."""
     if error is None:
@@ -104,6 +111,7 @@ def _entrance(app: Any, error: Exception | None) -> None:
 
 
 def setup(app: Any) -> None:
-    """Have Sphinx ask for the source of each page, and tell when it has ended."""
+    """Have Sphinx ask for the source and the style of each page, and tell when it has ended."""
     app.connect("source-read", _source)
+    app.connect("html-page-context", _style)
     app.connect("build-finished", _entrance)
