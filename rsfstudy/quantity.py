@@ -7,13 +7,11 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from html.entities import html5
 from typing import Any
-
-import numpy as np
 
 from rsfstudy.errors import InvalidValue
 
@@ -59,12 +57,6 @@ class Quantity:
         """The CF attributes that say what its values mean; none of a plain number."""
         values = [float(number) for number in range(len(self.flags))]
         return {"flag_values": values, "flag_meanings": " ".join(self.flags)} if self.flags else {}
-
-
-def flags_of(attributes: Mapping[str, Any]) -> dict[float, str]:
-    """What each value of a variable means, by its CF attributes; empty for one of numbers."""
-    words = str(attributes.get("flag_meanings", "")).split()
-    return dict(zip(np.ravel(attributes.get("flag_values", [])).tolist(), words, strict=True))
 
 
 @dataclass(frozen=True)

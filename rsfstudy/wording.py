@@ -14,6 +14,12 @@ _MOST_SHOWN = 8
 _LONG = re.compile(r"(?<![\w.])\d+\.\d{6,}(?:e[+-]?\d+)?")
 
 
+def flags_of(attributes: Mapping[str, Any]) -> dict[float, str]:
+    """What each value of a variable means, by its CF attributes; empty for one of numbers."""
+    words = str(attributes.get("flag_meanings", "")).split()
+    return dict(zip(np.ravel(attributes.get("flag_values", [])).tolist(), words, strict=True))
+
+
 def is_list(value: Any) -> bool:
     """True of several values, which an axis lays out."""
     if isinstance(value, np.ndarray):

@@ -17,9 +17,9 @@ import xarray as xr
 from rsfstudy.api.trajectory import simulate
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import comparison
-from rsfstudy.quantity import flags_of
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.scales import SCALES
+from rsfstudy.wording import flags_of
 
 
 def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:

@@ -18,11 +18,10 @@ from rsfstudy.compute import runner
 from rsfstudy.declare import verdicts
 from rsfstudy.declare.claims import VERDICTS
 from rsfstudy.files import contents, lattice, restore
-from rsfstudy.quantity import flags_of
 from rsfstudy.rig.scales import in_units_of_rig, renamed
 from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import coverage, quantity
-from rsfstudy.wording import counted, listed, short, stated
+from rsfstudy.wording import counted, flags_of, listed, short, stated
 
 #: Most cells of a lattice that are shown, unless few more are all; and most that failed.
 MOST_CELLS, _ALL_CELLS, _MOST_FAILURES = 24, 36, 20

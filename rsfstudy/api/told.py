@@ -14,9 +14,8 @@ from rsfstudy.api.events import QUANTITIES
 from rsfstudy.api.tables import MOST_CELLS, Table, number, units_of
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import contents
-from rsfstudy.quantity import flags_of
 from rsfstudy.slider.scene import Scene
-from rsfstudy.wording import stated
+from rsfstudy.wording import flags_of, stated
 
 Piece = Table | Mapping[str, str] | str
 

@@ -26,9 +26,9 @@ from rsfstudy.plots._text import (
     with_powers,
     wrapped,
 )
-from rsfstudy.quantity import flags_of
 from rsfstudy.reduce.base import stated_by
 from rsfstudy.vocabulary import coverage, quantity
+from rsfstudy.wording import flags_of
 
 #: Values that span more than this are drawn on a log axis.
 _WIDE = 100.0
