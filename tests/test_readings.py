@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
@@ -195,3 +195,43 @@ def test_friction_that_still_changes_has_not_settled():
     for record, settled in ((1.0, 0.0), (2.0, 0.0), (25.0, 1.0)):
         found = read(VelocityStep(record=record, phases=2), scene, 1e-4)
         assert found["settled"] == settled
+
+
+def with_mass(hold: float, scene: Scene) -> float:
+    """Friction that a rig reads after a hold, less mu_*: the full equations against time, by the
+    state variable itself.
+    """
+    a, b, mu, stiffness = scene.a, scene.b, scene.mu_star, scene.stiffness
+    cot, alpha, inertia = scene.parts.normal_stress.cot_phi, scene.alpha, scene.inertial_time
+
+    def rates(_time, y):
+        spring, rate, theta = y
+        coefficient = mu + a * rate + theta
+        g = (coefficient - mu) / (1.0 - cot * coefficient)
+        stress, slip_rate = 1.0 + cot * g, math.exp(rate)
+        rises = (spring - g) / (stiffness * inertia**2 * slip_rate)
+        evolves = b * (math.exp(-theta / b) - slip_rate)
+        by_g = stress * (a * rises + evolves) / (1.0 - cot * coefficient + alpha * cot)
+        return -stiffness * slip_rate, rises, evolves - alpha * cot * by_g / stress
+
+    y = solve_ivp(rates, (0.0, hold), (0.0, 0.0, 0.0), "Radau", rtol=1e-10, atol=1e-12).y[:, -1]
+    coefficient = mu + a * y[1] + y[2]
+    stress = 1.0 + cot * (coefficient - mu) / (1.0 - cot * coefficient)
+    return (mu + y[0]) / stress - mu
+
+
+def test_friction_of_a_mass_is_read_the_instant_before_the_load_point_changes():
+    """What mass takes of spring stress is then still that of the load point before."""
+    plain = {"law": "slowness", "normal_stress": "variable", "a": 0.01, "b_over_a": 1.2}
+    plain |= {"mu_star": 0.6, "stiffness": 0.05, "alpha": 0.3, "inertia": True}
+    scene = Scene(**plain, reference_rate=1e-3, period=2.0 * math.pi)
+    step = read(VelocityStep(phases=2), scene.with_(load_velocity_ratio=10.0))
+    assert step["friction_before"] == pytest.approx(0.6, abs=1e-15)
+    held = scene.with_(hold_time=5.0, load_velocity_ratio=10.0)
+    hold = read(Healing(phases=2), held)
+    # an error of a reading after the hold has begun would be 1e-7
+    assert hold["relaxation"] == pytest.approx(with_mass(5.0, held), abs=1e-9)
+    rows = [{"velocity": 2.0, "distance": 30.0}, {"velocity": 20.0}]
+    later = read(VelocityStep(step_number=2, phases=2), scene.with_(loading=protocol(rows)))
+    steady = 0.6 + (scene.a - scene.b) * math.log(2.0)
+    assert later["friction_before"] == pytest.approx(steady, abs=2e-9)

@@ -96,7 +96,9 @@ def limit_cycle(
     -------
     xarray.Dataset
         Recurrence interval, static and dynamic stress drop and range of slip rate, each with its
-        numerical error; the orbit along ``phase``; the status (``no_limit_cycle`` where the motion
+        numerical error: from one maximum of spring stress to the next; where the motion repeats
+        itself after several events only, as the message then says, those of the event with the
+        fastest peak. The orbit along ``phase``; the status (``no_limit_cycle`` where the motion
         settles), the message and the work.
 
     Warns

@@ -71,8 +71,9 @@ def simulate(
         Time to follow it for, in D_c/V_*. By default 50; of a protocol, all that it states, and 20
         D_c of the load point beyond where it does not say how long its last segment lasts.
     times : sequence of float, optional
-        Times in D_c/V_* at which to tell what the slider does, to the accuracy of the motion. By
-        default all of it is told, several times within each step.
+        Times in D_c/V_* at which to tell what the slider does, to the accuracy of the motion; with
+        mass, but for the inertial time after a step, in which slip rate follows: of that only where
+        it ends is told. By default all of it is told, several times within each step.
     start : xarray.Dataset, optional
         A motion of this scene, from whose end it goes on as if uninterrupted: time, slip and
         loading do. A duration counts from there.
@@ -127,7 +128,8 @@ def simulate(
     if at is not None:
         duration = float(at[-1]) - began
     duration = _as_stated(scene) - began if duration is None else duration
-    if not (isinstance(duration, int | float | np.number) and 0.0 < duration < math.inf):
+    known = isinstance(duration, int | float | np.number) and not isinstance(duration, bool)
+    if not (known and 0.0 < duration < math.inf):
         remedy = "It is in D_c/V_*; rig.dimensionless converts units of a laboratory."
         raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
     accuracy = Accuracy(rtol, budget, engine=engine)
@@ -256,7 +258,8 @@ def _increasing(times: Any, duration: float | None, began: float) -> np.ndarray 
     if duration is not None:
         raise InvalidValue("duration", duration, "give duration or times, not both")
     try:
-        at = np.asarray(times, dtype=float)
+        at = np.asarray(times)
+        at = at.astype(float) if at.dtype.kind in "iuf" else np.empty(0)
     except (TypeError, ValueError) as error:
         raise InvalidValue("times", times, "must be numbers, in D_c/V_*") from error
     right = at.ndim == 1 and at.size and np.isfinite(at).all() and at[0] >= began and at[-1] > began

@@ -96,6 +96,8 @@ def _agreement(
         allowed = errors[0].values[known] + errors[1].values[known]
         # a number that one of them lacks, or whose error is unknown, is beyond any estimate
         found["beyond_errors"] = int((~same & ~(gap <= allowed)).sum())
+    elif "flag_values" in a.attrs:  # codes have no errors
+        found["beyond_errors"] = int((~same).sum())
     return found
 
 

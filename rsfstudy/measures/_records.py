@@ -17,7 +17,9 @@ from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, EventSpecification, Kind
 from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.readings import friction_coefficient_of
 from rsfstudy.motion.recording import PLACE, Recording
+from rsfstudy.motion.starting import before_start
 from rsfstudy.quantity import Output
 from rsfstudy.slider.derived import derived
 from rsfstudy.slider.scene import Scene
@@ -52,6 +54,9 @@ class Record(NamedTuple):
     ----------
     begun : list of Event
         Where that segment begins, and each later one.
+    before : list of float
+        The friction coefficient the instant before. With mass, that after tells of the slow
+        manifold that the motion comes to within the inertial time.
     peak : Event or None
         The extreme that was asked for; None where there is none.
     end : Event
@@ -61,6 +66,7 @@ class Record(NamedTuple):
     """
 
     begun: list[Event]
+    before: list[float]
     peak: Event | None
     end: Event
     rows: np.ndarray
@@ -122,7 +128,11 @@ def followed(
     rows = recording.seen(scene)
     rows = rows[rows[:, 0] >= begun[first].time]
     rows[0, PLACE] = 0.0  # of the step that ends there, no other rows are left
-    return Record(begun[first:], peak, event, rows)
+    friction, later = friction_coefficient_of(rows), begun[max(first, 1) :]
+    before = [float(friction[rows[:, 0] == each.time][0]) for each in later]
+    if first == 0:
+        before.insert(0, before_start(scene).reading)
+    return Record(begun[first:], before, peak, event, rows)
 
 
 def since(begin: Event, path: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

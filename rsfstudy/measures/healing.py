@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -89,11 +89,10 @@ class Healing(Recorded):
         """Numbers read off a motion, and once more with smaller tolerances for the errors."""
         hold = _hold(scene)
         first = _follow(scene, hold, accuracy, meter)
-        begin, reload = first.begun[:2]
-        said = _beginning(scene, hold, begin, max(_STEADY, accuracy.rtol))
+        said = _beginning(scene, hold, first.begin, max(_STEADY, accuracy.rtol))
         peakless = Outcome(
             Status.NOT_APPLICABLE,
-            {"relaxation": reload.point.reading - begin.point.reading},
+            {"relaxation": first.before[1] - first.before[0]},
             "; ".join(filter(None, ("no peak of friction on reloading", said))),
         )
         if first.peak is None:
@@ -102,7 +101,7 @@ class Healing(Recorded):
         if again.peak is None:
             return peakless
         values, refined = (
-            _read(scene, record.begun, peak)
+            _read(scene, record, peak)
             for record, peak in ((first, first.peak), (again, again.peak))
         )
         # friction peaks where slip rate passes that of the load point, ln V being friction over a
@@ -167,12 +166,12 @@ def _follow(
     return followed(scene, accuracy, meter, asked, hold, hold + 1, until=until, halts=True)
 
 
-def _read(scene: Scene, begun: Sequence[Event], peak: Event) -> dict[str, float]:
+def _read(scene: Scene, record: Record, peak: Event) -> dict[str, float]:
     """Healing, relaxation and the displacement from reloading to the peak."""
-    before, reload = begun[0].point.reading, begun[1]
+    (before, held), reload = record.before[:2], record.begun[1]
     longer = (peak.point.spring_stress - reload.point.spring_stress) / scene.stiffness
     return {
         "healing": peak.point.reading - before,
-        "relaxation": reload.point.reading - before,
+        "relaxation": held - before,
         "peak_displacement": peak.slip - reload.slip + longer,
     }

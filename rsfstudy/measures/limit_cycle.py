@@ -24,6 +24,7 @@ import numpy as np
 from rsfstudy.analysis.approach import Approach, Course, course
 from rsfstudy.analysis.cycles import LN10, Cycle, more_events, path_of
 from rsfstudy.analysis.return_map import Orbit, ReturnMap
+from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures._records import Recorded, recorded
 from rsfstudy.measures._single_step import check_leaves_alone
@@ -120,6 +121,11 @@ class LimitCycle(Recorded):
     typical_work = 9_000
     outputs = _OUTPUTS
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.events, bool) or not self.events >= 1 or self.events % 1:
+            raise InvalidValue("events", self.events, "must be a whole number from 1")
+
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Follow events until one repeats, then go round once more with smaller tolerances: for the
         error, and to record the orbit.
@@ -184,8 +190,20 @@ class LimitCycle(Recorded):
         values["events_until_repeat"] = float(events)
         values["work_per_cycle"] = one.work / one.period
         status, why = judged(accuracy, one, errors)
+        why = why or _of_period(one)
         path = path_of(scene, again.cycles, again.recording)
         return Outcome(status, values | along_path(path, self.phases, engine=accuracy.engine), why)
+
+
+def _of_period(orbit: Orbit) -> str:
+    """What the numbers are of, where a motion repeats itself after several events only."""
+    if orbit.period == 1:
+        return ""
+    return (
+        f"the motion repeats itself after {orbit.period} events, in "
+        f"{math.fsum(cycle.interval for cycle in orbit.cycles):.6g} D_c/V_*: the numbers are those "
+        "of the event with the fastest peak, up to the next maximum of spring stress"
+    )
 
 
 SETTLES = Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")

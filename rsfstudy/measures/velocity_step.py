@@ -190,7 +190,7 @@ class VelocityStep(Recorded):
 
     def _read(self, step: _Step, record: Record, left: Event | None) -> dict[str, float]:
         """Numbers that are read off; NaN for those of the peak where there is none."""
-        before, after = (e.point.reading for e in (record.begin, record.end))
+        before, after = record.before[0], record.end.point.reading
         top = record.peak.point.reading if record.peak else math.nan
         return {
             "apparent_a": (top - before) / step.ratio,
@@ -230,7 +230,7 @@ class VelocityStep(Recorded):
         # there may be few samples, in long steps
         last = [np.interp(late, rows[:, 0], friction), *friction[rows[:, 0] >= late]]
         turned = record.peak or record.end
-        direct = turned.point.reading - friction[0]
+        direct = turned.point.reading - record.before[0]
         path = since(record.begin, along_path(rows, self.phases, READ))
         return {
             "settled": float(np.ptp(last) < _STAYS * abs(direct)),
@@ -255,7 +255,7 @@ def _departure(scene: Scene, step: _Step, record: Record) -> float:
     later = record.rows[:, 0] >= record.peak.time
     left = np.array([relaxation(step.ratio, at) for at in (slip[later] - slip[0]).tolist()])
     expected = steady + scene.b * left
-    seen = (friction_coefficient_of(record.rows) - record.begin.point.reading)[later]
+    seen = (friction_coefficient_of(record.rows) - record.before[0])[later]
     return float(np.abs(seen - expected).max())
 
 

@@ -67,8 +67,8 @@ class Accuracy:
                 f"must lie between {TIGHTEST_RTOL:g} and {LOOSEST_RTOL:g}",
                 remedy="Below that, rounding decides; above it, nothing is resolved.",
             )
-        if self.budget < 1:
-            raise InvalidValue("budget", self.budget, "must be at least 1")
+        if not 1 <= self.budget < math.inf or self.budget % 1:
+            raise InvalidValue("budget", self.budget, "must be a whole number from 1")
         object.__setattr__(self, "engine", named(self.engine))
         if self.methods and self.engine != SCIPY:
             rule = f"are SciPy's, and the engine is {self.engine}"

@@ -47,6 +47,15 @@ def starting(scene: Scene) -> Point:
     return at_rate(scene, stepped, log_slip_rate) if scene.has_mass else stepped
 
 
+def before_start(scene: Scene) -> Point:
+    """The point of a motion before its first step."""
+    before = scene.under(Segment(1.0))
+    psis = steady_states_of(before, 0.0, 0.0)
+    if scene.begins_elsewhere:
+        psis = _stated(scene, psis)[0]
+    return on_slow_manifold(before, scene.parts.slider.initial_stress, psis)
+
+
 def beginning(
     scene: Scene,
     spring_stress: float,

@@ -119,6 +119,8 @@ class SciPyStepper(Stepper):
     def retake(self, motion: Any, space: Any, clock: float) -> None:
         begin, motion.pace = np.array(space.y[: space.unknowns]), 0.0
         length, ends = abs(clock - motion.clock), (motion.clock, clock)
+        if length == 0.0:
+            raise Halt(Status.INTEGRATION_FAILED, "a step has no length")
         self._solver = solver = self._solves(motion, space, ends, begin, first_step=length)
         clocks, within = [motion.clock], []
         while solver.status == "running":
