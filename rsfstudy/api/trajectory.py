@@ -6,6 +6,7 @@ import json
 import math
 import warnings
 from collections.abc import Sequence
+from numbers import Real
 from typing import Any, Never
 
 import numpy as np
@@ -257,11 +258,10 @@ def _increasing(times: Any, duration: float | None, began: float) -> np.ndarray 
         return None
     if duration is not None:
         raise InvalidValue("duration", duration, "give duration or times, not both")
-    try:
-        at = np.asarray(times)
-        at = at.astype(float) if at.dtype.kind in "iuf" else np.empty(0)
-    except (TypeError, ValueError) as error:
-        raise InvalidValue("times", times, "must be numbers, in D_c/V_*") from error
+    given = np.array(times, dtype=object)
+    if not all(isinstance(time, Real) and not isinstance(time, bool) for time in given.flat):
+        raise InvalidValue("times", times, "must be numbers, in D_c/V_*")
+    at = given.astype(float)
     right = at.ndim == 1 and at.size and np.isfinite(at).all() and at[0] >= began and at[-1] > began
     if not right or not (np.diff(at) > 0.0).all():
         rule = f"must increase from {began:g} or later, and be finite"
