@@ -3,6 +3,7 @@
 import math
 import re
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ from scipy.stats import norm, uniform
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
+from rsfstudy.api.tables import answer, to_error
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.claims import Claim, verdicts
 from rsfstudy.declare.verdicts import Verdicts
@@ -137,6 +139,62 @@ def told_of(dataset, tmp_path, monkeypatch) -> str:
     monkeypatch.setenv("COLUMNS", "120")
     store.write(dataset, tmp_path / "it.nc")
     return call("show", tmp_path / "it.nc").stdout
+
+
+@pytest.mark.parametrize("value", [36.815156940184394, -77608.42471489437, 3.152948907494519e-9])
+@pytest.mark.parametrize("share", [3.1e-2, 9.9e-7, 1e-11])
+def test_numbers_have_the_digits_that_their_errors_leave(value, share):
+    """What is left out is a twentieth of the error at most; one digit less would be too few."""
+    error = share * abs(value)
+    text = to_error(value, error)
+    assert abs(float(text) - value) <= 0.05 * error
+    digits = len(re.sub(r"e.*|^[-0.]+|\.", "", text))
+    assert digits <= math.ceil(-math.log10(share)) + 2
+
+
+def test_an_answer_for_one_scene_has_units_and_words(tmp_path):
+    scales = {"slip_distance": "10 um", "reference_velocity": "1 um/s", "period": "10 ms"}
+    rig = rsfstudy.Laboratory(normal_stress="100 MPa", stiffness="0.03 MPa/um", **scales)
+    scene = rig.scene(law="slowness", a=0.01, b_over_a=1.4, load_velocity_ratio=10)
+    cycle = rsfstudy.limit_cycle(scene, rtol=1e-4, engine="compiled")
+    cycle = rig.in_units(cycle, stress="MPa", length="um")
+    shown = {row["number"]: row["value"] for row in answer(cycle).rows}
+    interval, units = shown["recurrence_interval"].split()
+    left_out = abs(float(interval) - float(cycle.recurrence_interval))
+    assert left_out <= 0.05 * float(cycle.recurrence_interval_error)
+    assert units == "s"
+    assert shown["slip_mode"] == "stick_slip"
+    assert shown["max_slip_rate"].endswith(" um/s")
+    assert "recurrence_interval_error" not in shown
+    cycle.to_netcdf(tmp_path / "cycle.nc")
+    assert (
+        "Limit cycle of a spring-slider, slowness law" in call("show", tmp_path / "cycle.nc").stdout
+    )
+
+
+def test_a_motion_by_a_law_that_is_not_known_is_shown(tmp_path):
+    """With its stiffness and its events, once a study file makes the law known."""
+    motion = rsfstudy.simulate(Scene(load_velocity_ratio=2.0), duration=0.1)
+    scene = motion.attrs["scene"].replace('"law": "slip"', '"law": "of_a_stranger"')
+    motion.assign_attrs(scene=scene).to_netcdf(tmp_path / "motion.nc")
+    text = (Path(__file__).parent / "extensions" / "steep_law.py").read_text()
+    (tmp_path / "study.py").write_text(text.replace('"steep"', '"of_a_stranger"'))
+    for study, told in (
+        ([], "neither its stability nor its events: law = 'of_a_stranger'"),
+        (["--study", tmp_path / "study.py"], "no event faster than 20 V_*"),
+    ):
+        shown = call("show", tmp_path / "motion.nc", *study)
+        assert shown.returncode == 0, shown.stderr
+        assert told in " ".join(shown.stdout.split())
+        assert "law = of_a_stranger" in shown.stdout
+
+
+def test_a_table_of_samples_tells_what_was_drawn(tmp_path, monkeypatch):
+    axis = Axis.samples({"b_over_a": uniform(1.3, 0.4)}, 4)
+    drawn = run(study_of("drawn", LinearStability(), axis, Axis("law", ["slip", "slowness"])))
+    shown = told_of(drawn, tmp_path, monkeypatch)
+    for sample, ratio in enumerate(drawn.b_over_a.values):
+        assert re.search(rf"^ +{sample} +slip +{ratio:.6g} ", shown, re.M)
 
 
 def test_a_large_lattice_is_thinned(map_of_stiffness, tmp_path, monkeypatch):
