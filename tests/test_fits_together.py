@@ -6,6 +6,7 @@ import math
 import re
 import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -178,12 +179,16 @@ def test_windows_tell_the_error_of_a_trend_that_is_none_of_the_fit() -> None:
         ("family", ("a", "b", "slip_distance", "mu_star", "law_exponent")),
     ],
 )
-def test_noise_tells_nothing_but_friction(law: str, free: tuple[str, ...]) -> None:
+def test_noise_tells_nothing_but_friction(law: str, free: tuple[str, ...], tmp_path: Path) -> None:
+    """A report does not call that ok."""
     times = synthetic.rows(STEP, synthetic.end(STEP), 200)
     arrays = {"time": times, "displacement": synthetic.load_point(STEP, times)}
     arrays["friction"] = 0.6 + synthetic.correlated(200, 0.5, 0.02, 0)
     one = rsfstudy.read_record(arrays).with_steps([(40.0, 40.0, 1.0, 10.0)])
-    fit = rsfstudy.fit(one, laws=[law], free=free, **OPTIONS).squeeze()
+    fits = rsfstudy.fit(one, laws=[law], free=free, **OPTIONS)
+    fits.to_netcdf(tmp_path / "fit.nc")
+    assert ' yellow">1 not identified<' in rsfstudy.report(tmp_path).read_text()
+    fit = fits.squeeze()
     assert fit.rsf.table().status.item() == "not_identified"
     untold = set(str(fit.message.values).partition(":")[0].split(", "))
     assert untold == set(free) - {"mu_star", "trend1"}

@@ -14,7 +14,7 @@ import xarray as xr
 from running import HANGS, call, claimed, run
 
 import rsfstudy
-from rsfstudy import Axis, Scene, Study
+from rsfstudy import Axis, Scene, Study, plots
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import store
 from rsfstudy.measures.linear_stability import LinearStability
@@ -158,6 +158,23 @@ def test_python_names_the_page_and_refuses_what_is_none(tmp_path):
     assert "mine" in page.read_text()
     with pytest.raises(InvalidValue, match="is no directory"):
         rsfstudy.report(tmp_path / "nowhere")
+
+
+def test_it_tells_answers_that_are_none_and_draws_what_is_in_other_units(tmp_path):
+    """Cycles, too; figures are as wide as on paper, so that letters of all are of one size."""
+    axes = [Axis("b_over_a", [1.5, 2.0, 3.0])]
+    study = Study(name="one", title="One", base=Scene(), axes=axes, measure=LinearStability())
+    found = run(study)
+    found.rsf.to_si(normal_stress=5e6, slip_distance=1e-5).to_netcdf(tmp_path / "si.nc")
+    store.write(found.assign(status=found.status * 0 + Status.LOCKED), tmp_path / "locked.nc")
+    scene = Scene(law="slowness", inertia=True, stiffness_ratio=0.8, load_velocity_ratio=2.0)
+    cycle = rsfstudy.limit_cycle(scene, rtol=1e-3, engine="compiled")
+    cycle.to_netcdf(tmp_path / "cycle.nc")
+    text = rsfstudy.report(tmp_path).read_text()
+    assert ' yellow">3 locked<' in text
+    with plots.styled():
+        wide = f"--inches: {plots.size(2, 1)[0]:.3g}"
+    assert [about["style"] for about in Page(text).all("img")] == [wide] * 3
 
 
 def test_a_browser_shows_it_on_a_phone_and_on_a_desk(written, tmp_path):
