@@ -15,7 +15,7 @@ from running import HANGS, call, claimed, run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.errors import DataError, InvalidValue, NoAnswer
 from rsfstudy.files import store
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.status import Status
@@ -170,8 +170,13 @@ def test_it_tells_answers_that_are_none_and_draws_what_is_in_other_units(tmp_pat
     scene = Scene(law="slowness", inertia=True, stiffness_ratio=0.8, load_velocity_ratio=2.0)
     cycle = rsfstudy.limit_cycle(scene, rtol=1e-3, engine="compiled")
     cycle.to_netcdf(tmp_path / "cycle.nc")
+    with pytest.warns(NoAnswer):
+        none = rsfstudy.limit_cycle(scene.with_(stiffness_ratio=1.5), engine="compiled")
+    none.to_netcdf(tmp_path / "none.nc")
     text = rsfstudy.report(tmp_path).read_text()
     assert ' yellow">3 locked<' in text
+    assert ' yellow">no limit cycle<' in text
+    assert "no figure: there is no motion, and nothing to draw. no_limit_cycle: " in text
     with plots.styled():
         wide = f"--inches: {plots.size(2, 1)[0]:.3g}"
     assert [about["style"] for about in Page(text).all("img")] == [wide] * 3

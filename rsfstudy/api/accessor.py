@@ -156,7 +156,8 @@ class Accessor:
 
     @door
     def plot(self, *what: Any, **how: Any) -> plots.Figure:
-        """The figure of the results of a study, or the picture of a motion or a limit cycle.
+        """The figure of the results of a study, or the picture of a motion or a limit cycle, in the
+        units that they have.
 
         Parameters
         ----------

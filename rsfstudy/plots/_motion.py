@@ -61,7 +61,7 @@ def picture(
     Raises
     ------
     DataError
-        Where the dataset is no motion and no limit cycle.
+        Where the dataset is no motion and no limit cycle, or there is none.
     InvalidValue
         For another abscissa.
     """
@@ -71,9 +71,9 @@ def picture(
         if name not in motion:
             text = "is missing: it is no motion as simulate gives it, and no limit cycle"
             raise DataError(f"{name} {text}")
-    if not motion["slip"].size:
+    if not motion["slip"].notnull().any():
         text = f"{motion.attrs.get('status', '')}: {motion.attrs.get('message', '')}"
-        raise DataError(f"nothing moved, and there is nothing to draw. {text}")
+        raise DataError(f"there is no motion, and nothing to draw. {text}")
     against = against or _abscissa(motion)
     shown = motion if laboratory is None else laboratory.in_units(motion, **_UNITS)
     with styled():
