@@ -118,8 +118,7 @@ def test_what_it_says_of_itself_is_in_the_file_and_on_the_figure(outside):
     stated = {"long_name": "sharpness of the law", "units": "1", "symbol": "$n$"}
     assert stated.items() <= about.items()
     lattice = example.dataset.transpose("stiffness_ratio", "sharpness", ...)
-    drawn = plots.draw(lattice, plots.Figure().add_subplot())
-    assert drawn.get_xlabel() == "Sharpness of the law, $n$"
+    assert plots.figure(lattice).axes[0].get_xlabel() == "Sharpness of the law, $n$"
     assert outside["loading_time"].dataset.loading_time.attrs["units"] == "s"
     exponent = outside["power_law"].dataset.exponent
     assert exponent.attrs["long_name"] == "exponent of critical_stiffness as a power of a"

@@ -31,6 +31,7 @@ def place(tmp_path_factory):
     for name, rest in (("plain", ("--duration", "8")), ("rig", ("--duration", "80 s", *RIG))):
         ran = call(*common, *rest, "--output", place / f"{name}.png")
         assert ran.returncode == 0, ran.stderr
+        assert "stiffness is 0.5 of the critical" in ran.stdout
         assert "Events faster than 100 V_*" in ran.stdout
     asked = rsfstudy.simulate(SCENE, times=[1.0, 2.0], engine="compiled")
     store.write(asked, place / "asked.nc")

@@ -147,7 +147,9 @@ class Accessor:
 
     @door
     def check(self) -> pd.DataFrame:
-        """The claims of the study held against the dataset, as `rsfstudy.check` gives them."""
+        """The claims of the study held against the dataset, as `rsfstudy.check` gives them: none
+        applies in other units.
+        """
         from rsfstudy.api import runs
 
         self._must_be_of_a_study()
@@ -169,7 +171,7 @@ class Accessor:
         from rsfstudy.plots._motion import picture
 
         if self._is_study:
-            self._must_be_whole("figures show", in_any_units=True)
+            self._must_be_whole("figures show")
             return runs.plot(self._dataset, *what, **how)
         return picture(self._dataset, *what, **how)
 
@@ -332,16 +334,14 @@ class Accessor:
         if not {"scene", "declaration"} & set(self._dataset.attrs):
             raise DataError(_FOREIGN)
 
-    def _must_be_whole(self, what: str, in_any_units: bool = False) -> None:
-        """Refuse results of which cells were selected, or that are in other units."""
+    def _must_be_whole(self, what: str) -> None:
+        """Refuse results of which cells were selected."""
         from rsfstudy.files import contents
-        from rsfstudy.rig.scales import SCALES
 
         axes = [axis["dimension"] for axis in contents.declaration(self._dataset).axes]
         selected = [name for name in axes if name not in self._dataset["status"].dims]
-        if selected or (SCALES in self._dataset.attrs and not in_any_units):
-            which = f"{', '.join(selected)} selected" if selected else "other units"
-            text = f"{what} all results of a study in its own units, and these are with {which}"
+        if selected:
+            text = f"{what} all results of a study, and of these {', '.join(selected)} is selected"
             raise DataError(f"{text}. Ask the dataset as it was opened.")
 
     def _must_be_of_a_study(self) -> None:

@@ -153,7 +153,8 @@ def _read(path: Path, dataset: xr.Dataset) -> _Result:
         figure = _figure(path, dataset.rsf.plot) if "slip" in dataset.variables else ""
         status = Status[str(dataset.attrs["status"]).upper()]
         colour = "green" if status is Status.OK else "yellow" if status.is_answer else "red"
-        return _Result(path, title, "", _words(status.label), colour, (figure, numbers))
+        ended = status.label.replace("_", " ")
+        return _Result(path, title, "", ended, colour, (figure, numbers))
     about = contents.declaration(dataset)
     parts = [_shown(about.summary)] if about.summary else []
     if about.overrides:
@@ -172,8 +173,8 @@ def _read(path: Path, dataset: xr.Dataset) -> _Result:
         return replace(found, status=", ".join(wrong), colour="red")
     counts = runner.counts(dataset)
     if (len(counts) > 1 and fit_results.is_fit(dataset)) or Status.OK.label not in counts:
-        ended = ", ".join(f"{count} {_words(label)}" for label, count in counts.items())
-        return replace(found, status=ended, colour="yellow")
+        ended = ", ".join(f"{count} {label}" for label, count in counts.items())
+        return replace(found, status=ended.replace("_", " "), colour="yellow")
     return found
 
 
@@ -185,10 +186,6 @@ def html(dataset: xr.Dataset) -> str:
     elif (claimed := tables.claims(runs.check(dataset))).rows:
         parts += ["<h3>Claims</h3>", _shown(claimed)]
     return "\n".join(filter(None, parts))
-
-
-def _words(label: str) -> str:
-    return label.replace("_", " ")
 
 
 # ---- pieces of HTML ------------------------------------------------------------------------------

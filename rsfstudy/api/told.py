@@ -31,13 +31,12 @@ def numbers(dataset: xr.Dataset) -> Iterator[Piece]:
         yield from tables.reductions(dataset)
         yield {f"no {name}": why for name, why in tables.refused(dataset).items()}
     elif is_motion(dataset):
+        yield motion(dataset)
         try:
-            scene = dataset.rsf.scene
-        except InvalidValue as error:  # a part of it is a user's own
-            yield from (motion(dataset), f"neither its stability nor its events: {error}")
-        else:
-            yield {**motion(dataset), **stability(scene)}
+            yield stability(dataset.rsf.scene)
             yield events(dataset.rsf.events())
+        except InvalidValue as error:  # a part of its scene is a user's own
+            yield f"neither its stability nor its events: {error}"
     else:
         yield tables.answer(dataset)
 
@@ -64,14 +63,11 @@ def origin(dataset: xr.Dataset) -> dict[str, str]:
 def motion(dataset: xr.Dataset) -> dict[str, str]:
     """What a reader of a motion looks for first."""
     time, friction = dataset["time"], dataset["friction_coefficient"]
-    rate, per = dataset.get("slip_rate"), "V_*"
-    if rate is None:
-        rate = 10.0 ** dataset["log10_slip_rate"]
-    else:
-        per = units_of(rate)
-    unit = units_of(time)
+    over_reference = (10.0 ** dataset["log10_slip_rate"]).assign_attrs(scale="V_*")
+    rate, unit = dataset.get("slip_rate", over_reference), units_of(time)
+    per = f" {units_of(rate)}"
     told = {"duration": f"{float(time[-1]):.6g} {unit}"}
-    for name, values, of in (("peak friction", friction, ""), ("peak slip rate", rate, f" {per}")):
+    for name, values, of in (("peak friction", friction, ""), ("peak slip rate", rate, per)):
         peak = int(np.argmax(values.values))
         told[name] = f"{float(values[peak]):.6g}{of} after {float(time[peak]):.6g} {unit}"
     if "instability_time" in dataset:
@@ -81,11 +77,11 @@ def motion(dataset: xr.Dataset) -> dict[str, str]:
     return told
 
 
-def stability(scene: Scene) -> dict[str, str]:
-    """How stiff a scene is."""
-    ratio = scene.stiffness_ratio
-    sliding = "stable" if ratio > 1.0 else "unstable"
-    return {"stiffness": f"{ratio:.4g} of the critical: steady sliding at V_* is {sliding}"}
+def stability(scene: Scene) -> str:
+    """Whether steady sliding at V_* is stable, by the stiffness."""
+    sliding = "stable" if scene.stiffness_ratio > 1.0 else "unstable"
+    ratio = f"{scene.stiffness_ratio:.4g} of the critical"
+    return f"stiffness is {ratio}: steady sliding at V_* is {sliding}"
 
 
 def events(catalogue: xr.Dataset) -> Table | str:

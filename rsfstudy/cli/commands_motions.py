@@ -87,6 +87,7 @@ def _write(motion: xr.Dataset, laboratory: Laboratory | None, given: Given) -> N
         if laboratory:
             found = [laboratory.in_units(of, **_UNITS) for of in found]
         layout.show(told.motion(found[0]))
+        layout.show(told.stability(motion.rsf.scene))
         layout.show(told.events(found[1]))
     console.print(f"{said}\nwrote {given.output} and {data}")
 

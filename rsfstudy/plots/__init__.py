@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Figure
 
@@ -43,7 +42,7 @@ from rsfstudy.reduce.base import stated_by
 from rsfstudy.rig.scales import in_units_of_rig, is_in_other_units
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED, quantity
-from rsfstudy.wording import settings
+from rsfstudy.wording import counted, settings
 
 #: What draws any lattice.
 _ANY = ("lines", "maps")
@@ -125,27 +124,13 @@ def figure(
     return figure
 
 
-def draw(dataset: xr.Dataset, axes: Axes, panel: Panel | None = None) -> Axes:
-    """Draw a results dataset as its study declares it: its main panel, or another."""
-    drawing, dataset = _fitting(in_units_of_rig(dataset))
-    panel = panel or drawing.panels[0]
-    _panel.draw(panel, dataset, axes)
-    if lacking := _lacking(dataset):
-        axes.set_title(f"{axes.get_title()}\n{lacking}".strip(), color="tab:red")
-    _panel.settle([panel], [axes])
-    return axes
-
-
 def _lacking(dataset: xr.Dataset) -> str:
     """The cells that a figure cannot show, in brackets; nothing where it shows all."""
     completeness = dataset.attrs.get("completeness", "complete")
     failed = int((is_failed(dataset["status"]) & (dataset["status"] != Status.PENDING)).sum())
-    parts = [
-        "" if completeness == "complete" else completeness,
-        f"{failed} cell{'s' * (failed > 1)} failed" * (failed > 0),
-    ]
-    told = ", ".join(filter(None, parts))
-    return f"[{told}]" if told else ""
+    parts = [completeness] * (completeness != "complete")
+    parts += [f"{counted(failed, 'cell')} failed"] * (failed > 0)
+    return f"[{', '.join(parts)}]" * bool(parts)
 
 
 def _not_as_declared(dataset: xr.Dataset, columns: int) -> str:

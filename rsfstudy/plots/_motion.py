@@ -137,21 +137,19 @@ def _rate(shown: xr.Dataset, axes: Axes, against: str) -> None:
 def _plane(motion: xr.Dataset, shown: xr.Dataset, axes: Axes) -> None:
     """Friction against slip rate, with the line of steady sliding."""
     logs = motion["log10_slip_rate"]
-    scale = 1.0
-    if "slip_rate" in shown:
-        scale = float(shown["slip_rate"][0]) / 10.0 ** float(logs[0])
+    rates = shown.get("slip_rate", (10.0**logs).assign_attrs(units="$V_*$"))
+    scale = float(rates[0]) / 10.0 ** float(logs[0])
     # in ruptures the spring carries what accelerates the mass, too
     normal = "normal_stress_ratio" if "normal_stress_ratio" in motion else "effective_normal_stress"
     friction = motion["frictional_stress"] / motion[normal]
     axes.plot(scale * 10.0**logs, friction, **look(0), label="motion")
     axes.plot(scale * 10.0 ** logs[0], friction[0], "o", color=look(0)["color"], label="its start")
-    rates = np.linspace(float(logs.min()) - 0.3, float(logs.max()) + 0.3, 201)
-    steady = _steady(json.loads(motion.attrs["scene"]), rates)
+    beyond = np.linspace(float(logs.min()) - 0.3, float(logs.max()) + 0.3, 201)
+    steady = _steady(json.loads(motion.attrs["scene"]), beyond)
     if steady is not None:
-        axes.plot(scale * 10.0**rates, steady, "--", color="0.4", label="steady sliding")
+        axes.plot(scale * 10.0**beyond, steady, "--", color="0.4", label="steady sliding")
     log_scale(axes, "x")
-    units = _written(shown["slip_rate"].attrs["units"]) if "slip_rate" in shown else "$V_*$"
-    axes.set_xlabel(f"Slip rate ({units})")
+    axes.set_xlabel(f"Slip rate ({_written(rates.attrs['units'])})")
     axes.set_ylabel(r"Friction coefficient of the fault, $\mu$")
     legend(axes, 3)
 

@@ -21,8 +21,8 @@ _WORDS = re.compile(r"^decimal logarithm of (the )?| over V_star")
 
 #: What stands before the name of a field where that is the name of an axis in units.
 BESIDE = "dimensionless_"
-#: Units of results of a rig in tables and figures, by their scales.
-_SHOWN = {"sigma_*": "MPa", "D_c": "um", "D_c/V_*": "s"}
+#: Units of stress, length and time of results of a rig, in tables and figures.
+_SHOWN = ("MPa", "um", "s")
 #: Attribute of a dataset in other units that tells their scales.
 SCALES = "scales"
 
@@ -159,15 +159,13 @@ def in_units_of_rig(dataset: xr.Dataset) -> xr.Dataset:
     """Results of a rig as tables and figures show them, in MPa, um and s; others as they are."""
     if "sigma_star" not in dataset.variables or SCALES in dataset.attrs:
         return dataset
-    return in_units(dataset, scales_of(dataset), *_SHOWN.values())
+    return in_units(dataset, scales_of(dataset), *_SHOWN)
 
 
 def is_in_other_units(dataset: xr.Dataset) -> bool:
     """True of results in units that figures of their study do not expect."""
-    told = dict(scale.split(" = ") for scale in dataset.attrs.get(SCALES, "").split(", ") if scale)
-    as_shown = "sigma_star" in dataset.variables and all(
-        told[scale].endswith(f" {units}") for scale, units in _SHOWN.items()
-    )
+    told = dataset.attrs.get(SCALES, "")
+    as_shown = "sigma_star" in dataset.variables and all(f" {u}," in told for u in _SHOWN)
     return bool(told) and not as_shown
 
 
