@@ -153,8 +153,7 @@ def _read(path: Path, dataset: xr.Dataset) -> _Result:
         figure = _figure(path, dataset.rsf.plot) if "slip" in dataset.variables else ""
         status = Status[str(dataset.attrs["status"]).upper()]
         colour = "green" if status is Status.OK else "yellow" if status.is_answer else "red"
-        ended = status.label.replace("_", " ")
-        return _Result(path, title, "", ended, colour, (figure, numbers))
+        return _Result(path, title, "", status.label.replace("_", " "), colour, (figure, numbers))
     about = contents.declaration(dataset)
     parts = [_shown(about.summary)] if about.summary else []
     if about.overrides:

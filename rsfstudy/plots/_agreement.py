@@ -19,9 +19,8 @@ def agreement(digits: Mapping[str, Points], label: str, enough: float) -> Figure
     figure = Drawing(figsize=size(2, 1), layout="constrained")
     axes = figure.subplots()
     for number, (name, points) in enumerate(digits.items()):
-        style = {"color": look(number)["color"], "marker": marker(number), "fillstyle": "none"}
-        words = name.replace("_", " ")
-        axes.plot(*zip(*points, strict=True), linestyle="none", label=words, **style)
+        style = {"color": look(number)["color"], "fillstyle": "none"}
+        axes.plot(*zip(*points, strict=True), marker(number), label=name.replace("_", " "), **style)
     axes.axhline(enough, color="0.5", linewidth=0.8, linestyle="--", label="enough to pass")
     axes.set(xlabel=label[0].upper() + label[1:], ylabel="Digits that agree")
     legend(axes, 5)
