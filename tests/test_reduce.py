@@ -321,6 +321,19 @@ def test_an_inverse_whose_bracket_stays_is_not_taken_for_exact():
     assert abs(at - np.log(6.0)) <= error < 0.3  # a quarter of the bracket
 
 
+@pytest.mark.parametrize("name", sorted(CURVED))
+def test_a_level_that_a_cell_has_is_reached_at_that_cell(name):
+    """At each of them, and a rounding error beside it, where two pieces of the interpolant meet.
+    Where the slope is 0 there, a rounding error of the level moves the place by its root.
+    """
+    x = np.array([0.3, 0.5, 1.1, 1.3, 2.9, 4.0])
+    values = CURVED[name][0](x)
+    for place, value in zip(x, values, strict=True):
+        assert inverted(x, values, value)[0] == pytest.approx(place, rel=4e-16)
+        for level in np.nextafter(value, [values[0], values[-1]]):
+            assert inverted(x, values, level)[0] == pytest.approx(place, rel=1e-7)
+
+
 def test_levels_by_label_and_levels_out_of_reach():
     x = np.geomspace(1.0, 100.0, 9)
     dataset = xr.Dataset(

@@ -9,11 +9,14 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
 
 from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, refused
 
 #: Change of ln(value) by which derivatives of an interpolant are taken.
 _STEP = 1e-6
+#: Error of ln(place) to which an interpolant is inverted.
+_FINE = 1e-15
 
 
 @dataclass(frozen=True)
@@ -242,8 +245,16 @@ def _unseen(x: np.ndarray, y: np.ndarray, level: float, fine: float) -> float:
 
 def _reaches(x: np.ndarray, y: np.ndarray, level: float) -> float:
     """Place where the interpolant through the points reaches the level; NaN unless it is one."""
-    roots = PchipInterpolator(x, y).solve(level, extrapolate=False)
-    return float(roots[0]) if len(roots) == 1 else np.nan
+    off = y - level
+    at, before = np.flatnonzero(off == 0.0), np.flatnonzero(off[:-1] * off[1:] < 0.0)
+    if at.size + before.size != 1:
+        return np.nan
+    if at.size:
+        return float(x[at[0]])
+    # between two points it is monotone; at them it is the points, which rounding misses
+    curve, known = PchipInterpolator(x, y), dict(zip(x.tolist(), off.tolist(), strict=True))
+    bracket = x[before[0] : before[0] + 2].tolist()
+    return float(brentq(lambda place: known.get(place, curve(place) - level), *bracket, xtol=_FINE))
 
 
 def _logarithms(values: np.ndarray, on: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
