@@ -9,6 +9,7 @@ samples were independent, which those of Sobol points and Latin hypercubes rarel
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -48,10 +49,8 @@ class _Statistic(Reduction):
     #: What it is, in words.
     text: ClassVar[str]
 
-    @property
-    def least(self) -> int:
-        """Fewest samples of which it can be told with its error."""
-        return 2
+    #: Fewest samples of which it can be told with its error.
+    least: ClassVar[int] = 2
 
     def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
         """The statistic, and its standard error."""
@@ -107,17 +106,26 @@ class Mean(_Statistic):
 
 @dataclass(frozen=True)
 class StandardDeviation(_Statistic):
-    """Standard deviation over samples."""
+    """Standard deviation over samples, of three at least.
+
+    References
+    ----------
+    Efron and Stein (1981), Annals of Statistics 9, 586-596: its standard error.
+    """
 
     kind: ClassVar[str] = "standard_deviation"
     text: ClassVar[str] = "standard deviation"
+    least = 3
 
     def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
-        """That of n - 1 degrees of freedom, and its error by the fourth moment."""
+        """That of n - 1 degrees of freedom, and its error by the jackknife: the scatter of those
+        without one sample. It takes no distribution for granted, only that samples are independent.
+        """
         count, apart = of.notnull().sum(self.over), of - of.mean(self.over)
-        deviation = of.std(self.over, ddof=1)
-        variance = (apart**4).mean(self.over) - (apart**2).mean(self.over) ** 2
-        return deviation, (variance / count) ** 0.5 / (2.0 * deviation).where(deviation > 0.0)
+        rest = (apart**2).sum(self.over) - apart**2 * count / (count - 1.0)
+        without = (rest.clip(min=0.0) / (count - 2.0).where(count > 2)) ** 0.5
+        scatter = without.std(self.over) * (count - 1.0) ** 0.5
+        return of.std(self.over, ddof=1), scatter
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """(y - mean)/((n - 1) sd)."""
@@ -151,7 +159,7 @@ class Quantile(_Statistic):
         return f"quantile at {self.level:g}"
 
     @property
-    def least(self) -> int:
+    def least(self) -> int:  # type: ignore[override]
         """So many that a standard deviation of the binomial stays between 0 and 1."""
         rarer = min(self.level, 1.0 - self.level)
         return max(2, math.ceil((1.0 - rarer) / rarer - 1e-9))
@@ -159,24 +167,34 @@ class Quantile(_Statistic):
     def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
         """By the order of the samples."""
         apart = (self.level * (1.0 - self.level) / of.notnull().sum(self.over)) ** 0.5
-        found = [
-            (_weights(of, self.over, self.level + sign * apart) * of.fillna(0.0)).sum(self.over)
-            for sign in (0.0, -1.0, 1.0)
-        ]
+        found = [_between(of, self.over, self.level + sign * apart) for sign in (0.0, -1.0, 1.0)]
         return found[0], 0.5 * (found[2] - found[1])
 
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
-        """The weights of the two samples beside it."""
-        of = _of(self, dataset)
-        return [(_weights(of, self.over, xr.DataArray(self.level)), {})]
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Reduce along the dimension of the samples; with what the errors of cells make of it: the
+        quantiles of values less and plus their errors bound it, however these change their order.
+        """
+        found, beside = super().__call__(dataset), f"{self.of}_error"
+        if beside not in dataset:
+            return found
+        of, at = _of(self, dataset), xr.DataArray(self.level)
+        errors = dataset[beside].reset_coords(drop=True)
+        errors = (errors + sys.float_info.epsilon * abs(of)).fillna(np.inf)
+        low, high = (_between(of + sign * errors, self.over, at) for sign in (-1.0, 1.0))
+        down, up = found[self.name] - low, high - found[self.name]
+        error = xr.where(down > up, down, up)
+        about = found[self.name].attrs | {"comment": "by quantiles of values less and plus errors"}
+        error = error.where(abs(error) < np.inf).assign_attrs(about)
+        return found.assign({f"{self.name}_error": error})
 
 
-def _weights(of: xr.DataArray, over: str, level: xr.DataArray) -> xr.DataArray:
-    """Weights of samples in a quantile: those of the two whose ranks are beside it."""
+def _between(of: xr.DataArray, over: str, level: xr.DataArray) -> xr.DataArray:
+    """A quantile: between the two samples whose ranks are beside it, by their distance."""
     place = of.get_axis_num(over)
     ranks = of.copy(data=np.argsort(np.argsort(of.values, axis=place), axis=place).astype(float))
     at = level.clip(0.0, 1.0) * (of.notnull().sum(over) - 1)
-    return (1.0 - abs(ranks - at)).clip(min=0.0).where(of.notnull(), 0.0)
+    weights = (1.0 - abs(ranks - at)).clip(min=0.0).where(of.notnull(), 0.0)
+    return (weights * of.where(weights > 0.0, 0.0)).sum(over)
 
 
 @dataclass(frozen=True)
