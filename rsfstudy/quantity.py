@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from html.entities import html5
@@ -100,6 +100,28 @@ class Output(Quantity):
 def is_name(name: object) -> bool:
     """True if a text can name a variable: an identifier, as a file gives it back."""
     return isinstance(name, str) and name.isidentifier() and unicodedata.is_normalized("NFC", name)
+
+
+def quotient(units: Sequence[str]) -> str:
+    """Units, or scales, of a first quantity over others, as in ``s (um s-1)-1``; `factors` are the
+    single ones again.
+    """
+    found = "1"
+    for number, each in enumerate(units):
+        if number == 0 or each != "1":
+            found = each if number == 0 else "1" if found == each else f"{found} ({each})-1"
+    return found
+
+
+def factors(units: str) -> list[str]:
+    """Units, or scales, of which something is in the first over the others."""
+    return [each.removesuffix(")-1") for each in units.split(" (")]
+
+
+def units_and_scale(attributes: Mapping[Any, Any]) -> str:
+    """What the numbers of a variable are in: units, or what those without units are measured in."""
+    units, scale = str(attributes.get("units", "1")), str(attributes.get("scale", ""))
+    return quotient([scale, *factors(units)[1:]]) if scale else units
 
 
 def headed(text: str) -> tuple[str, str] | None:

@@ -17,6 +17,7 @@ import xarray as xr
 from rsfstudy.api.trajectory import simulate
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import comparison
+from rsfstudy.quantity import units_and_scale
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.scales import SCALES
 from rsfstudy.wording import flags_of
@@ -52,7 +53,7 @@ def to_csv(dataset: xr.Dataset, path: Path) -> None:
 
 
 def _units(values: xr.DataArray) -> str:
-    return str(values.attrs.get("scale") or values.attrs.get("units", ""))
+    return units_and_scale(values.attrs) if "units" in values.attrs else ""
 
 
 def to_mat(dataset: xr.Dataset, path: Path) -> None:

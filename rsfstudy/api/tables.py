@@ -18,6 +18,7 @@ from rsfstudy.compute import runner
 from rsfstudy.declare import verdicts
 from rsfstudy.declare.claims import VERDICTS
 from rsfstudy.files import contents, lattice, restore
+from rsfstudy.quantity import factors, units_and_scale
 from rsfstudy.rig.scales import in_units_of_rig, renamed
 from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import coverage, quantity
@@ -98,8 +99,10 @@ def answer(dataset: xr.Dataset) -> Table:
 
 def units_of(values: xr.DataArray) -> str:
     """The units of values, or what those without units are measured in; "1" for numbers."""
-    units = values.attrs.get("scale") or values.attrs.get("units", "1")
-    return re.sub(r" (s|[num]?m)-1$", r"/\1", str(units))
+    first, *others = (
+        re.sub(r" (s|[num]?m)-1$", r"/\1", each) for each in factors(units_and_scale(values.attrs))
+    )
+    return "/".join([first, *(f"({each})" if "/" in each else each for each in others)])
 
 
 def with_units(along: xr.DataArray) -> str:
@@ -189,8 +192,9 @@ def in_short(dataset: xr.Dataset) -> list[str]:
         ends = " to ".join(map(short, dict.fromkeys((*told[:1], *told[-1:]))))
         text = f"{ends}{f' {units}' * (units != '1')}" if ends else "no number"
         lines.append(f"{values.name}: {text}")
-    slopes = {slope: converted[slope].values.ravel().tolist() for slope in _slopes(converted)}
-    lines += [f"{slope}: {listed(values, ', ')}" for slope, values in slopes.items()]
+    for slope in _slopes(converted):
+        slopes, units = converted[slope].values.ravel().tolist(), units_of(converted[slope])
+        lines.append(f"{slope}: {listed(slopes, ', ')}{f' {units}' * (units != '1')}")
     return [*lines, tally(dataset)]
 
 
@@ -245,10 +249,13 @@ def _slopes(dataset: xr.Dataset) -> list[str]:
 
 def _slope(dataset: xr.Dataset, name: str) -> Table:
     dims, words = dataset[name].dims, dataset[name].attrs.get("comment", name)
-    columns: Columns = {with_units(dataset[name]): (name, short)}
+    units = units_of(dataset[name])
+    columns: Columns = {f"{name} ({units})" if units != "1" else name: (name, short)}
     for end, (heading, form) in _OF_SLOPES.items():
-        if f"{name}_{end}" in dataset:
-            columns[heading] = f"{name}_{end}", f"{{:{form}}}".format
+        if (beside := f"{name}_{end}") in dataset:
+            if end != "points" and (own := units_of(dataset[beside])) != units:
+                heading += f" ({own})"
+            columns[heading] = beside, f"{{:{form}}}".format
     return Table(rows(dataset, dims, columns), words, {with_units(dataset[d]) for d in dims})
 
 

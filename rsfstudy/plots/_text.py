@@ -125,7 +125,7 @@ def label(about: Quantity, width: int = 45) -> str:
 
 def with_powers(units: str) -> str:
     """Units as figures write them."""
-    powers = re.sub(r"\b([a-zA-Z]+)(-?\d)\b", r"\1$^{\2}$", units)
+    powers = re.sub(r"(\b[a-zA-Z]+|\))(-?\d)\b", r"\1$^{\2}$", units)
     return pretty(re.sub(r"\bum\b", r"$\\mu$m", powers))
 
 

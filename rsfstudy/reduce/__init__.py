@@ -17,7 +17,6 @@ from rsfstudy.reduce.base import (
     carried,
     failed,
     known,
-    stated_by,
     without_failures,
     worst,
 )
@@ -26,6 +25,7 @@ from rsfstudy.reduce.comparisons import Difference, OverClosedForm, Range, Relat
 from rsfstudy.reduce.fits import DecadeFit, LinearFit, ProportionalFit
 from rsfstudy.reduce.samples import Logarithm, Mean, Quantile, StandardDeviation, StatusShares
 from rsfstudy.reduce.sobol_indices import SobolIndices
+from rsfstudy.reduce.units import described
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import coverage, quantity
 
@@ -77,15 +77,13 @@ def reduced(
         support = known(support, reduction.of, own)
         made = carried(reduction, support, reduction(support))
         stated = {q.name: q for q in reduction.quantities}
+        quantities = described(reduction, dataset, made)
         _check_new(reduction, made, dataset)
         for name, values in made.data_vars.items():
             drawn[str(name)] = worst(reduction.draws_on(support["status"]), values.dims)
             if bool(failed(drawn[str(name)]).any()):
                 values.attrs.setdefault("refused", "cells it draws on failed or are missing")
-            about = _about(quantity(str(name), stated_by(dataset) | stated), values)
-            if (measured := values.attrs.get("measured_as")) is not None:
-                theirs = dataset[measured].attrs
-                about |= {key: theirs[key] for key in ("units", "scale") if key in theirs}
+            about = _about(quantity(str(name), quantities), values)
             if str(name) in stated and stated[str(name)].symbol:
                 about["symbol"] = stated[str(name)].symbol
             if beside := [n for end in _BESIDE if (n := f"{name}_{end}") in made]:
@@ -102,7 +100,7 @@ def reduced(
 def _about(about: Quantity, values: xr.DataArray) -> dict[str, str]:
     """Attributes of a result: those of its quantity, and those that its reduction sets."""
     own = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
-    scale = {"scale": about.scale} if about.scale and about.units == "1" else {}
+    scale = {"scale": about.scale} if about.scale else {}
     kind = {"coverage_content_type": coverage(about.name)}
     return {"long_name": about.long_name, "units": about.units, **scale, **kind, **own}
 

@@ -20,6 +20,9 @@ Data = TypeVar("Data", xr.Dataset, xr.DataArray)
 #: Derivatives of a result by cells, each with the place of those on some dimensions.
 Derivatives = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
 
+#: Fields that name what a result is measured in units of, by the end of its name.
+Fields = Mapping[str, Sequence[str]]
+
 #: How a result comes by its error, for the attributes of that.
 COMMENT = "errors of the cells it draws on, each times the derivative by it, in absolute value"
 #: Rounding error by which a coordinate value may miss a range and still count as in it.
@@ -48,6 +51,9 @@ class Reduction:
     #: Long names of its results that are pure numbers, by what follows `name` in theirs; "{name}"
     #: in them is `name` in words.
     long_names: ClassVar[Mapping[str, str]] = {}
+    #: What its results are in units of, by what follows `name` in theirs: a field that names a
+    #: variable, such as `of`, or a first over others. All others are pure numbers.
+    measured_in: ClassVar[Fields] = {}
     #: Whether it tells of cells that failed, which all others refuse to draw on.
     of_failures: ClassVar[bool] = False
 
@@ -77,6 +83,11 @@ class Reduction:
         comes with it; along dimensions that the result does not have, by each of the cells.
         """
         return ()
+
+    @property
+    def dimensionless(self) -> bool:
+        """Whether it is about numbers without dimension, so that its results have no scale."""
+        return False
 
     @property
     def quantities(self) -> Sequence[Quantity]:
@@ -160,8 +171,8 @@ def within(dataset: Data, on: str, span: tuple[float, float] | None) -> Data:
 
 
 def stated_by(dataset: xr.Dataset) -> dict[str, Quantity]:
-    """Quantities that a dataset states for variables that the vocabulary does not hold, or holds
-    in other units.
+    """Quantities that a dataset states for variables that the vocabulary does not hold, or calls
+    something else, or holds in other units.
     """
     return {
         str(name): Quantity(
@@ -178,7 +189,9 @@ def stated_by(dataset: xr.Dataset) -> dict[str, Quantity]:
 
 def _is_known(name: str, attrs: Mapping[Any, Any]) -> bool:
     about = QUANTITIES.get(name)
-    return about is not None and attrs.get("units", about.units) == about.units
+    if about is None or attrs["long_name"] != about.long_name:
+        return False
+    return bool(attrs.get("units", about.units) == about.units)
 
 
 # ---- numerical errors ----------------------------------------------------------------------------
@@ -215,7 +228,7 @@ def carried(reduction: Reduction, dataset: xr.Dataset, made: xr.Dataset) -> xr.D
     if not parts:
         return made
     error = sum(parts[1:], start=parts[0]).where(result.notnull()).transpose(*result.dims)
-    about = {key: result.attrs[key] for key in ("refused", "measured_as") if key in result.attrs}
+    about = {key: result.attrs[key] for key in ("refused",) if key in result.attrs}
     comment = COMMENT
     if name in made:
         error, comment = error + made[name], f"{made[name].attrs['comment']}; and {COMMENT}"

@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, refused
+from rsfstudy.reduce.base import Derivatives, Fields, Reduction, dimension_of, refused
 
 #: Change of ln(value) by which derivatives of an interpolant are taken.
 _STEP = 1e-6
@@ -43,6 +43,7 @@ class Boundary(Reduction):
     on: str = ""
     level: float = 0.5
     kind: ClassVar[str] = "boundary"
+    measured_in: ClassVar[Fields] = {"": ("on",)}
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Bracket the boundary along the dimension of `on`, for each point of the others.
@@ -130,6 +131,7 @@ class Inverse(Reduction):
     uncertainty: float | Mapping[str, float] = 0.0
     along: str = ""
     kind: ClassVar[str] = "inverse"
+    measured_in: ClassVar[Fields] = {"": ("on",)}
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Interpolate along the dimension of `on`; NaN where the level is out of reach.

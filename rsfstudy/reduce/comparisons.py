@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, refused, within
+from rsfstudy.reduce.base import Derivatives, Fields, Reduction, dimension_of, refused, within
 from rsfstudy.slider.closed_forms import FORMS
 
 Pair = tuple[xr.DataArray, xr.DataArray]
@@ -34,6 +34,7 @@ class Difference(Reduction):
     along: str = ""
     reference: str | float = ""
     kind: ClassVar[str] = "difference"
+    measured_in: ClassVar[Fields] = {"": ("of",)}
     formula: ClassVar[str] = "{of} less {reference}"
 
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
@@ -74,6 +75,7 @@ class RelativeDifference(Difference):
     """Difference of a variable below its value at a reference point: ``1 - of/of_reference``."""
 
     kind: ClassVar[str] = "relative_difference"
+    measured_in: ClassVar[Fields] = {}
     formula: ClassVar[str] = "1 - {of} over {reference}"
 
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
@@ -104,6 +106,7 @@ class Range(Reduction):
     over: str = ""
     within: tuple[float, float] | None = None
     kind: ClassVar[str] = "range"
+    measured_in: ClassVar[Fields] = {"": ("of",)}
 
     def draws_on(self, status: xr.DataArray) -> xr.DataArray:
         """The points in range."""
@@ -119,7 +122,7 @@ class Range(Reduction):
         found = (of.max(dimension) - of.min(dimension)).where(known)
         span = "" if self.within is None else " from {:g} to {:g}".format(*self.within)
         note = f"largest less least {self.of} over {self.over}{span}"
-        return xr.Dataset({self.name: found.assign_attrs(comment=note, measured_as=self.of)})
+        return xr.Dataset({self.name: found.assign_attrs(comment=note)})
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """1 by the cell that, within its error, may be the largest, -1 by that which may be the
@@ -154,6 +157,7 @@ class OverClosedForm(Reduction):
 
     form: str = ""
     kind: ClassVar[str] = "over_closed_form"
+    measured_in: ClassVar[Fields] = {"_closed_form": ("of",)}
 
     def __post_init__(self) -> None:
         if self.form not in FORMS:

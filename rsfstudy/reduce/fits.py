@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.reduce.base import Derivatives, Reduction, dimension_of, refused, within
+from rsfstudy.reduce.base import Derivatives, Fields, Reduction, dimension_of, refused, within
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class LinearFit(Reduction):
     unknowns: ClassVar[int] = 2
     law: ClassVar[str] = "{of} = constant + {name} * {on}"
     kind: ClassVar[str] = "linear_fit"
+    measured_in: ClassVar[Fields] = {"": ("of", "on"), "_misfit": ("of",)}
 
     def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """Values as they enter a fit through the origin: less their mean, which takes care of the
@@ -110,13 +111,18 @@ class LinearFit(Reduction):
 @dataclass(frozen=True)
 class ProportionalFit(LinearFit):
     """Least squares of ``of - minus = name * on``, without intercept; `minus` is the value of `of`
-    at the origin.
+    at the origin. With one, as in V0/V_* - 1, the law is of numbers without dimension.
     """
 
     minus: float = 0.0
     unknowns: ClassVar[int] = 1
     kind: ClassVar[str] = "proportional_fit"
     law: ClassVar[str] = "{of} = {minus:g} + {name} * {on}"
+
+    @property
+    def dimensionless(self) -> bool:
+        """True with a value at the origin."""
+        return self.minus != 0.0
 
     def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """As they are: the line goes through the origin."""
@@ -134,6 +140,7 @@ class DecadeFit(LinearFit):
     """
 
     kind: ClassVar[str] = "decade_fit"
+    measured_in: ClassVar[Fields] = {"": ("of",)}
     law: ClassVar[str] = "{of} = constant + {name} * log10({on})"
 
     def abscissa(self, on: xr.DataArray) -> xr.DataArray:

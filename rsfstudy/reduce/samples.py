@@ -19,11 +19,9 @@ import xarray as xr
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
-from rsfstudy.reduce.base import Derivatives, Reduction, refused
+from rsfstudy.reduce.base import Derivatives, Fields, Reduction, refused
+from rsfstudy.reduce.units import varied_scale
 from rsfstudy.status import Status
-
-#: Coordinates of the scales that quantities are measured in.
-_SCALES = {"sigma_*": "sigma_star", "D_c": "slip_distance", "V_*": "reference_velocity"}
 
 
 @dataclass(frozen=True)
@@ -46,6 +44,7 @@ class _Statistic(Reduction):
         "_stderr": "standard error, by sampling, of {name}",
         "_points": "samples with a number for {name}",
     }
+    measured_in: ClassVar[Fields] = {"": ("of",), "_stderr": ("of",)}
     #: What it is, in words.
     text: ClassVar[str]
 
@@ -67,14 +66,14 @@ class _Statistic(Reduction):
         of, why = _of(self, dataset), ""
         count = of.notnull().sum(self.over)
         bad = refused(dataset, self.of, self.over)
-        if varied := _varied_scale(dataset, of, self.over):
+        if varied := varied_scale(dataset, of, {self.over}):
             bad, why = xr.ones_like(bad), f"{self.of} is in units of {varied}, which varies"
         elif bool(bad.any()):
             why = "samples failed or are missing"
         elif bool((count < self.least).any()):
             why = f"needs {self.least} samples with a number"
         about = {"comment": f"{self.text} of {self.of} over {self.over}"}
-        of_results = about | {"measured_as": self.of} | ({"refused": why} if why else {})
+        of_results = about | ({"refused": why} if why else {})
         known = (count >= self.least) & ~bad
         value, stderr = (result.where(known).drop_attrs(deep=False) for result in self.values(of))
         return xr.Dataset(
@@ -182,7 +181,7 @@ class Quantile(_Statistic):
         errors = (errors + sys.float_info.epsilon * abs(of)).fillna(np.inf)
         low, high = (_between(of + sign * errors, self.over, at) for sign in (-1.0, 1.0))
         down, up = found[self.name] - low, high - found[self.name]
-        error = xr.where(down > up, down, up)
+        error = down.where(down > up, up)
         about = found[self.name].attrs | {"comment": "by quantiles of values less and plus errors"}
         error = error.where(abs(error) < np.inf).assign_attrs(about)
         return found.assign({f"{self.name}_error": error})
@@ -270,12 +269,3 @@ def _of(reduction: _Statistic | StatusShares, dataset: xr.Dataset) -> xr.DataArr
         rule = f"is no dimension of {reduction.of}"
         raise InvalidValue("over", reduction.over, rule, choices=map(str, of.dims))
     return of
-
-
-def _varied_scale(dataset: xr.Dataset, of: xr.DataArray, over: str) -> str:
-    """A scale that a variable is measured in and that is not the same for all samples."""
-    scale = of.attrs.get("scale", "")
-    varied = (
-        s for s, name in _SCALES.items() if name in dataset.coords and over in dataset[name].dims
-    )
-    return next((symbol for symbol in varied if symbol in scale), "")

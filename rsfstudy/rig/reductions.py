@@ -11,7 +11,7 @@ import xarray as xr
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Derivatives, Reduction
-from rsfstudy.rig.scales import scales_of
+from rsfstudy.rig.scales import scale_of, scales_of
 from rsfstudy.rig.units import factor
 
 
@@ -45,8 +45,7 @@ class InUnits(Reduction):
         return [(self._size(dataset) * xr.ones_like(dataset[self.of]), {})]
 
     def _size(self, dataset: xr.Dataset) -> xr.DataArray:
-        scale, known = dataset[self.of].attrs.get("scale", ""), scales_of(dataset)
-        if scale not in known:
+        scale = scale_of(dataset[self.of], scales_of(dataset))
+        if scale is None:
             raise InvalidValue("of", self.of, "is a pure number, in no units of a rig")
-        size = known[scale].factor / float(factor(self.name, self.units, known[scale].units))
-        return xr.DataArray(size)
+        return xr.DataArray(scale.factor / float(factor(self.name, self.units, scale.units)))

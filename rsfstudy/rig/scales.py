@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.quantity import factors, quotient
 from rsfstudy.rig.units import factor
 
 #: What ratios of the slider are, once they are in other units. Scenes have another `normal_stress`.
@@ -155,6 +156,19 @@ def _range(factor: float | xr.Variable) -> str:
     return " to ".join(f"{end:g}" for end in ends)
 
 
+def scale_of(values: xr.DataArray | xr.Variable, by: Mapping[str, Scale]) -> Scale | None:
+    """What 1 of a variable is, in its units: of ``D_c/V_* (V_*)-1``, that of the first over that of
+    the other; None of what says no scale, or one that is not known.
+    """
+    named = factors(values.attrs.get("scale", ""))
+    if not {*named} <= {*by, "1"} or named == ["1"]:
+        return None
+    first, *others = (Scale(1.0, "1") if each == "1" else by[each] for each in named)
+    beside = factors(values.attrs.get("units", "1"))[1:]
+    size = first.factor / math.prod(each.factor for each in others)
+    return Scale(size, quotient([first.units, *(each.units for each in others), *beside]))
+
+
 def in_units_of_rig(dataset: xr.Dataset) -> xr.Dataset:
     """Results of a rig as tables and figures show them, in MPa, um and s; others as they are."""
     if "sigma_star" not in dataset.variables or SCALES in dataset.attrs:
@@ -187,13 +201,12 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
     dataset = dataset.drop_vars(beside)
     result = dataset.copy()
     logarithms = [n for n in map(str, dataset.variables) if _LOGARITHM.fullmatch(n)]
-    measured = [n for n, v in dataset.variables.items() if v.attrs.get("scale", "") in by]
-    if not measured:
+    sizes = {n: scale for n, v in dataset.variables.items() if (scale := scale_of(v, by))}
+    if not sizes:
         text = "nothing in the dataset says its scale: it is in other units already, or not ours"
         raise DataError(text)
-    for name in measured:
+    for name, scale in sizes.items():
         values = dataset[name].variable.to_base_variable()
-        scale = by[values.attrs["scale"]]
         converted = values * scale.factor if np.any(values) else values  # 0 has no dimensions
         if name in dataset.dims and converted.dims != (name,):
             other = next(dim for dim in converted.dims if dim != name)
@@ -209,7 +222,7 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
         result[name] = one.dims, one.values, words
     for name in logarithms:
         result = result.assign(_slip_rate(dataset, name, by["V_*"]))
-    new = {str(name): renamed(str(name)) for name in measured}
+    new = {str(name): renamed(str(name)) for name in sizes}
     result = result.rename({old: name for old, name in new.items() if name != old})
     for variable in result.variables.values():
         named = str(variable.attrs.get("ancillary_variables", "")).split()
