@@ -106,11 +106,8 @@ def quotient(units: Sequence[str]) -> str:
     """Units, or scales, of a first quantity over others, as in ``s (um s-1)-1``; `factors` are the
     single ones again.
     """
-    found = "1"
-    for number, each in enumerate(units):
-        if number == 0 or each != "1":
-            found = each if number == 0 else "1" if found == each else f"{found} ({each})-1"
-    return found
+    first, *others = units
+    return first + "".join(f" ({each})-1" for each in others if each != "1")
 
 
 def factors(units: str) -> list[str]:
@@ -120,7 +117,7 @@ def factors(units: str) -> list[str]:
 
 def units_and_scale(attributes: Mapping[Any, Any]) -> str:
     """What the numbers of a variable are in: units, or what those without units are measured in."""
-    units, scale = str(attributes.get("units", "1")), str(attributes.get("scale", ""))
+    units, scale = str(attributes.get("units", "")), str(attributes.get("scale", ""))
     return quotient([scale, *factors(units)[1:]]) if scale else units
 
 

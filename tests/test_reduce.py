@@ -19,6 +19,7 @@ from rsfstudy.reduce import (
     Inverse,
     LinearFit,
     OverClosedForm,
+    PowerLaw,
     ProportionalFit,
     Range,
     RelativeDifference,
@@ -73,6 +74,22 @@ def test_a_slope_per_decade_is_that_over_the_logarithm():
     result, expected = reduced(moved, (fit,)), linregress(np.log10(X[1:]), values[1:])
     assert float(result.rate) == pytest.approx(expected.slope, rel=1e-12)
     assert int(result.rate_points) == 4
+
+
+def test_the_exponent_of_a_power_law_is_the_slope_of_its_logarithms():
+    """Exact of an exact one; and that of a `Logarithm`, to natural logarithms. What is not positive
+    has none.
+    """
+    noise = np.array([1.02, 0.97, 1.01, 1.04, 0.98])
+    fit = PowerLaw(name="n", of="critical_velocity_ratio", on="a_over_b_minus_a")
+    exact = reduced(lattice(3.0 * X**-1.25), (fit,))
+    assert float(exact.n) == pytest.approx(-1.25, rel=1e-14)
+    result, logs = reduced(lattice(X**-1.25 * noise), (fit,)), np.log(X)
+    expected = linregress(logs, -1.25 * logs + np.log(noise))
+    assert float(result.n) == pytest.approx(expected.slope, rel=1e-12)
+    assert float(result.n_stderr) == pytest.approx(expected.stderr, rel=1e-9)
+    lost = reduced(lattice([-1.0, *X[1:] ** -1.25]), (fit,))
+    assert (float(lost.n), int(lost.n_points)) == (pytest.approx(-1.25, rel=1e-14), 4)
 
 
 CHAIN = (

@@ -48,12 +48,12 @@ def to_csv(dataset: xr.Dataset, path: Path) -> None:
     for name in table if "status" in dataset else ():
         if flags := flags_of(dataset[name].attrs):
             table[name] = table[name].map(flags)
-    headed = {n: f"{n} ({_units(dataset[n]) or 1})" for n in table if table[n].dtype.kind in "iuf"}
+    headed = {
+        n: f"{n} ({units_and_scale(dataset[n].attrs) or 1})"
+        for n in table
+        if table[n].dtype.kind in "iuf"
+    }
     table.rename(columns=headed).to_csv(path, index=False)
-
-
-def _units(values: xr.DataArray) -> str:
-    return units_and_scale(values.attrs) if "units" in values.attrs else ""
 
 
 def to_mat(dataset: xr.Dataset, path: Path) -> None:
@@ -77,7 +77,7 @@ def to_mat(dataset: xr.Dataset, path: Path) -> None:
         if values.dtype.kind in "OUT":
             data[name] = np.array(values.tolist(), dtype=object)
     about = {
-        "units": {name: _units(dataset[name]) for name in data},
+        "units": {name: units_and_scale(dataset[name].attrs) for name in data},
         "dimensions": {name: " ".join(map(str, dataset[name].dims)) for name in data},
         "attributes": dataset.attrs,
     }

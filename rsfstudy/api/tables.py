@@ -18,7 +18,7 @@ from rsfstudy.compute import runner
 from rsfstudy.declare import verdicts
 from rsfstudy.declare.claims import VERDICTS
 from rsfstudy.files import contents, lattice, restore
-from rsfstudy.quantity import factors, units_and_scale
+from rsfstudy.quantity import units_and_scale
 from rsfstudy.rig.scales import in_units_of_rig, renamed
 from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import coverage, quantity
@@ -99,10 +99,8 @@ def answer(dataset: xr.Dataset) -> Table:
 
 def units_of(values: xr.DataArray) -> str:
     """The units of values, or what those without units are measured in; "1" for numbers."""
-    first, *others = (
-        re.sub(r" (s|[num]?m)-1$", r"/\1", each) for each in factors(units_and_scale(values.attrs))
-    )
-    return "/".join([first, *(f"({each})" if "/" in each else each for each in others)])
+    units = re.sub(r" (s|[num]?m)-1\b", r"/\1", units_and_scale(values.attrs) or "1")
+    return re.sub(r" \((\w+)\)-1| (\(.*?\))-1", r"/\1\2", units)
 
 
 def with_units(along: xr.DataArray) -> str:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import (
     Reduction,
     carried,
@@ -22,7 +21,7 @@ from rsfstudy.reduce.base import (
 )
 from rsfstudy.reduce.boundaries import Boundary, Inverse
 from rsfstudy.reduce.comparisons import Difference, OverClosedForm, Range, RelativeDifference
-from rsfstudy.reduce.fits import DecadeFit, LinearFit, ProportionalFit
+from rsfstudy.reduce.fits import DecadeFit, LinearFit, PowerLaw, ProportionalFit
 from rsfstudy.reduce.samples import Logarithm, Mean, Quantile, StandardDeviation, StatusShares
 from rsfstudy.reduce.sobol_indices import SobolIndices
 from rsfstudy.reduce.units import described
@@ -38,6 +37,7 @@ __all__ = [
     "Logarithm",
     "Mean",
     "OverClosedForm",
+    "PowerLaw",
     "ProportionalFit",
     "Quantile",
     "Range",
@@ -78,12 +78,16 @@ def reduced(
         made = carried(reduction, support, reduction(support))
         stated = {q.name: q for q in reduction.quantities}
         quantities = described(reduction, dataset, made)
-        _check_new(reduction, made, dataset)
         for name, values in made.data_vars.items():
+            if name in dataset:
+                rule = f"would replace {name!r} by what it makes of {reduction.of!r}"
+                raise InvalidValue("reduction", reduction.name, rule)
             drawn[str(name)] = worst(reduction.draws_on(support["status"]), values.dims)
             if bool(failed(drawn[str(name)]).any()):
                 values.attrs.setdefault("refused", "cells it draws on failed or are missing")
-            about = _about(quantity(str(name), quantities), values)
+            said = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
+            about = quantity(str(name), quantities).attributes
+            about |= {"coverage_content_type": coverage(str(name)), **said}
             if str(name) in stated and stated[str(name)].symbol:
                 about["symbol"] = stated[str(name)].symbol
             if beside := [n for end in _BESIDE if (n := f"{name}_{end}") in made]:
@@ -95,19 +99,3 @@ def reduced(
                     along = quantity(str(coordinate), stated)
                     dataset[coordinate].attrs = {"long_name": along.long_name, "units": along.units}
     return dataset.assign_attrs({f"reduced_{key}": text for key, text in despite.items()})
-
-
-def _about(about: Quantity, values: xr.DataArray) -> dict[str, str]:
-    """Attributes of a result: those of its quantity, and those that its reduction sets."""
-    own = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
-    scale = {"scale": about.scale} if about.scale else {}
-    kind = {"coverage_content_type": coverage(about.name)}
-    return {"long_name": about.long_name, "units": about.units, **scale, **kind, **own}
-
-
-def _check_new(reduction: Reduction, made: xr.Dataset, dataset: xr.Dataset) -> None:
-    """Raise InvalidValue where a reduction would replace an existing variable."""
-    for name in made.data_vars:
-        if name in dataset:
-            rule = f"would replace {name!r} by what it makes of {reduction.of!r}"
-            raise InvalidValue("reduction", reduction.name, rule)

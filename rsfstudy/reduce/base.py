@@ -85,11 +85,6 @@ class Reduction:
         return ()
 
     @property
-    def dimensionless(self) -> bool:
-        """Whether it is about numbers without dimension, so that its results have no scale."""
-        return False
-
-    @property
     def quantities(self) -> Sequence[Quantity]:
         """Names and units of its results that the vocabulary does not hold: of `long_names`."""
         words = {"name": self.name.replace("_", " ")}

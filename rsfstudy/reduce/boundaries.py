@@ -15,8 +15,6 @@ from rsfstudy.reduce.base import Derivatives, Fields, Reduction, dimension_of, r
 
 #: Change of ln(value) by which derivatives of an interpolant are taken.
 _STEP = 1e-6
-#: Error of ln(place) to which an interpolant is inverted.
-_FINE = 1e-15
 
 
 @dataclass(frozen=True)
@@ -182,11 +180,8 @@ class Inverse(Reduction):
         if not isinstance(values, Mapping):
             return xr.DataArray(float(values))
         labels = dataset[self.along]
-        return xr.DataArray(
-            [float(values.get(label, np.nan)) for label in labels.values],
-            coords={self.along: labels},
-            dims=self.along,
-        )
+        stated = [float(values.get(label, np.nan)) for label in labels.values]
+        return xr.DataArray(stated, {self.along: labels}, self.along)
 
 
 def _inverse(
@@ -247,16 +242,14 @@ def _unseen(x: np.ndarray, y: np.ndarray, level: float, fine: float) -> float:
 
 def _reaches(x: np.ndarray, y: np.ndarray, level: float) -> float:
     """Place where the interpolant through the points reaches the level; NaN unless it is one."""
-    off = y - level
-    at, before = np.flatnonzero(off == 0.0), np.flatnonzero(off[:-1] * off[1:] < 0.0)
-    if at.size + before.size != 1:
-        return np.nan
-    if at.size:
-        return float(x[at[0]])
-    # between two points it is monotone; at them it is the points, which rounding misses
-    curve, known = PchipInterpolator(x, y), dict(zip(x.tolist(), off.tolist(), strict=True))
-    bracket = x[before[0] : before[0] + 2].tolist()
-    return float(brentq(lambda place: known.get(place, curve(place) - level), *bracket, xtol=_FINE))
+    off, curve = y - level, PchipInterpolator(x, y)
+    places = x[off == 0.0].tolist()
+    # between two points it is monotone, and at them it is the points, which rounding misses
+    known = dict(zip(x.tolist(), off.tolist(), strict=True))
+    for first in np.flatnonzero(off[:-1] * off[1:] < 0.0):
+        ends = x[first : first + 2].tolist()
+        places.append(brentq(lambda x: known.get(x, curve(x) - level), *ends, xtol=1e-15))
+    return float(places[0]) if len(places) == 1 else np.nan
 
 
 def _logarithms(values: np.ndarray, on: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

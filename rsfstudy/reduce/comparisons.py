@@ -170,14 +170,9 @@ class OverClosedForm(Reduction):
             return xr.Dataset()
         exact = self._exact(dataset)
         note = f"{form.text}: {form.source}"
-        return xr.Dataset(
-            {
-                self.name: (dataset[self.of] / exact).assign_attrs(
-                    comment=f"{self.of} over {note}"
-                ),
-                f"{self.name}_closed_form": exact.assign_attrs(comment=note),
-            }
-        )
+        ratio = (dataset[self.of] / exact).assign_attrs(comment=f"{self.of} over {note}")
+        beside = {f"{self.name}_closed_form": exact.assign_attrs(comment=note)}
+        return xr.Dataset({self.name: ratio, **beside})
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """One over the closed form."""

@@ -95,9 +95,8 @@ class LinearFit(Reduction):
         # sums over arrays with another memory layout differ in the last bit
         of = of.copy(data=np.ascontiguousarray(of.values))
         x = self.abscissa(support[self.on].astype(float))
-        of = of.where(x.notnull())
-        x = self.centred(x.where(of.notnull()), dimension)
-        return x, self.centred(self.offset(of), dimension)
+        y = self.offset(of).where(x.notnull())
+        return self.centred(x.where(y.notnull()), dimension), self.centred(y, dimension)
 
     def offset(self, values: xr.DataArray) -> xr.DataArray:
         """Values less what the law holds fixed."""
@@ -111,18 +110,13 @@ class LinearFit(Reduction):
 @dataclass(frozen=True)
 class ProportionalFit(LinearFit):
     """Least squares of ``of - minus = name * on``, without intercept; `minus` is the value of `of`
-    at the origin. With one, as in V0/V_* - 1, the law is of numbers without dimension.
+    at the origin. With one, as in V0/V_* - 1, the slope is that of numbers without dimension.
     """
 
     minus: float = 0.0
     unknowns: ClassVar[int] = 1
     kind: ClassVar[str] = "proportional_fit"
     law: ClassVar[str] = "{of} = {minus:g} + {name} * {on}"
-
-    @property
-    def dimensionless(self) -> bool:
-        """True with a value at the origin."""
-        return self.minus != 0.0
 
     def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """As they are: the line goes through the origin."""
@@ -136,7 +130,8 @@ class ProportionalFit(LinearFit):
 @dataclass(frozen=True)
 class DecadeFit(LinearFit):
     """Least squares of ``of = constant + name * log10(on)``: the slope per decade. Points where
-    `on` is 0 or less are left out.
+    `on` is 0 or less are left out. Of a power law see `PowerLaw`, not this of a `Logarithm`, which
+    is natural: that slope is 2.303 times the exponent.
     """
 
     kind: ClassVar[str] = "decade_fit"
@@ -147,3 +142,24 @@ class DecadeFit(LinearFit):
         """The decimal logarithm."""
         logarithms: xr.DataArray = xr.apply_ufunc(np.log10, on.where(on > 0.0))
         return logarithms
+
+
+@dataclass(frozen=True)
+class PowerLaw(DecadeFit):
+    """Least squares of ``log10(of) = constant + name * log10(on)``: the exponent of a power law,
+    with its largest misfit in decades. Points where either is 0 or less are left out.
+    """
+
+    kind: ClassVar[str] = "power_law"
+    measured_in: ClassVar[Fields] = {}
+    law: ClassVar[str] = "log10({of}) = constant + {name} * log10({on})"
+
+    def offset(self, values: xr.DataArray) -> xr.DataArray:
+        """The decimal logarithm."""
+        return self.abscissa(values)
+
+    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+        """The weights of least squares, over ``ln(10) of``."""
+        of = within(dataset[self.of], self.on, self.within)
+        ((weights, place),) = super().derivatives(dataset)
+        return [((weights / (np.log(10.0) * of)).where(weights != 0.0, 0.0), place)]

@@ -66,23 +66,19 @@ class _Statistic(Reduction):
         of, why = _of(self, dataset), ""
         count = of.notnull().sum(self.over)
         bad = refused(dataset, self.of, self.over)
-        if varied := varied_scale(dataset, of, {self.over}):
+        if varied := varied_scale(dataset, of.attrs.get("scale", ""), {self.over}):
             bad, why = xr.ones_like(bad), f"{self.of} is in units of {varied}, which varies"
         elif bool(bad.any()):
             why = "samples failed or are missing"
         elif bool((count < self.least).any()):
             why = f"needs {self.least} samples with a number"
-        about = {"comment": f"{self.text} of {self.of} over {self.over}"}
-        of_results = about | ({"refused": why} if why else {})
-        known = (count >= self.least) & ~bad
-        value, stderr = (result.where(known).drop_attrs(deep=False) for result in self.values(of))
-        return xr.Dataset(
-            {
-                self.name: value.assign_attrs(of_results),
-                f"{self.name}_stderr": stderr.assign_attrs(of_results),
-                f"{self.name}_points": count.astype("int32").assign_attrs(about),
-            }
+        known, said = (count >= self.least) & ~bad, {"refused": why} if why else {}
+        value, stderr = (
+            result.where(known).drop_attrs(deep=False).assign_attrs(said)
+            for result in self.values(of)
         )
+        found = {"": value, "_stderr": stderr, "_points": count.astype("int32")}
+        return self.results(f"{self.text} of {self.of} over {self.over}", found)
 
 
 @dataclass(frozen=True)
@@ -182,8 +178,8 @@ class Quantile(_Statistic):
         low, high = (_between(of + sign * errors, self.over, at) for sign in (-1.0, 1.0))
         down, up = found[self.name] - low, high - found[self.name]
         error = down.where(down > up, up)
-        about = found[self.name].attrs | {"comment": "by quantiles of values less and plus errors"}
-        error = error.where(abs(error) < np.inf).assign_attrs(about)
+        note = "by quantiles of values less and plus errors"
+        error = error.where(abs(error) < np.inf).assign_attrs(comment=note)
         return found.assign({f"{self.name}_error": error})
 
 
@@ -245,7 +241,9 @@ class StatusShares(Reduction):
 
 @dataclass(frozen=True)
 class Logarithm(Reduction):
-    """Natural logarithm of a variable, in each cell where that is positive."""
+    """Natural logarithm of a variable, in each cell where that is positive. Slopes of it over
+    natural logarithms are exponents; see `PowerLaw`.
+    """
 
     kind: ClassVar[str] = "logarithm"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Sequence
+from collections.abc import Collection, Hashable
 from dataclasses import replace
 
 import xarray as xr
@@ -20,19 +20,22 @@ def described(reduction: Reduction, dataset: xr.Dataset, made: xr.Dataset) -> di
 
     A result is what the reduction says in `quantities`, in units and scale of what it draws on
     (`measured_in`); all others are pure numbers. The vocabulary has words for those of the same
-    units and scale. Where cells of several scales went into one number it has none, and its comment
-    says so.
+    units and scale. What was made of cells of several scales has none, and its comment says so.
     """
     stated = {q.name: q for q in reduction.quantities}
-    found = stated_by(dataset) | stated
-    ends: dict[str, Sequence[str]] = {} if reduction.name in stated else {"": ()}
-    for end, of in (ends | dict(reduction.measured_in)).items():
+    found, of = stated_by(dataset) | stated, dataset[reduction.of]
+    for end, fields in {"": (), **reduction.measured_in}.items():
         name = f"{reduction.name}{end}"
-        if name not in made:
+        if name not in made or (name in stated and not fields):
             continue
-        units, scale, why = _measured(reduction, of, dataset, made[name])
-        if why:
-            made[name].attrs["comment"] = f"{made[name].attrs['comment']}; {why}"
+        drawn = [dataset[getattr(reduction, field)].attrs for field in fields] or [{}]
+        units, scale = (quotient([a.get(key) or "1" for a in drawn]) for key in ("units", "scale"))
+        across = {*of.dims} - {*made[name].dims} | {vars(reduction).get("along")}
+        if varied := varied_scale(dataset, f"{of.attrs.get('scale')} {scale}", across):
+            why = f"; of cells in units of {varied}, which varies"
+            made[name].attrs["comment"] = made[name].attrs.get("comment", "") + why
+        # a law that holds a number is one of numbers without dimension
+        scale = "" if varied or scale == "1" or vars(reduction).get("minus") else scale
         about = quantity(name, found)
         if not end and name not in stated and (about.units, about.scale) != (units, scale):
             about = Quantity(name, "", units, name.replace("_", " "))  # it is another's name
@@ -40,30 +43,7 @@ def described(reduction: Reduction, dataset: xr.Dataset, made: xr.Dataset) -> di
     return found
 
 
-def _measured(
-    reduction: Reduction, of: Sequence[str], dataset: xr.Dataset, result: xr.DataArray
-) -> tuple[str, str, str]:
-    """Units and scale of a result, and why it has no scale though what it is made of has."""
-    units, scales = [], []
-    for field in of:
-        values = dataset[getattr(reduction, field)]
-        units.append(values.attrs.get("units") or "1")
-        scales.append(values.attrs.get("scale") or "1")
-        across = {*values.dims} - {*result.dims}
-        if field == "of":
-            across |= {vars(reduction).get("along", "")}
-        if varied := varied_scale(dataset, values, across):
-            return quotient(units), "", f"{values.name} is in units of {varied}, which varies"
-    scale = "1" if reduction.dimensionless else quotient(scales)
-    return quotient(units), "" if scale == "1" else scale, ""
-
-
-def varied_scale(dataset: xr.Dataset, of: xr.DataArray, across: Collection[Hashable]) -> str:
-    """A scale that a variable is measured in and that varies across some dimensions."""
-    scale = of.attrs.get("scale", "")
-    varied = (
-        symbol
-        for symbol, name in _SCALES.items()
-        if name in dataset.coords and {*across} & {*dataset[name].dims}
-    )
-    return next((symbol for symbol in varied if symbol in scale), "")
+def varied_scale(dataset: xr.Dataset, scale: str, across: Collection[Hashable]) -> str:
+    """What of a scale varies across some dimensions."""
+    held = {part: dataset[n].dims for part, n in _SCALES.items() if n in dataset.coords}
+    return next((part for part, d in held.items() if part in scale and {*across} & {*d}), "")

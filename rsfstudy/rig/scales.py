@@ -161,9 +161,10 @@ def scale_of(values: xr.DataArray | xr.Variable, by: Mapping[str, Scale]) -> Sca
     the other; None of what says no scale, or one that is not known.
     """
     named = factors(values.attrs.get("scale", ""))
-    if not {*named} <= {*by, "1"} or named == ["1"]:
+    known = {"1": Scale(1.0, "1"), **by}
+    if not {*named} <= {*known}:
         return None
-    first, *others = (Scale(1.0, "1") if each == "1" else by[each] for each in named)
+    first, *others = (known[each] for each in named)
     beside = factors(values.attrs.get("units", "1"))[1:]
     size = first.factor / math.prod(each.factor for each in others)
     return Scale(size, quotient([first.units, *(each.units for each in others), *beside]))

@@ -1,0 +1,162 @@
+"""What is made of a lattice is in units of what it is made of, whatever it is called."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from running import run, study_of
+
+from rsfstudy import Laboratory
+from rsfstudy.api import tables
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.reduce import (
+    Boundary,
+    DecadeFit,
+    Difference,
+    Inverse,
+    LinearFit,
+    Mean,
+    OverClosedForm,
+    PowerLaw,
+    ProportionalFit,
+    Quantile,
+    Range,
+    RelativeDifference,
+    StandardDeviation,
+    reduced,
+)
+from rsfstudy.reduce.base import stated_by
+from rsfstudy.rig.reductions import InUnits
+from rsfstudy.rig.scales import in_units_of_rig
+
+X = np.geomspace(1.0, 30.0, 12)
+
+
+def lattice(**scales) -> xr.Dataset:
+    """Times in D_c/V_* of a rig of 5 MPa, 10 um and 2 um/s, unless stated otherwise: along a length
+    in D_c, a velocity in um/s, and a number.
+    """
+    random = np.random.default_rng(12)
+    times = 40.0 * X**-0.9 * random.uniform(0.95, 1.05, (2, X.size))
+    return xr.Dataset(
+        {
+            "time_to": (("law", "x"), times, {"units": "1", "scale": "D_c/V_*"}),
+            "time_to_error": (("law", "x"), 1e-6 * times, {"units": "1", "scale": "D_c/V_*"}),
+            "above": (("law", "x"), np.tile(1.0 * (X > 5.0), (2, 1)), {"units": "1"}),
+            "falling": (("law", "x"), 1.0 / np.stack([X, X + 1.0]), {"units": "1"}),
+            "status": (("law", "x"), np.zeros((2, X.size), np.int8)),
+        },
+        coords={
+            "law": ["slip", "slowness"],
+            "b_over_a": 2.0,
+            "number": ("x", X, {"units": "1"}),
+            "length": ("x", 3.0 * X, {"units": "1", "scale": "D_c"}),
+            "speed": ("x", 7.0 * X, {"units": "um/s"}),
+            "sigma_star": scales.get("sigma_star", ((), 5.0, {"units": "MPa"})),
+            "slip_distance": scales.get("slip_distance", ((), 1e-5, {"units": "m"})),
+            "reference_velocity": ((), 2e-6, {"units": "m s-1"}),
+            "reference_rate": scales.get("reference_rate", ((), 0.2, {"units": "s-1"})),
+        },
+    )
+
+
+OF, ALONG = "time_to", {"along": "law", "reference": "slip"}
+#: Each with the units that it has on a rig: named as if it were another, or by what it is.
+KINDS = {
+    LinearFit("static_slope", OF, on="number"): "s",
+    LinearFit("zeta", OF, on="length"): "s (um)-1",
+    LinearFit("per_speed", OF, on="speed"): "s (um/s)-1",
+    LinearFit("rise", "falling", on="length"): "1 (um)-1",
+    ProportionalFit("displacement_slope", OF, on="number"): "s",
+    DecadeFit("per_decade", OF, on="speed"): "s",
+    PowerLaw("exponent", OF, on="speed"): "1",
+    Difference("lowering", OF, **ALONG): "s",
+    RelativeDifference("separation", OF, **ALONG): "1",
+    Range("span", OF, over="x"): "s",
+    Mean("mean", OF, over="x"): "s",
+    StandardDeviation("sd", OF, over="x"): "s",
+    Quantile("median", OF, over="x"): "s",
+    Boundary("lattice_boundary", "above", on="length"): "um",
+    Boundary("edge", "above", on="speed"): "um/s",
+    Inverse("reached", "falling", on="length", levels=0.1): "um",
+    Difference("steeper", "zeta", **ALONG): "s (um)-1",
+    OverClosedForm("ratio", "above", form="displacement_step"): "1",
+}
+
+
+def test_what_is_made_of_a_lattice_in_units_is_that_of_numbers_in_units():
+    """To rounding: each kind is homogeneous in its variable and its coordinate. So are the errors
+    and misfits that come with it.
+    """
+    made, dataset = reduced(lattice(), tuple(KINDS)), lattice().assign_coords(a=0.01)
+    ours, theirs = in_units_of_rig(made), reduced(in_units_of_rig(dataset), tuple(KINDS))
+    assert {r.name: ours[r.name].attrs["units"] for r in KINDS} == {
+        r.name: units for r, units in KINDS.items()
+    }
+    for name in set(theirs) - set(dataset):
+        assert ours[name].attrs["units"] == theirs[name].attrs["units"], name
+        np.testing.assert_allclose(ours[name], theirs[name], rtol=1e-10, err_msg=str(name))
+    # the names of others do not lend their words
+    assert made["static_slope"].attrs["long_name"] == "static slope"
+    assert stated_by(made)["static_slope"].scale == "D_c/V_*"
+    assert ours["zeta_misfit"].attrs["units"] == "s"
+
+
+def test_a_slope_is_told_in_units_of_the_rig_beside_its_name():
+    with_units = (InUnits("slope_in_min", "static_slope", units="min"),)
+    made = reduced(lattice(), (LinearFit("static_slope", OF, on="number"), *with_units))
+    expected = made["static_slope"] * 5.0 / 60.0  # D_c/V_* is 5 s
+    np.testing.assert_allclose(made["slope_in_min"], expected, rtol=1e-14)
+
+
+def test_a_law_that_holds_a_number_stays_one_of_numbers():
+    """As V_0/V_* = 1 + zeta a/(b - a)."""
+    made = reduced(lattice(), (ProportionalFit("zeta", OF, on="number", minus=1.0),))
+    assert "scale" not in made["zeta"].attrs | made["zeta_misfit"].attrs
+    np.testing.assert_array_equal(in_units_of_rig(made)["zeta"], made["zeta"])
+
+
+@pytest.mark.parametrize(
+    ("kind", "across"),
+    [
+        (Difference("r", OF, along="law", reference="slip"), "law"),
+        (RelativeDifference("r", OF, along="law", reference="slip"), "law"),
+        (LinearFit("r", OF, on="number"), "x"),
+        (Range("r", OF, over="x"), "x"),
+    ],
+    ids=lambda value: getattr(value, "kind", value),
+)
+def test_cells_of_several_scales_make_a_number_that_says_so(kind, across):
+    sizes = np.linspace(1e-5, 2e-5, {"law": 2, "x": X.size}[across])
+    scales = {
+        "slip_distance": (across, sizes, {"units": "m"}),
+        "reference_rate": (across, 2e-6 / sizes, {"units": "s-1"}),
+    }
+    made = reduced(lattice(**scales), (kind,))
+    assert "scale" not in made["r"].attrs
+    assert made["r"].attrs["comment"].endswith("; of cells in units of D_c, which varies")
+    np.testing.assert_array_equal(in_units_of_rig(made)["r"], made["r"])
+    # along the other dimension each result has one scale
+    other = {"law": "x", "x": "law"}[across]
+    kept = Range("r", OF, over=other) if other == "x" else Difference("r", OF, "law", "slip")
+    assert reduced(lattice(**scales), (kept,))["r"].attrs["scale"] == "D_c/V_*"
+
+
+def test_tables_tell_them():
+    rig = Laboratory(
+        normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s",
+        stiffness="0.01 MPa/um",
+    )  # fmt: skip
+    fields = {"law": "slip", "normal_stress": "variable", "alpha": 0.5, "a": 0.01, "b_over_a": 1.4}
+    fits = (
+        LinearFit("static_slope", "critical_stiffness", on="load_velocity_ratio"),
+        DecadeFit("per_decade", "critical_stiffness", on="load_velocity_ratio"),
+    )
+    axis, base = rig.axis("load_velocity", "1:100:3:log um/s"), rig.scene(**fields)
+    of_rig = run(
+        study_of("of", LinearStability(), axis, base=base, laboratory=rig, reductions=fits)
+    )
+    slope, decade = (list(table.rows[0]) for table in tables.reductions(of_rig))
+    assert slope[0] == "static_slope (MPa/um/(um/s))"
+    assert slope[2] == "largest misfit (MPa/um)"
+    assert decade[:2] == ["per_decade (MPa/um)", "standard error"]
+    assert any(line.endswith(" MPa/um") for line in tables.in_short(of_rig))
