@@ -33,5 +33,5 @@ SCENES = {
 CALLS = {
     "Elasticities": 'Elasticities(LimitCycle(), parameters=("a", "b_over_a"))',
     "Fit": 'Fit(records=(record,), free=("a", "b", "slip_distance"), step=1)',
-    "Range": 'Range(name="range_of_a", of="a", over="part")',
+    "PowerLaw": 'PowerLaw(name="exponent", of="recurrence_interval", on="load_velocity_ratio")',
 }
