@@ -43,6 +43,7 @@ class Reduction:
     what carries numerical errors of cells over to ``<name>_error``::
 
         long_names: ClassVar[Mapping[str, str]]
+        measured_in: ClassVar[Mapping[str, Sequence[str]]]
         derivatives(self, dataset) -> Sequence[tuple[xarray.DataArray, Mapping]]
     """
 
@@ -51,8 +52,8 @@ class Reduction:
     #: Long names of its results that are pure numbers, by what follows `name` in theirs; "{name}"
     #: in them is `name` in words.
     long_names: ClassVar[Mapping[str, str]] = {}
-    #: What its results are in units of, by what follows `name` in theirs: a field that names a
-    #: variable, such as `of`, or a first over others. All others are pure numbers.
+    #: What its results are in units of, by what follows `name` in theirs: the variable that a field
+    #: names, as `("of",)`, or over that of others, as `("of", "on")`. All others are pure numbers.
     measured_in: ClassVar[Fields] = {}
     #: Whether it tells of cells that failed, which all others refuse to draw on.
     of_failures: ClassVar[bool] = False

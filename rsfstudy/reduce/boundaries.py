@@ -207,7 +207,7 @@ def _moved(values: np.ndarray, on: np.ndarray, level: float) -> np.ndarray:
         return slopes
     # each value moved in turn: the interpolant is smooth in them, but for kinks
     moved = PchipInterpolator(x, y + _STEP * np.eye(x.size), axis=1)(fine)
-    rise = float(PchipInterpolator(x, y)(fine, 1))
+    rise = float(PchipInterpolator(x, y)(fine, 1)) or np.nan  # at a flat end errors have no bound
     slopes[places] = (moved - np.log(level)) / _STEP / rise * np.exp(fine) / values[places]
     return slopes
 
