@@ -221,6 +221,40 @@ def test_other_units_and_other_quantities_are_converted(tmp_path):
     assert "1 problem of 24, 1" in ran.stdout
 
 
+@pytest.mark.parametrize("number", [15, 16, 17, 18])
+def test_shear_stress_tells_friction_where_normal_stress_changes(number, tmp_path):
+    """Normal stress as the files of the problems state it; 11 digits, for it and friction are
+    rounded to 12.
+    """
+    problem, told = of(number), told_by_second_way(number)
+    time, sigma = told["time"], problem.rig.normal_stress
+    sigma = {
+        15: np.where(time < 10.0, 1.0, 1.05) * sigma,
+        16: sigma + 1e5 * np.sin(2.0 * np.pi * time / 25.0),
+        17: told.get("normal_stress"),
+        18: sigma - told.get("pore_pressure", 0.0),
+    }[number]
+    header = [h.replace("friction (1)", "shear_stress (Pa)") for h in problem.header]
+    columns = [told[n] * (sigma if n == "friction" else 1.0) for n in problem.columns]
+    found = theirs.read(write(tmp_path / "mine.csv", header, columns), problem)
+    answer = known(problem, shipped()[number].with_suffix(".csv"))
+    assert verdict(*answer, found, ENOUGH).digits > 11.0
+
+
+def test_zeros_agree_in_nothing_and_overflows_are_refused(tmp_path):
+    zeros = np.zeros(len(of(1).times))
+    ran = call("verify", filed(tmp_path / "01.csv", 1, friction=zeros))
+    assert re.search(r"friction +0\.0 digits, fewest at", ran.stdout)
+    assert ran.returncode == 1
+    huge = filed(tmp_path / "01.csv", 1, slip_rate=zeros + 400.0)
+    huge.write_text(huge.read_text().replace("slip_rate (m/s)", "log10_slip_rate (1)"))
+    ran = call("verify", huge)
+    said = "line 2, column 3: log10_slip_rate = 400.0: must be a number, of 100 at most"
+    assert (ran.returncode, said in " ".join(ran.stderr.split())) == (2, True)
+    ran = call("verify", huge, "--digits", "nan")
+    assert (ran.returncode, "--digits = nan" in ran.stderr) == (2, True)
+
+
 @pytest.mark.parametrize(
     ("spoil", "error"),
     [

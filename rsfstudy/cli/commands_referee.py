@@ -25,6 +25,8 @@ def problems(given: Given) -> int:
 
 def verify(given: Given) -> int:
     """Hold files against answers; FAILED where one does not pass."""
+    if math.isnan(given.digits):  # which click finds in every range
+        raise InvalidValue("--digits", given.digits, "must be a number, from 1 to 12")
     found = [_verdict(file, given) for file in given.files]
     for file, one in zip(given.files, found, strict=True):
         _tell(file, one)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -14,13 +15,15 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Kind, maximum
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.recording import OBSERVED, STATES, Recording
 from rsfstudy.referee.problem import Problem
 from rsfstudy.slider.stability import critical_stiffness, growth_rates
 from rsfstudy.status import Status
 
 Table = dict[str, np.ndarray]
+#: What answers may cost.
+BUDGET = 5_000_000
 
 
 def answer(problem: Problem, accuracy: Accuracy) -> Table:
@@ -28,14 +31,22 @@ def answer(problem: Problem, accuracy: Accuracy) -> Table:
 
     Raises
     ------
-    Halt
-        Where the motion ends before all is told.
     RsfStudyError
-        Where a number that is asked for does not exist, or is not found.
+        Where the motion ends before all is told, or a number that is asked for does not exist, or
+        is not found.
     """
     found = {"series": _series, "peaks": _peaks, "numbers": _numbers}[problem.report]
-    told = found(problem, accuracy)
+    try:
+        told = found(problem, accuracy)
+    except Halt as halt:
+        raise RsfStudyError(f"{problem.title}: {halt.status.label} ({halt})") from halt
     return {name: told[name] for name in problem.columns}
+
+
+def normal_stress(problem: Problem) -> np.ndarray:
+    """Effective normal stress in Pa at the times of a series, to which friction refers."""
+    asked = replace(problem, quantities=["normal_stress"])
+    return answer(asked, Accuracy(1e-11, BUDGET))["normal_stress"]
 
 
 def _series(problem: Problem, accuracy: Accuracy) -> Table:

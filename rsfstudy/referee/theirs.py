@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
+from rsfstudy.referee import ours
 from rsfstudy.referee.problem import Problem
 from rsfstudy.rig.table import Column, read_table
 from rsfstudy.rig.units import in_si
@@ -19,6 +21,8 @@ _INSTEAD = {"slip_rate": ("log10_slip_rate", "1"), "friction": ("shear_stress", 
 _UNITS = dict(_INSTEAD.values())
 #: Times may differ by so much, over the last: they are written in decimals.
 _LATE = 1e-9
+#: In SI units; beyond it are overflows, whose ratios overflow too.
+_LARGEST = 1e100
 
 
 class Reported(NamedTuple):
@@ -61,16 +65,17 @@ def read(
 
 
 def _instead(name: str, problem: Problem, found: Mapping[str, Reported]) -> np.ndarray:
-    """A quantity by what is told instead: friction by the shear stress of the spring."""
+    """A quantity by what is told instead: friction by the shear stress of the spring, over normal
+    stress at the times of the problem.
+    """
     if name == "slip_rate":
         return np.asarray(10.0 ** found["log10_slip_rate"].values)
     radiated = problem.damping * found["slip_rate"].values if problem.damping else 0.0
-    return np.asarray((found["shear_stress"].values - radiated) / problem.rig.normal_stress)
+    return np.asarray((found["shear_stress"].values - radiated) / ours.normal_stress(problem))
 
 
 def _plain(key: str, column: Column, problem: Problem) -> Reported:
     """A column in SI units."""
-    column.check(key, ~np.isfinite(column.values), "must be a number")
     units = problem.units.get(key) or _UNITS[key]
     one = "1" if column.units in ("", "1") else f"1 {column.units}"
     if units != "1" and one == "1":
@@ -80,12 +85,16 @@ def _plain(key: str, column: Column, problem: Problem) -> Reported:
         factor = in_si(key, 1.0 if one == "1" else one, units)
     except InvalidValue as error:
         raise error.at(column.path) from error
+    most = math.log10(_LARGEST) if key == "log10_slip_rate" else _LARGEST / factor
+    rule = f"must be a number, of {most:g} at most"
+    column.check(key, ~(np.abs(column.values) <= most), rule)
     return Reported(column.values * factor, factor * _last_place(column.values))
 
 
 def _last_place(values: np.ndarray) -> float:
-    exponents = (Decimal(repr(x)).normalize().as_tuple().exponent for x in values.tolist())
-    return float(10.0 ** min(x for x in exponents if isinstance(x, int)))
+    """One in the last place of the numbers; 0 where none has one, and 1 of whole numbers."""
+    exponents = [Decimal(repr(x)).normalize().as_tuple().exponent for x in values.tolist() if x]
+    return float(10.0 ** min(0, *map(int, exponents))) if exponents else 0.0
 
 
 def _check_rows(column: Column, told: np.ndarray, rows: np.ndarray, problem: Problem) -> None:

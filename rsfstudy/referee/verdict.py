@@ -12,7 +12,6 @@ import numpy as np
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
-from rsfstudy.motion.meter import Halt
 from rsfstudy.referee import ours
 from rsfstudy.referee.ours import Table
 from rsfstudy.referee.problem import Problem
@@ -31,7 +30,7 @@ _FROM_ZERO = ("slip", "pore_pressure")
 #: Conventions of radiation damping, and factors of eta.
 _DAMPING = {"twice as much (G/c_s for G/(2 c_s))": 2.0, "half as much": 0.5, "left out": 0.0}
 #: Accuracies of ours where a problem has no answer yet; what candidates need.
-_TWICE, _ROUGH, _BUDGET = (1e-9, 1e-11), 1e-8, 5_000_000
+_TWICE, _ROUGH = (1e-9, 1e-11), 1e-8
 
 
 @dataclass(frozen=True)
@@ -104,12 +103,9 @@ def known(problem: Problem, path: Path | None) -> tuple[Problem, Table]:
         table = read_table(path)
         return problem, {name: column.values for name, column in table.items()}
     engine = COMPILED if is_installed(COMPILED) else SCIPY
-    try:
-        rough, fine = (
-            ours.answer(problem, Accuracy(rtol, _BUDGET, engine=engine)) for rtol in _TWICE
-        )
-    except Halt as halt:
-        raise RsfStudyError(f"{problem.title}: {halt.status.label} ({halt})") from halt
+    rough, fine = (
+        ours.answer(problem, Accuracy(rtol, ours.BUDGET, engine=engine)) for rtol in _TWICE
+    )
     both = [a.digits for a in _agreements(problem, rough, fine, 0.0)]
     return replace(problem, digits=max(1, math.floor(min(both)))), fine
 
@@ -143,7 +139,7 @@ def _agreements(
         found.append(
             Agreement(
                 name,
-                min(-math.log10(max(float(apart.max()), 1e-300)), float(problem.digits)),
+                min(max(0.0, -math.log10(max(apart.max(), 1e-300))), float(problem.digits)),
                 int(np.argmax(apart)),
                 int(few[0]) if len(few) else None,
                 bool((np.abs(theirs[name] - answer[name]) <= _ROUNDED * place).all()),
@@ -171,8 +167,8 @@ def _explained(problem: Problem, theirs: Table, answer: Table) -> Iterator[tuple
         yield min(a.digits for a in _agreements(problem, table, answer, 0.0)), words
     for words, other in _posed_otherwise(problem):
         try:
-            table = ours.answer(other, Accuracy(_ROUGH, _BUDGET))
-        except (Halt, RsfStudyError):
+            table = ours.answer(other, Accuracy(_ROUGH, ours.BUDGET))
+        except RsfStudyError:
             continue
         yield min(a.digits for a in _agreements(problem, theirs, table, 0.0)), words
 
