@@ -65,6 +65,36 @@ def test_one_column_is_named_and_the_others_are_known() -> None:
     assert "normal_stress" not in told
 
 
+@pytest.mark.parametrize(
+    ("key", "other", "one"),
+    [
+        ("displacement", "Displacement on board (um)", "LP displacement (um)"),
+        ("normal_stress", "Sigma_3 (MPa)", "Sigma_n (MPa)"),
+        ("normal_stress", "Normal stress (MPa)", "Effective normal stress (MPa)"),
+    ],
+)
+def test_headings_that_may_mean_the_same_are_refused(key: str, other: str, one: str) -> None:
+    """Unless units tell them apart, one has the very name, or the call says which."""
+    arrays = {"Time (s)": TIME, "Disp (um)": MOVED, "tau (MPa)": SHEAR, "sigma (MPa)": NORMAL}
+    del arrays["Disp (um)" if key == "displacement" else "sigma (MPa)"]
+    right = MOVED if key == "displacement" else NORMAL
+    scale = {"normal_stress": 1e6}.get(key, 1.0)
+    arrays |= {other: 2.0 * right, one: right}
+    with pytest.raises(InvalidValue, match="may be any of several columns") as refused:
+        rsfstudy.read_record(arrays)
+    assert other in str(refused.value)
+    assert f"--columns '{key}={one}'" in str(refused.value)
+    told = rsfstudy.read_record(arrays, {key: one}).columns
+    np.testing.assert_allclose(told[key], scale * right, rtol=1e-15)
+    units = one.partition(" (")[2]
+    exact = {f"{key} ({units}" if name == one else name: v for name, v in arrays.items()}
+    np.testing.assert_array_equal(rsfstudy.read_record(exact).columns[key], told[key])
+    apart = {
+        name.replace(units, "mm/s)") if name == other else name: v for name, v in arrays.items()
+    }
+    np.testing.assert_array_equal(rsfstudy.read_record(apart).columns[key], told[key])
+
+
 def test_a_table_in_memory_is_read_as_its_file(tmp_path: Path) -> None:
     headings = ["Time (min)", "LP disp (mm)", "mu"]
     path = written(tmp_path / "run.csv", headings, [TIME / 60.0, MOVED * 1e-3, FRICTION], ",")

@@ -176,13 +176,9 @@ def _completed(columns: Mapping[str, Any], headings: list[str], place: str) -> d
     if not {"friction", "shear_stress"} & set(columns):
         lacking |= {"friction", "shear_stress", "normal_stress"} - set(columns)
     wanted = dict(columns)
-    for text in headings:
-        match = HEADING.fullmatch(text)
-        for key, begins in _HEADINGS.items():
-            if match and key not in wanted and re.match(begins, match[1], re.IGNORECASE):
-                if key in lacking:
-                    wanted[key] = text
-                break
+    for key in _HEADINGS:
+        if key in lacking and not (key == "shear_stress" and "friction" in wanted):
+            wanted |= _usual(key, headings, place)
     if {"time", "displacement"} - set(wanted):
         remedy = (
             "Say which is which: --columns 'time=t (s),displacement=lp (um),friction=mu', or "
@@ -191,6 +187,30 @@ def _completed(columns: Mapping[str, Any], headings: list[str], place: str) -> d
         rule = "does not name time and displacement"
         raise InvalidValue("header", ", ".join(headings)[:200], rule, remedy=remedy).at(place)
     return wanted
+
+
+def _usual(key: str, headings: list[str], place: str) -> dict[str, str]:
+    """The column with the usual heading, if there is one: with the very name, or the only one that
+    begins as usual, and is measured in units of its kind.
+    """
+    parts = {text: match for text in headings if (match := HEADING.fullmatch(text))}
+    meant = [text for text, m in parts.items() if re.match(_HEADINGS[key], m[1], re.IGNORECASE)]
+    if len(meant) > 1:
+        meant = [text for text in meant if _is_of(key, parts[text][2] or "")] or meant
+        meant = [text for text in meant if parts[text][1] == key] or meant
+    if len(meant) > 1:
+        remedy = f"Say which, as in --columns '{key}={meant[-1]}' (columns={{'{key}': ...}})."
+        rule = "may be any of several columns"
+        raise InvalidValue("column", key, rule, choices=meant, remedy=remedy).at(place)
+    return {key: meant[0]} if meant else {}
+
+
+def _is_of(key: str, units: str) -> bool:
+    """Whether units, where they are stated, are of the kind of a column."""
+    try:
+        return _scale(key, units) > 0.0
+    except InvalidValue:
+        return False
 
 
 def _selected(key: str, told: Any, headings: Sequence[str]) -> Selected:
