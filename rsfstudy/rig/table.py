@@ -108,12 +108,25 @@ def picked(source: Any, columns: Mapping[str, Any]) -> dict[str, Column]:
         heading, units, scale, offset = selected(told, names)
         if heading not in names:
             raise InvalidValue("column", heading, "is not in the record", choices=names)
-        values = np.asarray(source[heading], dtype=float)
+        values, of_times = _floats(key, source[heading])
         if values.ndim != 1:
             raise InvalidValue(key, values.shape, "must lie along one dimension")
-        units = units or str(getattr(source[heading], "attrs", {}).get("units", ""))
+        units = of_times or units or str(getattr(source[heading], "attrs", {}).get("units", ""))
         found[key] = Column(values * scale + offset, units)
     return found
+
+
+def _floats(key: str, values: Any) -> tuple[np.ndarray, str]:
+    """Numbers of an array, NaN where it is masked, and their units if its type tells them: those of
+    times are s, from the first of dates on.
+    """
+    kind = getattr(getattr(values, "dtype", None), "kind", "")
+    if kind == "c":
+        raise InvalidValue(key, values.dtype.name, "must be real numbers")
+    if kind not in ("m", "M"):
+        return np.ma.asarray(values, dtype=float).filled(math.nan), ""
+    times = np.asarray(values, dtype=f"{'datetime' if kind == 'M' else 'timedelta'}64[ns]")
+    return (times - times[:1] if kind == "M" else times) / np.timedelta64(1, "s"), "s"
 
 
 @door
