@@ -11,6 +11,7 @@ from rsfstudy.named_studies._bifurcation import Bifurcation
 from running import run, study_of
 
 from rsfstudy import Axis, Scene, Segment, protocol, simulate
+from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
@@ -48,6 +49,23 @@ def test_protocols_are_what_their_fields_say():
     rows = [{"velocity": v, "distance": 8.0} for v in (4.0, 1.0, 4.0)]
     same_motion(stepped, Scene(**STIFF, loading=protocol(rows)), 12.0)
     assert protocol(rows).lasts == 2.0 + 8.0 + 2.0
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("begins", [0.0, 7.0])
+def test_a_segment_may_be_as_short_as_time_can_tell(engine, begins):
+    """Below that it is refused. The pulse moves the load point by 1e-11 D_c: less than rtol tells."""
+    before = [{"velocity": 1.0, "duration": begins}] if begins else []
+    after, short = {"velocity": 2.0}, max(1e-16, float(np.spacing(begins)))
+
+    def ends_with(*segments):
+        scene = Scene(**STIFF, loading=protocol([*before, *segments, after]))
+        return simulate(scene, duration=begins + 5.0, engine=engine).shear_stress[-1].item()
+
+    pulse = {"velocity": 1e4, "duration": short}
+    assert ends_with(pulse) == pytest.approx(ends_with(), abs=1e-7)
+    with pytest.raises(InvalidValue, match="must be 1e-16 D_c/V_"):
+        ends_with({**pulse, "duration": 0.4 * short})
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -15,6 +15,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.laboratory import SEGMENT, Laboratory
 from rsfstudy.rig.table import Column, picked, read_table
 from rsfstudy.slider.history import History, sampled
+from rsfstudy.slider.loading import SHORTEST
 from rsfstudy.slider.protocol import KEYS, Protocol, protocol
 
 #: What a record may hold, and the units of the slider.
@@ -83,7 +84,7 @@ def history(
         column.check(key, ~np.isfinite(column.values), "must be a finite number")
     values = {key: _plain(key, column, laboratory) for key, column in found.items()}
     time = values["time"]
-    late = np.append(False, np.diff(time) <= 0.0)
+    late = np.append(False, np.diff(time) < SHORTEST)
     found["time"].check("time", late, "must be later than the sample before")
     velocity, back = _velocity(values, found)
     fall = None

@@ -12,6 +12,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.parts import NOT_NEGATIVE, Numbers, Part, Scene, found_in, number
 
+#: Duration of a segment in D_c/V_* below which no step of an integrator is taken; from a time of 1
+#: on rounding is longer.
+SHORTEST = 1e-16
+
 
 class Segment(NamedTuple):
     """A part of a loading history.
@@ -78,7 +82,11 @@ class Loading(Part):
         return ()
 
     def check(self, scene: Scene) -> None:
-        """No fluid that changes normal stress too, unless it is its pressure that is loaded."""
+        """Segments that take time; no fluid that changes normal stress too, unless it is its
+        pressure that is loaded.
+        """
+        if len(self.segments) > 1:
+            self._check_durations()
         fluid, name = scene.parts.fluid, self.called_by
         if self.unknowns and fluid.unknowns and not self.of_pressure:
             rule = f"has no meaning for fluid={fluid.name!r}"
@@ -86,6 +94,15 @@ class Loading(Part):
             value = getattr(self, name or "name")
             remedy = "Leave one of them out."
             raise InvalidValue(name or "loading", value, rule, remedy=remedy)
+
+    def _check_durations(self) -> None:
+        for place, (begins, ends, *_others) in enumerate(self.table):
+            if ends - begins < SHORTEST and ends > 0.0:
+                lasts = self.segments[place].duration
+                rule = f"must be {SHORTEST:g} D_c/V_* at least, and more than the rounding of time"
+                remedy = "Leave out what lasts no time."
+                wrong = InvalidValue("duration", lasts, rule, remedy=remedy)
+                raise wrong.at(f"segment {place + 1}")
 
     @property
     def presses(self) -> bool:
