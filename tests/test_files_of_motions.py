@@ -74,11 +74,18 @@ def test_a_motion_that_differs_is_told(place, tmp_path):
     assert table.loc["shear_stress", "identical"] == table.loc["shear_stress", "values"]
 
 
-def test_what_cannot_be_computed_again_says_why(place):
-    with pytest.raises(DataError, match="told at times that were asked for"):
-        rsfstudy.rerun(place / "asked.nc")
-    with pytest.raises(DataError, match="no motion"):
-        rsfstudy.rerun(place / "cycle.nc")
+@pytest.mark.parametrize(
+    ("name", "why", "call"),
+    [
+        ("asked", "told at times that were asked for", "simulate(dataset.rsf.scene, times=..., "),
+        ("cycle", "Limit cycle of a spring-slider, slip law", "limit_cycle(dataset.rsf.scene, "),
+    ],
+)
+def test_what_cannot_be_computed_again_says_what_is_and_how(place, name, why, call):
+    with pytest.raises(DataError, match="motions of rsfstudy.simulate") as refused:
+        rsfstudy.rerun(place / f"{name}.nc")
+    assert f"{why})" in str(refused.value)
+    assert f"rsfstudy.{call}rtol=" in str(refused.value)
 
 
 def test_other_programs_read_what_is_exported(place, tmp_path):

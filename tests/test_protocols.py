@@ -54,7 +54,7 @@ def test_protocols_are_what_their_fields_say():
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("begins", [0.0, 7.0])
 def test_a_segment_may_be_as_short_as_time_can_tell(engine, begins):
-    """Below that it is refused. The pulse moves the load point by 1e-11 D_c: less than rtol tells."""
+    """Below that it is refused. The pulse moves the load point by 1e-11 D_c, of rtol 1e-7."""
     before = [{"velocity": 1.0, "duration": begins}] if begins else []
     after, short = {"velocity": 2.0}, max(1e-16, float(np.spacing(begins)))
 

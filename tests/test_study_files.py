@@ -52,6 +52,13 @@ def test_what_is_wrong_with_a_file_is_told(tmp_path, text, complaint):
     assert complaint in str(refused.value)
 
 
+def test_a_file_that_is_named_without_its_suffix_is_told(tmp_path, monkeypatch):
+    written(tmp_path, DECLARATION)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InvalidValue, match="There is a file mine.py here: name it mine.py"):
+        catalogue.load("mine")
+
+
 def test_a_file_may_have_helpers_beside_it_and_not_the_name_of_a_named_study(tmp_path):
     (tmp_path / "my_angles.py").write_text("angles = [55, 65]")
     helped = "from my_angles import angles\n" + DECLARATION.replace("[55, 65]", "angles")

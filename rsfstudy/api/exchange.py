@@ -103,10 +103,16 @@ def rerun(motion: xr.Dataset) -> pd.DataFrame:
         Where it is no motion, or one of which the file does not say how it was told.
     """
     about = motion.attrs
-    told = about.get("told", "")
-    if "duration" not in about or told != "as it moves":
-        why = f"told {told}" if told else "no motion, or one of before motions said their duration"
-        raise DataError(f"it is {why}: only motions that are told as they move are computed again")
+    if "duration" not in about or about.get("told") != "as it moves":
+        title, made = about.get("title", "untitled"), about.get("history", "").rpartition(" ")[2]
+        call = f"{made if made.startswith('rsfstudy.') else 'rsfstudy.simulate'}(dataset.rsf.scene"
+        if "told" in about:
+            title, call = f"{title}, told {about['told']}", f"{call}, times=..."
+        raise DataError(
+            "rerun computes again results of a study, and motions of rsfstudy.simulate (`rsfstudy "
+            f"simulate`) without times; this is of one scene ({title}). With the options that made "
+            f"it, {call}, rtol={about.get('rtol', '...')}) computes it anew."
+        )
     if SCALES in about and "laboratory" not in about:
         raise DataError(
             "it is in units of no rig: keep motions as simulate gives them, or by a rig"

@@ -151,7 +151,9 @@ def fit(
     >>> fit.rsf.table()
     """
     if "law" in scene:
-        raise InvalidValue("law", scene["law"], "are laws here", remedy="Write laws=[...].")
+        law = scene["law"]
+        remedy = f"Write laws={[law] if isinstance(law, str) else law!r}."
+        raise InvalidValue("law", law, "is given as laws, each of which is fitted", remedy=remedy)
     records: tuple[Any, ...] = (record,) if isinstance(record, Record) else tuple(record)
     for one in records:
         if not isinstance(one, Record):
