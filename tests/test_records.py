@@ -95,6 +95,23 @@ def test_headings_that_may_mean_the_same_are_refused(key: str, other: str, one: 
     np.testing.assert_array_equal(rsfstudy.read_record(apart).columns[key], told[key])
 
 
+def test_types_of_arrays_tell_what_they_are() -> None:
+    """Dates and intervals are times, to their nanosecond, and what is masked is missing."""
+    plain = {"Time (min)": TIME / 60.0, "LP (um)": MOVED, "mu": FRICTION}
+    first = pd.Timestamp("2026-03-29 01:59:59", tz="Europe/Berlin")  # clocks go on to 3 at 2
+    intervals = pd.to_timedelta(TIME, unit="s")
+    for times in (intervals, intervals.to_numpy(), first + intervals):
+        record = rsfstudy.read_record(pd.DataFrame({**plain, "Time (min)": times}))
+        np.testing.assert_allclose(record.time, TIME, atol=1e-9)
+    masked = np.ma.masked_where(np.arange(len(MOVED)) == 3, MOVED)
+    with pytest.raises(InvalidValue, match="sample 4: displacement = nan: must be a finite number"):
+        rsfstudy.read_record({**plain, "LP (um)": masked})
+    with pytest.raises(InvalidValue, match="displacement = '1 s': has units of another kind"):
+        rsfstudy.read_record({**plain, "LP (um)": intervals})
+    with pytest.raises(InvalidValue, match="friction = 'complex128': must be real numbers"):
+        rsfstudy.read_record({**plain, "mu": FRICTION + 0j})
+
+
 def test_a_table_in_memory_is_read_as_its_file(tmp_path: Path) -> None:
     headings = ["Time (min)", "LP disp (mm)", "mu"]
     path = written(tmp_path / "run.csv", headings, [TIME / 60.0, MOVED * 1e-3, FRICTION], ",")

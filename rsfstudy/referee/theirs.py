@@ -86,8 +86,7 @@ def _plain(key: str, column: Column, problem: Problem) -> Reported:
     except InvalidValue as error:
         raise error.at(column.path) from error
     most = math.log10(_LARGEST) if key == "log10_slip_rate" else _LARGEST / factor
-    rule = f"must be a number, of {most:g} at most"
-    column.check(key, ~(np.abs(column.values) <= most), rule)
+    column.check(key, ~(np.abs(column.values) <= most), f"must be a number, of {most:g} at most")
     return Reported(column.values * factor, factor * _last_place(column.values))
 
 

@@ -124,8 +124,8 @@ def _scale(key: str, units: str) -> float:
     si, ours = _UNITS[key]
     if not units:
         return {"Pa": 1e6}.get(si, 1.0)
-    if si == "1":
-        return 1.0 if units in ("1", "-") else float(factor(key, units, si))
+    if si == "1" and units in ("1", "-"):
+        return 1.0
     return float(factor(key, units, si)) * ours
 
 
@@ -195,9 +195,8 @@ def _usual(key: str, headings: list[str], place: str) -> dict[str, str]:
     """
     parts = {text: match for text in headings if (match := HEADING.fullmatch(text))}
     meant = [text for text, m in parts.items() if re.match(_HEADINGS[key], m[1], re.IGNORECASE)]
-    if len(meant) > 1:
-        meant = [text for text in meant if _is_of(key, parts[text][2] or "")] or meant
-        meant = [text for text in meant if parts[text][1] == key] or meant
+    meant = [text for text in meant if _is_of(key, parts[text][2] or "")] or meant
+    meant = [text for text in meant if parts[text][1] == key] or meant
     if len(meant) > 1:
         remedy = f"Say which, as in --columns '{key}={meant[-1]}' (columns={{'{key}': ...}})."
         rule = "may be any of several columns"

@@ -176,11 +176,10 @@ def read_table(path: str | Path, columns: Any = None) -> dict[str, Column]:
                 remedy = "Numbers have a decimal point." if len(row) > len(header) else ""
                 wrong = InvalidValue("line", between.join(row), rule, remedy=remedy)
                 raise wrong.at(f"{path}, line {n}")
-    select = columns if callable(columns) else _as_headed
     if isinstance(columns, Mapping):
         wanted = {name: selected(told, headings) for name, told in columns.items()}
     else:
-        wanted = select(headings, f"{path}, line {line}")
+        wanted = (columns or _as_headed)(headings, f"{path}, line {line}")
     found = {}
     for name, (heading, units, scale, offset) in wanted.items():
         if headings.count(heading) != 1:
