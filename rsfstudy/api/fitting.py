@@ -151,9 +151,8 @@ def fit(
     >>> fit.rsf.table()
     """
     if "law" in scene:
-        law = scene["law"]
-        remedy = f"Write laws={[law] if isinstance(law, str) else law!r}."
-        raise InvalidValue("law", law, "is given as laws, each of which is fitted", remedy=remedy)
+        remedy = f"Write laws={np.atleast_1d(scene['law']).tolist()}."
+        raise InvalidValue("law", scene["law"], "is given as laws, each fitted", remedy=remedy)
     records: tuple[Any, ...] = (record,) if isinstance(record, Record) else tuple(record)
     for one in records:
         if not isinstance(one, Record):

@@ -55,7 +55,8 @@ def read_record(
     source : str, Path, mapping or pandas.DataFrame
         A text or CSV file, a binary file of xlook, or arrays by name: ``time``, ``displacement`` of
         the load point, ``friction`` or ``shear_stress``, and ``normal_stress`` where it was
-        recorded. Plain arrays are in s, um, and MPa; with units in their names, as in ``LP disp
+        recorded. Plain arrays are in s, um, and MPa, and times of `numpy.datetime64` or
+        `numpy.timedelta64` are known as such; with units in their names, as in ``LP disp
         (um)``, they are read as a file with such a header.
     columns : mapping of str to str or (heading, units), optional
         Heading in the file, and units, of each: ``{"time": "t (s)", "friction": "mu"}``, or ``("t",
