@@ -14,6 +14,7 @@ from synthetic_records import LAWS, OPTIONS, STEP, TRUTH, record
 
 import rsfstudy
 from rsfstudy import Scene
+from rsfstudy.analysis.fitting.load_point import moved_steps
 from rsfstudy.analysis.fitting.model import Model
 from rsfstudy.analysis.fitting.record import loading_of
 from rsfstudy.motion.accuracy import Accuracy
@@ -96,6 +97,54 @@ def test_noise_of_a_load_point_that_is_loaded_as_recorded(noise: float, told: bo
     steps = rsfstudy.fit(one, **{**WHITE, "stiffness": 0.02}).squeeze()
     assert float(steps.slip_distance) == pytest.approx(TRUTH["slip_distance"], rel=2e-3)
     assert str(steps.message.values) == ""
+
+
+def with_noise(size: float, seed: int, rho: float = 0.0) -> rsfstudy.Record:
+    """A record of 400 rows whose steps are found in displacement with noise."""
+    columns = {name: of.copy() for name, of in record(size=5e-5, seed=seed).columns.items()}
+    columns["displacement"] += synthetic.correlated(400, rho, size, 1000 + seed)
+    return rsfstudy.read_record(columns)
+
+
+def test_errors_of_steps_are_those_of_two_straight_lines() -> None:
+    """In closed form: of n even rows over a time T, 12 s^2/(n T^2) is the variance of a velocity,
+    and 4 s^2/n that of either end.
+    """
+    one = with_noise(0.1, 0)
+    variances = sum(
+        np.square([*late, *faster])
+        for late, faster in (
+            (np.array([b.begins - a.begins for a, b in zip(back, forth, strict=True)]) / 2 / by,
+             np.array([forth[0].before - back[0].before, forth[0].after - back[0].after]) / 2 / by)
+            for back, forth, by in moved_steps(one, one.found)
+        )
+    )  # fmt: skip
+    (step,) = one.found
+    counts = np.array([(one.time < step.begins).sum(), (one.time >= step.begins).sum()])
+    lasts = np.array([step.begins - one.time[0], one.time[-1] - step.begins])
+    of_time = np.sum(4 * 0.01 / counts) / (step.after - step.before) ** 2
+    exact = [of_time, *(12 * 0.01 / (counts * lasts**2))]
+    # 400 rows tell s^2 to 7 per cent, and an order above 0 that chance may take to some more
+    assert variances == pytest.approx(exact, rel=0.25)
+    assert moved_steps(one.with_steps([step]), [step]) == []
+    assert moved_steps(record(), [step]) == []
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.9])
+def test_errors_count_noise_of_the_load_point(rho: float) -> None:
+    """Squared distances of the truth, over six fits, are those of chance; without what the load
+    point adds their sum is 50 and more for a.
+    """
+    names = ("a", "b", "slip_distance")
+    squares = dict.fromkeys(names, 0.0)
+    for seed in range(6):
+        fit = rsfstudy.fit(with_noise(0.4, seed, rho), **{**OPTIONS, "laws": ["slowness"]})
+        assert "noise of load point displacement makes most" in str(fit.message.values.item())
+        for name in names:
+            squares[name] += synthetic.off(fit.squeeze(), name, TRUTH[name]) ** 2
+            low, high = (float(fit[f"{name}_{end}"].item()) for end in ("low", "high"))
+            assert high - low > 3.9 * float(fit[f"{name}_stderr"].item())
+    assert all(0.5 < found < 25.0 for found in squares.values()), squares  # chi^2 of 6
 
 
 def test_basalt_is_what_the_page_tells() -> None:

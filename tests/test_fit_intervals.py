@@ -43,6 +43,10 @@ class Relaxation:
     def check(self, values: Values) -> None:
         """All is right."""
 
+    def by_loading(self, _values: Values) -> np.ndarray:
+        """Nothing: no load point moves it."""
+        return np.zeros((ROWS, 0))
+
     def jacobian(
         self, values: Values, free: Sequence[str], differences: Differences = QUICK
     ) -> np.ndarray:

@@ -299,8 +299,15 @@ class Fit(Measure):
         return replace(outcome, values=values)
 
     def _remark(self, found: Fitted, noise: float) -> str:
-        """Remark on what noise of a recorded load point does to the slip distance, or none."""
-        if self.loading != "recorded" or "slip_distance" not in found.free:
+        """Remark on what noise of the load point does to parameters, or none."""
+        if self.loading == "steps":
+            moved = np.diag(found.covariance) > 2.0 * np.diag(found.by_noise)
+            pairs = zip(found.free, moved.tolist(), strict=True)
+            names = ", ".join(n for n, most in pairs if most and plain(n) != "step_time")
+            remedy = "" if "step_time" in self.free else ": looked for, step_time lessens it"
+            text = f"noise of load point displacement makes most of the error of {names}{remedy}"
+            return text if names else ""
+        if "slip_distance" not in found.free:
             return ""
         # of second order: ln V of a stiff slider follows the load point by k x/a
         shift = 0.5 * (found.values["stiffness"] * noise / found.values["a"]) ** 2

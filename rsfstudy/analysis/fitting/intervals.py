@@ -34,7 +34,8 @@ def half_width(found: Fitted, covers: float) -> float:
 
 def interval(search: Search, found: Fitted, name: str) -> tuple[float, float]:
     """Ends of the 95 % interval of a parameter, in its units: where the likelihood has fallen as
-    far as Student's t says, or the bounds of the search.
+    far as Student's t says, or the bounds of the search. Noise of load point displacement makes it
+    wider by as much as the standard error.
 
     Parameters
     ----------
@@ -48,7 +49,11 @@ def interval(search: Search, found: Fitted, name: str) -> tuple[float, float]:
     (float, float)
     """
     profile, far = Profile(search, found, name), half_width(found, COVERS)
-    low, high = (value_of(name, profile.end(sign, far)) for sign in (-1.0, 1.0))
+    best = float(profile.best[profile.place])
+    wider = float(found.spread[profile.place]) / profile.spread
+    ends = [best + wider * (profile.end(sign, far) - best) for sign in (-1.0, 1.0)]
+    bounds = search.low[profile.place], search.high[profile.place]
+    low, high = (value_of(name, float(end)) for end in np.clip(ends, *bounds))
     return low, high
 
 
@@ -69,10 +74,10 @@ class Profile:
     def __init__(self, search: Search, found: Fitted, name: str) -> None:
         self.search, self.found, self.place = search, found, found.free.index(name)
         self.best = search.coordinates(found.values)
-        variance = float(found.covariance[self.place, self.place])
+        variance = float(found.by_noise[self.place, self.place])
         self.spread = math.sqrt(variance)
         #: By how much the others go with the parameter.
-        self.along = found.covariance[:, self.place] / variance
+        self.along = found.by_noise[:, self.place] / variance
 
     def end(self, sign: float, far: float) -> float:
         """Coordinate where the squared distance is that of so many standard errors, or a bound."""

@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from rsfstudy.analysis.fitting.model import FINE, Differences, Model, Values
 
@@ -104,6 +105,10 @@ class Joint:
             block[:, [*acting.values()]] = part.jacobian(own, [*acting], differences)
             blocks.append(block)
         return np.concatenate(blocks)
+
+    def by_loading(self, values: Values) -> np.ndarray:
+        """By how much friction is off by errors of the loading of each window."""
+        return np.asarray(block_diag(*(part.by_loading(own) for part, own in self._each(values))))
 
     def _each(self, values: Values) -> Iterator[tuple[Model, dict[str, float]]]:
         """The models, each with the parameters of its window."""

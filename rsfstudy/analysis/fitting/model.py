@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -119,6 +119,9 @@ class Model:
         Pieces as `loading_of` makes them.
     accuracy : Accuracy
     meter : Meter
+    moves : tuple of (ndarray, ndarray, float)
+        Pieces of loading moved back and forth by independent errors, and by how many standard
+        deviations.
     """
 
     scene: Scene
@@ -128,6 +131,7 @@ class Model:
     loading: np.ndarray
     accuracy: Accuracy
     meter: Meter
+    moves: tuple[tuple[np.ndarray, np.ndarray, float], ...] = ()
 
     @property
     def reference(self) -> float:
@@ -219,6 +223,16 @@ class Model:
         """
         powers = [(int(name[5:]), c) for name, c in values.items() if name.startswith("trend")]
         return sum((c * self.displacement**n for n, c in powers), np.zeros(len(self.time)))
+
+    def by_loading(self, values: Values) -> np.ndarray:
+        """By how much friction is off along the rows by each of the errors of its loading, shape
+        (rows, errors).
+        """
+        found = np.zeros((len(self.time), len(self.moves)))
+        for place, (back, forth, by) in enumerate(self.moves):
+            one, other = (replace(self, loading=side).curve(values) for side in (back, forth))
+            found[:, place] = (other - one) / (2.0 * by)
+        return found
 
     def jacobian(
         self, values: Values, free: Sequence[str], differences: Differences = FINE

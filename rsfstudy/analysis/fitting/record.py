@@ -163,11 +163,20 @@ def loading_of(record: Record, begins: float, ends: float, *, recorded: bool) ->
         Where noise moves the load point back it rests: of displacements that never fall the closest
         ones are taken.
     """
-    steps = [step for step in record.found if begins < step.begins and step.ends < ends]
-    first = steps[0].before if steps else 0.0
+    steps = steps_between(record, begins, ends)
     if recorded:
-        return _by_rows(record.window(begins, ends), first)
-    pieces = [(begins, first)]
+        return _by_rows(record.window(begins, ends), steps[0].before if steps else 0.0)
+    return by_steps(begins, steps)
+
+
+def steps_between(record: Record, begins: float, ends: float) -> list[Step]:
+    """The steps of a record between two times."""
+    return [step for step in record.found if begins < step.begins and step.ends < ends]
+
+
+def by_steps(begins: float, steps: Sequence[Step]) -> np.ndarray:
+    """Pieces of loading by steps, from a time on."""
+    pieces = [(begins, steps[0].before if steps else 0.0)]
     for step in steps:
         for part in np.arange(_RAMP if step.ends > step.begins else 0) / _RAMP:
             at = step.begins + part * (step.ends - step.begins)

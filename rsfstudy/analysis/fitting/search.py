@@ -3,7 +3,9 @@
 Parameters p are those that leave the least of ``|W (y - f(p))|^2``, generalised least squares: y is
 friction, f the model, and W whitens the noise (``W'W`` is the inverse R^-1 of its correlation).
 Noise and parameters are found in turn. Then the covariance of parameters is ``s^2 (J'R^-1 J)^-1``
-with J the derivatives of f, and ``s^2 = |W (y - f)|^2/(n - p)`` of n rows and p parameters.
+with J the derivatives of f, and ``s^2 = |W (y - f)|^2/(n - p)`` of n rows and p parameters. Errors
+of times and velocities of steps (see `load_point`), which move f by the columns of G, add A A' with
+``A = (J'R^-1 J)^-1 J'R^-1 G``.
 
 References
 ----------
@@ -79,6 +81,8 @@ class Fitted:
     free : tuple of str
     covariance : ndarray
         Of the free parameters, or of their logarithms (see `LOGARITHMIC`).
+    by_noise : ndarray
+        What noise of friction alone makes of it; the rest is that of load point displacement.
     errors : dict
         Numerical errors of the free parameters.
     noise : Noise
@@ -101,6 +105,7 @@ class Fitted:
     values: dict[str, float]
     free: tuple[str, ...]
     covariance: np.ndarray
+    by_noise: np.ndarray
     errors: dict[str, float]
     noise: Noise
     noise_sd: float
@@ -292,7 +297,12 @@ class Search:
         free_of = len(left) - len(x)
         size = math.sqrt(float(innovations @ innovations) / free_of)
         inverse = _inverse(whitened[:, :-1])
-        covariance = size**2 * inverse
+        by_noise = covariance = size**2 * inverse
+        if (moved_by := self.model.by_loading(values)).size and np.isfinite(inverse).all():
+            shifts = inverse @ whitened[:, :-1].T @ noise.whitened(moved_by)
+            covariance = by_noise + shifts @ shifts.T
+            if not np.isfinite(covariance).all():  # motions close by fail
+                covariance = np.full_like(by_noise, math.inf)
         degrees = max(noise.degrees * free_of / len(left), _FEWEST)
         finer = self.model.curve(values, refined=True) - curve
         with np.errstate(invalid="ignore"):  # of what is not told
@@ -305,6 +315,7 @@ class Search:
             values=values,
             free=self.free,
             covariance=covariance,
+            by_noise=by_noise,
             errors=dict(zip(self.free, errors.tolist(), strict=True)),
             noise=noise,
             noise_sd=size,

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rsfstudy.analysis.fitting.load_point import moved_steps
 from rsfstudy.analysis.fitting.model import Model, parameters_of
-from rsfstudy.analysis.fitting.record import Record, loading_of
+from rsfstudy.analysis.fitting.record import Record, by_steps, loading_of, steps_between
 from rsfstudy.analysis.fitting.steps import Step
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt, Meter
@@ -140,13 +141,18 @@ class Window:
         pieces = loading_of(record, begins, ends, recorded=loading == "recorded")
         if scene.parts.normal_stress.name == "constant":
             pieces[:, 2:] = 1.0, 0.0  # what was recorded is noise
+        moves = []
+        if loading == "steps":
+            steps = moved_steps(record, steps_between(record, begins, ends))
+            moves = [(by_steps(begins, a), by_steps(begins, b), by) for a, b, by in steps]
         if "step_time" in free:
-            pieces[0, 0] -= _LATE * (step.begins - begins)
+            for each in (pieces, *(side for move in moves for side in move[:2])):
+                each[0, 0] -= _LATE * (step.begins - begins)
         if not pieces[0, 1] > 0.0:
             text = "the window begins in a hold: a fit begins with steady sliding"
             raise Halt(Status.NOT_APPLICABLE, text)
         moved = moved - np.interp(step.begins, time, moved)
-        return Model(scene, time, moved, friction, pieces, accuracy, meter)
+        return Model(scene, time, moved, friction, pieces, accuracy, meter, tuple(moves))
 
 
 def first_guess(
