@@ -11,6 +11,7 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from rsfstudy.analysis.fitting import noise
 from rsfstudy.analysis.fitting.record import Record
@@ -78,7 +79,7 @@ def _errors(
     knots, moves = np.array([0.0, *at, ends - begins]), np.flatnonzero(speeds)
     late = -np.diff(speeds) * (t[:, None] > at)
     lasts = np.clip(t[:, None], knots[:-1], knots[1:]) - knots[:-1]
-    columns = np.column_stack([np.ones(len(t)), late, lasts[:, moves], x - x[0]])
+    columns = np.column_stack([late, lasts[:, moves], np.ones(len(t)), x - x[0]])
     best = np.linalg.lstsq(columns[:, :-1], columns[:, -1])[0]
     left = columns[:, -1] - columns[:, :-1] @ best
     if not np.std(left) > _CLEAN * np.ptp(x) or len(t) < 4 * columns.shape[1]:
@@ -90,12 +91,14 @@ def _errors(
         for of in (t, columns)
     )
     told = noise.fitted(noise.AUTOREGRESSIVE, t, columns[:, -1], columns[:, :-1])
-    whitened = told.whitened(columns)
-    size = np.linalg.norm(whitened[:, -1]) / np.sqrt(len(t) - columns.shape[1] + 1.0)
-    # the covariance (J'R^-1 J)^-1 is T^-1 T^-1', T being the triangle of R^-1/2 J
-    root = size * np.linalg.inv(np.linalg.qr(whitened[:, :-1])[1])[1:, 1:]
+    white = told.whitened(np.eye(len(t)))
+    size = np.linalg.norm(white @ columns[:, -1]) / np.sqrt(len(t) - columns.shape[1] + 1.0)
+    # lines are those of least squares, with J^+ R J^+' for covariance, J^+ = (J'J)^-1 J'
+    inverse = np.linalg.pinv(columns[:, :-1])
+    acting = solve_triangular(white, inverse.T, trans="T", lower=True)
+    root = size * np.linalg.qr(acting)[1].T[:-1, :-1]
     # steps are found where displacement parts best, which need not be where all of it would have it
-    missed = best[1:] - np.concatenate([np.zeros(len(at)), speeds[moves]])
+    missed = best[:-1] - np.concatenate([np.zeros(len(at)), speeds[moves]])
     root = np.column_stack([root, missed])
     faster = np.zeros((len(speeds), root.shape[1]))
     faster[moves] = root[len(at) :]
