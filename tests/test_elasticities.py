@@ -130,6 +130,30 @@ def test_steps_know_the_error_of_the_number(error):
         assert estimate <= 4.0 * max(error, 2e-14) ** (2.0 / 3.0)
 
 
+@dataclass(frozen=True)
+class Ending(Known):
+    """y = (1 - k/k_cr)^0.05, no number from k_cr on, and an error that is stated, and made."""
+
+    def find(self, scene, accuracy, meter):
+        if scene.stiffness_ratio >= 1.0:
+            return Outcome(Status.NO_LIMIT_CYCLE)
+        y = (1.0 - scene.stiffness_ratio) ** 0.05
+        made = y * (1.0 + self.error * math.sin(1e9 * y))
+        return Outcome(Status.OK, {"y": made, "y_error": self.error * y})
+
+
+@pytest.mark.parametrize("apart", [0.02, 0.005, 0.002, 0.0005])
+@pytest.mark.parametrize("error", [1e-7, 1e-5])
+def test_near_the_end_of_answers_errors_cover(apart, error):
+    """Steps of (e/2)^(1/3), .004 and .017, reach beyond the end: a secant to one side of it would
+    be off by half and more.
+    """
+    measure = Elasticities(Ending(error), parameters=("stiffness_ratio",))
+    ((elasticity, estimate),) = told(measure, SCENE.with_(stiffness_ratio=1.0 - apart))[0].values()
+    exact = -0.05 * (1.0 - apart) / apart
+    assert abs(elasticity - exact) <= estimate <= 0.5 * abs(exact)
+
+
 def test_ends_without_elasticities():
     measure = Elasticities(Known())
     assert measure(SCENE.with_(mu_star=0.95), COMPILED).status is Status.WORK_BUDGET_SPENT

@@ -32,6 +32,10 @@ _FOLLOWS = (
 _LONGEST = 0.1
 #: Slopes that are none, and how much more than by curvature alone the third derivative may be.
 _FLAT, _MOST_CURVED = 1e-9, 4.0
+#: Parts of a step that are tried where there is no number on one side of it, or an error of more
+#: than a part of the slope; and right-hand sides that a measurement takes then at most, over those
+#: of the number itself.
+_SHORTER, _CLOSE, _MOST = (1.0, 0.125, 0.125**2, 0.125**3), 0.1, 4
 #: How many numbers a scene usually has that are not zero.
 _USUAL = 8
 
@@ -51,9 +55,11 @@ class Elasticities(Measure):
     They are central differences over a step of ln p that balances what is left out with the error
     of y, which the measure tells: h = (e/2)^(1/3). The error estimate adds both: e/h, and three
     times what is left out of a logarithm, or a power, that ends at a boundary and has the slope and
-    curvature of ln y. Where only one side has a number, as at the critical stiffness, the
-    difference is one-sided, and its error larger by that. There are two measurements of each number
-    and one more. `elasticity` and `elasticity_error` are pure numbers of the shape (parameters,).
+    curvature of ln y. There are two measurements of each number and one more. Where only one side
+    has a number, steps of an eighth, and so on three times, find both sides of a number that is
+    near the end of answers; at the end itself, as at the critical stiffness, the difference is
+    one-sided, and its error adds twice what the last two steps differ by. `elasticity` and
+    `elasticity_error` are pure numbers of the shape (parameters,).
 
     Parameters
     ----------
@@ -135,19 +141,59 @@ class Elasticities(Measure):
         if here is None:
             why = f"{self.headline} is zero, which has no logarithm"
             return Outcome(Status.NOT_APPLICABLE, values, why)
+        most = _MOST * (outcome.rhs_evaluations or 1)
         step = min(_LONGEST, (0.5 * here.error) ** (1.0 / 3.0))
         found = np.full((len(self.parameters), 2), np.nan)
         lacking, stated = [], scene.as_dict()
         for place, name in enumerate(self.parameters):
             if not stated.get(name):
                 continue
-            sides = [self._at(scene, name, by, accuracy, meter) for by in (-step, step)]
-            found[place] = _derivative(here, sides, step)
+            found[place] = self._by(scene, name, here, step, accuracy, meter, most)
             if np.isnan(found[place, 0]):
                 lacking.append(name)
         values = {**values, "elasticity": found[:, 0], "elasticity_error": found[:, 1]}
         why = f"no number on either side of {', '.join(lacking)}" if lacking else ""
         return Outcome(Status.OK, values, why)
+
+    def _by(
+        self,
+        scene: Scene,
+        name: str,
+        here: _Level,
+        step: float,
+        accuracy: Accuracy,
+        meter: Meter,
+        most: int,
+    ) -> tuple[float, float]:
+        """The derivative by one number, and its error: over shorter steps too where there is no
+        number on one side or the error is large, until what is left out is no more than what the
+        error of y makes.
+        A measurement of those takes as many right-hand sides at most as are stated.
+        """
+        central: list[tuple[float, float]] = []
+        one_sided: list[tuple[float, float]] = []
+        for part in _SHORTER:
+            try:
+                sides = [self._at(scene, name, by * step, accuracy, meter) for by in (-part, part)]
+            except Halt:
+                if not one_sided:
+                    raise
+                break  # beside the end of answers some take long
+            slope, error, of_levels = _derivative(here, sides, part * step)
+            (central if all(sides) else one_sided).append((slope, error))
+            accuracy = replace(accuracy, budget=min(accuracy.budget, most))
+            close = _CLOSE * abs(slope) if not one_sided else 0.0
+            if not any(sides) or (central and error < max(2.0 * of_levels, close)):
+                break
+            if len(central) > 1 and error > central[-2][1]:
+                break
+        if central:
+            return min(central, key=lambda found: found[1])
+        if len(one_sided) < 2:
+            return one_sided[-1]
+        # twice by how much they differ: the longer step leaves out eight times as much
+        *_rest, (before, _), (slope, error) = one_sided
+        return slope, error + 2.0 * abs(slope - before)
 
     def _at(
         self, scene: Scene, name: str, by: float, accuracy: Accuracy, meter: Meter
@@ -180,9 +226,11 @@ class Elasticities(Measure):
         return _Level(value, error / abs(y) + 4.0 * sys.float_info.epsilon * (1.0 + abs(value)))
 
 
-def _derivative(here: _Level, sides: Sequence[_Level | None], step: float) -> tuple[float, float]:
-    """The derivative of ln|y| by ln p, and its error, from levels below and above, as far as there
-    are any.
+def _derivative(
+    here: _Level, sides: Sequence[_Level | None], step: float
+) -> tuple[float, float, float]:
+    """The derivative of ln|y| by ln p, its error, and the part of that which errors of y make, from
+    levels below and above, as far as there are any.
     """
     below, above = sides
     if below and above:
@@ -190,10 +238,12 @@ def _derivative(here: _Level, sides: Sequence[_Level | None], step: float) -> tu
         curved = abs(above.value - 2.0 * here.value + below.value) / step**2
         # of c ln(x - x_0), slope and curvature tell half of the third derivative
         third = curved**1.5 * min(max(1.0, curved**0.5 / max(abs(slope), _FLAT)), _MOST_CURVED)
-        return slope, step**2 * max(1.0, third) + (above.error + below.error) / (2.0 * step)
+        of_levels = (above.error + below.error) / (2.0 * step)
+        return slope, step**2 * max(1.0, third) + of_levels, of_levels
     for beside, sign in ((below, -1.0), (above, 1.0)):
         if beside:
             slope = sign * (beside.value - here.value) / step
             # how it curves is not known: twice as much as a logarithm of that slope
-            return slope, step * max(1.0, slope**2) + (beside.error + here.error) / step
-    return math.nan, math.nan
+            of_levels = (beside.error + here.error) / step
+            return slope, step * max(1.0, slope**2) + of_levels, of_levels
+    return math.nan, math.nan, math.nan
