@@ -185,7 +185,10 @@ def events(
             raise InvalidValue("stiffness", stiffness, "needs the displacement of the load point")
         moves = moves - stress / _stiffness(stiffness, about)
     found, noise, smallest = _drops(stress)
-    rows = [_row(times, stress, moves, drop) for drop in found]
+    ends = [0, *(drop[1] for drop in found[:-1])]
+    begins = [*(drop[0] for drop in found[1:]), len(stress)]
+    rooms = [*zip(ends, begins, strict=True)] if found else []
+    rows = [_row(times, stress, moves, *of) for of in zip(found, rooms, strict=True)]
     runs_on = moves is not None and stiffness is None and not _slips(times, moves, found)
     for row in rows if runs_on else ():
         row[0].update(dict.fromkeys(_OF_SLIP, (math.nan, math.nan)))
@@ -309,8 +312,11 @@ def _row(
     stress: np.ndarray,
     moves: np.ndarray | None,
     drop: tuple[int, int, int, float],
+    room: tuple[int, int],
 ) -> Found:
-    """The numbers of one event of a record, each with its standard error by noise."""
+    """The numbers of one event of a record, each with its standard error by noise; between the end
+    of the event before and the beginning of the next.
+    """
     begin, end, window, error = drop
     before, after = stress[begin - window : begin].mean(), stress[end : end + window].mean()
     apart = times[end] - times[begin - 1]
@@ -323,12 +329,18 @@ def _row(
     }
     if moves is None:
         return row, 0
+    # moved by m samples, the mean of stress falls less by m drop/window, with noise of a deviation
+    # of sqrt(3 m/window) of the error: so far may noise have moved the place, but once in 1,000
+    off = math.ceil(3.0 * window * (_FOUND * error / (before - after)) ** 2)
+    off = max(0, min(off, window, begin - window - room[0], room[1] - end - window))
+    begin, end = begin - off, end + off
     slips = -_falls(moves, window)
     rates = np.diff(moves) / np.diff(times)
     fastest = begin - 1 + int(np.argmax(rates[begin - 1 : end]))
     noise = _spread(rates)
     slip = moves[end : end + window].mean() - moves[begin - window : begin].mean()
-    row["slip"] = slip, _spread(slips) + abs(float(np.median(slips)))
+    crept = abs(float(np.median(slips))) * (1.0 + 2.0 * off / window)
+    row["slip"] = slip, _spread(slips) + crept
     row["peak_slip_rate"] = row["dynamic_stress_drop"] = math.nan, math.nan
     if rates[fastest] > noise * norm.isf(_CHANCE / len(rates)):
         row["peak_slip_rate"] = rates[fastest], noise
