@@ -96,7 +96,8 @@ def fit(
         parameter among them is told beside its standard error (``_windows``): where that is more,
         something else than noise is in the record, a trend that is none of those fitted, say.
     noise : str
-        "white", "ar" (autoregressive, of an order that a criterion chooses), or "ar1" and so on.
+        "ar" (autoregressive, of an order that a criterion chooses), "ar1" and so on, or "white":
+        errors by the usual formula, in which the load point has no noise either.
     loading : {"steps", "recorded"}
         The load point as its steps say, or as it was recorded, and normal stress with it where that
         is no constant of the scene (``normal_stress="imposed"``).

@@ -21,7 +21,7 @@ from rsfstudy.analysis.fitting.model import (
     check_positive,
     of_law,
 )
-from rsfstudy.analysis.fitting.noise import check_noise, whiteness
+from rsfstudy.analysis.fitting.noise import WHITE, check_noise, whiteness
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
 from rsfstudy.analysis.fitting.steps import Step, noise_variance
@@ -95,8 +95,8 @@ class Fit(Measure):
     part : float
         Part of what follows the step that is fitted.
     noise : str
-        "white"; "ar", an autoregressive process whose order a criterion chooses; or "ar1" and so
-        on.
+        "white", with errors by the usual formula; "ar", an autoregressive process whose order a
+        criterion chooses; or "ar1" and so on.
     loading : {"steps", "recorded"}
         The load point moves steadily between its steps; or as recorded, and normal stress with it,
         unless that of the scene is constant.
@@ -258,6 +258,8 @@ class Fit(Measure):
         smooth = accuracy.at(min(accuracy.rtol, _SMOOTH))
         windows = self._windows
         parts = [w.model(scene, self.free, self.loading, smooth, meter) for w in windows]
+        if self.noise == WHITE:  # the usual formula
+            parts = [replace(part, moves=()) for part in parts]
         distances = self.slip_distance_guess, self.slip_distance_2_guess
         first: dict[str, float] = {}
         for number, (part, window) in enumerate(zip(parts, windows, strict=True), start=1):

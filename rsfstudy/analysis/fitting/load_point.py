@@ -20,9 +20,9 @@ from rsfstudy.analysis.fitting.steps import Step
 #: Means of rows of which noise is told: an autoregressive process of them remembers long enough for
 #: a load point that wanders about its set point.
 _MEANS = 1000
-#: Part of the displacement of a record that noise exceeds, and part of a velocity, or of the time
-#: up to its step, by which it is moved at most.
-_CLEAN, _PART = 1e-7, 0.5
+#: Part of the displacement of a record that noise exceeds; standard deviations by which steps are
+#: moved, little enough for derivatives, and part of a velocity, or of the time up to its step.
+_CLEAN, _MOVED, _PART = 1e-7, 0.01, 0.5
 
 
 def moved_steps(
@@ -53,7 +53,7 @@ def moved_steps(
     moved = []
     for late, faster in errors:
         parts = np.abs(np.concatenate([late / lasts, faster[speeds > 0.0] / speeds[speeds > 0.0]]))
-        size = min(1.0, _PART / max(float(parts.max()), 1e-300))
+        size = min(_MOVED, _PART / max(float(parts.max()), 1e-300))
         back, forth = (
             [
                 Step(s.begins + t, s.ends + t, one, other)
