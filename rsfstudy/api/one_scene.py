@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import warnings
 from typing import Any
 
@@ -64,10 +65,14 @@ def critical_step(
     -----
     NoAnswer
         Where there is no critical step, with the status and the message; its numbers are NaN.
+    UserWarning
+        Where the instability norm is hardly faster than the load point, as on rigs whose period is
+        short: ``instability_slip_rate`` tells how fast it is.
     """
-    return _measured(
-        CriticalStep(of=of, direction=direction), scene, Accuracy(rtol, budget, engine=engine)
-    )
+    measure = CriticalStep(of=of, direction=direction)
+    found = _measured(measure, scene, Accuracy(rtol, budget, engine=engine))
+    rate = (), math.exp(scene.log_norm_rate), quantity("instability_slip_rate").attributes
+    return found.assign_coords(instability_slip_rate=rate)
 
 
 @door
@@ -169,6 +174,8 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         why = outcome.message or outcome.status.meaning
         text = f"{measure.name} has no number: {outcome.status.label} ({why})"
         warnings.warn(text, NoAnswer, stacklevel=4)
+    elif outcome.message:
+        warnings.warn(outcome.message, UserWarning, stacklevel=4)
     own, inner = {about.name: about for about in measure.quantities}, measure.inner_coordinates
     variables: dict[str, Any] = {}
     for name, dims in measure.variables.items():

@@ -128,6 +128,8 @@ def run(
     Incomplete
         Where cells failed: how many, and with which status; and where a reduction refused to draw
         on its cells, with the reason.
+    UserWarning
+        Where answers for a rig are for an instability norm near the load point velocity.
     """
     declared = declaration(study, overrides, rtol=rtol, engine=engine, budget=budget)
     keeping = Keeping(
@@ -147,6 +149,8 @@ def run(
         told = [first, *told, "dataset.rsf.failures() lists them"]
     if told:
         warnings.warn("; ".join(told), Incomplete, stacklevel=outside())
+    if slow := tables.slow_norm(results):
+        warnings.warn(slow, UserWarning, stacklevel=outside())
     return results
 
 

@@ -19,6 +19,7 @@ from rsfstudy.declare import verdicts
 from rsfstudy.declare.claims import VERDICTS
 from rsfstudy.files import contents, lattice, restore
 from rsfstudy.quantity import units_and_scale
+from rsfstudy.measures._single_step import SLOW_NORM
 from rsfstudy.rig.scales import in_units_of_rig, renamed
 from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import coverage, quantity
@@ -237,6 +238,17 @@ def unreduced(dataset: xr.Dataset) -> dict[str, str]:
             span = f", with {least} <= {on} <= {most}" if most else ""
             found[about["name"]] = f"among these cells are none, or too few, to draw on{span}"
     return found
+
+
+def slow_norm(dataset: xr.Dataset) -> str:
+    """How many answers of a study of a rig are for a norm near the load point velocity, and what
+    the first of them says; empty where there are none.
+    """
+    if contents.declaration(dataset).laboratory is None:
+        return ""
+    ok = dataset["message"].values[dataset["status"].values == int(Status.OK)]
+    near = [text for text in ok.tolist() if text.startswith(SLOW_NORM)]
+    return f"{len(near)} of {counted(len(ok), 'answer')}: {near[0]}" if near else ""
 
 
 def _slopes(dataset: xr.Dataset) -> list[str]:

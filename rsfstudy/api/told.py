@@ -30,6 +30,7 @@ def numbers(dataset: xr.Dataset) -> Iterator[Piece]:
         yield tables.headline(dataset)
         yield from tables.reductions(dataset)
         yield {f"no {name}": why for name, why in tables.refused(dataset).items()}
+        yield from filter(None, [tables.slow_norm(dataset)])
     elif is_motion(dataset):
         yield motion(dataset)
         try:
@@ -52,8 +53,10 @@ def origin(dataset: xr.Dataset) -> dict[str, str]:
     if not contents.is_of_a_scene(dataset):
         return tables.origin(dataset)
     about, scene = dataset.attrs, contents.scene_of(dataset)
+    norm = {n: dataset[n] for n in ("instability_slip_rate",) if n in dataset.coords}
     return {
         "scene": stated({n: v for n, v in scene.items() if n not in ("segments", "samples")}),
+        **{n.replace("_", " "): f"{float(v):.4g} {units_of(v)}" for n, v in norm.items()},
         "made by": about.get("history", "unknown"),
         "with": about.get("source", "unknown"),
         "status": f"{about['status']} {about.get('message', '')}".strip(),

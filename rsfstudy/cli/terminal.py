@@ -129,6 +129,8 @@ def report(dataset: xr.Dataset, end: Ended, files: Sequence[Path]) -> None:
         layout.show(table)
     for name, why in tables.unreduced(dataset).items():
         console.print(f"no {name}: {why}")
+    if slow := tables.slow_norm(dataset):
+        console.print(slow, style="yellow")
     _verdicts(_claims([dataset]))
     failures(dataset, str(files[0]))
     console.print(f"{end.study}: {tables.tally(dataset)}")

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
+from rsfstudy.slider.numbers import Slider
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
+
+#: Slip rate over that of the load point from which on a norm is that of an instability.
+_FAST = 1e3
+#: How a text begins that tells of a slower one.
+SLOW_NORM = "the instability norm "
 
 
 def check_single_step(scene: Scene) -> None:
@@ -34,6 +42,28 @@ def reached_by_loading(scene: Scene, load_velocity: float = 0.0) -> Outcome:
         message=f"norm {norm:g} is reached by the loading alone, whose norm is {least:.3g}: give "
         f"instability_norm= well above that, or period= (here {scene.period:g} s) well below "
         f"{scene.period * norm / least:.3g} s",
+    )
+
+
+def near_loading(scene: Scene, load_velocity: float) -> str:
+    """A text where the norm is so slow that it tells little: within a thousand times the load point
+    velocity. Scenes at the default reference rate are those of published studies, and of no rig.
+
+    Parameters
+    ----------
+    scene : Scene
+    load_velocity : float
+        That after the step, over V_*.
+    """
+    rate = math.exp(scene.log_norm_rate)
+    load = max(1.0, abs(load_velocity))
+    if rate >= _FAST * load or scene.reference_rate == Slider.reference_rate:
+        return ""
+    return (
+        f"{SLOW_NORM}{scene.instability_norm:g} is a slip rate of {rate:.3g} V_*, only "
+        f"{rate / load:.3g} times that of the load point: what reaches it may be no instability. "
+        f"Give one above {_FAST * load:.3g} V_*, of a rig as a slip rate, as in "
+        "rig.scene(instability_norm='10 mm/s')"
     )
 
 

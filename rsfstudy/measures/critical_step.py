@@ -25,7 +25,7 @@ from rsfstudy.analysis.kinds_of_steps import DisplacementSteps, NormalStressStep
 from rsfstudy.analysis.search_of_steps import Steps
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._single_step import check_single_step, reached_by_loading
+from rsfstudy.measures._single_step import check_single_step, near_loading, reached_by_loading
 from rsfstudy.motion.accuracy import ROUNDING, TIGHTEST_RTOL, Accuracy
 from rsfstudy.motion.handover import mass_acts
 from rsfstudy.motion.meter import Halt, Meter
@@ -189,7 +189,8 @@ class CriticalStep(Measure):
                 values = self._values(
                     steps, boundary.size, error, steps.value(inner), steps.value(outer)
                 )
-                return Outcome(Status.OK, values)
+                load = steps.scene_at(boundary.size).load_velocity
+                return Outcome(Status.OK, values, near_loading(steps.scene, load))
             if not (boundary.by_motions or boundary.of_cycle):
                 break
             if boundary.of_cycle and below is not None and below > _AT_ONCE:

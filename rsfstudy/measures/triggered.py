@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from rsfstudy.analysis.after_step import neutral, reaches_norm
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._single_step import check_single_step, reached_by_loading
+from rsfstudy.measures._single_step import check_single_step, near_loading, reached_by_loading
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output
@@ -50,4 +50,5 @@ class Triggered(Measure):
             return Outcome(
                 Status.UNVERIFIED, message="the tolerance decides: ask for a smaller rtol"
             )
-        return Outcome(Status.OK, {"unstable": float(answer), "unstable_error": 0.0})
+        said = near_loading(scene, scene.load_velocity)
+        return Outcome(Status.OK, {"unstable": float(answer), "unstable_error": 0.0}, said)

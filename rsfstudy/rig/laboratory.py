@@ -22,6 +22,7 @@ from rsfstudy.rig.quantities import (
     UNITS,
     check_together,
     in_si_of,
+    is_slip_rate,
     of_scene,
     stated,
     units_of,
@@ -117,9 +118,16 @@ class Laboratory(ShownAsTable):
         **fields
             Those of `Scene`. One that is measured in a unit of the slider (`hold_time`,
             `displacement_step` and so on) is a quantity here; a ratio stays a ratio, unless it has
-            units. ``inertia=False`` leaves out the mass that the rig states. Normal stress is
-            constant, or imposed where the loading changes it, unless a field says otherwise.
+            units. `instability_norm` may be a slip rate ("10 mm/s"): the scene has the number that
+            this is with its period. ``inertia=False`` leaves out the mass that the rig states.
+            Normal stress is constant, or imposed where the loading changes it, unless a field says
+            otherwise.
         """
+        if is_slip_rate(norm := fields.get("instability_norm")):
+            rate = self.dimensionless(norm, "V_*", "instability_norm")
+            fields = {name: v for name, v in fields.items() if name != "instability_norm"}
+            scene = self.scene(**fields)
+            return scene.with_(instability_norm=rate * scene.inertial_time)
         for name in FULL.keys() & fields.keys():
             if FULL[name] in fields:
                 raise InvalidValue(name, fields[name], f"give {name} or {FULL[name]}, not both")

@@ -1,0 +1,70 @@
+"""The instability norm of a rig: stated as a slip rate, and told where it is slow."""
+
+import math
+import re
+
+import pytest
+
+import rsfstudy
+from rsfstudy import Laboratory, Scene, Study
+from rsfstudy.cli import terminal
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures.triggered import Triggered
+from rsfstudy.motion.accuracy import Accuracy
+
+SHORT = Laboratory(
+    normal_stress="12 MPa", slip_distance="5 um", reference_velocity="1 um/s",
+    stiffness="7.5 MPa/mm", period="5 ms",
+)  # fmt: skip
+FALLS = {
+    "law": "slowness", "normal_stress": "imposed", "a": 0.006, "b_over_a": 1.5, "alpha": 0.2,
+    "load_velocity_ratio": 1,
+}  # fmt: skip
+STUDY = Study(
+    name="falls",
+    title="Falls",
+    laboratory=SHORT,
+    base=SHORT.scene(**FALLS),
+    axes=[SHORT.axis("normal_stress_step", ["-0.3 MPa", "-0.1 MPa"])],
+    measure=Triggered(),
+    accuracy=Accuracy(1e-3),
+)
+SLOW = "the instability norm 0.0005 is a slip rate of 3.14 V_*, only 3.14 times that of the load"
+
+
+def test_a_norm_may_be_a_slip_rate():
+    """V T/(2 pi D_c), whoever states the period; a study of a rig takes one in place of its own."""
+    expected = 10e-3 * 5e-3 / (2.0 * math.pi * 5e-6)
+    scene = SHORT.scene(instability_norm="10 mm/s", **FALLS)
+    assert scene.instability_norm == pytest.approx(expected, rel=1e-14)
+    longer = SHORT.scene(instability_norm="10 mm/s", period="50 ms", **FALLS)
+    assert longer.instability_norm == pytest.approx(10.0 * expected, rel=1e-14)
+    assert SHORT.scene(instability_norm="0.01", **FALLS).instability_norm == 0.01
+    other = STUDY.with_(instability_norm="10 mm/s")
+    assert other.base.instability_norm == pytest.approx(expected, rel=1e-14)
+    for wrong in ("10 mm", "-1 mm/s"):
+        with pytest.raises(InvalidValue, match="instability_norm"):
+            SHORT.scene(instability_norm=wrong, **FALLS)
+
+
+def test_a_norm_near_the_load_point_is_told_once(capsys):
+    """Of a step, and of all cells of a study; not of a norm that is faster, nor of no rig."""
+    with pytest.warns(UserWarning, match=re.escape(SLOW)) as told:
+        found = rsfstudy.critical_step(
+            SHORT.scene(**FALLS), "normal_stress_step", "down", rtol=1e-3
+        )
+    assert len(told) == 1
+    in_units = SHORT.in_units(found, stress="MPa", length="um")
+    # 2 pi D_c 5e-4/T
+    assert float(in_units.instability_slip_rate) == pytest.approx(math.pi, rel=1e-12)
+    terminal.results(in_units, "falls.nc")
+    assert "3.142 um/s" in capsys.readouterr().out
+    quiet = {"workers": 0, "output": None, "progress": False}
+    with pytest.warns(UserWarning, match=re.escape(f"2 of 2 answers: {SLOW}")) as told:
+        results = rsfstudy.run(STUDY, **quiet)
+    assert len(told) == 1
+    assert results.unstable.values.tolist() == [1.0, 1.0]
+    # the smaller of them triggers nothing
+    results = rsfstudy.run(STUDY, instability_norm="10 mm/s", **quiet)
+    assert results.unstable.values.tolist() == [1.0, 0.0]
+    rsfstudy.critical_step(Scene(period=1e4, b_over_a=1.5), rtol=1e-3)
