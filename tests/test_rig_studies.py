@@ -273,6 +273,27 @@ def test_figures_and_tables_show_units(cycles, capsys):
     assert f"{interval:.8g}" in said
 
 
+def test_results_say_what_they_are_of(cycles):
+    """What their study holds fixed, and what the rig states: as the study itself is shown. What an
+    axis varies is not among them.
+    """
+    from rsfstudy.api import told
+
+    of = told.origin(cycles)
+    assert {"a = 0.01", "b_over_a = 1.4"} <= set(of["fixed"].split(", "))
+    # in units of the slider the stiffness goes with D_c and sigma_*
+    assert not {"stiffness", "load_velocity_ratio"} & set(of["fixed"].replace(",", "").split())
+    assert of["laboratory"].split(", ")[0] == "reference_velocity = 1 um/s"
+    assert "slip_distance" not in of["laboratory"]
+    scene = RIG.scene(**LAW, hold_time="10 s")
+    motion = RIG.in_units(rsfstudy.simulate(scene, duration=1.0))
+    assert told.origin(motion)["laboratory"] == (
+        "normal_stress = 5 MPa, slip_distance = 10 um, reference_velocity = 1 um/s, "
+        "stiffness = 0.01 MPa/um"
+    )
+    assert "hold_time = 1" in told.origin(motion)["scene"].split(", ")
+
+
 # ---- the command line ----------------------------------------------------------------------------
 
 OPTIONS = [

@@ -20,7 +20,9 @@ from rsfstudy.declare.claims import VERDICTS
 from rsfstudy.files import contents, lattice, restore
 from rsfstudy.quantity import units_and_scale
 from rsfstudy.measures._single_step import SLOW_NORM
-from rsfstudy.rig.scales import in_units_of_rig, renamed
+from rsfstudy.rig.quantities import ON_AXIS, STATED
+from rsfstudy.rig.scales import BESIDE, in_units_of_rig, renamed
+from rsfstudy.rig.units import factor, times
 from rsfstudy.status import LABELS, Status
 from rsfstudy.vocabulary import coverage, quantity
 from rsfstudy.wording import counted, flags_of, listed, short, stated
@@ -38,6 +40,8 @@ _OF_SLOPES = {
     "points": ("points", ".0f"),
     "error": ("numerical error", ".2g"),
 }
+#: Units in which quantities of a rig are shown, by their SI units.
+_OF_RIG = {"Pa": "MPa", "m": "um", "m/s": "um/s", "Pa/m": "MPa/um"}
 #: Variables of columns, each with what makes a text of a value, by the headings.
 Columns = dict[str, tuple[str, Callable[[Any], str]]]
 
@@ -121,14 +125,42 @@ def tally(dataset: xr.Dataset) -> str:
     return f"{told}; {work:,} right-hand sides"
 
 
+def given(what: str, fields: Mapping[str, Any], rig: Mapping[str, float]) -> dict[str, str]:
+    """Fields of a scene that have a value, under the heading stated, those that are 0, and what the
+    rig states; nothing of what there is none of.
+    """
+    in_units = {
+        name: f"{times(value, 1 / factor(name, unit, STATED[name].units)):g} {unit}"
+        for name, value in rig.items()
+        for unit in [_OF_RIG.get(STATED[name].units, STATED[name].units)]
+    }
+    told = {
+        what: stated({n: v for n, v in fields.items() if v}),
+        "0 or absent": ", ".join(n for n, v in fields.items() if not v and v is not None),
+        "laboratory": stated(in_units),
+    }
+    if {"slip_distance", "reference_velocity"} <= set(rig) and {
+        "instability_norm",
+        "period",
+    } <= set(fields):
+        rate = fields["instability_norm"] * math.tau * rig["slip_distance"] / fields["period"]
+        if rate > rig["reference_velocity"]:  # else it is no norm that tells anything
+            told["unstable from"] = f"a slip rate of {1e6 * rate:.4g} um/s on"
+    return {name: text for name, text in told.items() if text}
+
+
 def origin(dataset: xr.Dataset) -> dict[str, str]:
     """What the results of a study are of, and where they come from, by what each is."""
     attrs, about = dataset.attrs, contents.provenance(dataset)
-    dims = dataset["status"].dims
+    dims, declared = dataset["status"].dims, contents.declaration(dataset)
+    varied = {str(n).removeprefix(BESIDE) for n, along in dataset.coords.items() if along.dims}
+    fixed = {n: v for n, v in declared.base.items() if n not in varied}
+    rig = {n: v for n, v in (declared.laboratory or {}).items() if ON_AXIS.get(n, n) not in varied}
     reduced = attrs.get("reduced_despite")
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
     return {
         "lattice": " x ".join(f"{dataset.sizes[d]} {d}" for d in dims),
+        **given("fixed", fixed, rig),
         "cells": f"{attrs['completeness']}; {tally(dataset)}",
         **({"reductions": reduced} if reduced else {}),
         "made by": f"{about['command']}, {about['time']}",

@@ -15,7 +15,7 @@ from rsfstudy.api.tables import MOST_CELLS, Table, number, units_of
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import contents
 from rsfstudy.slider.scene import Scene
-from rsfstudy.wording import flags_of, stated
+from rsfstudy.wording import flags_of
 
 Piece = Table | Mapping[str, str] | str
 
@@ -53,10 +53,10 @@ def origin(dataset: xr.Dataset) -> dict[str, str]:
     if not contents.is_of_a_scene(dataset):
         return tables.origin(dataset)
     about, scene = dataset.attrs, contents.scene_of(dataset)
-    norm = {n: dataset[n] for n in ("instability_slip_rate",) if n in dataset.coords}
+    fields = {n: v for n, v in scene.items() if n not in ("segments", "samples")}
+    rig = contents.from_json(dataset, "laboratory") if "laboratory" in about else {}
     return {
-        "scene": stated({n: v for n, v in scene.items() if n not in ("segments", "samples")}),
-        **{n.replace("_", " "): f"{float(v):.4g} {units_of(v)}" for n, v in norm.items()},
+        **tables.given("scene", fields, rig),
         "made by": about.get("history", "unknown"),
         "with": about.get("source", "unknown"),
         "status": f"{about['status']} {about.get('message', '')}".strip(),
