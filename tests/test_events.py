@@ -58,6 +58,22 @@ def test_crossings_are_read_within_steps(motion):
     assert int(again.cut) == 1  # stress was highest before the first time
 
 
+def test_events_of_a_motion_in_units_are_in_them(motion):
+    """As those of the motion, once these are converted: to the errors of reading of both."""
+    rate = float(motion.reference_rate)
+    scales = {"normal_stress": "5 MPa", "slip_distance": 1e-5, "reference_velocity": 1e-5 * rate}
+    rig = rsfstudy.Laboratory(**scales)
+    units = {"stress": "MPa", "length": "um"}
+    ours = rig.in_units(motion, **units).rsf.events()
+    theirs = rig.in_units(motion.rsf.events(), **units)
+    for name in ("time", "peak_slip_rate", "slip", "static_stress_drop"):
+        errors = ours[f"{name}_error"] + theirs[f"{name}_error"]
+        assert (abs(ours[name] - theirs[name]) <= errors).all()
+        np.testing.assert_allclose(ours[name], theirs[name], rtol=1e-6)
+        assert ours[name].attrs["units"] == theirs[name].attrs["units"]
+    assert ours.peak_slip_rate.attrs["units"] == "um s-1"
+
+
 def test_slip_rate_decides_what_an_event_is(motion):
     quick, slow = motion.rsf.events(1e6), motion.rsf.events(30.0)
     assert quick.sizes["event"] == slow.sizes["event"] == 4

@@ -96,15 +96,15 @@ def test_other_programs_read_what_is_exported(place, tmp_path):
         assert ran.returncode == 0, ran.stderr
         assert call("export", place / "rig.nc", f"--{form}", "--output", file).returncode == 2
     table = pd.read_csv(tmp_path / "motion.csv")
-    np.testing.assert_allclose(table["shear_stress (Pa)"], motion["shear_stress"], rtol=1e-15)
+    np.testing.assert_allclose(table["shear_stress (MPa)"], motion["shear_stress"], rtol=1e-15)
     assert not any(name.startswith("reference_rate") for name in table)  # it never changes
     read = rsfstudy.read_table(tmp_path / "motion.csv")
-    units = {"time": "s", "slip": "m", "slip_rate": "m s-1", "log10_slip_rate": "1"}
+    units = {"time": "s", "slip": "um", "slip_rate": "um s-1", "log10_slip_rate": "1"}
     assert {name: read[name].units for name in units} == units
     mat = loadmat(tmp_path / "motion.mat", squeeze_me=True)
     np.testing.assert_array_equal(mat["slip"], motion["slip"])
     assert mat["reference_rate"] == pytest.approx(0.1, rel=1e-15)  # V_*/D_c, one rounding
-    assert str(mat["units"]["shear_stress"]) == "Pa"
+    assert str(mat["units"]["shear_stress"]) == "MPa"
     assert "simulate" in str(mat["attributes"]["history"])
     assert call("export", place / "rig.nc").returncode == 2  # of which kind?
     shutil.copy(place / "rig.nc", tmp_path / "both.nc")

@@ -261,7 +261,7 @@ def test_the_command_simulates_a_rig(tmp_path):
     assert "duration 1130 s peak friction 0." in told
     assert re.search(r"peak slip rate [\d.]+ um/s after [\d.]+ s friction at the end 0\.", told)
     with xr.open_dataset(tmp_path / "out" / "test.nc") as written:
-        assert written.load_point_displacement.attrs["units"] == "m"
+        assert written.load_point_displacement.attrs["units"] == "um"
         assert float(written.time[-1]) == pytest.approx(1130.0)
 
 

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 
 from rsfstudy.api.events import Found, catalogue
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.rig.scales import Scale, slip_rate_of
 from rsfstudy.slider.scene import Scene
 
 #: Slip rate over that of the load point from which on a motion is an event. Steady sliding is 1,
@@ -58,7 +59,12 @@ def of_motion(
     rows = _Rows(times, np.column_stack(rest), math.log10(slip_rate))
     found = [rows.event(*ends) for ends in rows.spans()]
     about = {name: motion[name].attrs for name in names}
-    return catalogue(found, about).assign_attrs(slip_rate_threshold=slip_rate)
+    told = catalogue(found, about).assign_attrs(slip_rate_threshold=slip_rate)
+    if "slip_rate" in motion and motion.sizes["time"]:  # in units
+        rate = motion["slip_rate"]
+        per = Scale(float(rate[0]) / 10.0 ** float(motion["log10_slip_rate"][0]), rate.units)
+        told = told.assign(slip_rate_of(told, "peak_log10_slip_rate", per))
+    return told
 
 
 class _Rows:

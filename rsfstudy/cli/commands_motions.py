@@ -27,7 +27,7 @@ from rsfstudy.status import Status
 
 #: Exit status where a motion passes the instability norm with neither mass nor damping.
 _NO_PHYSICS = 3
-#: Units of the rig in what is printed.
+#: Units of the rig in what is printed, and written.
 _UNITS = {"stress": "MPa", "length": "um", "time": "s"}
 #: Most steps of a record that are listed.
 _MOST_STEPS = 24
@@ -80,7 +80,7 @@ def _write(motion: xr.Dataset, laboratory: Laboratory | None, given: Given) -> N
         console.print(f"{said}\nnothing moved: there is nothing to draw or to keep")
         return
     data = given.output.with_suffix(".nc")
-    store.write(laboratory.in_units(motion) if laboratory else motion, data)
+    store.write(laboratory.in_units(motion, **_UNITS) if laboratory else motion, data)
     terminal.write_figure(picture(motion, laboratory, against=given.against), given.output)
     if not given.quiet:
         found = [motion, motion.rsf.events()]

@@ -222,7 +222,7 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
         words = dataset[name].attrs | {"units": by[held[name]].units}
         result[name] = one.dims, one.values, words
     for name in logarithms:
-        result = result.assign(_slip_rate(dataset, name, by["V_*"]))
+        result = result.assign(slip_rate_of(dataset, name, by["V_*"]))
     new = {str(name): renamed(str(name)) for name in sizes}
     result = result.rename({old: name for old, name in new.items() if name != old})
     for variable in result.variables.values():
@@ -242,7 +242,7 @@ def renamed(name: str) -> str:
     return name
 
 
-def _slip_rate(dataset: xr.Dataset, name: str, scale: Scale) -> dict[str, xr.Variable]:
+def slip_rate_of(dataset: xr.Dataset, name: str, scale: Scale) -> dict[str, xr.Variable]:
     """The slip rate of a logarithm of one, and of its error, if there is one."""
     log, plain = dataset[name].variable, name.replace("log10_", "")
     words = str(log.attrs.get("long_name", plain))
