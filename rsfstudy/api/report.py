@@ -20,13 +20,14 @@ import xarray as xr
 from rsfstudy.api import fit_results, runs, tables, told
 from rsfstudy.api.tables import Table
 from rsfstudy.compute import provenance, runner
+from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.defaults import FIGURES, OUTPUT
 from rsfstudy.doors import door, in_words
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief, spelt
 from rsfstudy.files import contents, places, store
 from rsfstudy.quantity import Markup, table
 from rsfstudy.status import Status
-from rsfstudy.wording import settings
+from rsfstudy.wording import counted, settings
 
 _UNREAD = "cannot be read"
 #: What begins a page of ours, and a figure.
@@ -124,7 +125,7 @@ def _page(directory: Path, found: list[_Result]) -> str:
     page = Template(resources.files(__package__).joinpath("report.html").read_text("utf-8"))
     return page.substitute(
         title=f"Results in {_text(directory.resolve().name)}",
-        made=_text(f"{len(found)} files, read by {by}, {when}"),
+        made=_text(f"{counted(len(found), 'file')}, read by {by}, {when}"),
         summary=f"<nav>{_shown(summary)}</nav>",
         sections="\n".join(sections),
     )
@@ -182,8 +183,10 @@ def html(dataset: xr.Dataset) -> str:
     parts = list(map(_shown, told.numbers(dataset)))
     if contents.is_of_a_scene(dataset):
         parts.append(_shown(told.origin(dataset)))
-    elif (claimed := tables.claims(runs.check(dataset))).rows:
-        parts += ["<h3>Claims</h3>", _shown(claimed)]
+    elif len(found := runs.check(dataset)):
+        apply = set(found["verdict"]) != {NOT_APPLICABLE}
+        none = f"{counted(len(found), 'claim')} not checked: {tables.verdicts_of(found)}"
+        parts += ["<h3>Claims</h3>", _shown(tables.claims(found) if apply else none)]
     return "\n".join(filter(None, parts))
 
 

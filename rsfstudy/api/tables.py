@@ -16,7 +16,7 @@ import xarray as xr
 
 from rsfstudy.compute import runner
 from rsfstudy.declare import verdicts
-from rsfstudy.declare.claims import VERDICTS
+from rsfstudy.declare.claims import NOT_APPLICABLE, VERDICTS
 from rsfstudy.files import contents, lattice, restore
 from rsfstudy.quantity import units_and_scale
 from rsfstudy.measures._single_step import SLOW_NORM
@@ -201,7 +201,13 @@ def headline(dataset: xr.Dataset) -> Table:
         columns["status"] = "status", LABELS.__getitem__
     units, shown = units_of(dataset[name]), few["status"].size
     caption = dataset[name].attrs.get("long_name", name) + f", in {units}" * (units != "1")
-    caption += f" ({shown} of {size:,} cells; rsfstudy export --csv writes all)" * (shown < size)
+    if shown < size:
+        every = {n: (len(places), dataset.sizes[n]) for n, places in at.items()}
+        which = " and ".join(
+            f"{kept} of {there} {n}" for n, (kept, there) in every.items() if kept < there
+        )
+        caption += f" ({shown} of {size:,} cells: {which}, from first to last; "
+        caption += "rsfstudy export --csv writes all)"
     return Table(rows(few, dims, columns), caption)
 
 
@@ -314,8 +320,10 @@ def claims(frame: pd.DataFrame) -> Table:
 
 
 def verdicts_of(found: pd.DataFrame) -> str:
-    """How many claims have which verdict."""
+    """How many claims have which verdict; where none applies, why."""
     given = list(found["verdict"])
+    if set(given) == {NOT_APPLICABLE}:
+        return "other values or units have no published numbers"
     return ", ".join(f"{given.count(v)} {v}" for v in VERDICTS if v in given)
 
 
