@@ -132,14 +132,12 @@ def legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
     below = offset_copy(axes.transAxes, figure, 0.0, -drop, "points")
     made = partial(
         axes.legend,
-        list(shown.values()),
-        list(shown),
         loc="upper center",
         bbox_to_anchor=(0.5 * (left + right), 0.0),
         bbox_transform=blended_transform_factory(figure.transFigure, below),
         title=title,
     )
-    _fit(made, min(columns, len(shown)), 0.97 * (right - left) * figure.bbox.width)
+    _fit(made, shown, columns, 0.97 * (right - left) * figure.bbox.width)
 
 
 def _tick_lines(axes: Axes) -> float:
@@ -161,10 +159,14 @@ def _named(axes: Axes) -> dict[str, Any]:
     return named
 
 
-def _fit(made: Callable[..., Legend], columns: int, width: float) -> None:
-    """Make a legend of so many columns, or of fewer, until it is no wider than that."""
-    for beside in range(columns, 0, -1):
-        if made(ncols=beside).get_window_extent().width <= width:
+def _fit(made: Callable[..., Legend], named: Mapping[str, Any], columns: int, width: float) -> None:
+    """Make a legend of so many columns, or of fewer, until it is no wider than that. It is read
+    line by line: matplotlib fills columns.
+    """
+    for beside in range(min(columns, len(named)), 0, -1):
+        texts = [text for column in range(beside) for text in list(named)[column::beside]]
+        legend = made([named[text] for text in texts], texts, ncols=beside)
+        if legend.get_window_extent().width <= width:
             return
 
 
@@ -209,13 +211,12 @@ def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
     for panel in alike:
         cast(Legend, panel.get_legend()).remove()
 
-    def made(ncols: int) -> Legend:
+    def made(shown: Sequence[Any], texts: Sequence[str], ncols: int) -> Legend:
         figure.legends.clear()
         place: Any = "outside lower center"
-        shown = [handles[text] for text in named[chosen]]
-        return figure.legend(shown, named[chosen], loc=place, ncols=ncols, title=title)
+        return figure.legend(shown, texts, loc=place, ncols=ncols, title=title)
 
-    _fit(made, min(len(named[chosen]), 5), figure.bbox.width)
+    _fit(made, handles, 5, figure.bbox.width)
 
 
 def _texts(legend: Legend) -> list[str]:

@@ -15,6 +15,8 @@ _PARSER = MathTextParser("path")
 _MATH = re.compile(r"((?<!\\)\$(?:[^$\\]|\\.)*\$)")
 _NUMBER = re.compile(r"-?[\d.,]*\d")
 _WORD = re.compile(rf"(?:{_MATH.pattern[1:-1]}|\\\$|[^\s$])+")
+#: A space at which no line ends.
+_TIE = r"$\ $"
 
 #: What results call things, and how figures write it.
 _SYMBOLS: tuple[tuple[str, str], ...] = (
@@ -120,7 +122,8 @@ def label(about: Quantity, width: int = 45) -> str:
     words = _SHORT.get(about.name, about.long_name.split(":")[0])
     text = ", ".join(filter(None, (f"{words[:1].upper()}{words[1:]}", about.symbol)))
     units = about.units if about.units not in ("", "1") else about.scale * (not about.symbol)
-    return wrapped(f"{pretty(text)} ({with_powers(units)})" if units else pretty(text), width)
+    text = pretty(text) + (f"{_TIE}({with_powers(units).replace(' ', _TIE)})" if units else "")
+    return wrapped(text, width).replace(_TIE, " ")
 
 
 def with_powers(units: str) -> str:

@@ -106,15 +106,18 @@ def _record(dataset: xr.Dataset, axes: Axes) -> None:
     windows = []
     for number, (one, name, law) in enumerate(_each(dataset)):
         if not number:
-            axes.plot(*_rows(one, ("record_displacement", "record_friction")), **_POINTS)
+            axes.plot(
+                *_rows(one, ("record_displacement", "record_friction")), label="record", **_POINTS
+            )
         names = "record_displacement", "fitted_friction", "fitted_friction_stderr"
         style = look(law) | {"marker": "", "label": name, "linewidth": 1.2, "zorder": 3}
         for x, y, error in _pieces(one, names):
             if not law:
-                axes.axvspan(x[0], x[-1], color="0.94", lw=0, zorder=0)
+                axes.axvspan(x[0], x[-1], color="0.94", lw=0, zorder=0, label="what is fitted")
             windows += [x[0], x[-1]]
             band = {"color": style["color"], "alpha": 0.3, "lw": 0, "zorder": 2}
-            axes.fill_between(x, y - _BAND * error, y + _BAND * error, **band)
+            said = f"within {_BAND:g} standard errors"
+            axes.fill_between(x, y - _BAND * error, y + _BAND * error, label=said, **band)
             axes.plot(x, y, **style)
     if windows:
         beside = _BESIDE * (max(windows) - min(windows))
@@ -127,7 +130,7 @@ def _residuals(dataset: xr.Dataset, axes: Axes) -> None:
         style = look(law) | {"label": name, "marker": "", "linewidth": 1.0, "zorder": 3}
         for x, y in _pieces(one, ("record_displacement", "residual")):
             if not law:
-                axes.plot(x, y, **_POINTS)
+                axes.plot(x, y, label=f"each row, {name}", **_POINTS)
             count = max(1, round(_AVERAGED * len(x)))
             mean = np.ones(count) / count
             axes.plot(np.convolve(x, mean, "valid"), np.convolve(y, mean, "valid"), **style)
@@ -144,7 +147,7 @@ def _autocorrelation(dataset: xr.Dataset, axes: Axes) -> None:
         axes.plot(_correlated(freed), **style | {"linestyle": ":"})
         chance = 2.0 / len(left) ** 0.5
         if not law:
-            axes.axhspan(-chance, chance, color="0.9", lw=0, zorder=0)
+            axes.axhspan(-chance, chance, color="0.9", lw=0, zorder=0, label="white noise (95 %)")
     in_grey(axes, "freed of correlation", {"linestyle": ":"})
 
 
