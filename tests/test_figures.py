@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 from matplotlib.container import ErrorbarContainer
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.lines import Line2D
 from matplotlib.mathtext import MathTextParser
@@ -19,7 +20,8 @@ from rsfstudy.defaults import FIGURES
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import store
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.plots import _text
+from rsfstudy.plots import _style, _text
+from rsfstudy.quantity import Quantity
 
 MM = 25.4
 #: Inches by which neighbours may seem to touch: extents are those of the highest letters.
@@ -348,3 +350,24 @@ def test_plot_takes_a_directory_a_format_a_style_and_a_variable(results, tmp_pat
 )
 def test_words(text, written):
     assert _text.pretty(text) == written
+
+
+@pytest.mark.parametrize(("count", "columns"), [(5, 4), (7, 3), (4, 2), (3, 5)])
+def test_a_legend_is_read_line_by_line(count, columns):
+    figure = Figure(figsize=(12.0, 3.0))
+    axes = figure.add_subplot()
+    for number in range(count):
+        axes.plot([0.0, 1.0], [number, number], label=f"{number} MPa/mm")
+    _style.legend(axes, columns)
+    figure.draw_without_rendering()
+    placed = [(text.get_window_extent(), text) for text in axes.get_legend().get_texts()]
+    read = sorted(placed, key=lambda one: (-round(one[0].y0), one[0].x0))
+    assert [text.get_text() for _box, text in read] == [f"{n} MPa/mm" for n in range(count)]
+
+
+@pytest.mark.parametrize("units", ["s", "MPa um-1"])
+def test_units_stay_with_the_last_word(units):
+    about = Quantity("recurrence", "", units, "recurrence interval of stick-slip")
+    for width in range(8, 60):
+        last = _text.label(about, width).split("\n")[-1]
+        assert re.match(r"(?!\().*\(.*\)$", last)

@@ -308,7 +308,7 @@ def test_a_study_of_no_rig_is_put_on_one(tmp_path):
     studied = catalogue.load("slide_hold_slide")
     rig = Laboratory(**{n: v for n, v in STATED.items() if n != "stiffness"})
     there = rigs.on(studied, rig)
-    assert there.axes[2].units == {"hold_time": "s"}
+    assert [axis.units for axis in there.axes[1:]] == [{"stiffness": "MPa/um"}, {"hold_time": "s"}]
     # what is fitted is what was: D_c/V_* is 10 s
     assert [fit.within for fit in there.reductions] == [(1e5, 1e9)] * 2
     for one, other in zip(studied.scenes(), there.scenes(), strict=True):

@@ -20,7 +20,7 @@ from rsfstudy.declare.claims import NOT_APPLICABLE, VERDICTS
 from rsfstudy.files import contents, lattice, restore
 from rsfstudy.quantity import units_and_scale
 from rsfstudy.measures._single_step import SLOW_NORM
-from rsfstudy.rig.quantities import ON_AXIS, STATED
+from rsfstudy.rig.quantities import ON_AXIS, SHOWN, STATED
 from rsfstudy.rig.scales import BESIDE, in_units_of_rig, renamed
 from rsfstudy.rig.units import factor, times
 from rsfstudy.status import LABELS, Status
@@ -40,8 +40,6 @@ _OF_SLOPES = {
     "points": ("points", ".0f"),
     "error": ("numerical error", ".2g"),
 }
-#: Units in which quantities of a rig are shown, by their SI units.
-_OF_RIG = {"Pa": "MPa", "m": "um", "m/s": "um/s", "Pa/m": "MPa/um"}
 #: Variables of columns, each with what makes a text of a value, by the headings.
 Columns = dict[str, tuple[str, Callable[[Any], str]]]
 
@@ -132,7 +130,7 @@ def given(what: str, fields: Mapping[str, Any], rig: Mapping[str, float]) -> dic
     in_units = {
         name: f"{times(value, 1 / factor(name, unit, STATED[name].units)):g} {unit}"
         for name, value in rig.items()
-        for unit in [_OF_RIG.get(STATED[name].units, STATED[name].units)]
+        for unit in [SHOWN.get(STATED[name].units, STATED[name].units)]
     }
     told = {
         what: stated({n: v for n, v in fields.items() if v}),

@@ -7,37 +7,41 @@ from typing import TYPE_CHECKING, Any
 
 from rsfstudy.axes.axis import Axis
 from rsfstudy.rig.axes import axis as axis_in_units
+from rsfstudy.rig.axes import factor_to_si
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.lattice import Cells, factors
 from rsfstudy.rig.quantities import (
     FIELDS,
     OF_AXIS,
+    SHOWN,
     UNITS,
     is_scaled,
     is_slip_rate,
     of_scene,
     stated,
 )
+from rsfstudy.rig.units import times
 
 if TYPE_CHECKING:
     from rsfstudy.declare.study import Study
 
 
 def on(study: Study, laboratory: Laboratory) -> Study:
-    """A study of no rig on a rig: what its axes, its base and the ranges of its fits hold without
-    dimension is turned into SI units, and what the rig states takes the place of theirs.
+    """A study of no rig on a rig: what its axes and the ranges of its fits hold without dimension
+    is turned into units of the rig, as it is shown, and what it states takes the place of theirs.
     """
     sizes_of = factors(laboratory.as_dict())
     axes: list[Axis] = []
     every: dict[str, float] = {}
     for along in study.axes:
-        sizes = {n: sizes_of[FIELDS[n].scale] for n in along.fields if is_scaled(n)}
+        scales = {n: FIELDS[n].scale for n in along.fields if is_scaled(n)}
+        units = {n: SHOWN.get(UNITS[scale], UNITS[scale]) for n, scale in scales.items()}
+        sizes = {n: times(sizes_of[s], 1 / factor_to_si(n, units[n])) for n, s in scales.items()}
         every |= sizes
         rows = [
             {n: v * sizes[n] if n in sizes and v is not None else v for n, v in row.items()}
             for row in along.rows
         ]
-        units = {n: UNITS[FIELDS[n].scale] for n in sizes}
         axes.append(along.with_rows(rows, units, along.drawn))
     reductions = [_in_range(each, every.get(getattr(each, "on", ""))) for each in study.reductions]
     changes = of_scene(laboratory.as_dict())
@@ -48,7 +52,7 @@ def on(study: Study, laboratory: Laboratory) -> Study:
 
 
 def _in_range(reduction: Any, scale: float | None) -> Any:
-    """A reduction whose range, if it has any, is in SI units."""
+    """A reduction whose range, if it has any, is in units."""
     span = getattr(reduction, "within", None)
     if scale is None or span is None:
         return reduction

@@ -49,6 +49,8 @@ UNITS = {
     "sigma_*": "Pa", "D_c": "m", "V_*": "m/s", "D_c/V_*": "s", "sigma_*/D_c": "Pa/m",
     "V_*/D_c": "1/s", "s": "s", "s-1": "1/s",
 }  # fmt: skip
+#: Units in which what a rig states is shown, by its SI units.
+SHOWN = {"Pa": "MPa", "m": "um", "m/s": "um/s", "Pa/m": "MPa/um"}
 #: What fields of scenes are.
 FIELDS = {about.name: about for about in QUANTITIES}
 #: Slip rates of a scene, by the names that they have where they are no ratios.
