@@ -18,8 +18,8 @@ from rsfstudy.compute import runner
 from rsfstudy.declare import verdicts
 from rsfstudy.declare.claims import NOT_APPLICABLE, VERDICTS
 from rsfstudy.files import contents, lattice, restore
-from rsfstudy.quantity import units_and_scale
 from rsfstudy.measures._single_step import SLOW_NORM
+from rsfstudy.quantity import units_and_scale
 from rsfstudy.rig.quantities import ON_AXIS, SHOWN, STATED
 from rsfstudy.rig.scales import BESIDE, in_units_of_rig, renamed
 from rsfstudy.rig.units import factor, times
