@@ -21,6 +21,7 @@ from rsfstudy.motion.course import follow
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import Kind, maximum
 from rsfstudy.motion.meter import Meter
+from rsfstudy.slider import loading
 from rsfstudy.slider.protocol import Protocol
 from rsfstudy.status import Status
 
@@ -66,6 +67,18 @@ def test_a_segment_may_be_as_short_as_time_can_tell(engine, begins):
     assert ends_with(pulse) == pytest.approx(ends_with(), abs=1e-7)
     with pytest.raises(InvalidValue, match="must be 1e-16 D_c/V_"):
         ends_with({**pulse, "duration": 0.4 * short})
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_step_may_end_where_its_clock_rounds_to_the_begin(engine, monkeypatch):
+    """As that of slip may; here by a hold that is too short to be told. It changes nothing."""
+    monkeypatch.setattr(loading, "SHORTEST", 0.0)
+    ends = [
+        simulate(Scene(**STIFF, load_velocity_ratio=2.0, **hold), duration=5.0, engine=engine)
+        for hold in ({}, {"hold_time": 1e-300})
+    ]
+    one, other = (motion.shear_stress[-1].item() for motion in ends)
+    assert one == pytest.approx(other, abs=1e-7)  # rtol of both
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -118,9 +118,9 @@ class SciPyStepper(Stepper):
 
     def retake(self, motion: Any, space: Any, clock: float) -> None:
         begin, motion.pace = np.array(space.y[: space.unknowns]), 0.0
-        length, ends = abs(clock - motion.clock), (motion.clock, clock)
-        if length == 0.0:
-            raise Halt(Status.INTEGRATION_FAILED, "a step has no length")
+        # the clock may round to where the step begins; an integrator wants a way to go
+        end = clock if clock != motion.clock else np.nextafter(clock, motion.direction * np.inf)
+        length, ends = abs(end - motion.clock), (motion.clock, end)
         self._solver = solver = self._solves(motion, space, ends, begin, first_step=length)
         clocks, within = [motion.clock], []
         while solver.status == "running":

@@ -96,13 +96,12 @@ class Loading(Part):
             raise InvalidValue(name or "loading", value, rule, remedy=remedy)
 
     def _check_durations(self) -> None:
-        for place, (begins, ends, *_others) in enumerate(self.table):
+        for n, (begins, ends, *_others) in enumerate(self.table):
             if ends - begins < SHORTEST and ends > 0.0:
-                lasts = self.segments[place].duration
                 rule = f"must be {SHORTEST:g} D_c/V_* at least, and more than the rounding of time"
                 remedy = "Leave out what lasts no time."
-                wrong = InvalidValue("duration", lasts, rule, remedy=remedy)
-                raise wrong.at(f"segment {place + 1}")
+                wrong = InvalidValue("duration", self.segments[n].duration, rule, remedy=remedy)
+                raise wrong.at(f"segment {n + 1}")
 
     @property
     def presses(self) -> bool:
