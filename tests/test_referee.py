@@ -241,6 +241,15 @@ def test_shear_stress_tells_friction_where_normal_stress_changes(number, tmp_pat
     assert verdict(*answer, found, ENOUGH).digits > 11.0
 
 
+def test_shear_stress_beside_what_is_asked_for_is_left_alone(tmp_path):
+    """Of peaks, which know no friction."""
+    told = told_by_second_way(13)
+    header = [*of(13).header, "shear_stress (Pa)"]
+    columns = [*(told[name] for name in of(13).columns), told["slip_rate"]]
+    found = theirs.read(write(tmp_path / "13.csv", header, columns), of(13))
+    assert [*found] == [*of(13).columns]
+
+
 def test_zeros_agree_in_nothing_and_overflows_are_refused(tmp_path):
     zeros = np.zeros(len(of(1).times))
     ran = call("verify", filed(tmp_path / "01.csv", 1, friction=zeros))

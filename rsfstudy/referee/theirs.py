@@ -48,7 +48,7 @@ def read(
     for name, (other, _units) in _INSTEAD.items():
         # what waves carry away takes a slip rate
         waits = name == "friction" and problem.damping and "slip_rate" not in found
-        if name not in found and other in found and not waits:
+        if name in problem.units and name not in found and other in found and not waits:
             found[name] = Reported(_instead(name, problem, found), 0.0)
     for name in reversed(problem.columns):
         if name not in found:
