@@ -29,7 +29,7 @@ QUANTITIES = {
     "interval": ("D_c/V_*", "interval", "time since the event before began"),
     "peak_log10_slip_rate": (
         "",
-        "lg peak rate/V_*",
+        "lg peak V/V_*",
         "decimal logarithm of peak slip rate over V_star",
     ),
     "peak_slip_rate": ("V_*", "peak rate", "peak slip rate"),

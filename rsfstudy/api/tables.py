@@ -123,27 +123,26 @@ def tally(dataset: xr.Dataset) -> str:
     return f"{told}; {work:,} right-hand sides"
 
 
-def given(what: str, fields: Mapping[str, Any], rig: Mapping[str, float]) -> dict[str, str]:
+def given(
+    what: str, fields: Mapping[str, Any], rig: Mapping[str, float], varied: Collection[str] = ()
+) -> dict[str, str]:
     """Fields of a scene that have a value, under the heading stated, those that are 0, and what the
-    rig states; nothing of what there is none of.
+    rig states, but for what is varied; nothing of what there is none of.
     """
-    in_units = {
-        name: f"{times(value, 1 / factor(name, unit, STATED[name].units)):g} {unit}"
-        for name, value in rig.items()
-        for unit in [SHOWN.get(STATED[name].units, STATED[name].units)]
-    }
+    fields = {n: v for n, v in fields.items() if n not in varied}
+    units = {n: STATED[n].units for n in rig if ON_AXIS.get(n, n) not in varied}
+    shown = {n: SHOWN.get(si, si) for n, si in units.items()}
+    sizes = {n: times(rig[n], 1 / factor(n, shown[n], si)) for n, si in units.items()}
     told = {
         what: stated({n: v for n, v in fields.items() if v}),
         "0 or absent": ", ".join(n for n, v in fields.items() if not v and v is not None),
-        "laboratory": stated(in_units),
+        "laboratory": stated({n: f"{v:g} {shown[n]}" for n, v in sizes.items()}),
     }
-    if {"slip_distance", "reference_velocity"} <= set(rig) and {
-        "instability_norm",
-        "period",
-    } <= set(fields):
-        rate = fields["instability_norm"] * math.tau * rig["slip_distance"] / fields["period"]
-        if rate > rig["reference_velocity"]:  # else it is no norm that tells anything
-            told["unstable from"] = f"a slip rate of {1e6 * rate:.4g} um/s on"
+    norm, period = fields.get("instability_norm"), fields.get("period")
+    if norm and period and {"slip_distance", "reference_velocity"} <= set(sizes):
+        rate = norm * math.tau * sizes["slip_distance"] / period
+        if rate > sizes["reference_velocity"]:  # else it is no norm that tells anything
+            told["unstable from"] = f"a slip rate of {rate:.4g} um/s on"
     return {name: text for name, text in told.items() if text}
 
 
@@ -152,13 +151,11 @@ def origin(dataset: xr.Dataset) -> dict[str, str]:
     attrs, about = dataset.attrs, contents.provenance(dataset)
     dims, declared = dataset["status"].dims, contents.declaration(dataset)
     varied = {str(n).removeprefix(BESIDE) for n, along in dataset.coords.items() if along.dims}
-    fixed = {n: v for n, v in declared.base.items() if n not in varied}
-    rig = {n: v for n, v in (declared.laboratory or {}).items() if ON_AXIS.get(n, n) not in varied}
     reduced = attrs.get("reduced_despite")
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
     return {
         "lattice": " x ".join(f"{dataset.sizes[d]} {d}" for d in dims),
-        **given("fixed", fixed, rig),
+        **given("fixed", declared.base, declared.laboratory or {}, varied),
         "cells": f"{attrs['completeness']}; {tally(dataset)}",
         **({"reductions": reduced} if reduced else {}),
         "made by": f"{about['command']}, {about['time']}",
@@ -200,12 +197,13 @@ def headline(dataset: xr.Dataset) -> Table:
     units, shown = units_of(dataset[name]), few["status"].size
     caption = dataset[name].attrs.get("long_name", name) + f", in {units}" * (units != "1")
     if shown < size:
-        every = {n: (len(places), dataset.sizes[n]) for n, places in at.items()}
-        which = " and ".join(
-            f"{kept} of {there} {n}" for n, (kept, there) in every.items() if kept < there
-        )
-        caption += f" ({shown} of {size:,} cells: {which}, from first to last; "
-        caption += "rsfstudy export --csv writes all)"
+        every = [
+            f"{few.sizes[d]} of {n} {d}"
+            for d, n in dataset.sizes.items()
+            if n > few.sizes.get(d, n)
+        ]
+        which = f"{shown} of {size:,} cells, {', '.join(every)}, from first to last"
+        caption += f" ({which}; rsfstudy export --csv writes all)"
     return Table(rows(few, dims, columns), caption)
 
 

@@ -23,7 +23,6 @@ from rsfstudy.files import contents
 from rsfstudy.files.comparison import Comparison
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.accuracy import DEFAULT_RTOL
-from rsfstudy.rig.quantities import ON_AXIS
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import coverage
@@ -47,9 +46,7 @@ def declaration(study: Study, output: Path) -> None:
     varied = {field for axis in study.axes for field in axis.fields}
     if study.rig:
         varied |= {name for name, (dims, _values) in study.rig.beside().items() if dims}
-    fixed = {n: v for n, v in study.base.as_dict().items() if n not in varied}
-    stated = study.laboratory.as_dict() if study.laboratory else {}
-    rig = {n: v for n, v in stated.items() if ON_AXIS.get(n, n) not in varied}
+    rig = study.laboratory.as_dict() if study.laboratory else {}
     measured = {n: v for n, v in study.measure.describe().items() if n not in varied}
     measured |= {n: f"{len(v)} of them" for n, v in measured.items() if isinstance(v, tuple | list)}
     gives = study.measure.variables
@@ -60,7 +57,7 @@ def declaration(study: Study, output: Path) -> None:
     costs = filter(None, (cost.in_words(plan, output), cost.faster(plan, output)))
     about = {
         **{f"axis {axis.dimension} ({len(axis)})": _points(axis.points) for axis in study.axes},
-        **tables.given("fixed", fixed, rig),
+        **tables.given("fixed", study.base.as_dict(), rig, varied),
         "measure": ", ".join(f"{n} = {v}" for n, v in measured.items()),
         "gives": ", ".join(f"{n}{w}" for n, w in with_errors.items() if not n.endswith("_error")),
         "reduced to": ", ".join(r.describe()["name"] for r in study.reductions),

@@ -106,9 +106,8 @@ def _record(dataset: xr.Dataset, axes: Axes) -> None:
     windows = []
     for number, (one, name, law) in enumerate(_each(dataset)):
         if not number:
-            axes.plot(
-                *_rows(one, ("record_displacement", "record_friction")), label="record", **_POINTS
-            )
+            record = _rows(one, ("record_displacement", "record_friction"))
+            axes.plot(*record, label="record", **_POINTS)
         names = "record_displacement", "fitted_friction", "fitted_friction_stderr"
         style = look(law) | {"marker": "", "label": name, "linewidth": 1.2, "zorder": 3}
         for x, y, error in _pieces(one, names):
