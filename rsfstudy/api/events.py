@@ -27,11 +27,7 @@ QUANTITIES = {
     "time": ("D_c/V_*", "time", "time at which the event begins"),
     "duration": ("D_c/V_*", "duration", "duration of the event"),
     "interval": ("D_c/V_*", "interval", "time since the event before began"),
-    "peak_log10_slip_rate": (
-        "",
-        "lg peak V/V_*",
-        "decimal logarithm of peak slip rate over V_star",
-    ),
+    "peak_log10_slip_rate": ("", "lg V_max/V_*", "decimal logarithm of peak slip rate over V_star"),
     "peak_slip_rate": ("V_*", "peak rate", "peak slip rate"),
     "slip": ("D_c", "slip", "slip during the event"),
     "stress_before": ("sigma_*", "", "highest shear stress before the event"),

@@ -20,7 +20,6 @@ import xarray as xr
 from rsfstudy.api import fit_results, runs, tables, told
 from rsfstudy.api.tables import Table
 from rsfstudy.compute import provenance, runner
-from rsfstudy.declare.claims import NOT_APPLICABLE
 from rsfstudy.defaults import FIGURES, OUTPUT
 from rsfstudy.doors import door, in_words
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief, spelt
@@ -183,10 +182,8 @@ def html(dataset: xr.Dataset) -> str:
     parts = list(map(_shown, told.numbers(dataset)))
     if contents.is_of_a_scene(dataset):
         parts.append(_shown(told.origin(dataset)))
-    elif len(found := runs.check(dataset)):
-        apply = set(found["verdict"]) != {NOT_APPLICABLE}
-        none = f"{counted(len(found), 'claim')} not checked: {tables.verdicts_of(found)}"
-        parts += ["<h3>Claims</h3>", _shown(tables.claims(found) if apply else none)]
+    elif claimed := tables.claims(runs.check(dataset)):
+        parts += ["<h3>Claims</h3>", _shown(claimed)]
     return "\n".join(filter(None, parts))
 
 

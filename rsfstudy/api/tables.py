@@ -303,9 +303,13 @@ def _slope(dataset: xr.Dataset, name: str) -> Table:
     return Table(rows(dataset, dims, columns), words, {with_units(dataset[d]) for d in dims})
 
 
-def claims(frame: pd.DataFrame) -> Table:
-    """Claims and their verdicts, as `rsfstudy.check` gives them, of one study or of several."""
+def claims(frame: pd.DataFrame) -> Table | str:
+    """Claims and their verdicts, as `rsfstudy.check` gives them, of one study or of several; a
+    sentence where none applies.
+    """
     rows = frame.to_dict("records")
+    if not any(row["verdict"] != NOT_APPLICABLE for row in rows):
+        return f"{counted(len(rows), 'claim')} not checked: {verdicts_of(frame)}" * bool(rows)
     colours = [
         "red" if row["moved"] else "green" if row["verdict"] == "reproduced" else "yellow"
         for row in rows

@@ -8,18 +8,9 @@ from typing import TYPE_CHECKING, Any
 from rsfstudy.axes.axis import Axis
 from rsfstudy.rig.axes import axis as axis_in_units
 from rsfstudy.rig.axes import factor_to_si
-from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.laboratory import Laboratory, instability_norm
 from rsfstudy.rig.lattice import Cells, factors
-from rsfstudy.rig.quantities import (
-    FIELDS,
-    OF_AXIS,
-    SHOWN,
-    UNITS,
-    is_scaled,
-    is_slip_rate,
-    of_scene,
-    stated,
-)
+from rsfstudy.rig.quantities import FIELDS, OF_AXIS, SHOWN, UNITS, is_scaled, of_scene, stated
 from rsfstudy.rig.units import times
 
 if TYPE_CHECKING:
@@ -63,9 +54,9 @@ def fixed(study: Study, name: str, value: Any) -> dict[str, Any]:
     """What changes in a study of a rig by another value of a quantity that is no axis of it."""
     laboratory = study.laboratory
     assert laboratory is not None
-    if name == "instability_norm" and is_slip_rate(value):
-        rate = laboratory.dimensionless(value, "V_*", name)
-        return {"base": study.base.with_(instability_norm=rate * study.base.inertial_time)}
+    if name == "instability_norm":
+        norm = instability_norm(laboratory, value, study.base)
+        return {"base": study.base.with_(instability_norm=norm)}
     made = axis_in_units(name, [value])
     fields = Cells(laboratory, study.base, [made]).fields(made.rows[0])
     found: dict[str, Any] = {"base": study.base.with_(**fields)}

@@ -50,5 +50,5 @@ class Triggered(Measure):
             return Outcome(
                 Status.UNVERIFIED, message="the tolerance decides: ask for a smaller rtol"
             )
-        said = near_loading(scene, scene.load_velocity)
-        return Outcome(Status.OK, {"unstable": float(answer), "unstable_error": 0.0}, said)
+        values = {"unstable": float(answer), "unstable_error": 0.0}
+        return Outcome(Status.OK, values, near_loading(scene, scene.load_velocity))

@@ -199,15 +199,15 @@ def _is_drawn(handle: Any) -> bool:
 
 def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
     """Name what most panels name, or some of it, once and below them all."""
-    named = {panel: _texts(legend) for panel in panels if (legend := panel.get_legend())}
+    named = {panel: _named(panel) for panel in panels if panel.get_legend()}
     alike: list[Axes] = []
     for fullest in named:
-        within = [panel for panel, texts in named.items() if set(texts) <= set(named[fullest])]
+        within = [panel for panel, texts in named.items() if texts.keys() <= named[fullest].keys()]
         if len(within) > max(1, len(alike), len(panels) // 2):
             alike, chosen = within, fullest
     if not alike:
         return
-    handles, title = _named(chosen), cast(Legend, chosen.get_legend()).get_title().get_text()
+    title = cast(Legend, chosen.get_legend()).get_title().get_text()
     for panel in alike:
         cast(Legend, panel.get_legend()).remove()
 
@@ -216,11 +216,7 @@ def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
         place: Any = "outside lower center"
         return figure.legend(shown, texts, loc=place, ncols=ncols, title=title)
 
-    _fit(made, handles, 5, figure.bbox.width)
-
-
-def _texts(legend: Legend) -> list[str]:
-    return [text.get_text() for text in legend.get_texts()]
+    _fit(made, named[chosen], 5, figure.bbox.width)
 
 
 def make_room(figure: Figure, rows: Sequence[Sequence[Axes]]) -> None:

@@ -124,10 +124,8 @@ class Laboratory(ShownAsTable):
             otherwise.
         """
         if is_slip_rate(norm := fields.get("instability_norm")):
-            rate = self.dimensionless(norm, "V_*", "instability_norm")
-            fields = {name: v for name, v in fields.items() if name != "instability_norm"}
-            scene = self.scene(**fields)
-            return scene.with_(instability_norm=rate * scene.inertial_time)
+            scene = self.scene(**{n: v for n, v in fields.items() if n != "instability_norm"})
+            return scene.with_(instability_norm=instability_norm(self, norm, scene))
         for name in FULL.keys() & fields.keys():
             if FULL[name] in fields:
                 raise InvalidValue(name, fields[name], f"give {name} or {FULL[name]}, not both")
@@ -220,3 +218,10 @@ class Laboratory(ShownAsTable):
             }
         except InvalidValue as error:
             raise error.at(f"segment {number}") from error
+
+
+def instability_norm(rig: Laboratory, stated: Any, scene: Scene) -> float:
+    """The norm V T/(2 pi D_c) of a scene of a rig, where it may be stated as the slip rate V."""
+    if not is_slip_rate(stated):
+        return in_si("instability_norm", stated, "1")
+    return rig.dimensionless(stated, "V_*", "instability_norm") * scene.inertial_time
