@@ -69,10 +69,9 @@ def critical_step(
         Where the instability norm is hardly faster than the load point, as on rigs whose period is
         short: ``instability_slip_rate`` tells how fast it is.
     """
-    measure = CriticalStep(of=of, direction=direction)
-    found = _measured(measure, scene, Accuracy(rtol, budget, engine=engine))
-    rate = (), math.exp(scene.log_norm_rate), quantity("instability_slip_rate").attributes
-    return found.assign_coords(instability_slip_rate=rate)
+    return _measured(
+        CriticalStep(of=of, direction=direction), scene, Accuracy(rtol, budget, engine=engine)
+    )
 
 
 @door
@@ -186,6 +185,7 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
     work = "rhs_evaluations"
     variables[work] = (), outcome.rhs_evaluations, quantity(work).attributes
     rate = (), scene.reference_rate, {"units": "s-1"}
+    norm = (), math.exp(scene.log_norm_rate), quantity("instability_slip_rate").attributes
     what = measure.name.replace("_", " ").capitalize()
     about = {
         "title": f"{what} of a spring-slider, {scene.law} law",
@@ -196,4 +196,6 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         "message": outcome.message,
         **provenance.attributes(f"rsfstudy.{measure.name}"),
     }
-    return xr.Dataset(variables, {**inner, "reference_rate": rate}, about)
+    return xr.Dataset(
+        variables, {**inner, "reference_rate": rate, "instability_slip_rate": norm}, about
+    )

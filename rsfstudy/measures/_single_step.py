@@ -55,8 +55,7 @@ def near_loading(scene: Scene, load_velocity: float) -> str:
     load_velocity : float
         That after the step, over V_*.
     """
-    rate = math.exp(scene.log_norm_rate)
-    load = max(1.0, abs(load_velocity))
+    rate, load = math.exp(scene.log_norm_rate), max(1.0, abs(load_velocity))
     if rate >= _FAST * load or scene.reference_rate == Slider.reference_rate:
         return ""
     return (

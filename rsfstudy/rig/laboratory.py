@@ -22,7 +22,6 @@ from rsfstudy.rig.quantities import (
     UNITS,
     check_together,
     in_si_of,
-    is_slip_rate,
     of_scene,
     stated,
     units_of,
@@ -123,7 +122,7 @@ class Laboratory(ShownAsTable):
             Normal stress is constant, or imposed where the loading changes it, unless a field says
             otherwise.
         """
-        if is_slip_rate(norm := fields.get("instability_norm")):
+        if units_of("instability_norm", norm := fields.get("instability_norm")):
             scene = self.scene(**{n: v for n, v in fields.items() if n != "instability_norm"})
             return scene.with_(instability_norm=instability_norm(self, norm, scene))
         for name in FULL.keys() & fields.keys():
@@ -222,6 +221,7 @@ class Laboratory(ShownAsTable):
 
 def instability_norm(rig: Laboratory, stated: Any, scene: Scene) -> float:
     """The norm V T/(2 pi D_c) of a scene of a rig, where it may be stated as the slip rate V."""
-    if not is_slip_rate(stated):
+    try:
         return in_si("instability_norm", stated, "1")
-    return rig.dimensionless(stated, "V_*", "instability_norm") * scene.inertial_time
+    except InvalidValue:
+        return rig.dimensionless(stated, "V_*", "instability_norm") * scene.inertial_time

@@ -97,21 +97,10 @@ def in_si_of(name: str, value: Any, units: str, stress: float | None) -> float:
 
 def is_friction(stiffness: Any) -> bool:
     """True if a stiffness is friction over displacement, in 1/length."""
-    return _has_units(stiffness) and _is_in(stiffness, "1/m")
-
-
-def is_slip_rate(norm: Any) -> bool:
-    """True if an instability norm has units, as a slip rate has."""
-    return _has_units(norm) and not _is_in(norm, "1")
-
-
-def _has_units(value: Any) -> bool:
-    return isinstance(value, str) or hasattr(value, "magnitude")
-
-
-def _is_in(value: Any, units: str) -> bool:
+    if not isinstance(stiffness, str) and not hasattr(stiffness, "magnitude"):
+        return False
     try:
-        in_si("value", value, units)
+        in_si("stiffness", stiffness, "1/m")
     except InvalidValue:
         return False
     return True
