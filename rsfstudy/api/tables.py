@@ -197,11 +197,8 @@ def headline(dataset: xr.Dataset) -> Table:
     units, shown = units_of(dataset[name]), few["status"].size
     caption = dataset[name].attrs.get("long_name", name) + f", in {units}" * (units != "1")
     if shown < size:
-        every = [
-            f"{few.sizes[d]} of {n} {d}"
-            for d, n in dataset.sizes.items()
-            if n > few.sizes.get(d, n)
-        ]
+        full = dataset.sizes
+        every = [f"{n} of {full[d]} {d}" for d, n in few.sizes.items() if n < full[d]]
         which = f"{shown} of {size:,} cells, {', '.join(every)}, from first to last"
         caption += f" ({which}; rsfstudy export --csv writes all)"
     return Table(rows(few, dims, columns), caption)

@@ -22,13 +22,12 @@ from rsfstudy.files import store
 from rsfstudy.plots._motion import picture
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.records import read_record
+from rsfstudy.rig.scales import TOLD_IN
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Exit status where a motion passes the instability norm with neither mass nor damping.
 _NO_PHYSICS = 3
-#: Units of the rig in what is printed, and written.
-_UNITS = {"stress": "MPa", "length": "um", "time": "s"}
 #: Most steps of a record that are listed.
 _MOST_STEPS = 24
 #: Options that `rsfstudy.fit` takes as they are.
@@ -80,12 +79,12 @@ def _write(motion: xr.Dataset, laboratory: Laboratory | None, given: Given) -> N
         console.print(f"{said}\nnothing moved: there is nothing to draw or to keep")
         return
     data = given.output.with_suffix(".nc")
-    store.write(laboratory.in_units(motion, **_UNITS) if laboratory else motion, data)
+    store.write(laboratory.in_units(motion, **TOLD_IN) if laboratory else motion, data)
     terminal.write_figure(picture(motion, laboratory, against=given.against), given.output)
     if not given.quiet:
         found = [motion, motion.rsf.events()]
         if laboratory:
-            found = [laboratory.in_units(of, **_UNITS) for of in found]
+            found = [laboratory.in_units(of, **TOLD_IN) for of in found]
         layout.show(told.motion(found[0]))
         layout.show(told.stability(motion.rsf.scene))
         layout.show(told.events(found[1]))

@@ -20,6 +20,7 @@ from rsfstudy.plots._axes import log_scale
 from rsfstudy.plots._style import hold_ticks, legend, letter, look, make_room, settle, size, styled
 from rsfstudy.plots._text import pretty, wrapped
 from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.scales import TOLD_IN
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_excess
 
@@ -31,8 +32,6 @@ AGAINST = ("load_point_displacement", "slip", "time")
 #: Change of load point displacement, over slip, below which the load point is held.
 _ROUNDING = 1e-6
 _FRICTION = r"Friction coefficient, $\mu$"
-#: Units of the rig on axes.
-_UNITS = {"stress": "MPa", "length": "um", "time": "s"}
 
 
 @door
@@ -75,7 +74,7 @@ def picture(
         text = f"{motion.attrs.get('status', '')}: {motion.attrs.get('message', '')}"
         raise DataError(f"there is no motion, and nothing to draw. {text}")
     against = against or _abscissa(motion)
-    shown = motion if laboratory is None else laboratory.in_units(motion, **_UNITS)
+    shown = motion if laboratory is None else laboratory.in_units(motion, **TOLD_IN)
     with styled():
         figure = Drawing(figsize=size(2, 2, HEIGHT), layout="constrained")
         grid = figure.add_gridspec(2, 2)

@@ -22,8 +22,8 @@ _WORDS = re.compile(r"^decimal logarithm of (the )?| over V_star")
 
 #: What stands before the name of a field where that is the name of an axis in units.
 BESIDE = "dimensionless_"
-#: Units of stress, length and time of results of a rig, in tables and figures.
-_SHOWN = ("MPa", "um", "s")
+#: Units in which results and motions of a rig are told, in tables and figures.
+TOLD_IN = {"stress": "MPa", "length": "um", "time": "s"}
 #: Attribute of a dataset in other units that tells their scales.
 SCALES = "scales"
 
@@ -174,13 +174,13 @@ def in_units_of_rig(dataset: xr.Dataset) -> xr.Dataset:
     """Results of a rig as tables and figures show them, in MPa, um and s; others as they are."""
     if "sigma_star" not in dataset.variables or SCALES in dataset.attrs:
         return dataset
-    return in_units(dataset, scales_of(dataset), *_SHOWN)
+    return in_units(dataset, scales_of(dataset), **TOLD_IN)
 
 
 def is_in_other_units(dataset: xr.Dataset) -> bool:
     """True of results in units that figures of their study do not expect."""
     told = dataset.attrs.get(SCALES, "")
-    as_shown = "sigma_star" in dataset.variables and all(f" {u}," in told for u in _SHOWN)
+    as_shown = "sigma_star" in dataset.variables and all(f" {u}," in told for u in TOLD_IN.values())
     return bool(told) and not as_shown
 
 
