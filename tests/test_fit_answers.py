@@ -14,7 +14,7 @@ from synthetic_records import LAWS, OPTIONS, STEP, TRUTH, record
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.analysis.fitting.load_point import moved_steps
+from rsfstudy.analysis.fitting.load_point import MOVED, moved_steps
 from rsfstudy.analysis.fitting.model import Model
 from rsfstudy.analysis.fitting.record import loading_of
 from rsfstudy.motion.accuracy import Accuracy
@@ -111,14 +111,8 @@ def test_errors_of_steps_are_those_of_two_straight_lines() -> None:
     and 4 s^2/n that of either end.
     """
     one = with_noise(0.1, 0)
-    variances = sum(
-        np.square([*late, *faster])
-        for late, faster in (
-            (np.array([b.begins - a.begins for a, b in zip(back, forth, strict=True)]) / 2 / by,
-             np.array([forth[0].before - back[0].before, forth[0].after - back[0].after]) / 2 / by)
-            for back, forth, by in moved_steps(one, one.found)
-        )
-    )  # fmt: skip
+    variances = np.square(moved_steps(one, one.found) - np.array(one.found)).sum(axis=(0, 1))
+    variances = variances[[0, 2, 3]] / MOVED**2
     (step,) = one.found
     counts = np.array([(one.time < step.begins).sum(), (one.time >= step.begins).sum()])
     lasts = np.array([step.begins - one.time[0], one.time[-1] - step.begins])

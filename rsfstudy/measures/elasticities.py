@@ -141,14 +141,15 @@ class Elasticities(Measure):
         if here is None:
             why = f"{self.headline} is zero, which has no logarithm"
             return Outcome(Status.NOT_APPLICABLE, values, why)
-        most = _MOST * (outcome.rhs_evaluations or 1)
+        most = min(accuracy.budget, _MOST * (outcome.rhs_evaluations or 1))
+        accuracies = accuracy, *3 * (replace(accuracy, budget=most),)
         step = min(_LONGEST, (0.5 * here.error) ** (1.0 / 3.0))
         found = np.full((len(self.parameters), 2), np.nan)
         lacking, stated = [], scene.as_dict()
         for place, name in enumerate(self.parameters):
             if not stated.get(name):
                 continue
-            found[place] = self._by(scene, name, here, step, accuracy, meter, most)
+            found[place] = self._by(scene, name, here, step, accuracies, meter)
             if np.isnan(found[place, 0]):
                 lacking.append(name)
         values = {**values, "elasticity": found[:, 0], "elasticity_error": found[:, 1]}
@@ -161,39 +162,29 @@ class Elasticities(Measure):
         name: str,
         here: _Level,
         step: float,
-        accuracy: Accuracy,
+        accuracies: Sequence[Accuracy],
         meter: Meter,
-        most: int,
     ) -> tuple[float, float]:
         """The derivative by one number, and its error: over shorter steps too where there is no
-        number on one side or the error is large, until what is left out is no more than what the
-        error of y makes.
-        A measurement of those takes as many right-hand sides at most as are stated.
+        number on one side or the error is large. Accuracies are those of each step.
         """
-        central: list[tuple[float, float]] = []
-        one_sided: list[tuple[float, float]] = []
-        for part in _SHORTER:
+        found: list[tuple[bool, float, float]] = []
+        for part, accuracy in zip(_SHORTER, accuracies, strict=True):
             try:
                 sides = [self._at(scene, name, by * step, accuracy, meter) for by in (-part, part)]
             except Halt:
-                if not one_sided:
+                if not found:
                     raise
                 break  # beside the end of answers some take long
             slope, error, of_levels = _derivative(here, sides, part * step)
-            (central if all(sides) else one_sided).append((slope, error))
-            accuracy = replace(accuracy, budget=min(accuracy.budget, most))
-            close = _CLOSE * abs(slope) if not one_sided else 0.0
-            if not any(sides) or (central and error < max(2.0 * of_levels, close)):
+            if found and not all(sides):  # the longer step leaves out eight times as much
+                error += 2.0 * abs(slope - found[-1][2])
+            found.append((not all(sides), error, slope))
+            told = error < max(2.0 * of_levels, _CLOSE * abs(slope))
+            if not any(sides) or (all(sides) and told):
                 break
-            if len(central) > 1 and error > central[-2][1]:
-                break
-        if central:
-            return min(central, key=lambda found: found[1])
-        if len(one_sided) < 2:
-            return one_sided[-1]
-        # twice by how much they differ: the longer step leaves out eight times as much
-        *_rest, (before, _), (slope, error) = one_sided
-        return slope, error + 2.0 * abs(slope - before)
+        _one_sided, error, slope = found[-1] if found[-1][0] else min(found)
+        return slope, error
 
     def _at(
         self, scene: Scene, name: str, by: float, accuracy: Accuracy, meter: Meter

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from rsfstudy.analysis.fitting.load_point import MOVED
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
@@ -119,9 +120,8 @@ class Model:
         Pieces as `loading_of` makes them.
     accuracy : Accuracy
     meter : Meter
-    moves : tuple of (ndarray, ndarray, float)
-        Pieces of loading moved back and forth by independent errors, and by how many standard
-        deviations.
+    moves : sequence of ndarray
+        Pieces of loading by steps that are moved (see `moved_steps`).
     """
 
     scene: Scene
@@ -131,7 +131,7 @@ class Model:
     loading: np.ndarray
     accuracy: Accuracy
     meter: Meter
-    moves: tuple[tuple[np.ndarray, np.ndarray, float], ...] = ()
+    moves: Sequence[np.ndarray] = ()
 
     @property
     def reference(self) -> float:
@@ -228,11 +228,10 @@ class Model:
         """By how much friction is off along the rows by each of the errors of its loading, shape
         (rows, errors).
         """
-        found = np.zeros((len(self.time), len(self.moves)))
-        for place, (back, forth, by) in enumerate(self.moves):
-            one, other = (replace(self, loading=side).curve(values) for side in (back, forth))
-            found[:, place] = (other - one) / (2.0 * by)
-        return found
+        if not self.moves:
+            return np.zeros((len(self.time), 0))
+        curves = [replace(self, loading=moved).curve(values) for moved in self.moves]
+        return np.asarray(np.array(curves) - self.curve(values)).T / MOVED
 
     def jacobian(
         self, values: Values, free: Sequence[str], differences: Differences = FINE

@@ -301,8 +301,6 @@ class Search:
         if (moved_by := self.model.by_loading(values)).size and np.isfinite(inverse).all():
             shifts = inverse @ whitened[:, :-1].T @ noise.whitened(moved_by)
             covariance = by_noise + shifts @ shifts.T
-            if not np.isfinite(covariance).all():  # motions close by fail
-                covariance = np.full_like(by_noise, math.inf)
         degrees = max(noise.degrees * free_of / len(left), _FEWEST)
         finer = self.model.curve(values, refined=True) - curve
         with np.errstate(invalid="ignore"):  # of what is not told

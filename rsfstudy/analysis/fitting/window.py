@@ -141,18 +141,16 @@ class Window:
         pieces = loading_of(record, begins, ends, recorded=loading == "recorded")
         if scene.parts.normal_stress.name == "constant":
             pieces[:, 2:] = 1.0, 0.0  # what was recorded is noise
-        moves = []
-        if loading == "steps":
-            steps = moved_steps(record, steps_between(record, begins, ends))
-            moves = [(by_steps(begins, a), by_steps(begins, b), by) for a, b, by in steps]
+        between = steps_between(record, begins, ends) if loading == "steps" else []
+        moves = [by_steps(begins, steps) for steps in moved_steps(record, between)]
         if "step_time" in free:
-            for each in (pieces, *(side for move in moves for side in move[:2])):
+            for each in (pieces, *moves):
                 each[0, 0] -= _LATE * (step.begins - begins)
         if not pieces[0, 1] > 0.0:
             text = "the window begins in a hold: a fit begins with steady sliding"
             raise Halt(Status.NOT_APPLICABLE, text)
         moved = moved - np.interp(step.begins, time, moved)
-        return Model(scene, time, moved, friction, pieces, accuracy, meter, tuple(moves))
+        return Model(scene, time, moved, friction, pieces, accuracy, meter, moves)
 
 
 def first_guess(
