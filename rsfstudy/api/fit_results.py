@@ -15,6 +15,7 @@ import xarray as xr
 
 from rsfstudy.analysis.fitting.joint import of_window, plain
 from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, fields_of, parameters_of
+from rsfstudy.analysis.fitting.noise import LAGS
 from rsfstudy.api.tables import Table
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import contents
@@ -304,4 +305,6 @@ def _remarks(one: xr.Dataset) -> Iterator[str]:
     chance = one["whiteness"].item()
     if math.isfinite(chance):
         verdict = "white" if chance > _CHANCE else "still correlated"
-        yield f"{law}: residuals freed of correlation are {verdict} (chance {chance:.2g})"
+        apart = min(LAGS + int(one["noise_order"]), int(one["rows_fitted"]) // 4)
+        text = f"residuals freed of correlation are {verdict} over {apart} rows"
+        yield f"{law}: {text} (chance {chance:.2g})"

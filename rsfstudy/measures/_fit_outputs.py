@@ -16,7 +16,7 @@ _NUMBERS = (
     Output("noise_order", "", "1", "order of the autoregressive process of the noise"),
     Output("effective_samples", "", "1", "number of independent samples that tell as much"),
     Output("degrees_of_freedom", "", "1", "degrees of freedom of the intervals"),
-    Output("whiteness", "", "1", "chance of as much correlation in residuals freed of it"),
+    Output("whiteness", "", "1", "chance of as much correlation of near rows, freed of it"),
     Output("criterion", "", "1", "Akaike's criterion, in which the noise counts; less is better"),
     Output("r_squared", "$R^2$", "1", "share of the variance of friction that the fit explains"),
     Output("velocity_before", "$V_0$", "um s-1", "load point velocity before the step"),

@@ -46,7 +46,7 @@ _LARGEST, _ENOUGH = 0.999, 0.02
 #: another, or in runs shorter than so many, do not tell a process of their own: clocks are uneven.
 _ALIKE, _RARE, _SHORT = 2.0, 300, 30
 #: Lags at which residuals freed of correlation are tested for what is left of it.
-_LAGS = 20
+LAGS = 20
 
 
 def check_noise(name: str) -> None:
@@ -217,7 +217,7 @@ def whiteness(innovations: np.ndarray, order: int) -> float:
         Coefficients that were found; by so many there are fewer degrees of freedom.
     """
     count, seen = len(innovations), innovations - innovations.mean()
-    lags = np.arange(1, min(_LAGS + order, count // 4) + 1)
+    lags = np.arange(1, min(LAGS + order, count // 4) + 1)
     correlations = np.array([seen[lag:] @ seen[:-lag] for lag in lags]) / (seen @ seen)
     size = count * (count + 2.0) * float(np.sum(correlations**2 / (count - lags)))
     return float(chi2.sf(size, max(len(lags) - order, 1)))
