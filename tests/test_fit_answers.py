@@ -14,8 +14,8 @@ from synthetic_records import LAWS, OPTIONS, STEP, TRUTH, record
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.analysis.fitting.load_point import MOVED, moved_steps
-from rsfstudy.analysis.fitting.model import Model
+from rsfstudy.analysis.fitting.load_point import moved_steps
+from rsfstudy.analysis.fitting.model import MOVED, Model
 from rsfstudy.analysis.fitting.record import loading_of
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter

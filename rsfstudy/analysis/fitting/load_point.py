@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from rsfstudy.analysis.fitting import noise
+from rsfstudy.analysis.fitting.model import MOVED
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.analysis.fitting.steps import Step
 
@@ -21,8 +22,6 @@ from rsfstudy.analysis.fitting.steps import Step
 _MEANS = 1000
 #: Part of the displacement of a record that noise exceeds.
 _CLEAN = 1e-7
-#: Standard deviations by which steps are moved: little enough for derivatives.
-MOVED = 0.01
 
 
 def moved_steps(record: Record, steps: Sequence[Step]) -> list[list[Step]]:

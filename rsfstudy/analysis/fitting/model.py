@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 
-from rsfstudy.analysis.fitting.load_point import MOVED
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
@@ -70,6 +69,8 @@ QUICK, FINE = (3e-4, 2), (5e-3, 4)
 #: Differences over a step and over two must be alike to this part of the largest, else the step
 #: shrinks, so often at most: the square of it is what fourth order loses.
 _ALIKE, _SHRUNK = 2e-4, 4
+#: Standard deviations by which steps of the load point are moved: little enough for derivatives.
+MOVED = 0.01
 #: Beyond these a parameter has no meaning: differences next to them are to one side.
 _DOMAINS = {"law_exponent": (0.0, 1.0), "alpha": (0.0, math.inf)}
 #: Step of a over a, of b over the larger of both, of frictions and exponents, and of time over the
