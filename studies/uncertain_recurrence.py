@@ -1,9 +1,9 @@
 """From a fit of a, b and D_c with their covariance to the distribution of a recurrence interval.
 
 A fit of a velocity step knows a and b to a tenth each, and b - a to a fifth, because the two are
-correlated; D_c, known to a tenth, hardly shows. The interval of stick-slip on this machine is known
-to 15 %: the drop goes with b - a, and with b for what heals at rest. Errors taken for independent
-would say 90 %.
+correlated; D_c, known to an eighth, hardly shows. The interval of stick-slip on this machine is
+known to 15 %: the drop goes with b - a, and with b for what heals at rest. Errors taken for
+independent would say 90 %.
 """
 
 import math
@@ -22,14 +22,14 @@ from rsfstudy.rig.reductions import InUnits
 
 #: A fit of a velocity step of basalt from 3 to 10 um/s at 20 MPa, of which a record is shipped:
 #: ``rsfstudy.fit(record, stiffness="0.0013 1/um", laws=["slowness"])``. Estimates, D_c in um, and
-#: their covariance with correlated noise. One step tells b - a far better than a or b, whose errors
-#: are correlated by 0.97.
+#: their covariance with correlated noise, of the load point too. One step tells b - a far better
+#: than a or b, whose errors are correlated by 0.97.
 ESTIMATES = {"a": 5.606e-3, "b": 6.200e-3, "slip_distance": 8.048}
 COVARIANCE = np.array(
     [
-        [2.651e-7, 2.516e-7, -3.383e-4],
-        [2.516e-7, 2.522e-7, -3.001e-4],
-        [-3.383e-4, -3.001e-4, 0.7624],
+        [2.956e-7, 2.791e-7, -2.355e-4],
+        [2.791e-7, 2.770e-7, -2.082e-4],
+        [-2.355e-4, -2.082e-4, 1.1246],
     ]
 )
 
