@@ -126,7 +126,8 @@ def events(
     Slip is that of the fault: displacement less shear stress over `stiffness`, that of what lies
     between the fault and where displacement is measured. Without it displacement is taken for that
     of the fault, if it moves faster during the drops than before and after, by three standard
-    deviations of its noise and by a tenth. That of a load point does not.
+    deviations of its noise and by a tenth. That of a load point does not. It is read some samples
+    away from each drop, whose place noise of stress may have moved.
 
     Parameters
     ----------

@@ -227,7 +227,7 @@ class Model:
 
     def by_loading(self, values: Values) -> np.ndarray:
         """By how much friction is off along the rows by each of the errors of its loading, shape
-        (rows, errors).
+        (rows, errors); NaN where there is no such motion.
         """
         if not self.moves:
             return np.zeros((len(self.time), 0))
