@@ -39,7 +39,8 @@ sys.dont_write_bytecode = False
 #: Modules that take longest, which begin first: none of them is left for one process alone at the
 #: end. What uses the results of studies comes later, when they are there: it would wait for each.
 DEAR = (
-    "test_studies", "test_resume", "test_doors", "test_faults", "test_clusters", "test_strangers",
+    "test_studies", "test_resume", "test_public_functions", "test_faults", "test_clusters",
+    "test_strangers",
     "test_report", "test_compiled", "test_scale", "test_figures", "test_fits_together",
     "test_notebook", "test_statuses", "test_cli", "test_readme", "test_extensions", "test_site",
     "test_two_states", "test_critical_step", "test_fit_command", "test_tables",

@@ -11,6 +11,7 @@ from running import called, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Laboratory, Scene, Study
+from rsfstudy.api import summaries
 from rsfstudy.declare import catalogue, rigs
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import SLIP_MODES, LimitCycle
@@ -277,9 +278,8 @@ def test_results_say_what_they_are_of(cycles):
     """What their study holds fixed, and what the rig states: as the study itself is shown. What an
     axis varies is not among them.
     """
-    from rsfstudy.api import told
 
-    of = told.origin(cycles)
+    of = summaries.origin(cycles)
     assert {"a = 0.01", "b_over_a = 1.4"} <= set(of["fixed"].split(", "))
     # in units of the slider the stiffness goes with D_c and sigma_*
     assert not {"stiffness", "load_velocity_ratio"} & set(of["fixed"].replace(",", "").split())
@@ -287,11 +287,11 @@ def test_results_say_what_they_are_of(cycles):
     assert "slip_distance" not in of["laboratory"]
     scene = RIG.scene(**LAW, hold_time="10 s")
     motion = RIG.in_units(rsfstudy.simulate(scene, duration=1.0))
-    assert told.origin(motion)["laboratory"] == (
+    assert summaries.origin(motion)["laboratory"] == (
         "normal_stress = 5 MPa, slip_distance = 10 um, reference_velocity = 1 um/s, "
         "stiffness = 0.01 MPa/um"
     )
-    assert "hold_time = 1" in told.origin(motion)["scene"].split(", ")
+    assert "hold_time = 1" in summaries.origin(motion)["scene"].split(", ")
 
 
 # ---- the command line ----------------------------------------------------------------------------

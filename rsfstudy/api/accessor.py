@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 from xarray.backends import BackendEntrypoint
 
-from rsfstudy.doors import door
+from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError, InvalidValue
 
 # all else is loaded when asked for: xarray imports this module whatever file it opens
@@ -53,7 +53,7 @@ class Accessor:
         return report.html(self._dataset)
 
     @property
-    @door
+    @error_boundary
     def scene(self) -> Scene:
         """The scene: of results of a study that of the one cell that is selected, of a fit that
         with the parameters found.
@@ -72,7 +72,7 @@ class Accessor:
         return scenes.described(self._dataset)
 
     @property
-    @door
+    @error_boundary
     def laboratory(self) -> Laboratory:
         """The rig of one fit of a record, whose scales are those of ``.scene``: the slip distance
         and the stiffness of the fit, velocity and mean normal stress before the step. It turns
@@ -90,7 +90,7 @@ class Accessor:
         return fit_results.laboratory(self._dataset)
 
     @property
-    @door
+    @error_boundary
     def study(self) -> Study:
         """The study that made the dataset, all of it, whatever is selected.
 
@@ -111,7 +111,7 @@ class Accessor:
             raise InvalidValue("study", declared.name, rule, remedy=remedy.strip())
         return restore.from_declaration(declared, loadings.held(self._dataset))
 
-    @door
+    @error_boundary
     def to_si(self, **scales: Any) -> xr.Dataset:
         """The dataset in SI units.
 
@@ -125,7 +125,7 @@ class Accessor:
         self._must_be_ours()
         return to_si(self._dataset, **scales)
 
-    @door
+    @error_boundary
     def in_units(self, *, stress: str = "MPa", length: str = "um", time: str = "s") -> xr.Dataset:
         """The results of a study of a rig in these units, by the scales that each cell has; all of
         them, as `rsfstudy.to_si` says.
@@ -145,7 +145,7 @@ class Accessor:
         self._must_be_ours()
         return in_units(self._dataset, scales_of(self._dataset), stress, length, time)
 
-    @door
+    @error_boundary
     def check(self) -> pd.DataFrame:
         """The claims of the study held against the dataset, as `rsfstudy.check` gives them: none
         applies in other units.
@@ -156,7 +156,7 @@ class Accessor:
         self._must_be_whole("claims are held against")
         return runs.check(self._dataset)
 
-    @door
+    @error_boundary
     def plot(self, *what: Any, **how: Any) -> plots.Figure:
         """The figure of the results of a study, or the picture of a motion or a limit cycle, in the
         units that they have.
@@ -175,7 +175,7 @@ class Accessor:
             return runs.plot(self._dataset, *what, **how)
         return picture(self._dataset, *what, **how)
 
-    @door
+    @error_boundary
     def events(self, slip_rate: float | None = None) -> xr.Dataset:
         """The events of a motion: what is faster than a slip rate.
 
@@ -207,7 +207,7 @@ class Accessor:
             raise DataError("the dataset is of a study: events are told of a motion of one scene")
         return of_motion(self._dataset, slip_rate, lambda: self.scene)
 
-    @door
+    @error_boundary
     def slip_mode(self, stick_slip_from: Any) -> xr.DataArray:
         """What sliders do in the end, where stick-slip begins at a slip rate in units.
 
@@ -242,7 +242,7 @@ class Accessor:
         modes, slow = self._dataset["slip_mode"], SLIP_MODES.index("slow_slip")
         return modes.where(~(modes >= slow), slow + fast).assign_attrs(modes.attrs)
 
-    @door
+    @error_boundary
     def to_dataframe(self) -> pd.DataFrame:
         """A table without columns that never change.
 
@@ -258,7 +258,7 @@ class Accessor:
         self._must_be_ours()
         return to_dataframe(self._dataset)
 
-    @door
+    @error_boundary
     def table(self) -> pd.DataFrame:
         """One row a fit of a record, with the columns that laboratories use; lengths in um.
 
@@ -277,7 +277,7 @@ class Accessor:
 
         return fit_results.table(self._dataset)
 
-    @door
+    @error_boundary
     def draw(self, n: int, seed: int = 0) -> xr.Dataset:
         """Samples of the parameters of one fit, as its errors let them be.
 
@@ -302,7 +302,7 @@ class Accessor:
 
         return fit_results.draw(self._dataset, n, seed)
 
-    @door
+    @error_boundary
     def failures(self) -> pd.DataFrame:
         """The cells that failed or gave no number.
 

@@ -15,7 +15,7 @@ import xarray as xr
 from scipy.ndimage import find_objects, label
 from scipy.stats import norm
 
-from rsfstudy.doors import door, outside
+from rsfstudy.error_boundary import error_boundary, user_stacklevel
 from rsfstudy.errors import InvalidValue, NoAnswer
 from rsfstudy.rig.table import read_table
 from rsfstudy.rig.units import factor, in_si
@@ -99,7 +99,7 @@ def _units(scale: str, about: Mapping[str, Mapping[Any, Any]]) -> dict[str, str]
 # ---- of a record --------------------------------------------------------------------------------
 
 
-@door
+@error_boundary
 def events(
     record: xr.Dataset | str | Path | None = None,
     *,
@@ -198,7 +198,9 @@ def events(
         why = "displacement moves no faster during the drops of stress than before and after"
         dataset["slip"].attrs["comment"] = why
         remedy = "Give stiffness='0.05 MPa/um', that of the rig, or math.inf if it is the fault's"
-        warnings.warn(f"slip has no number: {why}. {remedy}", NoAnswer, stacklevel=outside())
+        warnings.warn(
+            f"slip has no number: {why}. {remedy}", NoAnswer, stacklevel=user_stacklevel()
+        )
     units = {key: value for key, value in about["shear_stress"].items() if key == "units"}
     dataset["noise"] = ((), noise, {"long_name": "standard deviation of the noise", **units})
     words = "drop of shear stress that is found but once in 1,000"

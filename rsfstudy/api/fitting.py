@@ -16,7 +16,7 @@ from rsfstudy.api import runs
 from rsfstudy.axes.axis import Axis
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FIT_BUDGET as BUDGET
-from rsfstudy.doors import door
+from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.fit import Fit
 from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
@@ -42,7 +42,7 @@ _ONE = {"b_over_a": 1.2}
 _TWO = {"b1_over_a": 0.9, "b2_over_a": 0.3, "length_ratio": 10.0}
 
 
-@door
+@error_boundary
 def fit(
     record: Record | Sequence[Record],
     rig: Laboratory | None = None,

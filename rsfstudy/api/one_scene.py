@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.compute import provenance
-from rsfstudy.doors import door
+from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import NoAnswer
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
@@ -25,7 +25,7 @@ from rsfstudy.status import Status
 from rsfstudy.vocabulary import quantity
 
 
-@door
+@error_boundary
 def critical_step(
     scene: Scene,
     of: str = "load_velocity_ratio",
@@ -74,7 +74,7 @@ def critical_step(
     )
 
 
-@door
+@error_boundary
 def limit_cycle(
     scene: Scene,
     *,
@@ -113,7 +113,7 @@ def limit_cycle(
     return _measured(LimitCycle(events=events), scene, Accuracy(rtol, budget, engine=engine))
 
 
-@door
+@error_boundary
 def to_si(
     dataset: xr.Dataset,
     *,

@@ -17,11 +17,11 @@ from urllib.parse import quote
 
 import xarray as xr
 
-from rsfstudy.api import fit_results, runs, tables, told
+from rsfstudy.api import fit_results, runs, summaries, tables
 from rsfstudy.api.tables import Table
 from rsfstudy.compute import provenance, runner
 from rsfstudy.defaults import FIGURES, OUTPUT
-from rsfstudy.doors import door, in_words
+from rsfstudy.error_boundary import error_boundary, in_words
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief, spelt
 from rsfstudy.files import contents, places, store
 from rsfstudy.quantity import Markup, table
@@ -50,7 +50,7 @@ class _Result:
         return re.sub(r"\W+", "-", self.path.name)
 
 
-@door
+@error_boundary
 def report(directory: str | Path = OUTPUT, output: str | Path | None = None) -> Path:
     """Path of one page of HTML, which is written: it shows all results in a directory.
 
@@ -166,7 +166,7 @@ def _read(path: Path, dataset: xr.Dataset) -> _Result:
     if cells:
         commands = "\n".join(tables.reproducing(dataset, path.name, cell) for cell in cells)
         parts.append(f"<h3>Failures</h3>\n{_shown(failed)}<pre>{_text(commands)}</pre>")
-    parts.append(f"<h3>Provenance</h3>\n{_shown(told.origin(dataset))}")
+    parts.append(f"<h3>Provenance</h3>\n{_shown(summaries.origin(dataset))}")
     found = _Result(path, title, verdicts, shown=tuple(parts))
     if wrong:
         return replace(found, status=", ".join(wrong), colour="red")
@@ -179,9 +179,9 @@ def _read(path: Path, dataset: xr.Dataset) -> _Result:
 
 def html(dataset: xr.Dataset) -> str:
     """The numbers of a dataset in HTML, and the verdicts on those of a study."""
-    parts = list(map(_shown, told.numbers(dataset)))
+    parts = list(map(_shown, summaries.numbers(dataset)))
     if contents.is_of_a_scene(dataset):
-        parts.append(_shown(told.origin(dataset)))
+        parts.append(_shown(summaries.origin(dataset)))
     elif claimed := tables.claims(runs.check(dataset)):
         parts += ["<h3>Claims</h3>", _shown(claimed)]
     return "\n".join(filter(None, parts))
@@ -199,7 +199,7 @@ def _said(text: str, colour: str = "") -> str:
     return f'<p class="{colour}">{_text(text)}</p>'
 
 
-def _shown(piece: told.Piece) -> str:
+def _shown(piece: summaries.Piece) -> str:
     """A sentence, what is what, or a table, in a box of its own that scrolls where it is too wide;
     nothing of what is empty.
     """

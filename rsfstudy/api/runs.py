@@ -21,7 +21,7 @@ from rsfstudy.declare import catalogue, names
 from rsfstudy.declare.claims import verdicts
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import OUTPUT, TIME_LIMIT
-from rsfstudy.doors import door, outside
+from rsfstudy.error_boundary import error_boundary, user_stacklevel
 from rsfstudy.errors import Incomplete, InvalidValue
 from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import Comparison, cell_number, compared, side_by_side
@@ -47,14 +47,14 @@ class Studies(dict[str, Study]):
         return table(("study", "title", "cells", "claims"), rows)
 
 
-@door
+@error_boundary
 def studies() -> dict[str, Study]:
     """The named studies, by name."""
     return Studies({name: catalogue.load(name) for name in names.names()})
 
 
 @completed()
-@door
+@error_boundary
 def run(
     study: str | Path | Study,
     *,
@@ -148,9 +148,9 @@ def run(
         first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
         told = [first, *told, "dataset.rsf.failures() lists them"]
     if told:
-        warnings.warn("; ".join(told), Incomplete, stacklevel=outside())
+        warnings.warn("; ".join(told), Incomplete, stacklevel=user_stacklevel())
     if slow := tables.slow_norm(results):
-        warnings.warn(slow, UserWarning, stacklevel=outside())
+        warnings.warn(slow, UserWarning, stacklevel=user_stacklevel())
     return results
 
 
@@ -194,7 +194,7 @@ def prepared(
     return run
 
 
-@door
+@error_boundary
 def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
     """Load the results of a named study, or a results file, into memory.
 
@@ -216,7 +216,7 @@ def _opened(dataset: xr.Dataset | str | Path) -> xr.Dataset:
     return dataset
 
 
-@door
+@error_boundary
 def plot(
     dataset: xr.Dataset | str | Path,
     variable: str | None = None,
@@ -255,7 +255,7 @@ def plot(
     return plots.figure(_opened(dataset), own, variable=variable, style=style)
 
 
-@door
+@error_boundary
 def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     """Compare a dataset (or a named study's results, or a file) with the claims of its study.
 
@@ -270,7 +270,7 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     return verdicts(results, list(declared.claims), declared.overrides)
 
 
-@door
+@error_boundary
 def rerun(
     file: str | Path,
     *,
@@ -331,7 +331,7 @@ def rerun(
     return compared(theirs, ours)
 
 
-@door
+@error_boundary
 def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> Comparison:
     """Differences between two datasets (or named studies' results, or files): in declaration, in
     what made them, and in numbers, cell by cell where both have the same place on every axis.
@@ -393,7 +393,7 @@ def cell(
     return scene, declared.measure.with_(**changes)(scene, declared.accuracy)
 
 
-@door
+@error_boundary
 def _found(
     file: str | Path, place: Mapping[str, Any], study: str | Path | None
 ) -> tuple[Study, int, Mapping[str, tuple[Any, Any]]]:

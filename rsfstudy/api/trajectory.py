@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.compute import provenance
-from rsfstudy.doors import door
+from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import Incomplete, InvalidValue, NoAnswer, brief
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.course import follow
@@ -51,7 +51,7 @@ _OVER_LOADING = 1e6
 _REGIMES = ("quasi_static", "slow_manifold", IN_RUPTURE, "quasi_dynamic")
 
 
-@door
+@error_boundary
 def simulate(
     scene: Scene,
     *nameless: Never,

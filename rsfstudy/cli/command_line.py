@@ -18,7 +18,7 @@ import click
 from rsfstudy.cli import command_line_motions, options
 from rsfstudy.declare import names
 from rsfstudy.defaults import FORMATS, OUTPUT
-from rsfstudy.doors import in_words
+from rsfstudy.error_boundary import in_words
 from rsfstudy.errors import (
     Incomplete,
     Interrupted,

@@ -9,7 +9,7 @@ import xarray as xr
 
 from rsfstudy import plots
 from rsfstudy.analysis.fitting.record import Record
-from rsfstudy.api import fit_results, fitting, told
+from rsfstudy.api import fit_results, fitting, summaries
 from rsfstudy.api.tables import Table
 from rsfstudy.api.trajectory import BEYOND
 from rsfstudy.api.trajectory import simulate as simulated
@@ -37,7 +37,7 @@ _TAKEN = ("stiffness", "slip_distance", "laws", "free", "together", "before", "a
 
 def simulate(given: Given) -> int:
     """Follow one motion, draw it and write it."""
-    _check_replaceable(given.output.with_suffix(".nc"), told.is_motion, "motion")
+    _check_replaceable(given.output.with_suffix(".nc"), summaries.is_motion, "motion")
     scene, laboratory = _stated(given)
     duration, accuracy = _duration(given.duration, laboratory), ("rtol", "budget", "engine")
     motion = simulated(scene, duration=duration, **given.only(*accuracy))
@@ -85,9 +85,9 @@ def _write(motion: xr.Dataset, laboratory: Laboratory | None, given: Given) -> N
         found = [motion, motion.rsf.events()]
         if laboratory:
             found = [laboratory.in_units(of, **TOLD_IN) for of in found]
-        layout.show(told.motion(found[0]))
-        layout.show(told.stability(motion.rsf.scene))
-        layout.show(told.events(found[1]))
+        layout.show(summaries.motion(found[0]))
+        layout.show(summaries.stability(motion.rsf.scene))
+        layout.show(summaries.events(found[1]))
     console.print(f"{said}\nwrote {given.output} and {data}")
 
 
@@ -109,7 +109,7 @@ def fit(given: Given) -> int:
     )
     dataset = store.write(dataset, data)
     plots.save(dataset, given.output)
-    for piece in told.numbers(dataset):
+    for piece in summaries.numbers(dataset):
         layout.show(piece)
     console.print(f"wrote {given.output} and {data}", soft_wrap=True)
     return terminal.status_of(dataset)

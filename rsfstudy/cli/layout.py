@@ -12,8 +12,8 @@ from rich.cells import cell_len
 from rich.padding import Padding
 from rich.text import Text
 
+from rsfstudy.api.summaries import Piece
 from rsfstudy.api.tables import Table
-from rsfstudy.api.told import Piece
 from rsfstudy.cli.console import clean, console
 
 #: Characters between columns, and in which a column of sentences can be read.

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.api import fit_results, runs, tables, told
+from rsfstudy.api import fit_results, runs, summaries, tables
 from rsfstudy.api.tables import Table
 from rsfstudy.cli import cost, layout
 from rsfstudy.cli.console import console, stderr
@@ -167,8 +167,8 @@ def results(dataset: xr.Dataset, file: str) -> int:
     title = dataset.attrs.get("title", "answer for one scene")
     name = f"{dataset.attrs['id']}: " if "id" in dataset.attrs else ""
     console.print(f"{name}{title}\n", style="bold")
-    layout.show(told.origin(dataset))
-    for piece in told.numbers(dataset):
+    layout.show(summaries.origin(dataset))
+    for piece in summaries.numbers(dataset):
         layout.show(piece)
     if not contents.is_of_a_scene(dataset) and not fit_results.is_fit(dataset):
         layout.show(tables.held(dataset))

@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rsfstudy.doors import door
+from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.plots import Drawing
 from rsfstudy.plots._axes import log_scale
@@ -34,7 +34,7 @@ _ROUNDING = 1e-6
 _FRICTION = r"Friction coefficient, $\mu$"
 
 
-@door
+@error_boundary
 def picture(
     motion: xr.Dataset, laboratory: Laboratory | None = None, *, against: str | None = None
 ) -> Figure:

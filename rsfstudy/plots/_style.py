@@ -23,7 +23,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.transforms import blended_transform_factory, offset_copy
 
-from rsfstudy.doors import check_file
+from rsfstudy.error_boundary import check_file
 from rsfstudy.errors import InvalidValue
 from rsfstudy.plots._text import length, wrapped
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from scipy.special import lambertw
 
-from rsfstudy.doors import check_file, in_words
+from rsfstudy.error_boundary import check_file, in_words
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.motion.events import Event, Kind
 from rsfstudy.motion.meter import Halt

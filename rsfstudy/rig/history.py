@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.doors import door
+from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.laboratory import SEGMENT, Laboratory
 from rsfstudy.rig.table import Column, picked, read_table
@@ -25,7 +25,7 @@ _SCALES = {
 }  # fmt: skip
 
 
-@door
+@error_boundary
 def history(
     record: Any,
     laboratory: Laboratory | None = None,
@@ -155,7 +155,7 @@ def _velocity(
     return mean, (key, float(found[key].values[first]), found[key].place(first))
 
 
-@door
+@error_boundary
 def read_protocol(
     path: str | Path, laboratory: Laboratory | None = None, name: str = "protocol"
 ) -> Protocol:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
-from rsfstudy.doors import check_file, door
+from rsfstudy.error_boundary import check_file, error_boundary
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.table import HEADING, Column, Selected, picked, read_table, selected
 from rsfstudy.rig.units import factor, in_si
@@ -40,7 +40,7 @@ _HEAD, _HEADER, _COLUMNS = 36, 84, 32
 _BEGIN = _HEAD + _HEADER * _COLUMNS
 
 
-@door
+@error_boundary
 def read_record(
     source: Any,
     columns: Mapping[str, Any] | None = None,

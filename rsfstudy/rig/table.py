@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rsfstudy.doors import check_file, door
+from rsfstudy.error_boundary import check_file, error_boundary
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.quantity import headed
 from rsfstudy.rig.units import number
@@ -129,7 +129,7 @@ def _floats(key: str, values: Any) -> tuple[np.ndarray, str]:
     return (times - times[:1] if kind == "M" else times) / np.timedelta64(1, "s"), "s"
 
 
-@door
+@error_boundary
 def read_table(path: str | Path, columns: Any = None) -> dict[str, Column]:
     """Columns of a CSV file, or of a text with tabs, by their names: numbers, units, and where each
     stands.

@@ -50,7 +50,7 @@ LATTICE = study_of(
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory) -> Path:
-    place = tmp_path_factory.mktemp("doors")
+    place = tmp_path_factory.mktemp("public")
     run(LATTICE, output=place)
     (place / "circle").symlink_to("circle")
     (place / "protocol.csv").write_text("velocity (V_*), duration (D_c/V_*)\n2, 1\n")

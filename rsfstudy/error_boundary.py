@@ -1,6 +1,6 @@
 """Error boundary of public functions: what they raise is an error of rsfstudy.
 
-Each is a door: whatever goes wrong behind one, and is no error of ours yet, becomes one that says
+Whatever goes wrong within one, and is no error of ours yet, becomes one that says
 what was asked, what went wrong and what to do.
 """
 
@@ -20,7 +20,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 
-def door(function: Callable[P, T]) -> Callable[P, T]:
+def error_boundary(function: Callable[P, T]) -> Callable[P, T]:
     """The function, with errors of ours only.
 
     Of a call with a dataset, or on one, any other becomes a `DataError`, of all others an
@@ -46,7 +46,7 @@ def door(function: Callable[P, T]) -> Callable[P, T]:
     return answered
 
 
-def outside() -> int:
+def user_stacklevel() -> int:
     """The ``stacklevel`` by which a warning of whoever asks names the line of the user's."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back and frame.f_globals.get("__name__", "").startswith("rsfstudy."):
