@@ -77,6 +77,28 @@ def test_statuses_that_differ_are_named(two):
     }
 
 
+def test_codes_are_compared_though_they_have_no_errors(two):
+    first, second = two
+    codes = {"flag_values": [0.0, 1.0], "flag_meanings": "slow fast"}
+    for dataset, code in ((first, 0.0), (second, 1.0)):
+        dataset["mode"] = dataset[NUMBER].copy(data=dataset[NUMBER].values * 0.0 + code)
+        dataset["mode"].attrs = codes
+    assert rsfstudy.compare(first, first).agrees
+    assert rsfstudy.compare(first, second).beyond_errors == ["mode"]
+
+
+def test_points_of_one_name_must_hold_the_same(two):
+    """As samples that are drawn anew do not: they are other cells."""
+    first, second = two
+    values = ("b_over_a", [0.5, 0.6, 0.7, 0.8])
+    first = first.assign_coords(alpha=values)
+    rounded = first.assign_coords(alpha=first["alpha"] * (1.0 + 1e-15))
+    assert rsfstudy.compare(first, rounded).agrees
+    with pytest.raises(InvalidValue, match="other values of alpha") as caught:
+        rsfstudy.compare(first, second.assign_coords(alpha=first["alpha"] + 0.1))
+    assert caught.value.name == "axis"
+
+
 def test_cells_are_matched_by_their_places(two):
     """In another order, on axes that rounding has moved; the others are counted and named."""
     first, second = two

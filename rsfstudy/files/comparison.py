@@ -157,7 +157,8 @@ def side_by_side(first: xr.Dataset, second: xr.Dataset) -> Comparison:
     Raises
     ------
     InvalidValue
-        Where an axis of one has no counterpart in the other, not even a fixed value.
+        Where an axis of one has no counterpart in the other, not even a fixed value; and where its
+        points have the same names in both and hold other values, as samples drawn anew do.
     """
     both = [_with_axes(one, other) for one, other in ((first, second), (second, first))]
     dims = [str(d) for d in both[0]["status"].dims]
@@ -165,6 +166,7 @@ def side_by_side(first: xr.Dataset, second: xr.Dataset) -> Comparison:
     left_out = _left_out(labelled)
     kept = [dataset.drop_vars(left_out, errors="ignore") for dataset in labelled]
     shared = [one.transpose(*dims, ...) for one in xr.align(*kept, join="inner")]
+    _check_points(*shared)
     indexes = [[dataset.indexes[d] for dataset in labelled] for d in dims]
     points = {
         d: (a.difference(b, sort=False).tolist(), b.difference(a, sort=False).tolist())
@@ -213,6 +215,22 @@ def _labels(dataset: xr.Dataset) -> dict[str, Any]:
     return labels
 
 
+def _check_points(first: xr.Dataset, second: xr.Dataset) -> None:
+    """Refuse points of one name that hold other values of a field in the two, beyond rounding."""
+    for name, one in first.coords.items():
+        if not one.dims or name in one.dims or name not in second.coords:
+            continue
+        x, y = one.values, second[name].values
+        if x.shape == y.shape and x.dtype.kind == y.dtype.kind == "f":
+            same = np.allclose(x, y, rtol=1e-11, atol=0.0, equal_nan=True)
+        else:
+            same = np.array_equal(x, y)
+        if not same:
+            rule = f"has other values of {name} in the two, for points of the same names"
+            remedy = "They are results for other cells, and have no number in common."
+            raise InvalidValue("axis", ", ".join(map(str, one.dims)), rule, remedy=remedy)
+
+
 def _left_out(both: Sequence[xr.Dataset]) -> dict[str, str]:
     """Variables that cannot be compared, or would compare other things than numbers of cells."""
     first, second = both
@@ -242,7 +260,7 @@ def _numbers(shared: Sequence[xr.Dataset]) -> pd.DataFrame:
 
 def _statuses(shared: Sequence[xr.Dataset], known: xr.DataArray) -> pd.DataFrame:
     """The cells that ended otherwise, by their places on the axes."""
-    first, second = (one["status"] for one in shared)
+    first, second = (one["status"].reset_coords(drop=True) for one in shared)
     both = xr.Dataset({"first": first, "second": second, "known": known}).reset_coords(drop=True)
     frame = both.to_dataframe(dim_order=[*map(str, first.dims)]).reset_index()
     ended = frame[frame["known"] & (frame["first"] != frame["second"])].drop(columns="known")
