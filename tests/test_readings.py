@@ -234,4 +234,5 @@ def test_friction_of_a_mass_is_read_the_instant_before_the_load_point_changes():
     rows = [{"velocity": 2.0, "distance": 30.0}, {"velocity": 20.0}]
     later = read(VelocityStep(step_number=2, phases=2), scene.with_(loading=protocol(rows)))
     steady = 0.6 + (scene.a - scene.b) * math.log(2.0)
+    # three times its error estimate; exp(-30) of the evolution before is left
     assert later["friction_before"] == pytest.approx(steady, abs=2e-9)

@@ -6,6 +6,7 @@ Its name stands for it in results, and its segments count for what decided the n
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,7 +26,7 @@ KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stated(Loading):
+class Stated(Loading, ABC):
     """Base of loading histories of a user's own, which are data.
 
     Attributes
@@ -51,9 +52,9 @@ class Stated(Loading):
         return "velocity", self.segments[number].load_velocity, f"segment {number + 1}"
 
     @property
+    @abstractmethod
     def lasts(self) -> float:
         """Duration in D_c/V_* of all that was stated."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)
