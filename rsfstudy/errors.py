@@ -7,7 +7,7 @@ from __future__ import annotations
 import difflib
 import reprlib
 import signal
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 #: Most characters of a text, and most choices, that a message has room for; and the most that are
 #: listed beside those that look like what was given.
@@ -89,6 +89,28 @@ class InvalidValue(RsfStudyError, ValueError):
         return placed
 
 
+class CallError(RsfStudyError, TypeError):
+    """A call whose arguments do not fit the signature of the function.
+
+    Parameters
+    ----------
+    name : str
+        The function or class.
+    reason : str
+        The message of Python.
+    parameters : sequence of str
+        Names of the parameters, which the message lists.
+    """
+
+    def __init__(self, name: str, reason: str, parameters: Sequence[str]) -> None:
+        text = f"{brief(name)}() {brief(reason)}; it takes {', '.join(parameters) or 'nothing'}"
+        if "unexpected" in reason:
+            given = reason.rpartition(" ")[2].strip("'")
+            close = difflib.get_close_matches(brief(given), parameters, n=1, cutoff=0.6)
+            text += "".join(f". Did you mean {each!r}?" for each in close)
+        super().__init__(text)
+
+
 class DataError(RsfStudyError):
     """A file that is missing, damaged, or not a results file of rsfstudy."""
 
@@ -114,13 +136,20 @@ class Signalled(KeyboardInterrupt):
         self.exit_status = 128 + number
 
 
-class NoAnswer(UserWarning):
+class RsfStudyWarning(UserWarning):
+    """Base of the warnings, whose text is safe to print on a terminal."""
+
+    def __str__(self) -> str:
+        return spelt(brief(super().__str__(), _LONGEST))
+
+
+class NoAnswer(RsfStudyWarning):
     """What was asked of one scene has no number for an answer, nothing happens in it, or what
     happens is no physics.
     """
 
 
-class Incomplete(UserWarning):
+class Incomplete(RsfStudyWarning):
     """A motion that ended early, or cells of a run that failed."""
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from rsfstudy.axes.axis import check_text
 from rsfstudy.declare.names import names
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 
@@ -34,6 +35,7 @@ ANY_LATTICE = frozenset(
 )
 
 
+@guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Panel:
     """One panel of a figure, or one for each point of some axes.
@@ -115,6 +117,7 @@ class Panel:
     as_marked: bool = False
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Figure:
     """Panels, from left to right and from top to bottom.

@@ -20,6 +20,7 @@ from rsfstudy.declare.cell import Cell, Changes
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
 from rsfstudy.declare.shown import study_html
+from rsfstudy.error_boundary import error_boundary, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.motion.accuracy import Accuracy
@@ -44,10 +45,13 @@ from rsfstudy.slider.registry import (
 from rsfstudy.slider.scene import Scene
 from rsfstudy.wording import is_list
 
+#: Most bytes of the name of a study: a file name has at most 255, and endings follow.
+_LONGEST_NAME = 200
 #: Fields that decide what fills a slot.
 _CHOOSING = frozenset({*SLOT_NAMES, *CALLERS})
 
 
+@guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Study:
     """A parameter study, declared.
@@ -109,6 +113,9 @@ class Study:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isidentifier():
             raise InvalidValue("name", self.name, "must be a Python identifier: it names files")
+        if len(self.name.encode()) > _LONGEST_NAME:
+            rule = f"must have at most {_LONGEST_NAME} bytes, because it names files"
+            raise InvalidValue("name", self.name, rule)
         for name in ("title", "summary", "declared_in"):
             check_text(name, getattr(self, name))
         check_figure(self.plot)
@@ -131,6 +138,7 @@ class Study:
                 raise InvalidValue(name, value, f"must be plain data ({error})") from error
 
     @staticmethod
+    @error_boundary
     def caption(docstring: str | None) -> str:
         """The second paragraph of a module's docstring: a summary at the top of the file."""
         paragraphs = (docstring or "").split("\n\n", 2)

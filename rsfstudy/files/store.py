@@ -18,7 +18,8 @@ import dask
 import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import DataError, brief
+from rsfstudy.error_boundary import user_stacklevel
+from rsfstudy.errors import DataError, RsfStudyWarning, brief
 from rsfstudy.files import contents
 from rsfstudy.files.contents import LAYOUT
 
@@ -177,7 +178,7 @@ def read_any(path: Path) -> xr.Dataset:
         raise DataError(f"{where}: {error}") from error
     if not sealed and not (path.is_dir() and "layout" not in dataset.attrs):
         said = f"{where} has no digest: another program saved it, and may have changed it"
-        warnings.warn(said, stacklevel=5)
+        warnings.warn(said, RsfStudyWarning, stacklevel=user_stacklevel())
     return dataset
 
 

@@ -26,6 +26,7 @@ from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
 from rsfstudy.analysis.fitting.steps import Step, noise_variance
 from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
 from rsfstudy.measures._fit_outputs import outputs_of
@@ -51,6 +52,7 @@ _SOUGHT = (
 _LEAST = 1.001
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Fit(Measure):
     """Friction parameters by least squares, under the noise that the residuals tell.

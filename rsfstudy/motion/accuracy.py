@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from numbers import Real
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import SCIPY, named
 
@@ -24,6 +25,7 @@ MUCH_WORSE = 100.0
 ROUNDING = 1e-13
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Accuracy:
     """The accuracy a result must meet, and the work it may cost.
@@ -69,6 +71,7 @@ class Accuracy:
             )
         if not 1 <= self.budget < math.inf or self.budget % 1:
             raise InvalidValue("budget", self.budget, "must be a whole number from 1")
+        object.__setattr__(self, "budget", int(self.budget))
         object.__setattr__(self, "engine", named(self.engine))
         if self.methods and self.engine != SCIPY:
             rule = f"are SciPy's, and the engine is {self.engine}"

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ _ROUNDING = 1e-6
 _FRICTION = r"Friction coefficient, $\mu$"
 
 
-@error_boundary
+@partial(error_boundary, is_inner=True)
 def picture(
     motion: xr.Dataset, laboratory: Laboratory | None = None, *, against: str | None = None
 ) -> Figure:
@@ -67,9 +68,11 @@ def picture(
     if against not in (None, *AGAINST):
         raise InvalidValue("against", against, "is unknown", choices=AGAINST)
     for name in (against or "time", "slip", "frictional_stress", "log10_slip_rate"):
-        if name not in motion:
+        if not {name, "slip"} <= set(motion.variables):
             text = "is missing: it is no motion as simulate gives it, and no limit cycle"
             raise DataError(f"{name} {text}")
+        if motion[name].ndim != 1 or motion[name].dims != motion["slip"].dims:
+            raise DataError(f"{name} must lie along one dimension, that of slip, as in any motion")
     if not motion["slip"].notnull().any():
         text = f"{motion.attrs.get('status', '')}: {motion.attrs.get('message', '')}"
         raise DataError(f"there is no motion, and nothing to draw. {text}")

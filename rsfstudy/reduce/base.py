@@ -10,6 +10,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 import xarray as xr
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.status import Status
@@ -29,6 +30,7 @@ COMMENT = "errors of the cells it draws on, each times the derivative by it, in 
 ROUNDING = 1e-9
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Reduction:
     """Base of all reductions: ``reduction(dataset)`` gives a dataset of the new variables.

@@ -11,12 +11,14 @@ import xarray as xr
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.reduce.base import Derivatives, Fields, Reduction, dimension_of, refused
 
 #: Change of ln(value) by which derivatives of an interpolant are taken.
 _STEP = 1e-6
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Boundary(Reduction):
     """Boundary between the points of a coordinate whose cells say no and those that say yes.
@@ -101,6 +103,7 @@ class Boundary(Reduction):
         return *ends, float(changes.size)
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Inverse(Reduction):
     """Place along a coordinate where a smooth, monotone variable reaches a level, by logarithms.

@@ -17,6 +17,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Derivatives, Fields, Reduction, refused
@@ -81,6 +82,7 @@ class _Statistic(Reduction):
         return self.results(f"{self.text} of {self.of} over {self.over}", found)
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Mean(_Statistic):
     """Mean over samples."""
@@ -99,6 +101,7 @@ class Mean(_Statistic):
         return [(has / has.sum(self.over), {})]
 
 
+@guard_methods
 @dataclass(frozen=True)
 class StandardDeviation(_Statistic):
     """Standard deviation over samples, of three at least.
@@ -130,6 +133,7 @@ class StandardDeviation(_Statistic):
         return [(by.fillna(0.0), {})]
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Quantile(_Statistic):
     """Quantile over samples, between neighbours by their distance; its standard error is half the
@@ -192,6 +196,7 @@ def _between(of: xr.DataArray, over: str, level: xr.DataArray) -> xr.DataArray:
     return (weights * of.where(weights > 0.0, 0.0)).sum(over)
 
 
+@guard_methods
 @dataclass(frozen=True)
 class StatusShares(Reduction):
     """Share of the samples that ended by each status, failures among them; its standard error is
@@ -239,6 +244,7 @@ class StatusShares(Reduction):
         return xr.Dataset({name: values.where(known) for name, values in found.items()})
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Logarithm(Reduction):
     """Natural logarithm of a variable, in each cell where that is positive. Slopes of it over

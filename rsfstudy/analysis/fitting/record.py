@@ -6,13 +6,13 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from scipy.optimize import isotonic_regression
 
 from rsfstudy.analysis.fitting.steps import Step, steps_of
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity, is_name
 
@@ -28,6 +28,7 @@ COLUMNS = (
 _RAMP = 16
 
 
+@guard_methods
 @dataclass(frozen=True, eq=False)
 class Record:
     """A record of an experiment.
@@ -107,16 +108,22 @@ class Record:
             raise InvalidValue("window", (begins, ends), rule)
         return replace(self, columns={n: v[rows] for n, v in self.columns.items()})
 
-    def with_steps(self, steps: Sequence[Any]) -> Record:
+    def with_steps(self, steps: Sequence[Sequence[float]]) -> Record:
         """The record with its steps stated: times in s at which velocity begins and ends to change,
         and velocities before and after in um/s.
         """
-        stated = tuple(Step(*map(float, step)) for step in steps)
+        stated: list[Step] = []
+        for step in steps:
+            try:
+                stated.append(Step(*map(float, step)))
+            except (TypeError, ValueError) as error:
+                rule = "must be four numbers: begins, ends, velocity before and after"
+                raise InvalidValue("step", step, rule) from error
         for step in stated:
             if not step.begins <= step.ends or min(step.before, step.after) < 0.0:
                 rule = "is no step: begins, ends, velocity before and after"
                 raise InvalidValue("step", tuple(step), rule)
-        return replace(self, stated=stated)
+        return replace(self, stated=tuple(stated))
 
     @cached_property
     def found(self) -> tuple[Step, ...]:

@@ -18,6 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rsfstudy.error_boundary import guard_methods
+
 #: Rows among which steps are looked for at once: of a longer record, the means of as many.
 _ROWS = 20_000
 #: Fewest rows of a piece, part of the faster velocity by which the next one must differ, and by how
@@ -39,6 +41,7 @@ _NORMAL = 1.4826
 _Line = tuple[float, float]
 
 
+@guard_methods
 class Step(NamedTuple):
     """A change of load point velocity.
 
