@@ -8,6 +8,7 @@ from rsfstudy.axes.axis import check_text
 from rsfstudy.declare import catalogue, names
 from rsfstudy.defaults import OUTPUT
 from rsfstudy.errors import DataError, InvalidValue, brief
+from rsfstudy.paths import check_path
 
 
 def directory(output: str | Path | None) -> Path | None:
@@ -23,6 +24,7 @@ def directory(output: str | Path | None) -> Path | None:
     if not isinstance(output, str | Path):
         raise InvalidValue("output", output, "must be a path, or None")
     check_text("output", str(output))
+    check_path("output", output)
     if output == "":
         remedy = "Name a directory; . is the one you are in."
         raise InvalidValue("output", output, "is empty", remedy=remedy)
@@ -43,6 +45,7 @@ def results(name: str | Path, output: str | Path | None) -> Path:
     DataError, InvalidValue
         If there are none.
     """
+    check_path("study", name)
     path = Path(name)
     if path.suffix in (".nc", ".zarr"):
         return path
