@@ -32,14 +32,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.slider.equations import relation_of, steady_states_of
+from rsfstudy.slider.equations import relation_of
+from rsfstudy.slider.law_slopes import Matrix, slopes_of_law
 from rsfstudy.slider.parts import Scene
 from rsfstudy.slider.steady import Steady, steady_sliding
-
-#: Step of the differences that give the slopes of a law, in ln V, and their weights: order eight.
-#: States take a part of it over b; each of several, over what ln V moves it by, if it does.
-_STEP, _PART, _MOVES = 0.05, 0.05, 1e-9
-_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
 
 #: Critical stiffness over a, and growth per slip in D_c, that rounding leaves where there is none.
 _ROUNDING, _STILL = 1e-12, 1e-9
@@ -49,7 +45,6 @@ _ROUNDING, _STILL = 1e-12, 1e-9
 _LIGHT, _POLISHED = 1e-6, 2
 
 Polynomial = list[float]
-Matrix = list[list[float]]
 
 
 def critical_stiffness(scene: Scene, log_slip_rate: float, *, quasi_static: bool = False) -> float:
@@ -173,7 +168,7 @@ def response(scene: Scene, steady: Steady) -> tuple[Polynomial, Polynomial]:
     Rice and Ruina (1983), J. Appl. Mech. 50, 343-349.
     """
     _value, slope, _shift, shift_slope = relation_of(scene)(steady.friction)
-    by_rate, by_shift, by_state = slopes_of_law(scene, steady)
+    by_rate, by_shift, by_state, _error = slopes_of_law(scene, steady)
     weights, shifting = _actions(scene, steady)
     for row, of_shift in zip(by_state, by_shift, strict=True):
         row[-1] += of_shift * shifting
@@ -199,44 +194,6 @@ def _actions(scene: Scene, steady: Steady) -> tuple[list[float], float]:
 
 def _dot(first: Sequence[float], second: Sequence[float]) -> float:
     return sum(map(mul, first, second))
-
-
-def slopes_of_law(scene: Scene, steady: Steady) -> tuple[list[float], list[float], Matrix]:
-    """Derivatives of the evolution of the states per unit slip at steady sliding: with respect to
-    ln V and to the shift, both of shape (states,), and to each state, of shape (states, states).
-
-    By central differences of order eight: ``f' = sum of w_n [f(x + n h) - f(x - n h)]/h``, n from 1
-    to 4.
-    """
-    evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
-    shift = relation_of(scene)(steady.friction)[2]
-    at, columns = [steady.log_slip_rate, shift, *steady.psis], []
-    for place, (value, scale) in enumerate(zip(at, _scales(scene, steady, shift), strict=True)):
-        step = _STEP * scale
-        slopes = [0.0] * len(steady.psis)
-        for number, weight in _WEIGHTS:
-            at[place] = value + number * step
-            ahead = evolutions(at[0], tuple(at[2:]), at[1], 1.0, p)
-            at[place] = value - number * step
-            behind = evolutions(at[0], tuple(at[2:]), at[1], 1.0, p)
-            changes = zip(slopes, ahead, behind, strict=True)
-            slopes = [slope + weight * (more - less) / step for slope, more, less in changes]
-        at[place] = value
-        columns.append(slopes)
-    by_rate, by_shift, *by_state = columns
-    return by_rate, by_shift, [list(row) for row in zip(*by_state, strict=True)]
-
-
-def _scales(scene: Scene, steady: Steady, shift: float) -> list[float]:
-    """Scales over which the evolution bends: in ln V, in the shift, and in each state."""
-    size = _PART * scene.a * scene.parts.law.size_over_a
-    # b of several states may be next to nothing where each has a large one
-    of_shift = size if scene.parts.law.states > 1 else _PART * abs(scene.b) or size
-    if len(steady.psis) == 1:
-        return [1.0, of_shift, size]
-    slow, fast = (steady_states_of(scene, steady.log_slip_rate + x, shift) for x in (-1.0, 1.0))
-    moved = [0.5 * abs(y - x) for x, y in zip(slow, fast, strict=True)]
-    return [1.0, of_shift, *(by if by > _MOVES * size else size for by in moved)]
 
 
 def resolvent(matrix: Matrix) -> tuple[Polynomial, list[Matrix]]:
@@ -307,7 +264,7 @@ def response_to_normal_stress(scene: Scene, log_slip_rate: float, frequency: flo
     psis = (*steady.psis, *(0.0 for _unknown in scene.pressure_source.unknowns))
     by_pressure, p = scene.functions.friction.by_pressure, scene.numbers_of_friction
     gained, shifted = by_pressure(steady.friction, psis, p)
-    _by_rate, by_shift, by_state = slopes_of_law(still, steady)
+    _by_rate, by_shift, by_state, _error = slopes_of_law(still, steady)
     denominator, adjugate = resolvent(by_state)
     forced = [gained * x for x in denominator]
     for power, matrix in enumerate(adjugate):
