@@ -34,14 +34,19 @@ class LawSlopes(NamedTuple):
     by_state : list of list of float
         Derivatives with respect to each state, of shape (states, states).
     relative_error : float
-        Error estimate of the derivatives, relative to the largest derivative with respect to the
-        same argument.
+        Largest relative error estimate of a derivative.
     """
 
     by_rate: list[float]
     by_shift: list[float]
     by_state: Matrix
     relative_error: float
+
+    def with_relative_change(self, part: float) -> LawSlopes:
+        """Return derivatives that differ by a relative change, of opposite sign for states."""
+        by_rate, by_shift = ([x * (1.0 + part) for x in row] for row in self[:2])
+        by_state = [[x * (1.0 - part) for x in row] for row in self.by_state]
+        return self._replace(by_rate=by_rate, by_shift=by_shift, by_state=by_state)
 
 
 def slopes_of_law(scene: Scene, steady: Steady) -> LawSlopes:
@@ -81,12 +86,12 @@ def _derivatives(
     the smaller rounding error. If no two steps converge, the pair with the smallest difference
     decides.
     """
-    coarse, best, smallest = _order_eight(function, step), list[float](), math.inf
+    (coarse, _sizes), best, smallest = _order_eight(function, step), list[float](), math.inf
     for _ in range(_HALVINGS):
         step *= 0.5
-        fine = _order_eight(function, step)
-        size = max(map(abs, fine)) or 1.0
-        error = max(abs(x - y) for x, y in zip(fine, coarse, strict=True)) / size
+        fine, sizes = _order_eight(function, step)
+        pairs = zip(fine, coarse, sizes, strict=True)
+        error = max(abs(x - y) / size if x != y else 0.0 for x, y, size in pairs)
         noise = _CONVERGED + rounding / step
         if error <= noise:
             return coarse, noise
@@ -96,14 +101,26 @@ def _derivatives(
     return best, smallest
 
 
-def _order_eight(function: Callable[[float], Numbers], step: float) -> list[float]:
-    """Differentiate by central differences of order eight."""
+def _order_eight(
+    function: Callable[[float], Numbers], step: float
+) -> tuple[list[float], list[float]]:
+    """Differentiate by central differences of order eight.
+
+    Returns
+    -------
+    derivatives, sizes : list of float
+        The derivatives, and the largest quotient of a value and the step, to which the rounding
+        error is relative.
+    """
     slopes = [0.0] * len(function(0.0))
+    sizes = slopes
     for number, weight in _WEIGHTS:
         ahead, behind = function(number * step), function(-number * step)
         changes = zip(slopes, ahead, behind, strict=True)
         slopes = [slope + weight * (more - less) / step for slope, more, less in changes]
-    return slopes
+        values = zip(sizes, ahead, behind, strict=True)
+        sizes = [max(size, abs(more) / step, abs(less) / step) for size, more, less in values]
+    return slopes, sizes
 
 
 def _scales(scene: Scene, steady: Steady, shift: float) -> list[float]:

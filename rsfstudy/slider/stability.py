@@ -32,13 +32,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rsfstudy.slider.derived import once
 from rsfstudy.slider.equations import relation_of
-from rsfstudy.slider.law_slopes import Matrix, slopes_of_law
+from rsfstudy.slider.law_slopes import LawSlopes, Matrix, slopes_of_law
 from rsfstudy.slider.parts import Scene
 from rsfstudy.slider.steady import Steady, steady_sliding
 
 #: Critical stiffness over a, and growth per slip in D_c, that rounding leaves where there is none.
 _ROUNDING, _STILL = 1e-12, 1e-9
+#: Rounding error of growth rates, relative to the largest.
+_ROUNDING_OF_ROOTS = 64.0 * 2.0**-52
 
 #: Part of the next coefficient below which the one of mass is small, and steps of Newton from the
 #: growth rates without it.
@@ -103,10 +106,12 @@ class _Around(NamedTuple):
     norm: float
 
 
-def _around(scene: Scene, steady: Steady, *, quasi_static: bool = False) -> _Around:
+def _around(
+    scene: Scene, steady: Steady, slopes: LawSlopes | None = None, *, quasi_static: bool = False
+) -> _Around:
     damping = 0.0 if quasi_static else scene.dynamics.damping(steady.log_slip_rate)
     norm = 0.0 if quasi_static else scene.dynamics.norm(scene, steady.log_slip_rate)
-    return _Around(*response(scene, steady), damping, norm)
+    return _Around(*response(scene, steady, slopes), damping, norm)
 
 
 def _crossings(around: _Around, least: float) -> list[float]:
@@ -151,9 +156,13 @@ def _grows(around: _Around, stiffness: float) -> bool:
     return bool(_rates(around, stiffness)[0].real > _STILL)
 
 
-def response(scene: Scene, steady: Steady) -> tuple[Polynomial, Polynomial]:
-    """Friction against slip around steady sliding, ``G(p) = p above(p)/below(p)``: coefficients of
-    the two polynomials, from the constant one up.
+def response(
+    scene: Scene, steady: Steady, slopes: LawSlopes | None = None
+) -> tuple[Polynomial, Polynomial]:
+    """Compute the response of friction to slip around steady sliding.
+
+    The response is ``G(p) = p above(p)/below(p)``; the result holds the coefficients of the two
+    polynomials, from the constant one up.
 
     ``G(p) = p [a + 1.(p - M)^-1 E_x]/[D - S 1.(p - M)^-1 E_s]``, as at the top of this file; by a
     law of one state at constant normal stress ``G(p) = p [a - b/(p + 1)]``, over sigma_*/D_c.
@@ -162,13 +171,16 @@ def response(scene: Scene, steady: Steady) -> tuple[Polynomial, Polynomial]:
     ----------
     scene : Scene
     steady : Steady
+    slopes : LawSlopes, optional
+        Derivatives of the state evolution. By default they are computed.
 
     References
     ----------
     Rice and Ruina (1983), J. Appl. Mech. 50, 343-349.
     """
     _value, slope, _shift, shift_slope = relation_of(scene)(steady.friction)
-    by_rate, by_shift, by_state, _error = slopes_of_law(scene, steady)
+    by_rate, by_shift, by_state, _error = slopes or slopes_of_law(scene, steady)
+    by_state = [list(row) for row in by_state]
     weights, shifting = _actions(scene, steady)
     for row, of_shift in zip(by_state, by_shift, strict=True):
         row[-1] += of_shift * shifting
@@ -236,6 +248,65 @@ def growth_rates(scene: Scene, log_slip_rate: float) -> np.ndarray:
     """
     scene = scene.unforced
     return _rates(_around(scene, _sliding(scene, log_slip_rate)), scene.stiffness)
+
+
+class GrowthRate(NamedTuple):
+    """Largest growth rate of small changes of steady sliding, per slip in D_c.
+
+    Attributes
+    ----------
+    value, error : float
+        The real part of the growth rate, and its error estimate.
+    """
+
+    value: float
+    error: float
+
+    @property
+    def is_positive(self) -> bool:
+        """True if small changes grow, beyond the error."""
+        return self.value > self.error
+
+    @property
+    def is_undecided(self) -> bool:
+        """True if the growth rate is zero within its error."""
+        return abs(self.value) <= self.error
+
+
+@once
+def largest_growth_rate(scene: Scene, log_slip_rate: float) -> GrowthRate | None:
+    """Compute the largest growth rate at the stiffness of the scene, with its error.
+
+    The error includes that of the derivatives of the law and the rounding error of the roots.
+
+    Parameters
+    ----------
+    scene : Scene
+    log_slip_rate : float
+        ln(V/V_*).
+
+    Returns
+    -------
+    GrowthRate or None
+        None if there is no steady sliding.
+    """
+    scene = scene.unforced
+    steady = steady_sliding(scene, log_slip_rate)
+    if steady is None:
+        return None
+    slopes = slopes_of_law(scene, steady)
+    error = slopes.relative_error
+
+    def rates(part: float) -> np.ndarray:
+        changed = slopes.with_relative_change(part)
+        return _rates(_around(scene, steady, changed), scene.stiffness)
+
+    found = rates(0.0)
+    changes = [abs(rates(part)[0].real - found[0].real) for part in (error, -error)]
+    # the root that a small mass sends far off is found apart from the others
+    sizes = np.sort(np.abs(found))[: -1 if scene.has_mass else None]
+    rounding = _ROUNDING_OF_ROOTS * float(sizes.max(initial=0.0))
+    return GrowthRate(float(found[0].real), float(max(changes)) + rounding + _STILL)
 
 
 def response_to_normal_stress(scene: Scene, log_slip_rate: float, frequency: float) -> complex:
