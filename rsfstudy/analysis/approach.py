@@ -264,22 +264,35 @@ def course(
 
 
 def _on_its_way(seen: Sequence[Cycle]) -> bool:
-    """True if cycles are too few to say anything of them, or still grow or shrink all the time."""
-    growth = np.diff([cycle.swing for cycle in seen[len(seen) // 2 :]])
-    return len(seen) < _FIRST_LOOK or bool((growth > 0.0).all() or (growth < 0.0).all())
+    """Return True if the cycles are too few to judge, or still change in one direction.
+
+    The range of ln V, or a slow unknown, then grows or falls from each cycle to the next.
+    """
+    if len(seen) < _FIRST_LOOK:
+        return True
+    latest = [(cycle.swing, *cycle.end.psis) for cycle in seen[len(seen) // 2 :]]
+    changes = np.diff(latest, axis=0)
+    return bool(((changes > 0.0).all(axis=0) | (changes < 0.0).all(axis=0)).any())
 
 
 def recurrence(scene: Scene, seen: Sequence[Cycle]) -> tuple[int, float]:
-    """After how many cycles a motion comes closest to where it was, in all of the later half of its
-    cycles; and how far it is off then (infinitely, where there are too few cycles to say).
+    """Find the number of cycles after which a motion comes closest to repeating itself.
 
-    After n cycles it is off by the largest ``|Psi(i + n) - Psi(i)|`` of any state at the ends of
-    these cycles, over a times how far ln V swings; the smallest n that is within twice the least
-    of all counts.
+    After n cycles the motion is off by the largest ``|Psi(i + n) - Psi(i)|`` of any state at the
+    ends of the later half of its cycles, relative to a times the range of ln V. States that a part
+    lists in `excluded_from_distance` are left out.
+
+    Returns
+    -------
+    period : int
+        The smallest n that is within twice the smallest difference.
+    off : float
+        The difference after n cycles, infinite if there are too few cycles.
     """
     if len(seen) < 4:
         return 1, math.inf
-    states = np.array([cycle.end.psis for cycle in seen])
+    counted = list(scene.functions.friction.counted)
+    states = np.array([cycle.end.psis for cycle in seen])[:, counted]
     latest, scale = states[len(states) // 2 :], scene.a * seen[-1].swing
     longest = min(LONGEST, len(latest) // 2)
     off = np.array(

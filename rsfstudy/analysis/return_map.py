@@ -170,6 +170,11 @@ class ReturnMap:
     ) -> None:
         self.scene, self.accuracy, self._meter = scene, accuracy, meter
         self._recorded = recorded
+        friction = scene.functions.friction
+        excluded = sorted({*range(friction.states)} - {*friction.counted})
+        #: Places in a section of unknowns that do not count for the distance, and of the others.
+        self._excluded = [1 + place for place in excluded]
+        self._counted = [0, *(1 + place for place in friction.counted)]
 
     def point(self, at: np.ndarray) -> Point:
         """The slider at a section: on the slow manifold, or at V_0 where mass acts there.
@@ -277,7 +282,7 @@ class ReturnMap:
         found = self._solve(start, slopes, scale, reach) if len(slopes) == count else None
         if found is None:
             return None
-        count = _cycles_until_repeat(found.cycles, scale)
+        count = self._cycles_until_repeat(found.cycles, scale)
         if np.abs(found.begin - start).max() > 10.0 * self.accuracy.rtol * scale:
             slopes = self.slopes(found.begin, count, scale)
         if len(slopes) < count:
@@ -310,22 +315,32 @@ class ReturnMap:
             if move is not None:
                 jacobian += off[:, None] * move / (move @ move)
             move = -dgesv(jacobian, off)[2]
-            size = max(map(abs, move.tolist()))
+            size = self._size(move, at, scale)
             # as close as asked for, or as errors of the motion let it come
             if size <= enough or 0.5 * last <= size <= 100.0 * enough:
                 work = self._meter.spent - spent
                 return Orbit(tuple(seen), tuple(slopes), move, self.accuracy, work, recording)
             at, last = at + move, size
-            if not max(map(abs, (at - start).tolist())) <= reach * scale:
+            if not np.abs((at - start)[self._counted]).max() <= reach * scale:
                 return None
         return None
 
+    def _size(self, move: np.ndarray, at: np.ndarray, scale: float) -> float:
+        """Return the largest change of a section.
 
-def _cycles_until_repeat(cycles: Sequence[Cycle], scale: float) -> int:
-    """After how many of its cycles an orbit begins anew."""
-    begin = section(cycles[0].begin)
-    for count in range(1, len(cycles)):
-        apart = np.abs(section(cycles[count - 1].end) - begin).max()
-        if len(cycles) % count == 0 and apart < 1e-4 * scale:
-            return count
-    return len(cycles)
+        Unknowns that do not count for the distance may be huge, so their changes are relative to
+        their values, in units of the scale of the states.
+        """
+        changes = np.abs(move)
+        for place in self._excluded:
+            changes[place] /= max(1.0, abs(float(at[place])) / scale)
+        return float(changes.max())
+
+    def _cycles_until_repeat(self, cycles: Sequence[Cycle], scale: float) -> int:
+        """Return the number of cycles after which an orbit repeats itself."""
+        begin = section(cycles[0].begin)
+        for count in range(1, len(cycles)):
+            apart = self._size(section(cycles[count - 1].end) - begin, begin, scale)
+            if len(cycles) % count == 0 and apart < 1e-4 * scale:
+                return count
+        return len(cycles)
