@@ -245,17 +245,20 @@ def course(
     """
     seen, orbit, repels = list[Cycle](), None, False
     fine = accuracy.at(min(accuracy.rtol, _FINE))
-    by, look = ReturnMap(scene, fine, meter), min(_FIRST_LOOK, events)
+    look = min(_FIRST_LOOK, events)
     for cycle in cycles(scene, accuracy, meter, None):
         if cycle is None:
             return None
         seen.append(cycle)
         if len(seen) == look and not orbit:
             look = min(2 * look, events)
-            period, off = recurrence(scene, seen)
-            found = None
-            if off < _OFF:
-                found = by.orbit(section(cycle.end), period, cycle.swing)
+            found, off = None, math.inf
+            for counted in _counted(scene):
+                period, off = recurrence(scene, seen, counted)
+                if off < _OFF:
+                    by = ReturnMap(scene, fine, meter, counted=counted)
+                    found = by.orbit(section(cycle.end), period, cycle.swing)
+                    break
             repels = off >= _OFF or (found is not None and abs(found.multipliers[0]) > _REPELS)
             orbit = found if found is not None and found.attracts else None
         if len(seen) == events or (orbit and not to_its_end):
@@ -275,12 +278,30 @@ def _on_its_way(seen: Sequence[Cycle]) -> bool:
     return bool(((changes > 0.0).all(axis=0) | (changes < 0.0).all(axis=0)).any())
 
 
-def recurrence(scene: Scene, seen: Sequence[Cycle]) -> tuple[int, float]:
+def _counted(scene: Scene) -> tuple[tuple[int, ...], ...]:
+    """Return the states by which a cycle repeats: those that count, or only those of the law.
+
+    An unknown that follows the motion slowly approaches its cycle long after the law has.
+    """
+    of_law = tuple(range(scene.parts.law.states))
+    return tuple(dict.fromkeys((scene.functions.friction.counted, of_law)))
+
+
+def recurrence(
+    scene: Scene, seen: Sequence[Cycle], counted: Sequence[int] | None = None
+) -> tuple[int, float]:
     """Find the number of cycles after which a motion comes closest to repeating itself.
 
     After n cycles the motion is off by the largest ``|Psi(i + n) - Psi(i)|`` of any state at the
-    ends of the later half of its cycles, relative to a times the range of ln V. States that a part
-    lists in `excluded_from_distance` are left out.
+    ends of the later half of its cycles, relative to a times the range of ln V.
+
+    Parameters
+    ----------
+    scene : Scene
+    seen : sequence of Cycle
+    counted : sequence of int, optional
+        Places of the states that are compared. By default, all states that a part does not list in
+        `excluded_from_distance`.
 
     Returns
     -------
@@ -291,8 +312,8 @@ def recurrence(scene: Scene, seen: Sequence[Cycle]) -> tuple[int, float]:
     """
     if len(seen) < 4:
         return 1, math.inf
-    counted = list(scene.functions.friction.counted)
-    states = np.array([cycle.end.psis for cycle in seen])[:, counted]
+    places = list(scene.functions.friction.counted if counted is None else counted)
+    states = np.array([cycle.end.psis for cycle in seen])[:, places]
     latest, scale = states[len(states) // 2 :], scene.a * seen[-1].swing
     longest = min(LONGEST, len(latest) // 2)
     off = np.array(

@@ -163,18 +163,25 @@ class ReturnMap:
         Charged with the motions.
     recorded : bool
         Whether to keep what the motions along an orbit do, besides its ends.
+    counted : sequence of int, optional
+        Places of the states that count for the distance between two sections. By default, all
+        states that a part does not list in `excluded_from_distance`.
     """
 
     def __init__(
-        self, scene: Scene, accuracy: Accuracy, meter: Meter, *, recorded: bool = False
+        self,
+        scene: Scene,
+        accuracy: Accuracy,
+        meter: Meter,
+        *,
+        recorded: bool = False,
+        counted: Sequence[int] | None = None,
     ) -> None:
         self.scene, self.accuracy, self._meter = scene, accuracy, meter
         self._recorded = recorded
-        friction = scene.functions.friction
-        excluded = sorted({*range(friction.states)} - {*friction.counted})
-        #: Places in a section of unknowns that do not count for the distance, and of the others.
-        self._excluded = [1 + place for place in excluded]
-        self._counted = [0, *(1 + place for place in friction.counted)]
+        places = scene.functions.friction.counted if counted is None else counted
+        #: Places in a section of the unknowns that count for the distance.
+        self._counted = [0, *(1 + place for place in places)]
 
     def point(self, at: np.ndarray) -> Point:
         """The slider at a section: on the slow manifold, or at V_0 where mass acts there.
@@ -274,8 +281,23 @@ class ReturnMap:
     def orbit(
         self, start: np.ndarray, count: int, swing: float, reach: float = _NEAR
     ) -> Orbit | None:
-        """The orbit of so many cycles, or of a divisor of them, within reach of a section; None
-        where there is none.
+        """Find the orbit of a number of cycles, or of a divisor of it, close to a section.
+
+        Parameters
+        ----------
+        start : ndarray
+            The section.
+        count : int
+            The number of cycles.
+        swing : float
+            Range of ln V.
+        reach : float
+            Largest distance of the orbit from the section, relative to `a` times the range of ln V.
+
+        Returns
+        -------
+        Orbit or None
+            None if there is no orbit.
         """
         scale = self.scene.a * swing
         slopes = self.slopes(start, count, scale)
@@ -328,12 +350,11 @@ class ReturnMap:
     def _size(self, move: np.ndarray, at: np.ndarray, scale: float) -> float:
         """Return the largest change of a section.
 
-        Unknowns that do not count for the distance may be huge, so their changes are relative to
-        their values, in units of the scale of the states.
+        The unknowns of a fluid may be huge. If they are larger than the scale of the states, their
+        changes are relative to their values, in units of that scale.
         """
-        changes = np.abs(move)
-        for place in self._excluded:
-            changes[place] /= max(1.0, abs(float(at[place])) / scale)
+        changes, first = np.abs(move), 1 + self.scene.parts.law.states
+        changes[first:] /= np.maximum(1.0, np.abs(at[first:]) / scale)
         return float(changes.max())
 
     def _cycles_until_repeat(self, cycles: Sequence[Cycle], scale: float) -> int:
