@@ -82,7 +82,7 @@ def _plain(over: Any) -> Any:
 
 def _checked(settings: Mapping[Any, Any]) -> dict[str, Any]:
     """Return settings as matplotlib converts them; reject unknown names and invalid values."""
-    checked = RcParams()
+    checked: Any = RcParams()
     for name, value in settings.items():
         if name not in rcParams:
             rule = "is not a setting of matplotlib"
