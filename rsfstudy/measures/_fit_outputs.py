@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
+
+import numpy as np
 
 from rsfstudy.analysis.fitting.joint import plain
 from rsfstudy.analysis.fitting.model import OF_SOME_LAWS, PARAMETERS
 from rsfstudy.analysis.fitting.record import COLUMNS
+from rsfstudy.analysis.fitting.steps import noise_variance
+from rsfstudy.analysis.fitting.window import Window
 from rsfstudy.quantity import Output
 
 _NUMBERS = (
@@ -73,3 +78,20 @@ def _of_parameter(name: str) -> Iterator[Output]:
     yield Output(name, about.symbol, about.units, about.long_name, error=True, optional=optional)
     for suffix, words in _BESIDE.items():
         yield Output(f"{name}_{suffix}", "", about.units, f"{words} of the {about.long_name}")
+
+
+def place_of(window: Window) -> dict[str, float]:
+    """Return the velocities of a step, the ends of its window, its normal stress and the noise of
+    its load point.
+    """
+    record, rows = window.record, window.rows
+    moved, time = record.columns["displacement"][rows], record.time[rows]
+    stress = record.columns.get("normal_stress", np.full(len(record), math.nan))[rows]
+    return {
+        "load_point_noise": math.sqrt(noise_variance(time, moved)),
+        "velocity_before": window.step.before,
+        "velocity_after": window.step.after,
+        "window_begins": moved[0],
+        "window_ends": moved[-1],
+        "normal_stress_before": stress[: max(np.searchsorted(time, window.step.begins), 1)].mean(),
+    }
