@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsfstudy.analysis.fitting.load_point import moved_steps
+from rsfstudy.analysis.fitting.load_point import integrated_displacement, moved_steps
 from rsfstudy.analysis.fitting.model import Model, parameters_of
 from rsfstudy.analysis.fitting.record import Record, by_steps, loading_of, steps_between
 from rsfstudy.analysis.fitting.steps import Step
@@ -128,7 +128,7 @@ class Window:
             For too few rows, friction that is not positive, and a window that begins in a hold.
         """
         record, step, rows = self.record, self.step, self.rows
-        time, moved = record.time[rows], record.columns["displacement"][rows]
+        time = record.time[rows]
         friction = record.columns["friction"][rows]
         if len(rows) < _ROWS * len(free) or not step.begins < self._closes():
             text = f"the window holds {len(rows)} rows, too few for {len(free)} parameters"
@@ -149,7 +149,8 @@ class Window:
         if not pieces[0, 1] > 0.0:
             text = "the window begins in a hold: a fit begins with steady sliding"
             raise Halt(Status.NOT_APPLICABLE, text)
-        moved = moved - np.interp(step.begins, time, moved)
+        steady = by_steps(begins, steps_between(record, begins, ends))
+        moved = integrated_displacement(steady, time, step.begins)
         return Model(scene, time, moved, friction, pieces, accuracy, meter, moves)
 
 
