@@ -132,8 +132,9 @@ def fit(
         error (``_error``); ``a_minus_b``; ``covariance`` and ``correlation``; what the noise is
         (``noise_size``, ``noise_order``, ``effective_samples``, ``whiteness``); the window; along
         the rows of the record, ``fitted_friction``, ``residual`` and ``innovation``, NaN outside
-        the window. Lengths are in um, rates in um/s. ``status`` is ``not_identified`` where the
-        record does not tell a parameter, and ``message`` names it. ``dataset.rsf.table()``,
+        the window. Lengths are in um, rates in um/s. ``status`` is ``not_identified`` if the record
+        does not constrain a parameter, and ``errors_not_valid`` if the values stand but their
+        standard errors do not; ``message`` gives the reason. ``dataset.rsf.table()``,
         ``.rsf.plot()``, ``.rsf.scene``, ``.rsf.laboratory`` and ``.rsf.draw()`` say more.
 
     Raises
