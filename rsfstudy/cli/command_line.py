@@ -10,7 +10,6 @@ import shlex
 import signal
 import sys
 import warnings
-from pathlib import Path
 from typing import Any
 
 import click
@@ -78,7 +77,7 @@ def main() -> None:
     try:
         sys.exit(cli(standalone_mode=False) or OK)
     except click.ClickException as error:
-        error.message = brief(error.message)  # type: ignore[misc]
+        error.message = spelt(brief(error.message))  # type: ignore[misc]
         error.show()
         sys.exit(WRONG_USAGE)
     except (click.Abort, KeyboardInterrupt):
@@ -208,8 +207,13 @@ def plot() -> None:
 
 
 @cli.command()
-@click.argument("directory", default=OUTPUT, type=click.Path(path_type=Path))
-@click.option("--output", metavar="FILE", help="The page.  [default: DIRECTORY/report.html]")
+@click.argument("directory", default=OUTPUT, type=options.FilePath())
+@click.option(
+    "--output",
+    type=options.FilePath(dir_okay=False),
+    metavar="FILE",
+    help="The page.  [default: DIRECTORY/report.html]",
+)
 def report() -> None:
     """Write one page of HTML of all results in a directory.
 
@@ -232,7 +236,7 @@ def compare() -> None:
 
 
 @cli.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=options.FilePath())
 @click.option(
     "--cell",
     "place",
@@ -253,13 +257,13 @@ def rerun() -> None:
 
 
 @cli.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=options.FilePath())
 @click.option("--csv", is_flag=True, help="Without what never changes.")
 @click.option("--mat", is_flag=True, help="For MATLAB: every variable.")
 @click.option("--units", nargs=3, metavar="STRESS LENGTH TIME", help="Of a rig, as in MPa um s.")
 @click.option(
     "--output",
-    type=click.Path(path_type=Path),
+    type=options.FilePath(dir_okay=False),
     help="The file to write; .csv and .mat take the place of its ending.  [default: beside FILE]",
 )
 def export() -> None:

@@ -5,6 +5,7 @@ loads this when one is called.
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 import traceback
 import warnings
@@ -194,11 +195,11 @@ def export(given: Given) -> int:
     asked = [ending for ending in writers if getattr(given, ending)]
     if not asked:
         raise click.UsageError("say --csv or --mat, or both")
+    dataset = store.read_any(given.file)
     paths = {ending: (given.output or given.file).with_suffix(f".{ending}") for ending in asked}
     for path in paths.values():
-        if path.exists():
+        if os.path.lexists(path):
             raise InvalidValue("--output", str(path), "is there already", remedy="Name another.")
-    dataset = store.read_any(given.file)
     if given.units:
         dataset = dataset.rsf.in_units(**dict(zip(_UNITS, given.units, strict=True)))
     for ending, path in paths.items():

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import os
 import shlex
 import sys
 from collections.abc import Callable
@@ -59,6 +60,23 @@ class Command(click.Command):
         return getattr(module, str(self.name))(Given(**context.params))
 
 
+class FilePath(click.Path):
+    """The type of arguments and options that are paths: not empty, and accepted by the system."""
+
+    def __init__(self, **kind: Any) -> None:
+        super().__init__(path_type=Path, **kind)
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str | bytes | os.PathLike[str]:
+        """Return a path; raise `InvalidValue` if it cannot be one."""
+        from rsfstudy.files import places
+
+        name = param.opts[0] if isinstance(param, click.Option) else str(param and param.name)
+        places.check_path(name, value)
+        return super().convert(value, param, ctx)
+
+
 def together(*several: Callable[[Any], Any]) -> Callable[[F], F]:
     """Several options as one, in their order."""
     return lambda command: functools.reduce(lambda c, each: each(c), reversed(several), command)
@@ -70,17 +88,9 @@ def count(name: str, default: int | None, words: str) -> Callable[[F], F]:
     return click.option(name, type=kind, metavar="N", default=default, help=words)
 
 
-def _directory(_context: click.Context, _option: click.Parameter, value: str | None) -> Path | None:
-    """A directory for results."""
-    from rsfstudy.files import places
-
-    return places.directory(value)
-
-
 def into(words: str, default: Path | None = None, **kind: bool) -> Callable[[F], F]:
     """The option that says where results go."""
-    path = click.Path(**kind)  # type: ignore[arg-type]
-    return click.option("--output", type=path, callback=_directory, default=default, help=words)
+    return click.option("--output", type=FilePath(**kind), default=default, help=words)
 
 
 named = together(
@@ -131,7 +141,7 @@ computing = together(
 )
 study = click.option(
     "--study",
-    type=click.Path(path_type=Path),
+    type=FilePath(),
     help="File that declares the study, if its measure, a part or the figure is its own.",
 )
 
@@ -183,7 +193,7 @@ def _image(_context: click.Context, option: click.Parameter, value: Path | None)
 
 def image(name: str, default: Path | None, words: str) -> Callable[[F], F]:
     """An option that names the file of a figure."""
-    kind = click.Path(path_type=Path, dir_okay=False)
+    kind = FilePath(dir_okay=False)
     return click.option(name, type=kind, callback=_image, default=default, help=words)
 
 

@@ -22,15 +22,26 @@ def directory(output: str | Path | None) -> Path | None:
         return None
     if not isinstance(output, str | Path):
         raise InvalidValue("output", output, "must be a path, or None")
-    check_text("output", str(output))
-    if output == "":
-        remedy = "Name a directory; . is the one you are in."
-        raise InvalidValue("output", output, "is empty", remedy=remedy)
+    return check_path("output", output)
+
+
+def check_path(name: str, path: str | Path) -> Path:
+    """Return a path that a file or a directory can have, whether there is one or not.
+
+    Raises
+    ------
+    InvalidValue
+        If it is empty, or if the system does not accept it, for example because it is too long.
+    """
+    check_text(name, str(path))
+    if path == "":
+        remedy = "Name a file or a directory; . is the directory you are in."
+        raise InvalidValue(name, path, "is empty", remedy=remedy)
     try:
-        Path(output).exists()
+        Path(path).exists()
     except OSError as error:
-        raise InvalidValue("output", str(output), f"cannot be used ({error.strerror})") from error
-    return Path(output)
+        raise InvalidValue(name, str(path), f"cannot be used: {error.strerror}") from error
+    return Path(path)
 
 
 def results(name: str | Path, output: str | Path | None) -> Path:
