@@ -21,9 +21,11 @@ import dask
 import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import DataError, brief
+from rsfstudy.errors import DataError, RsfStudyError, brief
 from rsfstudy.files import content_digest, contents
+from rsfstudy.files.attributes import check_attributes
 from rsfstudy.files.contents import LAYOUT
+from rsfstudy.paths import check_path
 
 #: How Zarr stores are opened: lazily, and none of an older format.
 ZARR: Mapping[str, Any] = {
@@ -174,13 +176,14 @@ def read_any(path: Path) -> xr.Dataset:
             if not sealed:
                 content_digest.check_content(dataset, where)
             dataset.attrs.pop(content_digest.ATTRIBUTE, None)
-    except DataError:
+    except RsfStudyError:
         raise
     except Exception as error:  # HDF5, Zarr and xarray raise almost anything on damaged data
         raise DataError(f"{where} cannot be read: {brief(error)}") from error
-    if contents.is_of_a_scene(dataset):
-        return dataset  # which users write by xarray, without a digest
     try:
+        check_attributes(dataset)
+        if contents.is_of_a_scene(dataset):
+            return dataset  # which users write by xarray, without a digest
         contents.check(dataset)
     except DataError as error:
         raise DataError(f"{where}: {error}") from error
@@ -191,7 +194,8 @@ def read_any(path: Path) -> xr.Dataset:
 
 
 def _check_there(path: Path, where: str) -> None:
-    """Refuse anything but a file or a Zarr store: opening a pipe could wait for ever."""
+    """Refuse anything but a file or a Zarr store, because opening a pipe could wait forever."""
+    check_path("file", path)
     if not path.exists():
         raise DataError(f"{where} does not exist. Run the study first, or name another file.")
     if path.is_dir() and not (path / "zarr.json").is_file():
