@@ -22,6 +22,7 @@ from rsfstudy.motion.events import Event, Kind, rise
 from rsfstudy.motion.meter import Halt, Meter, more_work
 from rsfstudy.motion.readings import friction_coefficient_of, load_point_of
 from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording, strictly_later
+from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.history import History
@@ -168,7 +169,8 @@ def simulate(
         "flag_meanings": " ".join(recording.regimes),
     }
     dataset["regime"] = "time", seen[:, REGIME].astype(np.int8), regimes
-    dataset["reference_rate"] = (), scene.reference_rate, {"units": "s-1"}
+    about_rate = quantity("reference_rate").attributes
+    dataset["reference_rate"] = (), scene.reference_rate, about_rate
     dataset = dataset.set_coords(["slip", "reference_rate"])
     dataset = dataset.assign_attrs(
         {
@@ -200,7 +202,7 @@ def simulate(
     if status is not Status.OK:
         text = f"the motion ends after {max([0.0, *seen[-1:, 0]]):.6g} of {duration:g} D_c/V_*"
         warnings.warn(f"{text}: {status.label} ({message})", Incomplete, stacklevel=3)
-    return dataset
+    return with_cf_encoding(dataset)
 
 
 def _state(number: int) -> Quantity:
