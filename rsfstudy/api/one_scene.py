@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from rsfstudy.api.trajectory import attributes_of
 from rsfstudy.compute import provenance
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import NoAnswer
@@ -183,7 +184,7 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         values = outcome.values.get(name)
         if values is None:
             values = np.full([len(inner[dim]) for dim in dims], np.nan)
-        variables[name] = dims, values, quantity(name, own).attributes
+        variables[name] = dims, values, attributes_of(quantity(name, own), scene)
     work = "rhs_evaluations"
     variables[work] = (), outcome.rhs_evaluations, quantity(work).attributes
     rate = (), scene.reference_rate, quantity("reference_rate").attributes
