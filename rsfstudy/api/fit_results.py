@@ -90,7 +90,8 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
     """One row a fit, with the columns that laboratories use; lengths in um.
 
     ``_std`` are standard errors, ``_windows`` ranges of parameters among windows; NaN stands
-    where something was not looked for.
+    where something was not looked for. ``normal_stress`` is the mean before the step in MPa, and
+    ``k`` is stiffness over this normal stress in 1/um.
     """
     rows = []
     for one in cells(dataset):
@@ -102,11 +103,22 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
                 row[f"{short}_windows"] = one[f"{name}_windows"].item()
         row |= {"V0": one["velocity_before"].item(), "V1": one["velocity_after"].item()}
         row |= {"law": one["law"].item() if "law" in one.coords else ""}
+        row |= _normal_stresses(one)
+        if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
+            row["k"] = one["window_stiffness"].item()
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
         row["R2"], row["criterion"] = one["r_squared"].item(), one["criterion"].item()
         row["status"] = status(one)
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def _normal_stresses(one: xr.Dataset) -> dict[str, float]:
+    """Return the normal stress before the step in MPa; before each step, if there are several."""
+    names = [str(n) for n in one.data_vars if str(n).startswith("normal_stress_before_")]
+    stresses = {n: one[n].item() * 1e-6 for n in names or ["normal_stress_before"] if n in one}
+    known = {n: stress for n, stress in stresses.items() if math.isfinite(stress)}
+    return {n.replace("_before", ""): stress for n, stress in known.items()}
 
 
 def status(one: xr.Dataset) -> str:
@@ -153,6 +165,8 @@ def scene(dataset: xr.Dataset) -> Scene:
     )
     values = parameters_of(first, *distances)
     found = {n: one[n].item() for n in map(str, one["parameter"].values)}
+    if "window_stiffness" in one:
+        values["stiffness"] = one["window_stiffness"].item()
     values |= {n: value for n, value in of_window(found, 1).items() if n in values}
     before, after = one["velocity_before"].item(), one["velocity_after"].item()
     return first.with_(**fields_of(values, before), load_velocity_ratio=after / before)
@@ -234,6 +248,11 @@ def _table(where: str, fits: Sequence[xr.Dataset]) -> Table:
 def _column(one: xr.Dataset) -> dict[str, str]:
     """The parameters of a fit, how well it explains its rows, and the noise that is left."""
     found = {n + _units(plain(name)): with_error(one, name) for name, n in shown(one).items()}
+    if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
+        found["k" + _units("stiffness")] = f"{one['window_stiffness'].item():.6g}"
+    stresses = [f"{stress:.6g}" for stress in _normal_stresses(one).values()]
+    if stresses:
+        found["normal stress (MPa)"] = ", ".join(stresses)
     quality = dict.fromkeys(("R2", "criterion", "noise", "worth"), "-")
     if np.isfinite(one["rows_fitted"].item()):
         order = int(one["noise_order"].item())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from numbers import Real
 from typing import Any
 
@@ -12,6 +13,7 @@ import xarray as xr
 from rsfstudy.analysis.fitting.model import check_free, of_law
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.analysis.fitting.steps import Step
+from rsfstudy.analysis.fitting.window import Window
 from rsfstudy.api import runs
 from rsfstudy.axes.axis import Axis
 from rsfstudy.declare.study import Study
@@ -108,8 +110,9 @@ def fit(
         as ``work_budget_spent``.
     stiffness : quantity, optional
         Of the machine, where no rig states it: over normal stress ("1.6e-3 1/um", a plain number
-        is in 1/um), or in MPa/um, over the mean of the normal stress that the record holds. The
-        first guess, where ``free`` names it.
+        is in 1/um), or in MPa/um. Stiffness in MPa/um is divided by the mean normal stress in the
+        window before each step. The first guess, if ``free`` names it. In a joint fit it is that of
+        the first window, and the other windows follow by their normal stress.
     slip_distance : quantity, optional
         First guess ("10 um", a plain number is in um); by default a twentieth of the way after the
         step. Five others are tried, a tenth to ten times as long.
@@ -159,12 +162,17 @@ def fit(
         if not isinstance(one, Record):
             remedy = "Make one by rsfstudy.read_record."
             raise InvalidValue("record", one, "is no record", remedy=remedy)
+    records = tuple(_with_normal_stress(one, rig) for one in records)
     numbers = _numbers(records, steps)
     guess = _guess(records[0], rig, numbers[0], slip_distance)
     if "alpha" in free:
         _check_stressed(records, loading)
         scene = {"normal_stress": "imposed", **scene}
-    first = _first_scene(laws, scene, _stiffness(rig, stiffness, free, records[0]) * guess)
+    ratio, machine = _stiffness(rig, stiffness, free, records)
+    if machine:
+        _check_compressive(records, numbers)
+        ratio = machine / Window(records[0], numbers[0]).normal_stress
+    first = _first_scene(laws, scene, ratio * guess)
     sought = _of_laws(free, laws, first)
     there = tuple((one.name, n) for one in records for n in numbers if n <= len(one.found))
     measure = Fit(
@@ -179,6 +187,7 @@ def fit(
         noise=noise,
         loading=loading,
         posterior=posterior,
+        machine_stiffness=machine,
     )
     axes = [Axis("law", list(laws))]
     if len(records) > 1 and not together:
@@ -262,29 +271,63 @@ def _guess(record: Record, rig: Laboratory | None, number: int, stated: Any) -> 
     return float(_GUESS * (moved[-1] - np.interp(begins, record.time, moved)))
 
 
-def _stiffness(rig: Laboratory | None, stated: Any, free: Sequence[str], record: Record) -> float:
-    """Stiffness over normal stress, in 1/um."""
+def _stiffness(
+    rig: Laboratory | None, stated: Any, free: Sequence[str], records: Sequence[Record]
+) -> tuple[float, float]:
+    """Read the stiffness to begin with, in units that it was stated in.
+
+    Returns
+    -------
+    ratio : float
+        Stiffness over normal stress in 1/um; 0 if the stiffness of the machine is stated.
+    machine : float
+        Stiffness of the machine in Pa/um, or 0.
+    """
     if stated is None:
         if rig is not None and rig.stiffness is not None:
-            return float(rig.stiffness / rig.normal_stress * 1e-6)
+            return 0.0, float(rig.stiffness * 1e-6)
         if "stiffness" in free:
-            return 1e-3
+            return 1e-3, 0.0
         remedy = "Give --stiffness (stiffness=), as in '1.6e-3 /um', "
         remedy += "or look for it: --free (free=)."
         raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
+    over_stress = isinstance(stated, Real) or is_friction(stated)
     if isinstance(stated, Real):
         found = float(stated)
-    elif is_friction(stated):
-        found = in_si("stiffness", stated, "1/m") * 1e-6
     else:
-        found, stress = in_si("stiffness", stated, "Pa/m"), record.columns.get("normal_stress")
-        if stress is None:
-            remedy = "Give --normal-stress (normal_stress of read_record), or stiffness in 1/um."
-            raise InvalidValue("stiffness", stated, "needs a normal stress", remedy=remedy)
-        found = found * 1e-6 / float(stress.mean())
+        found = in_si("stiffness", stated, "1/m" if over_stress else "Pa/m") * 1e-6
     if not found > 0.0:
         raise InvalidValue("stiffness", stated, "must be positive")
-    return found
+    if over_stress:
+        return found, 0.0
+    for record in records:
+        if "normal_stress" not in record.columns:
+            remedy = "Give --normal-stress (normal_stress of read_record), or stiffness in 1/um."
+            rule = f"needs a normal stress, and {record.name} has none"
+            raise InvalidValue("stiffness", stated, rule, remedy=remedy)
+    return 0.0, found
+
+
+def _check_compressive(records: Sequence[Record], numbers: Sequence[int]) -> None:
+    """Refuse a normal stress that is not positive before a step."""
+    for record in records:
+        for number in numbers:
+            if number > len(record.found):
+                continue
+            stress = Window(record, number).normal_stress
+            if not stress > 0.0:
+                rule = f"must be positive before step {number} of {record.name}, in Pa"
+                remedy = "Compression is positive: reverse the sign, as in columns={"
+                remedy += "'normal_stress': ('heading', 'MPa', -1.0)}."
+                raise InvalidValue("normal_stress", stress, rule, remedy=remedy)
+
+
+def _with_normal_stress(record: Record, rig: Laboratory | None) -> Record:
+    """Return the record with the normal stress of the rig, if it holds none itself."""
+    if rig is None or "normal_stress" in record.columns:
+        return record
+    stress = np.full(len(record), float(rig.normal_stress))
+    return replace(record, columns={**record.columns, "normal_stress": stress})
 
 
 def _first_scene(laws: Sequence[str], stated: Mapping[str, Any], stiffness: float) -> Scene:

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes.axis import Axis, Row, check_text, plain_values, select, with_values
+from rsfstudy.axes.axis import Axis, Row, check_text, plain_values
+from rsfstudy.axes.overrides import select, with_values
 from rsfstudy.declare import checks, rigs
 from rsfstudy.declare.cell import Cell, Changes
 from rsfstudy.declare.claims import Claim

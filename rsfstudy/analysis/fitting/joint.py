@@ -52,9 +52,18 @@ def of_window(values: Mapping[str, T], number: int) -> dict[str, T]:
 
 @dataclass(frozen=True)
 class Joint:
-    """The models of one window or several, with the interface of a model."""
+    """The models of one or several windows, with the interface of a model.
+
+    Attributes
+    ----------
+    parts : tuple of Model
+    stiffness_factors : tuple of float
+        Stiffness over normal stress of each window, relative to the first window. Empty if all
+        windows have the same value.
+    """
 
     parts: tuple[Model, ...]
+    stiffness_factors: tuple[float, ...] = ()
 
     @cached_property
     def time(self) -> np.ndarray:
@@ -111,6 +120,8 @@ class Joint:
         return np.asarray(block_diag(*(part.by_loading(own) for part, own in self._each(values))))
 
     def _each(self, values: Values) -> Iterator[tuple[Model, dict[str, float]]]:
-        """The models, each with the parameters of its window."""
-        for number, part in enumerate(self.parts, start=1):
-            yield part, of_window(values, number)
+        """Iterate over the models, each with the parameters of its window."""
+        factors = self.stiffness_factors or (1.0,) * len(self.parts)
+        for number, (part, factor) in enumerate(zip(self.parts, factors, strict=True), start=1):
+            own = of_window(values, number)
+            yield part, own | {"stiffness": factor * own["stiffness"]}
