@@ -8,7 +8,7 @@ import shlex
 from pathlib import Path
 
 import pytest
-from fuzz_commands import Answer, Line, damage, faults, line_of
+from fuzz_commands import STUDIES, Answer, Line, damage, faults, line_of
 from running import call, called
 
 from rsfstudy.cli.command_line import cli
@@ -47,6 +47,28 @@ def test_paths_are_refused_by_a_rule(words, message, tmp_path, monkeypatch):
     assert "Error:" not in said.replace("Error: Invalid", "").removeprefix("error:")
     assert status in (1, 2)
     assert os.listdir() == ["motion.nc"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            f"simulate --budget {10**30}",
+            "budget = 1000000000000000000000000000000: must be a whole",
+        ),
+        (f"run rate_step_boundary --serial --budget {10**16}", "from 1 to 1,000,000,000,000,000"),
+        (f"fit record.csv --step 1 --windows {10**12}", "windows = 1000000000000: must be a whole"),
+        (f"fit record.csv --step 1 --posterior {10**12}", "posterior = 1000000000000: must be a"),
+    ],
+)
+def test_numbers_are_bounded_before_memory_is_allocated(words, message, tmp_path, monkeypatch):
+    step = STUDIES / "pages" / "step.csv"
+    monkeypatch.chdir(tmp_path)
+    Path("record.csv").write_bytes(step.read_bytes())
+    options = ["--normal-stress", "20 MPa", "--stiffness", "0.04 MPa/um"] * ("fit" in words)
+    status, said = called([*shlex.split(words), *options])
+    assert (status, message in said) == (2, True), said
+    assert os.listdir() == ["record.csv"]
 
 
 @pytest.mark.parametrize("words", [["--\x1b[2J"], ["list", "\x1b[2J"], ["show", "a", "\x9b2J"]])
