@@ -35,6 +35,11 @@ LONG = "x" * 300
         (f"report . --output {LONG}.html", "cannot be used: File name too long"),
         ("problems ''", "is empty. Name a file or a directory"),
         (f"problems {LONG}", "cannot be used: File name too long"),
+        (f"run {LONG}", "is unknown. `rsfstudy list` shows all"),
+        (f"show {LONG}", "is unknown. `rsfstudy list` shows all"),
+        (f"show {LONG}.py", "is no file (File name too long)"),
+        (f"check {LONG}", "cannot be looked for: File name too long"),
+        (f"compare {LONG}.nc motion.nc", "File name too long"),
         ("rerun ''", "file = '': is empty"),
         ("plot motion.nc --output ''", "--output = '': is empty"),
     ],
@@ -69,6 +74,27 @@ def test_numbers_are_bounded_before_memory_is_allocated(words, message, tmp_path
     status, said = called([*shlex.split(words), *options])
     assert (status, message in said) == (2, True), said
     assert os.listdir() == ["record.csv"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "simulate --output pipe.png",
+        "fit record.csv --output data.png",
+        "plot motion.nc --output pipe.png",
+        "verify 01.csv --figure pipe.svg",
+        "report . --output pipe.html",
+    ],
+)
+def test_pipes_are_neither_read_nor_replaced(words, tmp_path, monkeypatch):
+    """Opening a pipe to see what would be replaced would never end."""
+    monkeypatch.chdir(tmp_path)
+    pipes = ("pipe.png", "pipe.svg", "pipe.html", "data.nc")
+    for name in pipes:
+        os.mkfifo(name)
+    status, said = called(shlex.split(words))
+    assert (status, "is a directory, a pipe or a device. Name a file." in said) == (2, True)
+    assert all(Path(name).is_fifo() for name in pipes)
 
 
 @pytest.mark.parametrize("words", [["--\x1b[2J"], ["list", "\x1b[2J"], ["show", "a", "\x9b2J"]])
