@@ -38,7 +38,7 @@ LONG = "x" * 300
         (f"run {LONG}", "is unknown. `rsfstudy list` shows all"),
         (f"show {LONG}", "is unknown. `rsfstudy list` shows all"),
         (f"show {LONG}.py", "is no file (File name too long)"),
-        (f"check {LONG}", "cannot be looked for: File name too long"),
+        (f"check {LONG}", "has no results in outputs"),
         (f"compare {LONG}.nc motion.nc", "File name too long"),
         ("rerun ''", "file = '': is empty"),
         ("plot motion.nc --output ''", "--output = '': is empty"),
