@@ -50,7 +50,7 @@ __all__ = [
 ]
 
 #: What tells of the quality of a result, by the ends of their names.
-_BESIDE = ("error", "stderr", "misfit", "points")
+_BESIDE = ("error", "stderr", "misfit", "points", "status")
 
 
 def reduced(
