@@ -58,7 +58,8 @@ class CheckedKeywords:
 
     def __new__(cls, *args: Any, **keywords: Any) -> Self:
         """Create an instance once all keywords are known to be parameters."""
-        valid = _parameters(cls)
+        kind: type = cls
+        valid = _parameters(kind)
         for name in keywords:
             if name not in valid:
                 close = difflib.get_close_matches(name, valid, n=1)

@@ -75,7 +75,7 @@ def reduced(
         if not reduction.of_failures:
             own = drawn.get(reduction.of, own)
         support = known(support, reduction.of, own)
-        found = reduction(support)
+        found: object = reduction(support)  # user-defined reductions may return anything
         if not isinstance(found, xr.Dataset):
             rule = "must return an xarray.Dataset of the new variables"
             remedy = "Write return self.results('how it was found', {'': values})."

@@ -180,7 +180,7 @@ def _appended(part: type[Part]) -> tuple[str, ...]:
     known = vars(overriding).get("__dataclass_fields__", {})
     return tuple(
         name
-        for name in names_of(part)  # type: ignore[arg-type]
+        for name in names_of(part)
         if name not in known and not is_flag(part, name)
     )
 

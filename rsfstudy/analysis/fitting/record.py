@@ -175,9 +175,7 @@ class Record:
         data = {about.name: ("step", rows[:, n], about.attributes) for n, about in enumerate(shown)}
         number = {"long_name": "number of the step", "units": "1"}
         steps = {"step": ("step", np.arange(1, len(rows) + 1), number)}
-        return with_cf_encoding(
-            xr.Dataset(data, steps, self._attributes("Steps of a laboratory record"))
-        )
+        return with_cf_encoding(xr.Dataset(data, steps, self._attributes("Detected steps")))
 
     def to_dataset(self) -> xr.Dataset:
         """Return the record as a dataset along ``time``."""
