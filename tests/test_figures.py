@@ -1,6 +1,7 @@
 """Figures that a journal would print: of every named study, of any lattice, in any style."""
 
 import itertools
+import math
 import re
 from pathlib import Path
 
@@ -316,6 +317,32 @@ def test_styles_are_checked_and_never_imported(style, message, tmp_path, monkeyp
         ran = call("plot", "missing.nc", "--style", style)
         assert (ran.returncode, ran.stdout) == (2, "")
         assert len(ran.stderr) < 2000
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"axes.prop_cycle": "cycler('color', [])"},
+        {"font.size": math.nan},
+        {"savefig.dpi": 1e9},
+        {"figure.figsize": (1e6, 1e6)},
+    ],
+)
+def test_a_style_in_which_nothing_can_be_drawn_is_named(settings, tmp_path):
+    message = r"^style = \{.*: a figure cannot be drawn in it: .* Draw it without this style"
+    with pytest.raises(InvalidValue, match=message):
+        plots.save(lattice(RATES), tmp_path / "figure.png", style=settings)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_font_that_is_missing_is_named_once(tmp_path, monkeypatch):
+    sheet = tmp_path / "mine.mplstyle"
+    sheet.write_text("font.family: No Such Font\n")
+    file = tmp_path / "lattice.nc"
+    store.write(lattice(RATES), file)
+    ran = call("plot", file, "--style", sheet)
+    said = " ".join(ran.stderr.split())
+    assert (ran.returncode, said.count("Font family 'No Such Font' not found")) == (0, 1)
 
 
 def test_style_sheets_are_read_as_matplotlib_reads_them():

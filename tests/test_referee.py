@@ -18,7 +18,7 @@ from referee_page import MARK, PAGE, parts
 from referee_ways import agrees, stated
 from running import call
 
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.referee import ours, theirs
@@ -407,8 +407,13 @@ def test_a_problem_of_ones_own(text, tmp_path):
         ("times = [1, 2, 5, 10, 20, 50]", "", "must list the times"),
         ('"slowness"', '"sloth"', "is unknown"),
         ("[1, 2, 5,", "[2, 1, 5,", "must increase"),
-        ("[1, 2, 5,", '["one", 2, 5,', "cannot be posed"),
-        ("[[loading]]", "[loading]", "must be a list of segments"),
+        ("[1, 2, 5,", '["one", 2, 5,', "must be a number, not a text"),
+        ('"slowness"', "5", "law = 5: must be a text, not a whole number"),
+        ('["friction", "slip_rate", "theta"]', "[]", "must list at least one quantity"),
+        ("a = 0.01", "a = 0", "a = 0: must be positive"),
+        ("times =", "digits = 99\ntimes =", "digits = 99: must lie between 1 and 15"),
+        ("times =", "number = 1\ntimes =", "key = 'number': is unknown"),
+        ("[[loading]]", "[loading]", "must be a list, not a table"),
         ('"slowness"', '"two_slip_states"', "must state b_2"),
         ("mu_star", "phi = 60.0\nmu_star", "has no meaning beside phi"),
     ],
@@ -417,6 +422,23 @@ def test_what_is_no_problem_is_refused(old, new, error, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(STEP.replace(old, new, 1))
     with pytest.raises(InvalidValue, match=re.escape(error)):
+        read(path)
+
+
+def test_a_file_nested_without_end_is_refused(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("title = " + "[" * 10_000)
+    with pytest.raises(DataError, match="nested too deeply"):
+        read(path)
+
+
+def test_the_number_of_peaks_is_bounded(tmp_path):
+    path = tmp_path / "mine.toml"
+    text = (
+        STEP.replace('"friction", ', "").replace(', "theta"]', "]").replace("times = [1, 2, 5,", "")
+    )
+    path.write_text(re.sub(r"( 10, 20, 50\])", 'report = "peaks"\ncount = 1000000000000', text))
+    with pytest.raises(InvalidValue, match="count = 1000000000000: must lie between 1 and 10,000"):
         read(path)
 
 

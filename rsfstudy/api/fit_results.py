@@ -18,8 +18,10 @@ from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, fields_of, 
 from rsfstudy.analysis.fitting.noise import LAGS
 from rsfstudy.analysis.fitting.validity import SIGNIFICANT
 from rsfstudy.api.tables import Table
+from rsfstudy.compute import provenance
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import contents
+from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import LABELS, Status
@@ -148,10 +150,20 @@ def draw(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
     spread /= np.sqrt(rng.chisquare(degrees, n) / degrees)[:, None]
     drawn = np.where(logs, at * np.exp(np.where(logs, spread, 0.0)), at + spread)
     data = {
-        name: ("draw", drawn[:, place], {"units": one[name].attrs.get("units", "1")})
+        name: (
+            "draw",
+            drawn[:, place],
+            {key: one[name].attrs[key] for key in ("long_name", "units") if key in one[name].attrs},
+        )
         for place, name in enumerate(names)
     }
-    return xr.Dataset(data, coords={"draw": np.arange(n)})
+    number = {"long_name": "number of the sample", "units": "1"}
+    about = {
+        "title": "Samples of the parameters of a fit",
+        "Conventions": "CF-1.11",
+        **provenance.attributes("dataset.rsf.draw"),
+    }
+    return with_cf_encoding(xr.Dataset(data, {"draw": ("draw", np.arange(n), number)}, about))
 
 
 def scene(dataset: xr.Dataset) -> Scene:

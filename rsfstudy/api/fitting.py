@@ -36,6 +36,8 @@ _EFFECTS = ("b", "b1", "b2")
 _STATES = "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
 #: Slip distance to begin with, as part of the load point displacement that is fitted after a step.
 _GUESS = 0.05
+#: Largest number of windows.
+_MOST_WINDOWS = 1000
 #: Shortest of several windows, as a part of what follows a step.
 _SHORTEST = 0.5
 #: First guesses of a scene: those of a record take their place.
@@ -166,8 +168,10 @@ def fit(
     records = tuple(_with_normal_stress(one, rig) for one in records)
     numbers = _numbers(records, steps)
     guess = _guess(records[0], rig, numbers[0], slip_distance)
+    if "alpha" in scene:
+        scene = {"normal_stress": "imposed", **scene}
     if "alpha" in free:
-        _check_stressed(records, loading)
+        _check_stressed(records, loading, numbers)
         scene = {"normal_stress": "imposed", **scene}
     ratio, machine = _stiffness(rig, stiffness, free, records)
     if machine:
@@ -196,8 +200,9 @@ def fit(
     if len(numbers) > 1 and not together:
         axes.append(Axis("step", list(numbers)))
     reductions = []
-    if not isinstance(windows, int) or windows < 1:
-        raise InvalidValue("windows", windows, "must be a whole number, 1 or more")
+    if not isinstance(windows, int) or not 1 <= windows <= _MOST_WINDOWS:
+        rule = f"must be a whole number from 1 to {_MOST_WINDOWS:,}"
+        raise InvalidValue("windows", windows, rule)
     if windows > 1:
         axes.append(Axis("part", np.linspace(1.0, _SHORTEST, windows).tolist()))
         reductions = [Range(f"{n}_windows", n, over="part") for n in measure.parameters]
@@ -225,7 +230,7 @@ def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]
     count = max(len(one.found) for one in records)
     if not count:
         remedy = "State them: record.with_steps([(begins, ends, before, after)])."
-        rule = "has no step of load point velocity"
+        rule = "has no step of load point velocity or normal stress"
         raise InvalidValue("record", records[0].name, rule, remedy=remedy)
     numbers = tuple(steps) or tuple(range(1, count + 1))
     for number in numbers:
@@ -251,13 +256,17 @@ def _check_step(record: Record, number: int, step: Step) -> None:
         raise InvalidValue("displacement", told, rule, remedy=remedy)
 
 
-def _check_stressed(records: Sequence[Record], loading: str) -> None:
-    """Refuse to look for the effect of a normal stress that does not change."""
+def _check_stressed(records: Sequence[Record], loading: str, numbers: Sequence[int]) -> None:
+    """Refuse to fit the effect of a normal stress that does not change."""
     for record in records:
         stress = record.columns.get("normal_stress", np.zeros(1))
-        if loading != "recorded" or not np.ptp(stress) > 0.0:
-            rule = f"needs a normal stress that changes, and that of {record.name} is constant"
-            remedy = "Leave it out, or record normal stress, with --loading recorded (loading=)."
+        steps = [record.found[n - 1] for n in numbers if n <= len(record.found)]
+        by_steps = loading == "steps" and any(step.stress_ratio != 1.0 for step in steps)
+        if not by_steps and not (loading == "recorded" and np.ptp(stress) > 0.0):
+            rule = "needs a normal stress that changes: "
+            rule += f"that of {record.name} has no step among those that are fitted"
+            remedy = "Leave alpha out, name a step of normal stress (steps=), or follow the "
+            remedy += "recorded normal stress with --loading recorded (loading=)."
             raise InvalidValue("free", "alpha", rule, remedy=remedy)
 
 

@@ -5,6 +5,7 @@ loaded when it is called, so that help and the list of studies answer at once.
 from __future__ import annotations
 
 import io
+import logging
 import os
 import shlex
 import signal
@@ -68,6 +69,7 @@ def main() -> None:
     warnings.filterwarnings("always", category=UserWarning, module="rsfstudy")
     warnings.filterwarnings("ignore", category=Incomplete)  # commands print it themselves
     warnings.showwarning = lambda message, *_place: _warn(message)
+    logging.getLogger("matplotlib").addHandler(_LOG)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # which may be unable to say what a file says
             stream.reconfigure(errors="backslashreplace")
@@ -103,6 +105,24 @@ def _end(number: int, _frame: object) -> None:
     for other in _ENDING:
         signal.signal(other, signal.SIG_IGN)
     raise Signalled(number)
+
+
+class _Log(logging.Handler):
+    """Print each message of a library once, as a warning: Matplotlib logs one for each text."""
+
+    def __init__(self, level: int) -> None:
+        super().__init__(level)
+        self._printed: set[str] = set()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print the message of a record unless it was printed before."""
+        text = record.getMessage()
+        if text not in self._printed:
+            self._printed.add(text)
+            _warn(text)
+
+
+_LOG = _Log(logging.WARNING)
 
 
 def _warn(message: Warning | str) -> None:

@@ -32,6 +32,7 @@ from rsfstudy.compute.workers import Workers
 from rsfstudy.declare import catalogue, names, rigs
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FIGURES, OUTPUT
+from rsfstudy.error_boundary import check_file
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError
 from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import cell_number
@@ -279,6 +280,7 @@ def _target(given: Given) -> Path | None:
     if ending in FIGURES:
         if given.every or given.form not in (None, ending):
             raise click.UsageError(f"{output} is one figure: no --all, nor another --figure")
+        check_file("--output", output)
         return output
     if not output.is_dir():
         rule = "ends in no format that figures are written in"

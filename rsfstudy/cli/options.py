@@ -17,8 +17,10 @@ from typing import Any, TypeVar
 import click
 
 from rsfstudy.defaults import FIGURES, OUTPUT, TIME_LIMIT
+from rsfstudy.error_boundary import check_file
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import ENGINES
+from rsfstudy.paths import check_path
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -70,10 +72,8 @@ class FilePath(click.Path):
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> str | bytes | os.PathLike[str]:
         """Return a path; raise `InvalidValue` if it cannot be one."""
-        from rsfstudy.files import places
-
         name = param.opts[0] if isinstance(param, click.Option) else str(param and param.name)
-        places.check_path(name, value)
+        check_path(name, value)
         return super().convert(value, param, ctx)
 
 
@@ -157,7 +157,7 @@ against = click.option(
 
 
 def _style(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
-    """A style that there is, found out before any work."""
+    """Return a style; raise InvalidValue before any work if it cannot be used."""
     if value is not None:
         from rsfstudy.plots import styled
 
@@ -176,18 +176,21 @@ looks = together(
     ),
     click.option(
         "--style",
-        metavar="FILE",
+        metavar="STYLE",
         callback=_style,
-        help="Style sheet of matplotlib, or the name of one, to be laid over ours.",
+        help="Style sheet of matplotlib (FILE.mplstyle), or the name of one, on top of ours.",
     ),
 )
 
 
 def _image(_context: click.Context, option: click.Parameter, value: Path | None) -> Path | None:
-    """A file that can be a figure."""
-    if value is not None and value.suffix not in (".png", ".pdf", ".svg"):
+    """Return the path of a figure, which replaces nothing but a file."""
+    if value is None:
+        return None
+    if value.suffix not in (".png", ".pdf", ".svg"):
         rule = "must end in .png, .pdf or .svg"
         raise InvalidValue(option.opts[0], str(value), rule)
+    check_file(option.opts[0], value)
     return value
 
 

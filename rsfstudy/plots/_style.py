@@ -24,7 +24,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import blended_transform_factory, offset_copy
 
 from rsfstudy.error_boundary import check_file
-from rsfstudy.errors import InvalidValue, brief
+from rsfstudy.errors import InvalidValue, RsfStudyError, brief
 from rsfstudy.plots._text import length, wrapped
 
 #: The style sheet that ships.
@@ -52,12 +52,22 @@ def styled(over: Any = None) -> Iterator[None]:
     Raises
     ------
     InvalidValue
-        If a style is none of these, or contains a setting that matplotlib does not have.
+        If a style is none of these, if it contains a setting that matplotlib does not have, or if
+        a figure cannot be drawn in it, for example because it needs a LaTeX that is not installed.
     """
     others = over if isinstance(over, list | tuple) else [over]
     settings = [_settings_of(other) for other in others if other is not None]
     with style.context([SHEET, *settings]):
-        yield
+        try:
+            yield
+        except (RsfStudyError, OSError):
+            raise
+        except Exception as error:  # settings that are valid alone may not be together
+            if not settings:
+                raise
+            rule = f"a figure cannot be drawn in it: {brief(error).rstrip('.')}"
+            remedy = "Draw it without this style to find out if the style is the reason."
+            raise InvalidValue("style", _plain(over), rule, remedy=remedy) from error
 
 
 def _settings_of(over: Any) -> str | dict[str, Any]:
