@@ -8,6 +8,8 @@ cells are carried to what is made of them (`rsfstudy.reduce.base.carried`).
 
 from __future__ import annotations
 
+from typing import Any
+
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
@@ -75,7 +77,7 @@ def reduced(
         if not reduction.of_failures:
             own = drawn.get(reduction.of, own)
         support = known(support, reduction.of, own)
-        found = reduction(support)
+        found: Any = reduction(support)
         if not isinstance(found, xr.Dataset):
             rule = "must return an xarray.Dataset of the new variables"
             remedy = "Write return self.results('how it was found', {'': values})."
