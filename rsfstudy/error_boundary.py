@@ -58,7 +58,8 @@ class CheckedKeywords:
 
     def __new__(cls, *args: Any, **keywords: Any) -> Self:
         """Create an instance once all keywords are known to be parameters."""
-        valid = _parameters(cls)  # type: ignore[arg-type]
+        kind: type = cls
+        valid = _parameters(kind)
         for name in keywords if valid else ():
             if name not in valid:
                 close = difflib.get_close_matches(name, valid, n=1)
@@ -112,7 +113,8 @@ def check_file(name: str, path: str | Path) -> None:
     try:
         is_other = Path(path).exists() and not Path(path).is_file()
     except (OSError, ValueError) as error:
-        raise InvalidValue(name, str(path), f"is no path of a file ({in_words(error)})") from error
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InvalidValue(name, str(path), f"cannot be the path of a file: {reason}") from error
     if is_other:
         remedy = "Name a file."
         raise InvalidValue(name, str(path), "is a directory, a pipe or a device", remedy=remedy)

@@ -175,8 +175,8 @@ def events(
     """
     given = {"time": time, "displacement": displacement, "shear_stress": shear_stress}
     if isinstance(record, str | Path):
-        table = read_table(record).items()
-        record = xr.Dataset({n: (n, of.values, {"units": of.units}) for n, of in table})
+        table = {n: of for n, of in read_table(record).items() if n in given}
+        record = xr.Dataset({n: (n, of.values, {"units": of.units}) for n, of in table.items()})
     if record is not None:
         given = {name: record.get(name) for name in given}
     times, stress = (_samples(name, given[name]) for name in ("time", "shear_stress"))

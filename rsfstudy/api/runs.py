@@ -234,9 +234,11 @@ def plot(
     variable : str, optional
         Draw this variable instead: as maps over two numeric axes, else as lines.
     style : path, str, dict or list of those, optional
-        What `matplotlib.style.use` takes, laid over the style that ships: a style sheet of yours,
-        ``"dark_background"``, or ``{"font.size": 9, "figure.figsize": (3.5, 2.6)}``, which is one
-        column of a journal in inches. All colours and line styles come from ``axes.prop_cycle``.
+        A style on top of the style of rsfstudy: a style sheet (a file that ends in
+        ``.mplstyle``), the name of a style in ``matplotlib.style.available``, or settings such as
+        ``{"font.size": 9, "figure.figsize": (3.5, 2.6)}``, which is one column of a journal in
+        inches. All colours and line styles come from ``axes.prop_cycle``. Unknown settings are
+        rejected.
     own : function or module, optional
         What draws it, where that is not part of rsfstudy: what ``Study(plot=...)`` was given.
 

@@ -232,7 +232,7 @@ class Measure(CheckedKeywords):
         meter = Meter(accuracy.budget, dict(accuracy.methods), accuracy.engine)
         try:
             outcome = self._checked(self.find(scene, accuracy, meter))
-            if outcome.status is Status.OK:
+            if outcome.status.has_values:
                 outcome = self._held_to(accuracy.rtol, scene, outcome)
         except Halt as halt:
             outcome = Outcome(halt.status, message=str(halt))
@@ -266,7 +266,7 @@ class Measure(CheckedKeywords):
             else _checks.number(declared, inner, name, value)
             for name, value in given
         }
-        lacking = self._lacking(values) if outcome.status is Status.OK else None
+        lacking = self._lacking(values) if outcome.status.has_values else None
         if lacking:
             why = f"{lacking} = {values.get(lacking, math.nan)}"
             return Outcome(Status.NOT_FINITE, values, why)

@@ -8,8 +8,6 @@ cells are carried to what is made of them (`rsfstudy.reduce.base.carried`).
 
 from __future__ import annotations
 
-from typing import Any
-
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
@@ -52,7 +50,7 @@ __all__ = [
 ]
 
 #: What tells of the quality of a result, by the ends of their names.
-_BESIDE = ("error", "stderr", "misfit", "points")
+_BESIDE = ("error", "stderr", "misfit", "points", "status")
 
 
 def reduced(
@@ -77,7 +75,7 @@ def reduced(
         if not reduction.of_failures:
             own = drawn.get(reduction.of, own)
         support = known(support, reduction.of, own)
-        found: Any = reduction(support)
+        found: object = reduction(support)  # user-defined reductions may return anything
         if not isinstance(found, xr.Dataset):
             rule = "must return an xarray.Dataset of the new variables"
             remedy = "Write return self.results('how it was found', {'': values})."

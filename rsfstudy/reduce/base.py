@@ -26,6 +26,8 @@ Fields = Mapping[str, Sequence[str]]
 
 #: How a result comes by its error, for the attributes of that.
 COMMENT = "errors of the cells it draws on, each times the derivative by it, in absolute value"
+#: Endings of the names of variables that hold statistical errors.
+_STATISTICAL = ("_stderr", "_low", "_high", "covariance", "correlation")
 #: Rounding error by which a coordinate value may miss a range and still count as in it.
 ROUNDING = 1e-9
 
@@ -117,10 +119,14 @@ def worst(status: xr.DataArray, dims: Collection[Hashable]) -> xr.DataArray:
 
 
 def known(dataset: xr.Dataset, of: str, status: xr.DataArray) -> xr.Dataset:
-    """The dataset for a reduction of `of`: with the status of the cells that `of` draws on, and
-    without the numbers of those that failed.
+    """Return the dataset for a reduction of `of`, with NaN for values that must not be used.
+
+    The status is that of the cells that `of` depends on. The values of failed cells become NaN,
+    and so do standard errors and confidence intervals that are not valid.
     """
     bad = failed(status)
+    if of.endswith(_STATISTICAL):
+        bad = bad | (status == int(Status.ERRORS_NOT_VALID))
     if bool(bad.any()) and dataset[of].dtype.kind == "f":
         dataset = dataset.assign({of: dataset[of].where(~bad)})
     return dataset.assign(status=status)

@@ -64,6 +64,10 @@ class Part:
     equations: ClassVar[frozenset[str]] = frozenset()
     #: Unknowns of a fluid or a loading, and the functions of them (see `fluid.Fluid`).
     unknowns: ClassVar[tuple[Quantity, ...]] = ()
+    #: Names of unknowns that do not count for the distance from steady sliding, for example because
+    #: their steady values are huge at the slip rate of a rupture. Motions may settle, and limit
+    #: cycles are recognised, whatever these unknowns do.
+    excluded_from_distance: ClassVar[tuple[str, ...]] = ()
     auxiliary_rates: ClassVar[Function | None] = None
     auxiliary_steady_states: ClassVar[Function | None] = None
     #: Where values of other parts of the slot have no meaning, and what would give them one.

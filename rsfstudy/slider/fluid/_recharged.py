@@ -68,6 +68,11 @@ class Recharged:
         return (*self.loading.unknowns, *self.fluid.unknowns)
 
     @property
+    def excluded_from_distance(self) -> tuple[str, ...]:
+        """Names of the unknowns of both parts that do not count for the distance."""
+        return (*self.loading.excluded_from_distance, *self.fluid.excluded_from_distance)
+
+    @property
     def auxiliary_rates(self) -> Function:
         """Theirs."""
         assert self.fluid.auxiliary_rates is not None
