@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
 from fuzz_commands import STUDIES, Answer, Line, damage, faults, line_of
 from running import call, called
 
+from rsfstudy.cli import command_line
 from rsfstudy.cli.command_line import cli
+from rsfstudy.cli.console import Plain
 
 LONG = "x" * 300
 
@@ -102,6 +107,33 @@ def test_usage_errors_print_no_control_characters(words):
     ran = call(*words)
     assert ran.returncode == 2
     assert all(c.isprintable() or c == "\n" for c in ran.stderr)
+
+
+def test_a_full_disk_is_named_whatever_prints(monkeypatch):
+    """Click prints lists and help by itself."""
+    said = io.StringIO()
+    with open("/dev/full", "w") as full, monkeypatch.context() as patch:
+        patch.setattr(sys, "argv", ["rsfstudy", "list"])
+        patch.setattr(sys, "stderr", said)
+        patch.setattr(sys, "stdout", full)
+        with pytest.raises(SystemExit) as ended:
+            command_line.main()
+        patch.undo()
+        with contextlib.suppress(OSError):
+            full.flush()
+    text = " ".join(said.getvalue().split())
+    assert text.startswith("error: rsfstudy list: No space left on device. Check that the place")
+    assert ended.value.code == 1
+
+
+@pytest.mark.parametrize(
+    ("columns", "width"), [("0", 20), ("1", 20), ("120", 120), ("9" * 11, 1000)]
+)
+def test_any_width_of_the_environment_is_bounded(columns, width):
+    printed = Plain(file=io.StringIO(), _environ={"COLUMNS": columns})
+    assert printed.width == width
+    printed.print("a study")
+    assert printed.file.getvalue() == "a study\n"
 
 
 # ---- the fuzzer ----------------------------------------------------------------------------------
