@@ -134,8 +134,9 @@ def fit(
         error (``_error``); ``a_minus_b``; ``covariance`` and ``correlation``; what the noise is
         (``noise_size``, ``noise_order``, ``effective_samples``, ``whiteness``); the window; along
         the rows of the record, ``fitted_friction``, ``residual`` and ``innovation``, NaN outside
-        the window. Lengths are in um, rates in um/s. ``status`` is ``not_identified`` where the
-        record does not tell a parameter, and ``message`` names it. ``dataset.rsf.table()``,
+        the window. Lengths are in um, rates in um/s. ``status`` is ``not_identified`` if the record
+        does not constrain a parameter, and ``errors_not_valid`` if the values stand but their
+        standard errors do not; ``message`` gives the reason. ``dataset.rsf.table()``,
         ``.rsf.plot()``, ``.rsf.scene``, ``.rsf.laboratory`` and ``.rsf.draw()`` say more.
 
     Raises
@@ -167,8 +168,10 @@ def fit(
     records = tuple(_with_normal_stress(one, rig) for one in records)
     numbers = _numbers(records, steps)
     guess = _guess(records[0], rig, numbers[0], slip_distance)
+    if "alpha" in scene:
+        scene = {"normal_stress": "imposed", **scene}
     if "alpha" in free:
-        _check_stressed(records, loading)
+        _check_stressed(records, loading, numbers)
         scene = {"normal_stress": "imposed", **scene}
     ratio, machine = _stiffness(rig, stiffness, free, records)
     if machine:
@@ -227,7 +230,7 @@ def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]
     count = max(len(one.found) for one in records)
     if not count:
         remedy = "State them: record.with_steps([(begins, ends, before, after)])."
-        rule = "has no step of load point velocity"
+        rule = "has no step of load point velocity or normal stress"
         raise InvalidValue("record", records[0].name, rule, remedy=remedy)
     numbers = tuple(steps) or tuple(range(1, count + 1))
     for number in numbers:
@@ -253,13 +256,17 @@ def _check_step(record: Record, number: int, step: Step) -> None:
         raise InvalidValue("displacement", told, rule, remedy=remedy)
 
 
-def _check_stressed(records: Sequence[Record], loading: str) -> None:
-    """Refuse to look for the effect of a normal stress that does not change."""
+def _check_stressed(records: Sequence[Record], loading: str, numbers: Sequence[int]) -> None:
+    """Refuse to fit the effect of a normal stress that does not change."""
     for record in records:
         stress = record.columns.get("normal_stress", np.zeros(1))
-        if loading != "recorded" or not np.ptp(stress) > 0.0:
-            rule = f"needs a normal stress that changes, and that of {record.name} is constant"
-            remedy = "Leave it out, or record normal stress, with --loading recorded (loading=)."
+        steps = [record.found[n - 1] for n in numbers if n <= len(record.found)]
+        by_steps = loading == "steps" and any(step.stress_ratio != 1.0 for step in steps)
+        if not by_steps and not (loading == "recorded" and np.ptp(stress) > 0.0):
+            rule = "needs a normal stress that changes: "
+            rule += f"that of {record.name} has no step among those that are fitted"
+            remedy = "Leave alpha out, name a step of normal stress (steps=), or follow the "
+            remedy += "recorded normal stress with --loading recorded (loading=)."
             raise InvalidValue("free", "alpha", rule, remedy=remedy)
 
 

@@ -28,6 +28,7 @@ from rsfstudy.files.comparison import Comparison, cell_number, compared, side_by
 from rsfstudy.files.journal import differences
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.engines import COMPILED, check_engine, own_stepper
+from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.quantity import table
 from rsfstudy.slider.registry import completed
 from rsfstudy.slider.scene import Scene
@@ -141,7 +142,7 @@ def run(
         command=command,
     )
     with Workers(workers, client, time_limit) as where:
-        results = prepared(declared, keeping, where, progress)()
+        results = with_cf_encoding(prepared(declared, keeping, where, progress)())
     told = [f"no {name}: {why}" for name, why in tables.refused(results).items()]
     if failed := runner.failures(results):
         each = ", ".join(f"{label} {number}" for label, number in failed.items())

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from rsfstudy.error_boundary import CheckedKeywords
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.slider.registry import name_of
@@ -21,7 +22,7 @@ Row = Mapping[str, Any]
 
 
 @dataclass(frozen=True, init=False)
-class Axis:
+class Axis(CheckedKeywords):
     """One dimension of a lattice.
 
     Parameters

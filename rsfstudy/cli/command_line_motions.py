@@ -143,8 +143,9 @@ def fit() -> None:
     Prints the steps that are found, and a table of a, b, D_c and their standard errors, which count
     the correlation of the noise. Says what the record does not tell, and writes figure and data.
 
-    Exit status 1 where a fit gives no numbers, or none that are verified; 2 for wrong usage; else
-    0, also where a parameter is not identified.
+    The exit status is 1 if a fit has no values, values that are not verified or standard errors
+    that are not valid, and 2 for wrong usage. Otherwise it is 0, also if a parameter is not
+    identified.
     """
 
 

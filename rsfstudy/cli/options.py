@@ -20,6 +20,7 @@ from rsfstudy.defaults import FIGURES, OUTPUT, TIME_LIMIT
 from rsfstudy.error_boundary import check_file
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import ENGINES
+from rsfstudy.paths import check_path
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -71,10 +72,8 @@ class FilePath(click.Path):
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> str | bytes | os.PathLike[str]:
         """Return a path; raise `InvalidValue` if it cannot be one."""
-        from rsfstudy.files import places
-
         name = param.opts[0] if isinstance(param, click.Option) else str(param and param.name)
-        places.check_path(name, value)
+        check_path(name, value)
         return super().convert(value, param, ctx)
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.declare.names import PACKAGE, names
 from rsfstudy.errors import InvalidValue
+from rsfstudy.paths import check_path
 
 if TYPE_CHECKING:
     from rsfstudy.declare.study import Study
@@ -29,6 +30,7 @@ def load(name: str) -> Study:
         For a name there is no study of, with close matches, and for a file that is not there,
         raises, or declares no study.
     """
+    check_path("study", name)
     if name.endswith(".py"):
         return replace(_declared_in(_run(Path(name)), name), declared_in=name)
     if name not in names():

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rsfstudy.axes.axis import check_text
 from rsfstudy.declare import catalogue, names
 from rsfstudy.defaults import OUTPUT
 from rsfstudy.errors import DataError, InvalidValue, brief
+from rsfstudy.paths import check_path
 
 
 def directory(output: str | Path | None) -> Path | None:
@@ -25,25 +25,6 @@ def directory(output: str | Path | None) -> Path | None:
     return check_path("output", output)
 
 
-def check_path(name: str, path: str | Path) -> Path:
-    """Return a path that a file or a directory can have, whether there is one or not.
-
-    Raises
-    ------
-    InvalidValue
-        If it is empty, or if the system does not accept it, for example because it is too long.
-    """
-    check_text(name, str(path))
-    if path == "":
-        remedy = "Name a file or a directory; . is the directory you are in."
-        raise InvalidValue(name, path, "is empty", remedy=remedy)
-    try:
-        Path(path).exists()
-    except OSError as error:
-        raise InvalidValue(name, str(path), f"cannot be used: {error.strerror}") from error
-    return Path(path)
-
-
 def results(name: str | Path, output: str | Path | None) -> Path:
     """The results of a named study, or of the study that a file declares, in a directory; or the
     results file that is named itself. A file that declares a study is run, because results bear the
@@ -54,6 +35,7 @@ def results(name: str | Path, output: str | Path | None) -> Path:
     DataError, InvalidValue
         If there are none.
     """
+    check_path("study", name)
     path = Path(name)
     if path.suffix in (".nc", ".zarr"):
         return path

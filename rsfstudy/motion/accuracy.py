@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from numbers import Real
 
+from rsfstudy.error_boundary import CheckedKeywords
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import SCIPY, named
 
@@ -27,7 +28,7 @@ ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
-class Accuracy:
+class Accuracy(CheckedKeywords):
     """The accuracy a result must meet, and the work it may cost.
 
     Parameters

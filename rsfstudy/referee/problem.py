@@ -21,10 +21,11 @@ import numpy as np
 from scipy.special import lambertw
 
 from rsfstudy.error_boundary import check_file, in_words
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.errors import DataError, InvalidValue, brief
 from rsfstudy.motion.events import Event, Kind
 from rsfstudy.motion.meter import Halt
 from rsfstudy.motion.starting import at_rate, on_slow_manifold
+from rsfstudy.paths import check_path
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.units import in_si
 from rsfstudy.slider import registry
@@ -291,10 +292,10 @@ def read(path: Path) -> Problem:
     check_file("problem", path)
     try:
         stated = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeError, tomllib.TOMLDecodeError) as error:
-        raise DataError(f"{path}: cannot be read as TOML ({error})") from error
     except RecursionError as error:
         raise DataError(f"{path}: cannot be read as TOML (it is nested too deeply)") from error
+    except (OSError, ValueError) as error:  # of the text, its encoding or the digits of a number
+        raise DataError(f"{path}: cannot be read as TOML ({brief(error)})") from error
     known = {name: kind for name, kind in get_type_hints(Problem).items() if name != "number"}
     try:
         for name, value in stated.items():
@@ -345,6 +346,7 @@ def write(directory: Path) -> None:
     DataError
         Where it cannot be written.
     """
+    check_path("DIR", directory)
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
         remedy = "Name a new one: nothing is replaced."
         raise InvalidValue("DIR", str(directory), "is there already", remedy=remedy)

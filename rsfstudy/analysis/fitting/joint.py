@@ -13,6 +13,9 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from rsfstudy.analysis.fitting.model import FINE, Differences, Model, Values
+from rsfstudy.errors import InvalidValue
+from rsfstudy.motion.meter import Halt
+from rsfstudy.status import Status
 
 T = TypeVar("T")
 #: What parameters that each window may have for itself begin with.
@@ -89,9 +92,13 @@ class Joint:
         return self.parts[max(parted(name)[1] - 1, 0)].latest
 
     def check(self, values: Values) -> None:
-        """Raise InvalidValue for parameters that make no scene."""
-        for part, own in self._each(values):
-            part.scene_of(own)
+        """Raise Halt if a scene cannot have these parameters."""
+        try:
+            for part, own in self._each(values):
+                part.scene_of(own)
+        except InvalidValue as wrong:
+            text = f"no slider has the first guess of the parameters: {wrong}"
+            raise Halt(Status.NOT_APPLICABLE, text) from wrong
 
     def curve(self, values: Values, *, refined: bool = False, checked: bool = False) -> np.ndarray:
         """Friction along the rows of all windows, without trends (see `Model.curve`)."""

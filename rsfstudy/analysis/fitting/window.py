@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
-from rsfstudy.analysis.fitting.load_point import moved_steps
+from rsfstudy.analysis.fitting.load_point import integrated_displacement, moved_steps
 from rsfstudy.analysis.fitting.model import Model, parameters_of
 from rsfstudy.analysis.fitting.record import Record, by_steps, loading_of, steps_between
 from rsfstudy.analysis.fitting.steps import Step, noise_variance
+from rsfstudy.analysis.fitting.stress_steps import CHANGES
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.slider.scene import Scene
@@ -25,12 +26,11 @@ _BACK, _ROWS = 0.5, 3
 #: Part of the time before the first step by which loading may come late.
 _LATE = 0.2
 LOADINGS = ("steps", "recorded")
-#: Change of normal stress, relative to that before the step, that a model may leave out. It alters
-#: stiffness over normal stress, and so the fitted parameters, by as much.
-VARIES = 0.02
 #: Rows of the running median by which noise of normal stress is reduced, the quantile of departures
 #: that is compared, and the standard deviations of noise by which it may exceed the limit.
 _SMOOTHED, _MOST_OF, _NOISE_ALLOWED = 5, 0.99, 2.0
+#: Logarithm of the ratio of velocities below which a step shows neither a nor b at a glance.
+_LEAST_RATIO = 0.02
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Window:
         """
         found = self.record.found
         if self.number > len(found):
-            text = f"{self.record.name} has {len(found)} steps of load point velocity"
+            text = f"{self.record.name} has {len(found)} steps"
             raise Halt(Status.NO_STEP, text)
         return found[self.number - 1]
 
@@ -173,7 +173,7 @@ class Window:
             a normal stress that varies by more than the loading of the model does.
         """
         record, step, rows = self.record, self.step, self.rows
-        time, moved = record.time[rows], record.columns["displacement"][rows]
+        time = record.time[rows]
         friction = record.columns["friction"][rows]
         if len(rows) < _ROWS * len(free) or not step.begins < self._closes():
             text = f"the window holds {len(rows)} rows, too few for {len(free)} parameters"
@@ -186,8 +186,7 @@ class Window:
         pieces = loading_of(record, begins, ends, recorded=loading == "recorded")
         if scene.parts.normal_stress.name == "constant":
             pieces[:, 2:] = 1.0, 0.0  # what was recorded is noise
-        between = steps_between(record, begins, ends) if loading == "steps" else []
-        moves = [by_steps(begins, steps) for steps in moved_steps(record, between)]
+        moves = self._moves(begins, ends) if loading == "steps" else []
         if "step_time" in free:
             for each in (pieces, *moves):
                 each[0, 0] -= _LATE * (step.begins - begins)
@@ -195,8 +194,16 @@ class Window:
             text = "the window begins in a hold: a fit begins with steady sliding"
             raise Halt(Status.NOT_APPLICABLE, text)
         self._check_normal_stress(rows, pieces)
-        moved = moved - np.interp(step.begins, time, moved)
+        steady = by_steps(begins, steps_between(record, begins, ends))
+        moved = integrated_displacement(steady, time, step.begins)
         return Model(scene, time, moved, friction, pieces, accuracy, meter, moves)
+
+    def _moves(self, begins: float, ends: float) -> list[np.ndarray]:
+        """Make the loading with steps that are moved by errors of displacement."""
+        steps = steps_between(self.record, begins, ends)
+        others = [step for step in steps if not step.changes_velocity]
+        moved = moved_steps(self.record, [step for step in steps if step.changes_velocity])
+        return [by_steps(begins, sorted([*each, *others])) for each in moved]
 
     def _check_normal_stress(self, rows: np.ndarray, pieces: np.ndarray) -> None:
         """Raise Halt if the recorded normal stress departs from that of the loading."""
@@ -210,14 +217,15 @@ class Window:
         apart = np.abs(median_filter(stress - modelled, _SMOOTHED, mode="nearest"))
         noise = math.sqrt(noise_variance(time, stress))
         varies = float(np.quantile(apart, _MOST_OF)) - _NOISE_ALLOWED * noise
-        if varies > VARIES:
+        if varies > CHANGES:
             stress *= before * 1e-6
             text = (
                 f"normal stress varies from {stress.min():.4g} to {stress.max():.4g} MPa within "
                 f"the window, and is {before * 1e-6:.4g} MPa before the step; the model accounts "
-                f"for changes of {100.0 * VARIES:g} % at most. Shorten the window with --before "
-                "and --after (before=, after=), or model the recorded normal stress with "
-                "--loading recorded --set normal_stress=imposed (loading=, normal_stress=)"
+                f"for changes of {100.0 * CHANGES:g} % at most. Shorten the window with --before "
+                "and --after (before=, after=), or model the normal stress: --set "
+                "normal_stress=imposed (normal_stress=) for its steps, with --loading recorded "
+                "(loading=) row by row; alpha is then free or stated"
             )
             raise Halt(Status.NOT_APPLICABLE, text)
 
@@ -260,6 +268,9 @@ def first_guess(
         values["mu_star"] = float(np.mean(before))
     if step.after > 0.0 and len(before):
         ratio = math.log(step.after / step.before)
+    else:
+        ratio = 0.0
+    if abs(ratio) > _LEAST_RATIO:
         peak = later.max() if ratio > 0.0 else later.min()
         read_a = max((peak - values["mu_star"]) / ratio, 1e-3)
         read_b = (peak - float(np.mean(later[-max(len(later) // 10, 1) :]))) / ratio
