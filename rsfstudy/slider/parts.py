@@ -178,11 +178,7 @@ def _appended(part: type[Part]) -> tuple[str, ...]:
     """Return the names of number fields that were declared below the last override of `numbers`."""
     overriding = next(kind for kind in part.__mro__ if "numbers" in vars(kind))
     known = vars(overriding).get("__dataclass_fields__", {})
-    return tuple(
-        name
-        for name in names_of(part)
-        if name not in known and not is_flag(part, name)
-    )
+    return tuple(name for name in names_of(part) if name not in known and not is_flag(part, name))
 
 
 def numbers_of(part: Part, scene: Scene) -> Numbers:
