@@ -9,11 +9,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from rsfstudy.analysis.settling import is_attracted
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures._records import Record, Recorded, errors_of, followed, recorded, since
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.events import Event, maximum, settling
+from rsfstudy.motion.events import Event, Kind, maximum, settling
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.motion.readings import (
     friction_coefficient_of,
@@ -102,6 +103,8 @@ class Healing(Recorded):
             "; ".join(filter(None, ("no peak of friction on reloading", said))),
         )
         if first.peak is None:
+            if first.end.kind is Kind.SETTLED:
+                is_attracted(scene)  # halts if that is undecided
             return peakless
         again = _follow(scene, hold, accuracy.refined(), meter, self._end(scene, hold, first.peak))
         if again.peak is None:

@@ -45,8 +45,43 @@ def moved_steps(record: Record, steps: Sequence[Step]) -> list[list[Step]]:
     for late, faster in _errors(record, steps, speeds):
         v = speeds + MOVED * faster
         shifts = zip(steps, MOVED * late, v[:-1], v[1:], strict=True)
-        moved.append([Step(s.begins + t, s.ends + t, one, two) for s, t, one, two in shifts])
+        moved.append(
+            [
+                s._replace(begins=s.begins + t, ends=s.ends + t, before=one, after=two)
+                for s, t, one, two in shifts
+            ]
+        )
     return moved
+
+
+def integrated_displacement(loading: np.ndarray, time: np.ndarray, origin: float) -> np.ndarray:
+    """Compute the load point displacement of a loading history, relative to that at one time.
+
+    Unlike the recorded displacement, that of the model has no noise. A regressor with noise would
+    bias the trend under generalised least squares, because the noise dominates its short lags.
+
+    Parameters
+    ----------
+    loading : ndarray, shape (pieces, 4)
+        Pieces as `loading_of` makes them; the first piece also holds for earlier times.
+    time : ndarray, shape (rows,)
+        Times in s.
+    origin : float
+        Time in s at which the displacement is zero.
+
+    Returns
+    -------
+    ndarray, shape (rows,)
+        Displacement in um.
+    """
+    begins, speeds = loading[:, 0], loading[:, 1]
+    knots = np.concatenate([[0.0], np.cumsum(np.diff(begins) * speeds[:-1])])
+
+    def moved(at: np.ndarray) -> np.ndarray:
+        piece = np.maximum(np.searchsorted(begins, at, side="right") - 1, 0)
+        return np.asarray(knots[piece] + speeds[piece] * (at - begins[piece]))
+
+    return np.asarray(moved(time) - moved(np.array([origin])))
 
 
 def _errors(

@@ -326,9 +326,10 @@ def _predictors(partial: Sequence[float] | np.ndarray) -> tuple[list[list[float]
 def _innovations(
     columns: np.ndarray, coefficients: list[list[float]], variances: list[float]
 ) -> np.ndarray:
-    """Columns less what the rows before tell of each row, over its standard deviation."""
+    """Subtract the prediction by earlier rows from each row, and divide by the standard error."""
     full = np.append(1.0, -np.array(coefficients[-1]))
-    found = np.asarray(lfilter(full, [1.0], columns, axis=0)) if len(full) > 1 else columns.copy()
+    is_plain = len(full) == 1 or not columns.size  # lfilter refuses empty arrays
+    found = columns.copy() if is_plain else np.asarray(lfilter(full, [1.0], columns, axis=0))
     for row, told in enumerate(coefficients[: min(len(coefficients) - 1, len(columns))]):
         found[row] = columns[row] - np.array(told) @ columns[:row][::-1]
         found[row] /= math.sqrt(variances[row])

@@ -18,12 +18,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from rsfstudy.analysis.fitting import noise as noises
+from rsfstudy.analysis.fitting.fitted import Fitted as Fitted
 from rsfstudy.analysis.fitting.joint import Joint
 from rsfstudy.analysis.fitting.model import (
     FINE,
@@ -70,76 +70,6 @@ _TOLD, _ACTS = 0.5, 2.0
 _DECIDES = 10.0
 
 
-@dataclass(frozen=True)
-class Fitted:
-    """Findings of a fit.
-
-    Attributes
-    ----------
-    values : dict
-        All parameters, those that were not free too.
-    free : tuple of str
-    covariance : ndarray
-        Of the free parameters, or of their logarithms (see `LOGARITHMIC`).
-    by_noise : ndarray
-        What noise of friction alone makes of it; the rest is that of load point displacement.
-    errors : dict
-        Numerical errors of the free parameters.
-    noise : Noise
-    noise_sd : float
-        Standard deviation of the noise.
-    degrees_of_freedom : float
-        Degrees of freedom of the intervals.
-    curve : ndarray
-        Friction along the rows, without trend.
-    innovations : ndarray
-        Residuals freed of correlation, over their size.
-    jacobian : ndarray
-        Derivatives of the curve with trend by the free parameters, or their logarithms.
-    criterion : float
-        Akaike's, of the likelihood of this record with this noise: less is better.
-    unidentified : tuple of str
-        Free parameters that the record does not tell.
-    """
-
-    values: dict[str, float]
-    free: tuple[str, ...]
-    covariance: np.ndarray
-    by_noise: np.ndarray
-    errors: dict[str, float]
-    noise: Noise
-    noise_sd: float
-    degrees_of_freedom: float
-    curve: np.ndarray
-    innovations: np.ndarray
-    jacobian: np.ndarray
-    criterion: float
-    unidentified: tuple[str, ...]
-
-    @property
-    def slopes(self) -> np.ndarray:
-        """Derivatives of the free parameters by their coordinates."""
-        return np.array([slope(name, self.values[name]) for name in self.free])
-
-    @property
-    def spread(self) -> np.ndarray:
-        """Standard errors of the coordinates of the free parameters."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
-
-    @property
-    def band(self) -> np.ndarray:
-        """Standard error of the curve with trend along the rows: ``sqrt(J C J')``, C being the
-        covariance of parameters.
-        """
-        variances = np.einsum("ij,jk,ik->i", self.jacobian, self.covariance, self.jacobian)
-        # below 0 by rounding, where a parameter is not told
-        return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
-
-    def stderr(self, name: str) -> float:
-        """Standard error of a parameter."""
-        return float((self.spread * self.slopes)[self.free.index(name)])
-
-
 class Search:
     """The search for some parameters of a model.
 
@@ -155,7 +85,7 @@ class Search:
 
     def __init__(self, model: Joint, values: Values, free: Sequence[str], noise: str) -> None:
         self.model, self.free, self.noise_model = model, tuple(free), noise
-        self.first, self.has_converged = dict(values), True
+        self.first, self.has_converged, self.white_size = dict(values), True, math.nan
         self.low, self.high = np.array([self._bounds(name) for name in free]).T
 
     def _bounds(self, name: str) -> tuple[float, float]:
@@ -209,6 +139,8 @@ class Search:
             before = x
             x, jacobian = self.least_squares(x, noise)
             left = self.residuals(self.values(x))
+            if not number:
+                self.white_size = math.sqrt(float(np.square(left).mean()))
             if number and _has_converged(
                 x - before, noise.whitened(np.column_stack([jacobian, left]))
             ):
@@ -319,10 +251,12 @@ class Search:
             noise_sd=size,
             degrees_of_freedom=degrees,
             curve=curve,
+            residuals=left,
             innovations=innovations / size,
             jacobian=jacobian,
             criterion=criterion,
             unidentified=self._unidentified(x, values, covariance, steps),
+            white_size=self.white_size,
         )
 
     def _criterion_without_steps(self, jacobian: np.ndarray, noise: Noise) -> float:

@@ -1,0 +1,66 @@
+"""Reasons why the standard errors of a fit are not valid.
+
+The parameter values of such a fit stand, and its status is `errors_not_valid`. Each reason is a
+sentence without its full stop: the condition that is violated, and the remedy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rsfstudy.analysis.fitting.fitted import Fitted
+from rsfstudy.analysis.fitting.noise import whiteness
+
+#: p-value below which whitened residuals are called autocorrelated.
+SIGNIFICANT = 0.01
+#: Standard deviation of friction below which residuals are numerical, not statistical.
+_NEGLIGIBLE = 1e-7
+#: Largest ratio of the residual standard deviation to that of an ordinary least-squares fit.
+_LARGEST_RATIO = 2.0
+
+
+def find_reasons(found: Fitted, friction: np.ndarray) -> tuple[str, ...]:
+    """Find the reasons why the standard errors of a fit are not valid.
+
+    Parameters
+    ----------
+    found : Fitted
+    friction : ndarray, shape (rows,)
+        Recorded friction.
+
+    Returns
+    -------
+    tuple of str
+        Empty if the standard errors are valid.
+    """
+    if found.noise_sd < _NEGLIGIBLE:
+        return ()
+    return (*_misfit(found, friction), *_autocorrelation(found))
+
+
+def _misfit(found: Fitted, friction: np.ndarray) -> Iterator[str]:
+    """Yield the reasons that the size of the residuals gives."""
+    size = float(np.sqrt(np.mean(found.residuals**2)))
+    if not size < np.std(friction):
+        yield (
+            "the fit explains the record no better than its mean does (R2 is not positive): "
+            "check the step, the stiffness and the law"
+        )
+    elif size > _LARGEST_RATIO * found.white_size:
+        yield (
+            f"the residuals ({size:.2g}) are {size / found.white_size:.1f} times as large as those "
+            "of an ordinary least-squares fit, so part of the response is taken for noise: "
+            "check the time of the step, the trend and the law"
+        )
+
+
+def _autocorrelation(found: Fitted) -> Iterator[str]:
+    """Yield a reason if the whitened residuals are autocorrelated."""
+    p_value = whiteness(found.innovations, found.noise.order)
+    if p_value < SIGNIFICANT:
+        yield (
+            f"the whitened residuals are still autocorrelated (p = {p_value:.2g}): "
+            "the law, the trend or the noise model does not describe the record"
+        )
