@@ -153,7 +153,7 @@ def test_noise_of_other_sampling_intervals_is_another() -> None:
         assert found.partial[number, 0] == pytest.approx(exact, abs=0.12)
     for noise in (found, noises.fitted("white", time, left, np.ones((1_500, 1)))):
         # 900 samples at .95 are 23 independent ones, which tell a size to 15 per cent
-        sizes = noise.sizes[[run.number for run in noise.runs]]
+        sizes = noise.sizes[[run.level for run in noise.runs]]
         assert sizes[1] / sizes[0] == pytest.approx(3.0, rel=0.5)
 
 

@@ -18,8 +18,10 @@ from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, fields_of, 
 from rsfstudy.analysis.fitting.noise import LAGS
 from rsfstudy.analysis.fitting.validity import SIGNIFICANT
 from rsfstudy.api.tables import Table
+from rsfstudy.compute import provenance
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import contents
+from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import LABELS, Status
@@ -93,7 +95,8 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
     Lengths are in um. The columns ``<name>_std`` hold standard errors, which are not valid if the
     status of the row is ``errors_not_valid``. The columns ``<name>_windows`` hold the range of a
     parameter among windows, and ``p_value`` is that of the autocorrelation test of the whitened
-    residuals. The value is NaN for a parameter that was not free.
+    residuals. ``normal_stress`` is the mean before the step in MPa, and ``k`` is the stiffness
+    divided by this normal stress in 1/um. The value is NaN for a parameter that was not free.
     """
     rows = []
     for one in cells(dataset):
@@ -105,11 +108,22 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
                 row[f"{short}_windows"] = one[f"{name}_windows"].item()
         row |= {"V0": one["velocity_before"].item(), "V1": one["velocity_after"].item()}
         row |= {"law": one["law"].item() if "law" in one.coords else ""}
+        row |= _normal_stresses(one)
+        if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
+            row["k"] = one["window_stiffness"].item()
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
         row["R2"], row["criterion"] = one["r_squared"].item(), one["criterion"].item()
         row["p_value"], row["status"] = one["whiteness"].item(), status(one)
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def _normal_stresses(one: xr.Dataset) -> dict[str, float]:
+    """Return the normal stress before the step in MPa; before each step, if there are several."""
+    names = [str(n) for n in one.data_vars if str(n).startswith("normal_stress_before_")]
+    stresses = {n: one[n].item() * 1e-6 for n in names or ["normal_stress_before"] if n in one}
+    known = {n: stress for n, stress in stresses.items() if math.isfinite(stress)}
+    return {n.replace("_before", ""): stress for n, stress in known.items()}
 
 
 def status(one: xr.Dataset) -> str:
@@ -136,10 +150,20 @@ def draw(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
     spread /= np.sqrt(rng.chisquare(degrees, n) / degrees)[:, None]
     drawn = np.where(logs, at * np.exp(np.where(logs, spread, 0.0)), at + spread)
     data = {
-        name: ("draw", drawn[:, place], {"units": one[name].attrs.get("units", "1")})
+        name: (
+            "draw",
+            drawn[:, place],
+            {key: one[name].attrs[key] for key in ("long_name", "units") if key in one[name].attrs},
+        )
         for place, name in enumerate(names)
     }
-    return xr.Dataset(data, coords={"draw": np.arange(n)})
+    number = {"long_name": "number of the sample", "units": "1"}
+    about = {
+        "title": "Samples of the parameters of a fit",
+        "Conventions": "CF-1.11",
+        **provenance.attributes("dataset.rsf.draw"),
+    }
+    return with_cf_encoding(xr.Dataset(data, {"draw": ("draw", np.arange(n), number)}, about))
 
 
 def scene(dataset: xr.Dataset) -> Scene:
@@ -156,6 +180,8 @@ def scene(dataset: xr.Dataset) -> Scene:
     )
     values = parameters_of(first, *distances)
     found = {n: one[n].item() for n in map(str, one["parameter"].values)}
+    if "window_stiffness" in one:
+        values["stiffness"] = one["window_stiffness"].item()
     values |= {n: value for n, value in of_window(found, 1).items() if n in values}
     before, after = one["velocity_before"].item(), one["velocity_after"].item()
     return first.with_(**fields_of(values, before), load_velocity_ratio=after / before)
@@ -240,6 +266,11 @@ def _table(where: str, fits: Sequence[xr.Dataset]) -> Table:
 def _column(one: xr.Dataset) -> dict[str, str]:
     """The parameters of a fit, how well it explains its rows, and the noise that is left."""
     found = {n + _units(plain(name)): with_error(one, name) for name, n in shown(one).items()}
+    if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
+        found["k" + _units("stiffness")] = f"{one['window_stiffness'].item():.6g}"
+    stresses = [f"{stress:.6g}" for stress in _normal_stresses(one).values()]
+    if stresses:
+        found["normal stress (MPa)"] = ", ".join(stresses)
     quality = dict.fromkeys(("R2", "criterion", "noise", "worth"), "-")
     if np.isfinite(one["rows_fitted"].item()):
         order = int(one["noise_order"].item())

@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from rsfstudy.error_boundary import CheckedKeywords
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import _checks
 from rsfstudy.measures._checks import Plain
@@ -56,7 +57,7 @@ TAKEN = frozenset({"status", "message", "rhs_evaluations", "wall_time", *FIELDS,
 
 
 @dataclass(frozen=True)
-class Measure:
+class Measure(CheckedKeywords):
     """Base of all measures: runs `find` under a work budget and turns a `Halt` into a status.
 
     What one writes, in a frozen dataclass whose fields are the options of the measure::

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
-
-import numpy as np
 
 from rsfstudy.analysis.fitting.joint import plain
 from rsfstudy.analysis.fitting.model import OF_SOME_LAWS, PARAMETERS
 from rsfstudy.analysis.fitting.record import COLUMNS
-from rsfstudy.analysis.fitting.steps import noise_variance
-from rsfstudy.analysis.fitting.window import Window
 from rsfstudy.quantity import Output
 
 _NUMBERS = (
@@ -33,6 +28,7 @@ _NUMBERS = (
     Output("load_point_noise", "", "um", "standard deviation of noise of the recorded load point"),
     Output("rows_fitted", "", "1", "number of rows in the window"),
     Output("normal_stress_before", r"$\sigma_*$", "Pa", "mean normal stress before the step"),
+    Output("window_stiffness", "$k$", "um-1", "stiffness over normal stress before the step"),
     *(
         Output(name, "", "1", f"{name} of parameters", dims=("parameter", "other_parameter"))
         for name in ("covariance", "correlation")
@@ -66,12 +62,24 @@ _DRAWN = (
 )
 
 
-def outputs_of(parameters: Sequence[str], drawn: bool) -> tuple[Output, ...]:
-    """Each parameter with its errors, draws of all if there are any, numbers that go with them, and
-    the rows of the record.
+def outputs_of(parameters: Sequence[str], drawn: bool, windows: int) -> tuple[Output, ...]:
+    """List the outputs of a fit: parameters with errors, draws, other numbers, and rows.
+
+    Parameters
+    ----------
+    parameters : sequence of str
+    drawn : bool
+        Include draws from the posterior.
+    windows : int
+        Number of windows that are fitted together. If there are several, the normal stress before
+        the step is an output for each.
     """
     found = [output for name in parameters for output in _of_parameter(name)]
-    return (*found, *(_DRAWN if drawn else ()), *_NUMBERS, *_ROWS_OF)
+    stresses = [
+        Output(f"normal_stress_before_{n}", "", "Pa", f"mean normal stress before step {n}")
+        for n in range(1, windows + 1 if windows > 1 else 1)
+    ]
+    return (*found, *(_DRAWN if drawn else ()), *_NUMBERS, *stresses, *_ROWS_OF)
 
 
 def _of_parameter(name: str) -> Iterator[Output]:
@@ -80,20 +88,3 @@ def _of_parameter(name: str) -> Iterator[Output]:
     yield Output(name, about.symbol, about.units, about.long_name, error=True, optional=optional)
     for suffix, words in _BESIDE.items():
         yield Output(f"{name}_{suffix}", "", about.units, f"{words} of the {about.long_name}")
-
-
-def place_of(window: Window) -> dict[str, float]:
-    """Return the velocities of a step, the ends of its window, its normal stress and the noise of
-    its load point.
-    """
-    record, rows = window.record, window.rows
-    moved, time = record.columns["displacement"][rows], record.time[rows]
-    stress = record.columns.get("normal_stress", np.full(len(record), math.nan))[rows]
-    return {
-        "load_point_noise": math.sqrt(noise_variance(time, moved)),
-        "velocity_before": window.step.before,
-        "velocity_after": window.step.after,
-        "window_begins": moved[0],
-        "window_ends": moved[-1],
-        "normal_stress_before": stress[: max(np.searchsorted(time, window.step.begins), 1)].mean(),
-    }

@@ -26,10 +26,10 @@ from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
 from rsfstudy.analysis.fitting.steps import Step
 from rsfstudy.analysis.fitting.validity import find_reasons, name_outliers
-from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess
+from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess, stiffness_factors
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
-from rsfstudy.measures._fit_outputs import outputs_of, place_of
+from rsfstudy.measures._fit_outputs import outputs_of
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output, Quantity
@@ -101,6 +101,9 @@ class Fit(Measure):
     loading : {"steps", "recorded"}
         The load point moves steadily between its steps; or as recorded, and normal stress with it,
         unless that of the scene is constant.
+    machine_stiffness : float
+        Stiffness of the machine in Pa/um. It is divided by the normal stress before the step of
+        each window. Zero: stiffness over normal stress is that of the scene in all windows.
     posterior : int
         Draws from the posterior (see `analysis.fitting.posterior`); none, unless asked for.
 
@@ -124,6 +127,7 @@ class Fit(Measure):
     noise: str = "ar"
     loading: str = "steps"
     posterior: int = 0
+    machine_stiffness: float = 0.0
     name: ClassVar[str] = "fit"
     typical_work = 250_000
     dimensions = (
@@ -196,7 +200,7 @@ class Fit(Measure):
     @property
     def outputs(self) -> Sequence[Output]:
         """Each parameter with its errors, what goes with all of them, and the rows."""
-        return outputs_of(self.parameters, self.posterior > 0)
+        return outputs_of(self.parameters, self.posterior > 0, len(self._steps))
 
     @property
     def quantities(self) -> Sequence[Quantity]:
@@ -258,7 +262,10 @@ class Fit(Measure):
             return self._widened(replace(self, free=own).find(scene, accuracy, meter))
         smooth = accuracy.at(min(accuracy.rtol, _SMOOTH))
         windows = self._windows
-        parts = [w.model(scene, self.free, self.loading, smooth, meter) for w in windows]
+        per_um = self.machine_stiffness * self.slip_distance_guess
+        scenes = [w.scene(scene, per_um) for w in windows]
+        of_each = zip(windows, scenes, strict=True)
+        parts = [w.model(one, self.free, self.loading, smooth, meter) for w, one in of_each]
         if self.noise == WHITE:  # the usual formula
             parts = [replace(part, moves=()) for part in parts]
         distances = self.slip_distance_guess, self.slip_distance_2_guess
@@ -268,13 +275,18 @@ class Fit(Measure):
             first = guess | first
             if len(windows) > 1:
                 first |= {f"{n}_{number}": v for n, v in guess.items() if is_own(n)}
-        model = Joint(tuple(parts))
+        one_machine = self.machine_stiffness > 0.0 or "stiffness" in self.free
+        model = Joint(tuple(parts), stiffness_factors(windows) if one_machine else ())
         search = Search(model, first, self.parameters, self.noise)
         found = search.run()
         unidentified = self._unidentified(found, parts[0], windows[0].step)
         rows = [window.rows + self._first_rows[window.record] for window in windows]
         values = self._told(found, np.concatenate(rows), model)
-        values |= (place := place_of(windows[0]))
+        values |= (place := windows[0].about)
+        values["window_stiffness"] = found.values["stiffness"]
+        if len(windows) > 1:
+            stresses = enumerate(windows, start=1)
+            values |= {f"normal_stress_before_{n}": w.normal_stress for n, w in stresses}
         for name in self.parameters:
             told = name not in unidentified
             ends = interval(search, found, name) if told else search.bounds(name)

@@ -154,7 +154,9 @@ class VelocityStep(Recorded):
         step = self._step(scene)
         records = [self._follow(scene, step, a, meter) for a in (accuracy, accuracy.refined())]
         (record, values), (_again, again) = records
-        errors = errors_of(values, again, self._by_friction(step.ratio, values), scene, accuracy)
+        slopes = self._by_friction(step.ratio, values)
+        neglected = dict.fromkeys(slopes, record.neglected_until(record.end.time))
+        errors = errors_of(values, again, slopes, scene, accuracy, neglected)
         found = {**values, **errors, **self._shown(scene, step, record)}
         if not abs(values["apparent_b"]) > errors["apparent_b_error"]:
             text = "friction has no extremum after the step, or does not evolve from there"

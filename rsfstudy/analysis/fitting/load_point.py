@@ -49,7 +49,12 @@ def moved_steps(record: Record, steps: Sequence[Step]) -> list[list[Step]]:
     for late, faster in _errors(record, steps, speeds):
         v = speeds + MOVED * faster
         shifts = zip(steps, MOVED * late, v[:-1], v[1:], strict=True)
-        moved.append([Step(s.begins + t, s.ends + t, one, two) for s, t, one, two in shifts])
+        moved.append(
+            [
+                s._replace(begins=s.begins + t, ends=s.ends + t, before=one, after=two)
+                for s, t, one, two in shifts
+            ]
+        )
     return moved
 
 

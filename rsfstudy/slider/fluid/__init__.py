@@ -21,6 +21,10 @@ class Fluid(Part):
     - ``auxiliary_rates(log_slip_rate, states, fraction, p)``: their changes per unit slip in D_c,
       times a fraction;
     - ``auxiliary_steady_states(log_slip_rate, p)``: what they are in steady sliding, where P is 0.
+
+    A case may list unknowns in `excluded_from_distance`. The distance from steady sliding, by which
+    a motion settles or a cycle repeats, then leaves them out. This is meant for unknowns whose
+    steady values are huge at the slip rate of a rupture.
     """
 
     conclusions = ("highest_pressure",)

@@ -111,6 +111,10 @@ class LawOfStates(Part):
         """Evolution effect of all states together, over the direct effect."""
         raise TypeError(f"{type(self).__name__} states no b_over_a")
 
+    def numbers(self, scene: Scene) -> Numbers:
+        """Return the numbers that all laws have in their places: none."""
+        return ()
+
     @property
     def size_over_a(self) -> float:
         """Change of the states by a unit of ln V, over the direct effect; positive."""
@@ -156,17 +160,18 @@ class Law(LawOfStates):
         evolution(log_slip_rate, state, p) -> float
 
     It returns dTheta per unit of slip in D_c, at constant normal stress. `log_slip_rate` is
-    ln(V/V_*) and `state` is Theta. ``p[LAW]`` is b (`rsfstudy.slider.places.LAW`); numbers of
-    the law's own follow it. A law that has some adds fields, by `rsfstudy.slider.parts.number`,
-    and::
+    ln(V/V_*) and `state` is Theta. ``p[LAW]`` is b (`rsfstudy.slider.places.LAW`). Parameters of
+    the law are fields declared by `rsfstudy.slider.parts.number`; they follow b in the order of
+    their declaration, as ``p[LAW + 1]``, ``p[LAW + 2]`` and so on. Optional methods are::
 
         numbers(self, scene) -> tuple[float, ...]
         check(self, scene) -> None
 
-    The first returns ``(*super().numbers(scene), ...)``, the second raises `InvalidValue`. The law
-    is named by ``name``. Optional are `relaxation`, `steady_states` and `state_effect`. A law with
-    one b may have several states, too, and then states `evolutions` and `steady_states`, as
-    `LawOfStates` says.
+    Override the first, which returns ``(*super().numbers(scene), ...)``, if `evolution` reads other
+    numbers than the fields, such as their logarithms. The second raises `InvalidValue` if values
+    contradict each other. The class attribute ``name`` names the law. `relaxation`,
+    `steady_states` and `state_effect` are optional, too. A law with one b may have several states,
+    and then defines `evolutions` and `steady_states`, as described for `LawOfStates`.
     """
 
     b_over_a: float = number(2.0, "$b/a$", "1", "ratio of evolution effect to direct effect")
