@@ -25,7 +25,7 @@ from rsfstudy.analysis.fitting.noise import WHITE, check_noise, whiteness
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
 from rsfstudy.analysis.fitting.steps import Step
-from rsfstudy.analysis.fitting.validity import find_reasons
+from rsfstudy.analysis.fitting.validity import find_reasons, name_outliers
 from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess, stiffness_factors
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
@@ -301,10 +301,10 @@ class Fit(Measure):
                 text += "; friction does not change at the step as velocity does: "
                 text += "see whether columns (time and displacement, say) are exchanged"
             return Outcome(Status.NOT_IDENTIFIED, values, text)
-        remark = self._remark(found, place["load_point_noise"])
+        remarks = (name_outliers(found.outliers), self._remark(found, place["load_point_noise"]))
         reasons = find_reasons(found, model.friction)
         status = Status.ERRORS_NOT_VALID if reasons else Status.OK
-        return Outcome(status, values, "; ".join(filter(None, (*reasons, remark))))
+        return Outcome(status, values, "; ".join(filter(None, (*reasons, *remarks))))
 
     def _widened(self, outcome: Outcome) -> Outcome:
         """An outcome of fewer parameters, with NaN in matrices where those of other laws stand."""
@@ -374,6 +374,8 @@ class Fit(Measure):
             "a_minus_b": found.values["a"] - b,
             "a_minus_b_stderr": math.sqrt(max(variance_of_rate, 0.0)),
             "noise_size": found.noise_sd,
+            "outliers": len(found.outliers),
+            "friction_quantum": found.quantum,
             "noise_order": found.noise.order,
             "effective_samples": found.noise.effective_samples,
             "degrees_of_freedom": found.degrees_of_freedom,
@@ -389,7 +391,7 @@ class Fit(Measure):
             "fitted_friction_stderr": found.band,
             "detrended_friction": found.curve,
             "residual": found.residuals,
-            "innovation": found.innovations,
+            "innovation": found.all_innovations,
         }
         for name in (about.name for about in COLUMNS[:3]):
             whole = [record.columns[name] for record in self._first_rows]
