@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from rsfstudy.errors import InvalidValue
@@ -11,8 +10,8 @@ from rsfstudy.errors import InvalidValue
 LONGEST_NAME, LONGEST_PATH = 255, 4096
 
 
-def check_path(name: str, path: str | Path) -> None:
-    """Check that a file system can hold a path.
+def check_path(name: str, path: str | Path) -> Path:
+    """Check that a file or a directory can have a path, whether it exists or not.
 
     Parameters
     ----------
@@ -20,16 +19,24 @@ def check_path(name: str, path: str | Path) -> None:
         The argument or option, for the error.
     path : str or Path
 
+    Returns
+    -------
+    Path
+
     Raises
     ------
     InvalidValue
-        If the path or one of its parts is too long, or is not text.
+        If the path is empty or not text, if it or one of its parts is too long, or if the system
+        does not accept it.
     """
     text = str(path)
+    if not text:
+        remedy = "Name a file or a directory; . is the directory you are in."
+        raise InvalidValue(name, text, "is empty", remedy=remedy)
     try:
-        parts = [len(os.fsencode(part)) for part in (text, *Path(text).parts)]
-    except UnicodeError as error:
-        raise InvalidValue(name, text, "must be a path, in characters that exist") from error
+        parts = [len(part.encode()) for part in (text, *Path(text).parts)]
+    except UnicodeError as error:  # neither NetCDF nor the attributes of a file could hold it
+        raise InvalidValue(name, text, "must be a text that UTF-8 can hold") from error
     if "\0" in text:
         raise InvalidValue(name, text, "must be a path, without the null character")
     rule = ""
@@ -39,3 +46,8 @@ def check_path(name: str, path: str | Path) -> None:
         rule = f"must have at most {LONGEST_NAME} bytes in each part (got {max(parts[1:]):,})"
     if rule:
         raise InvalidValue(name, text, rule, remedy="Choose a shorter name.")
+    try:
+        Path(path).exists()
+    except OSError as error:
+        raise InvalidValue(name, text, f"cannot be used: {error.strerror}") from error
+    return Path(path)

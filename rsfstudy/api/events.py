@@ -15,8 +15,10 @@ import xarray as xr
 from scipy.ndimage import find_objects, label
 from scipy.stats import norm
 
+from rsfstudy.compute import provenance
 from rsfstudy.error_boundary import error_boundary, user_stacklevel
 from rsfstudy.errors import InvalidValue, NoAnswer
+from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.rig.table import read_table
 from rsfstudy.rig.units import factor, in_si
 
@@ -67,7 +69,8 @@ def catalogue(found: Sequence[Found], about: Mapping[str, Mapping[Any, Any]]) ->
     for row, earlier in zip(rows, [{}, *rows], strict=False):
         (time, error), (before, unsure) = row["time"], earlier.get("time", (math.nan, math.nan))
         row["interval"] = time - before, error + unsure
-    dataset = xr.Dataset(coords={"event": np.arange(len(rows))})
+    number = {"long_name": "number of the event", "units": "1"}
+    dataset = xr.Dataset(coords={"event": ("event", np.arange(len(rows)), number)})
     for name, (scale, _heading, words) in QUANTITIES.items():
         if rows and name not in rows[0]:
             continue
@@ -82,7 +85,13 @@ def catalogue(found: Sequence[Found], about: Mapping[str, Mapping[Any, Any]]) ->
         "flag_meanings": " ".join(_CUT),
     }
     dataset["cut"] = "event", np.array([cut for _numbers, cut in found], dtype=np.int8), flags
-    return dataset.assign_attrs(title="Catalogue of events", Conventions="CF-1.11")
+    return with_cf_encoding(
+        dataset.assign_attrs(
+            title="Catalogue of events",
+            Conventions="CF-1.11",
+            **provenance.attributes("rsfstudy.events"),
+        )
+    )
 
 
 def _units(scale: str, about: Mapping[str, Mapping[Any, Any]]) -> dict[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import importlib.util
+import os
 import sys
 import traceback
 from dataclasses import replace
@@ -35,7 +36,7 @@ def load(name: str) -> Study:
     if name not in names():
         near = difflib.get_close_matches(name, names(), n=3, cutoff=0.5)
         remedy = "`rsfstudy list` shows all; or name a file: path/to/study.py."
-        if Path(f"{name}.py").is_file():
+        if os.path.isfile(f"{name}.py"):
             near, remedy = [], f"There is a file {name}.py here: name it {name}.py."
         raise InvalidValue("study", name, "is unknown", choices=near, remedy=remedy)
     study: Study = importlib.import_module(f"{PACKAGE}.{name}").study

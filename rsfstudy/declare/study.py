@@ -14,12 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes.axis import Axis, Row, check_text, plain_values, select, with_values
+from rsfstudy.axes.axis import Axis, Row, check_text, plain_values
+from rsfstudy.axes.overrides import select, with_values
 from rsfstudy.declare import checks, rigs
 from rsfstudy.declare.cell import Cell, Changes
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
 from rsfstudy.declare.shown import study_html
+from rsfstudy.error_boundary import CheckedKeywords
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.motion.accuracy import Accuracy
@@ -51,7 +53,7 @@ _LONGEST_NAME = 200
 
 
 @dataclass(frozen=True, kw_only=True)
-class Study:
+class Study(CheckedKeywords):
     """A parameter study, declared.
 
     Parameters

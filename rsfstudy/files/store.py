@@ -25,6 +25,7 @@ from rsfstudy.errors import DataError, RsfStudyError, brief
 from rsfstudy.files import content_digest, contents
 from rsfstudy.files.attributes import check_attributes
 from rsfstudy.files.contents import LAYOUT
+from rsfstudy.netcdf import fill_value_encoding, with_cf_encoding
 from rsfstudy.paths import check_path
 
 #: How Zarr stores are opened: lazily, and none of an older format.
@@ -67,8 +68,9 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
         path.parent.mkdir(parents=True, exist_ok=True)
         beside.unlink(missing_ok=True)  # were it a link or a pipe, writing would go elsewhere
         # with a Dask client, xarray would wait for a lock of the cluster, perhaps for ever
+        how: dict[str, Any] = {"engine": "netcdf4", "format": "NETCDF4"}
         with dask.config.set(scheduler="synchronous"):
-            stored.to_netcdf(beside, engine="netcdf4", format="NETCDF4", encoding=_encoding(clean))
+            stored.to_netcdf(beside, **how, encoding=fill_value_encoding(clean))
         with open(beside, "ab") as file:
             file.write(_MARK + _digest_of_bytes(beside, beside.stat().st_size))
         with xr.open_dataset(beside, engine="netcdf4") as back:
@@ -97,6 +99,19 @@ def _digest_of_bytes(path: Path, size: int) -> bytes:
             digest.update(part)
             size -= len(part)
     return digest.hexdigest().encode()
+
+
+def open_store(path: Path) -> xr.Dataset:
+    """Open a Zarr store lazily, with flags of the type of their variables.
+
+    Zarr keeps attributes as JSON, which has one type of number.
+    """
+    dataset = xr.open_dataset(path, **ZARR)
+    for variable in dataset.variables.values():
+        if "flag_values" in variable.attrs:
+            flags = np.asarray(variable.attrs["flag_values"], dtype=variable.dtype)
+            variable.attrs["flag_values"] = flags
+    return dataset
 
 
 def seal(store: Path) -> None:
@@ -169,7 +184,7 @@ def read_any(path: Path) -> xr.Dataset:
         if path.is_dir():
             _check_codecs(path)
             sealed = _check_store(path)
-            dataset = xr.open_dataset(path, **ZARR)
+            dataset = open_store(path)
         else:
             sealed = _check_bytes(path)
             dataset = xr.load_dataset(path, engine="netcdf4")
@@ -180,6 +195,7 @@ def read_any(path: Path) -> xr.Dataset:
         raise
     except Exception as error:  # HDF5, Zarr and xarray raise almost anything on damaged data
         raise DataError(f"{where} cannot be read: {brief(error)}") from error
+    dataset = with_cf_encoding(dataset)
     try:
         check_attributes(dataset)
         if contents.is_of_a_scene(dataset):
@@ -241,12 +257,3 @@ def _plain(value: Any) -> Any:
         values = np.asarray(value)
         return values if values.size > 1 else _plain(values.item()) if values.size else ""
     return value
-
-
-def _encoding(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
-    """No fill values on coordinates and flags, where they would mean that data are missing."""
-    plain: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in dataset.coords}
-    for name, values in dataset.data_vars.items():
-        if values.dtype.kind in "iu":
-            plain[name] = {"_FillValue": None}
-    return plain
