@@ -58,11 +58,11 @@ class Elasticities(Measure):
     They are central differences of the fourth order over ln p = -2h, -h, h and 2h. The step h =
     (e/2)^(1/3) follows from e, the error estimate of y. The error estimate is 1.5 e/h for the
     errors of y, plus a quarter of the difference between the formulas of the fourth and of the
-    second order, plus a bound by the fourth difference. There are four measurements for each number and one more.
-    Where a number is missing on one side, steps of an eighth, and so on three times, find both
-    sides of a number that is near the end of answers. At the end itself, as at the critical
-    stiffness, the difference is one-sided. `elasticity` and `elasticity_error` are pure numbers of
-    the shape (parameters,).
+    second order, plus a bound by the fourth difference. There are four measurements for each
+    number and one more. If a number is missing on one side, steps of an eighth, and so on three
+    times, find both sides of a number that is near the end of answers. At the end itself, as at the
+    critical stiffness, the difference is one-sided. `elasticity` and `elasticity_error` are pure
+    numbers of the shape (parameters,).
 
     Parameters
     ----------
