@@ -7,12 +7,13 @@ what was asked, what went wrong and what to do.
 from __future__ import annotations
 
 import bdb
+import difflib
 import functools
 import inspect
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, Self, TypeVar
 
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief
 
@@ -44,6 +45,38 @@ def error_boundary(function: Callable[P, T]) -> Callable[P, T]:
             raise _told(function.__name__, given, error) from error
 
     return answered
+
+
+class CheckedKeywords:
+    """Base of declarations that reports unknown keywords together with the valid ones.
+
+    Raises
+    ------
+    TypeError
+        If a keyword is no parameter of the class.
+    """
+
+    def __new__(cls, *args: Any, **keywords: Any) -> Self:
+        """Create an instance once all keywords are known to be parameters."""
+        kind: type = cls
+        valid = _parameters(kind)
+        for name in keywords if valid else ():
+            if name not in valid:
+                close = difflib.get_close_matches(name, valid, n=1)
+                hint = f" Did you mean {close[0]!r}?" if close else ""
+                names = ", ".join(valid)
+                raise TypeError(
+                    f"{cls.__name__}() has no parameter {name!r}.{hint} It takes {names}."
+                )
+        return super().__new__(cls)
+
+
+@functools.cache
+def _parameters(cls: type) -> tuple[str, ...]:
+    """Return the names of the parameters of a class; none if it takes any keyword."""
+    parameters = inspect.signature(cls.__init__).parameters  # type: ignore[misc]
+    takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters.values())
+    return () if takes_any else tuple(parameters)[1:]
 
 
 def user_stacklevel() -> int:
@@ -80,7 +113,8 @@ def check_file(name: str, path: str | Path) -> None:
     try:
         is_other = Path(path).exists() and not Path(path).is_file()
     except (OSError, ValueError) as error:
-        raise InvalidValue(name, str(path), f"is no path of a file ({in_words(error)})") from error
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InvalidValue(name, str(path), f"cannot be the path of a file: {reason}") from error
     if is_other:
         remedy = "Name a file."
         raise InvalidValue(name, str(path), "is a directory, a pipe or a device", remedy=remedy)

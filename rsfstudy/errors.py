@@ -14,6 +14,8 @@ from collections.abc import Iterable
 _MOST_CHARACTERS, _MOST_CHOICES, _FEW = 200, 60, 20
 #: Most characters of a message.
 _LONGEST = 5000
+#: Number and length of the choices that are compared with a value, which bounds the time.
+_MOST_COMPARED, _LONGEST_COMPARED = 1000, 100
 
 
 class _Values(reprlib.Repr):
@@ -68,7 +70,8 @@ class InvalidValue(RsfStudyError, ValueError):
         choices = list(choices)
         shown = _values.repr(value)
         text = f"{brief(name)} = {shown}: {rule}."
-        close = difflib.get_close_matches(shown.strip("'\""), choices, n=3, cutoff=0.5)
+        compared = [c for c in choices[:_MOST_COMPARED] if len(c) <= _LONGEST_COMPARED]
+        close = difflib.get_close_matches(shown.strip("'\""), compared, n=3, cutoff=0.5)
         if close:
             text += f" Did you mean {' or '.join(map(repr, close))}?"
         if choices and not (close and (len(choices) > _FEW or len(choices) == len(close))):

@@ -13,16 +13,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.analysis.drop_detection import (
-    SAMPLES,
-    SHORTEST,
-    Detection,
-)
+from rsfstudy.analysis.drop_detection import SAMPLES, SHORTEST, Detection
 from rsfstudy.analysis.drop_slip import moves_with_drops, numbers_of, place_of
 from rsfstudy.analysis.drops import find_drops
 from rsfstudy.analysis.fitting.record import Record
+from rsfstudy.compute import provenance
 from rsfstudy.error_boundary import error_boundary, user_stacklevel
 from rsfstudy.errors import InvalidValue, NoAnswer
+from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.rig.table import read_table
 from rsfstudy.rig.units import factor, in_si
 
@@ -62,7 +60,8 @@ def catalogue(found: Sequence[Found], about: Mapping[str, Mapping[Any, Any]]) ->
     for row, earlier in zip(rows, [{}, *rows], strict=False):
         (time, error), (before, unsure) = row["time"], earlier.get("time", (math.nan, math.nan))
         row["interval"] = time - before, error + unsure
-    dataset = xr.Dataset(coords={"event": np.arange(len(rows))})
+    number = {"long_name": "number of the event", "units": "1"}
+    dataset = xr.Dataset(coords={"event": ("event", np.arange(len(rows)), number)})
     for name, (scale, _heading, words) in QUANTITIES.items():
         if rows and name not in rows[0]:
             continue
@@ -77,7 +76,13 @@ def catalogue(found: Sequence[Found], about: Mapping[str, Mapping[Any, Any]]) ->
         "flag_meanings": " ".join(_CUT),
     }
     dataset["cut"] = "event", np.array([cut for _numbers, cut in found], dtype=np.int8), flags
-    return dataset.assign_attrs(title="Catalogue of events", Conventions="CF-1.11")
+    return with_cf_encoding(
+        dataset.assign_attrs(
+            title="Catalogue of events",
+            Conventions="CF-1.11",
+            **provenance.attributes("rsfstudy.events"),
+        )
+    )
 
 
 def _units(scale: str, about: Mapping[str, Mapping[Any, Any]]) -> dict[str, str]:
@@ -172,8 +177,8 @@ def events(
     """
     given = {"time": time, "displacement": displacement, "shear_stress": shear_stress}
     if isinstance(record, str | Path):
-        table = read_table(record).items()
-        record = xr.Dataset({n: (n, of.values, {"units": of.units}) for n, of in table})
+        table = {n: of for n, of in read_table(record).items() if n in given}
+        record = xr.Dataset({n: (n, of.values, {"units": of.units}) for n, of in table.items()})
     if isinstance(record, Record):
         record = _stress_of(record)
     if record is not None:

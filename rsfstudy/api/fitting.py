@@ -36,6 +36,8 @@ _EFFECTS = ("b", "b1", "b2")
 _STATES = "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
 #: Slip distance to begin with, as part of the load point displacement that is fitted after a step.
 _GUESS = 0.05
+#: Largest number of windows.
+_MOST_WINDOWS = 1000
 #: Shortest of several windows, as a part of what follows a step.
 _SHORTEST = 0.5
 #: First guesses of a scene: those of a record take their place.
@@ -132,8 +134,9 @@ def fit(
         error (``_error``); ``a_minus_b``; ``covariance`` and ``correlation``; what the noise is
         (``noise_size``, ``noise_order``, ``effective_samples``, ``whiteness``); the window; along
         the rows of the record, ``fitted_friction``, ``residual`` and ``innovation``, NaN outside
-        the window. Lengths are in um, rates in um/s. ``status`` is ``not_identified`` where the
-        record does not tell a parameter, and ``message`` names it. ``dataset.rsf.table()``,
+        the window. Lengths are in um, rates in um/s. ``status`` is ``not_identified`` if the record
+        does not constrain a parameter, and ``errors_not_valid`` if the values stand but their
+        standard errors do not; ``message`` gives the reason. ``dataset.rsf.table()``,
         ``.rsf.plot()``, ``.rsf.scene``, ``.rsf.laboratory`` and ``.rsf.draw()`` say more.
 
     Raises
@@ -197,8 +200,9 @@ def fit(
     if len(numbers) > 1 and not together:
         axes.append(Axis("step", list(numbers)))
     reductions = []
-    if not isinstance(windows, int) or windows < 1:
-        raise InvalidValue("windows", windows, "must be a whole number, 1 or more")
+    if not isinstance(windows, int) or not 1 <= windows <= _MOST_WINDOWS:
+        rule = f"must be a whole number from 1 to {_MOST_WINDOWS:,}"
+        raise InvalidValue("windows", windows, rule)
     if windows > 1:
         axes.append(Axis("part", np.linspace(1.0, _SHORTEST, windows).tolist()))
         reductions = [Range(f"{n}_windows", n, over="part") for n in measure.parameters]

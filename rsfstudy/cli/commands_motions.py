@@ -18,6 +18,7 @@ from rsfstudy.cli import assignments, layout, terminal
 from rsfstudy.cli.console import console
 from rsfstudy.cli.options import Given
 from rsfstudy.compute import provenance
+from rsfstudy.error_boundary import check_file
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import store
 from rsfstudy.plots._motion import picture
@@ -149,7 +150,8 @@ def _normal_stresses(step: Step, listed: bool) -> dict[str, str]:
 
 
 def _check_replaceable(data: Path, is_one: Callable[[xr.Dataset], bool], kind: str) -> None:
-    """What is there may be an earlier one of its kind, and nothing else."""
+    """Raise InvalidValue if a file of another kind would be replaced."""
+    check_file("--output", data)
     if not data.exists():
         return
     try:

@@ -14,12 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes.axis import Axis, Row, check_text, plain_values, select, with_values
+from rsfstudy.axes.axis import Axis, Row, check_text, plain_values
+from rsfstudy.axes.overrides import select, with_values
 from rsfstudy.declare import checks, rigs
 from rsfstudy.declare.cell import Cell, Changes
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
 from rsfstudy.declare.shown import study_html
+from rsfstudy.error_boundary import CheckedKeywords
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.motion.accuracy import Accuracy
@@ -46,10 +48,12 @@ from rsfstudy.wording import is_list
 
 #: Fields that decide what fills a slot.
 _CHOOSING = frozenset({*SLOT_NAMES, *CALLERS})
+#: Most bytes of the name of a study, which leaves room for the suffixes of its files.
+_LONGEST_NAME = 200
 
 
 @dataclass(frozen=True, kw_only=True)
-class Study:
+class Study(CheckedKeywords):
     """A parameter study, declared.
 
     Parameters
@@ -109,6 +113,9 @@ class Study:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isidentifier():
             raise InvalidValue("name", self.name, "must be a Python identifier: it names files")
+        if len(self.name.encode()) > _LONGEST_NAME:
+            rule = f"must have at most {_LONGEST_NAME} bytes, because it names files"
+            raise InvalidValue("name", self.name, rule)
         for name in ("title", "summary", "declared_in"):
             check_text(name, getattr(self, name))
         check_figure(self.plot)

@@ -25,6 +25,7 @@ from rsfstudy.analysis.fitting.noise import WHITE, check_noise, whiteness
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
 from rsfstudy.analysis.fitting.steps import Step
+from rsfstudy.analysis.fitting.validity import find_reasons, name_outliers
 from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess, stiffness_factors
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
@@ -300,7 +301,10 @@ class Fit(Measure):
                 text += "; friction does not change at the step as velocity does: "
                 text += "see whether columns (time and displacement, say) are exchanged"
             return Outcome(Status.NOT_IDENTIFIED, values, text)
-        return Outcome(Status.OK, values, self._remark(found, place["load_point_noise"]))
+        remarks = (name_outliers(found.outliers), self._remark(found, place["load_point_noise"]))
+        reasons = find_reasons(found, model.friction)
+        status = Status.ERRORS_NOT_VALID if reasons else Status.OK
+        return Outcome(status, values, "; ".join(filter(None, (*reasons, *remarks))))
 
     def _widened(self, outcome: Outcome) -> Outcome:
         """An outcome of fewer parameters, with NaN in matrices where those of other laws stand."""
@@ -365,17 +369,18 @@ class Fit(Measure):
             variance_of_rate = float(signs @ covariance @ signs)
         b = sum(found.values.get(name, 0.0) for name in ("b", "b1", "b2"))
         trend = model.trend(found.values)
-        left = model.friction - found.curve - trend
         variance = float(np.var(model.friction)) or math.nan
         values |= {
             "a_minus_b": found.values["a"] - b,
             "a_minus_b_stderr": math.sqrt(max(variance_of_rate, 0.0)),
             "noise_size": found.noise_sd,
+            "outliers": len(found.outliers),
+            "friction_quantum": found.quantum,
             "noise_order": found.noise.order,
             "effective_samples": found.noise.effective_samples,
             "degrees_of_freedom": found.degrees_of_freedom,
             "whiteness": whiteness(found.innovations, found.noise.order),
-            "r_squared": 1.0 - float(np.var(left)) / variance,
+            "r_squared": 1.0 - float(np.var(found.residuals)) / variance,
             "rows_fitted": len(rows),
             "criterion": found.criterion,
             "covariance": covariance,
@@ -385,8 +390,8 @@ class Fit(Measure):
             "fitted_friction": found.curve + trend,
             "fitted_friction_stderr": found.band,
             "detrended_friction": found.curve,
-            "residual": left,
-            "innovation": found.innovations,
+            "residual": found.residuals,
+            "innovation": found.all_innovations,
         }
         for name in (about.name for about in COLUMNS[:3]):
             whole = [record.columns[name] for record in self._first_rows]

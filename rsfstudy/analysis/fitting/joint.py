@@ -78,6 +78,11 @@ class Joint:
         """Friction of all rows."""
         return np.concatenate([part.friction for part in self.parts])
 
+    @property
+    def frictions(self) -> list[np.ndarray]:
+        """Friction of the rows of each window."""
+        return [part.friction for part in self.parts]
+
     @cached_property
     def displacement(self) -> np.ndarray:
         """Displacements of all rows, in um from the step of each window."""

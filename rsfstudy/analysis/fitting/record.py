@@ -20,6 +20,7 @@ from rsfstudy.analysis.fitting.stress_steps import (
     with_stress_steps,
 )
 from rsfstudy.errors import InvalidValue
+from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.quantity import Quantity, is_name
 
 #: Its columns.
@@ -28,6 +29,16 @@ COLUMNS = (
     Quantity("displacement", r"$\delta_0$", "um", "load point displacement"),
     Quantity("friction", r"$\mu$", "1", "friction coefficient"),
     Quantity("normal_stress", r"$\sigma$", "Pa", "normal stress"),
+)
+
+#: Columns of the table of its velocity steps, in the order of `Step`.
+_STEP_COLUMNS = (
+    Quantity("begins", "$t$", "s", "time at which the step begins"),
+    Quantity("ends", "$t$", "s", "time at which the step ends"),
+    Quantity("velocity_before", "$V_0$", "um s-1", "load point velocity before the step"),
+    Quantity("velocity_after", "$V_1$", "um s-1", "load point velocity after the step"),
+    Quantity("normal_stress_before", r"$\sigma$", "Pa", "normal stress before the step"),
+    Quantity("normal_stress_after", r"$\sigma$", "Pa", "normal stress after the step"),
 )
 
 #: Pieces of steady velocity that stand for a ramp: at their ends displacement is exact.
@@ -155,30 +166,29 @@ class Record:
         Returns
         -------
         xarray.Dataset
-            Along ``step``: ``begins``, ``ends`` (s), ``velocity_before``, ``velocity_after``
-            (um/s), and, if normal stress was recorded, ``normal_stress_before`` and
-            ``normal_stress_after`` (Pa).
+            Along ``step``, numbered from 1: ``begins``, ``ends`` (s), ``velocity_before``,
+            ``velocity_after`` (um/s), and, if normal stress was recorded,
+            ``normal_stress_before`` and ``normal_stress_after`` (Pa).
         """
         rows = np.array(self.found, dtype=float).reshape(-1, len(Step._fields))
-        names = ["begins", "ends", "velocity_before", "velocity_after"]
-        units = ["s", "s", "um s-1", "um s-1"]
-        if "normal_stress" in self.columns:
-            names += ["normal_stress_before", "normal_stress_after"]
-            units += ["Pa", "Pa"]
-        data = {
-            name: ("step", rows[:, n], {"units": of})
-            for n, (name, of) in enumerate(zip(names, units, strict=True))
-        }
-        return xr.Dataset(data, coords={"step": np.arange(1, len(rows) + 1)})
+        shown = _STEP_COLUMNS if "normal_stress" in self.columns else _STEP_COLUMNS[:4]
+        data = {about.name: ("step", rows[:, n], about.attributes) for n, about in enumerate(shown)}
+        number = {"long_name": "number of the step", "units": "1"}
+        steps = {"step": ("step", np.arange(1, len(rows) + 1), number)}
+        return with_cf_encoding(xr.Dataset(data, steps, self._attributes("Detected steps")))
 
     def to_dataset(self) -> xr.Dataset:
-        """The record along ``time``."""
+        """Return the record as a dataset along ``time``."""
         about = {column.name: column for column in COLUMNS}
         data = {
             name: ("time", values, {"long_name": about[name].long_name, "units": about[name].units})
             for name, values in self.columns.items()
         }
-        return xr.Dataset(data)
+        return with_cf_encoding(xr.Dataset(data, attrs=self._attributes("Laboratory record")))
+
+    def _attributes(self, title: str) -> dict[str, str]:
+        """Return the attributes of a dataset that was derived from the record."""
+        return {"title": f"{title}: {self.name}", "Conventions": "CF-1.11"}
 
 
 def loading_of(record: Record, begins: float, ends: float, *, recorded: bool) -> np.ndarray:

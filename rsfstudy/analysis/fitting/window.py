@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
-from rsfstudy.analysis.fitting.load_point import moved_steps
+from rsfstudy.analysis.fitting.load_point import integrated_displacement, moved_steps
 from rsfstudy.analysis.fitting.model import Model, parameters_of
 from rsfstudy.analysis.fitting.record import Record, by_steps, loading_of, steps_between
 from rsfstudy.analysis.fitting.steps import Step, noise_variance
@@ -173,7 +173,7 @@ class Window:
             a normal stress that varies by more than the loading of the model does.
         """
         record, step, rows = self.record, self.step, self.rows
-        time, moved = record.time[rows], record.columns["displacement"][rows]
+        time = record.time[rows]
         friction = record.columns["friction"][rows]
         if len(rows) < _ROWS * len(free) or not step.begins < self._closes():
             text = f"the window holds {len(rows)} rows, too few for {len(free)} parameters"
@@ -194,7 +194,8 @@ class Window:
             text = "the window begins in a hold: a fit begins with steady sliding"
             raise Halt(Status.NOT_APPLICABLE, text)
         self._check_normal_stress(rows, pieces)
-        moved = moved - np.interp(step.begins, time, moved)
+        steady = by_steps(begins, steps_between(record, begins, ends))
+        moved = integrated_displacement(steady, time, step.begins)
         return Model(scene, time, moved, friction, pieces, accuracy, meter, moves)
 
     def _moves(self, begins: float, ends: float) -> list[np.ndarray]:
