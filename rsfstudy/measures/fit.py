@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rsfstudy.analysis.fitting import posterior
+from rsfstudy.analysis.fitting.filters import Filter
 from rsfstudy.analysis.fitting.intervals import interval
 from rsfstudy.analysis.fitting.joint import Joint, is_own, numbered, plain
 from rsfstudy.analysis.fitting.model import (
@@ -104,6 +105,9 @@ class Fit(Measure):
     machine_stiffness : float
         Stiffness of the machine in Pa/um. It is divided by the normal stress before the step of
         each window. Zero: stiffness over normal stress is that of the scene in all windows.
+    filter : str
+        Filter that friction passed before it was recorded, such as "mean 1.0" (see
+        `analysis.fitting.filters.Filter`). Empty if there is no filter.
     posterior : int
         Draws from the posterior (see `analysis.fitting.posterior`); none, unless asked for.
 
@@ -126,6 +130,7 @@ class Fit(Measure):
     part: float = 1.0
     noise: str = "ar"
     loading: str = "steps"
+    filter: str = ""
     posterior: int = 0
     machine_stiffness: float = 0.0
     name: ClassVar[str] = "fit"
@@ -141,6 +146,7 @@ class Fit(Measure):
         Quantity("part", "", "1", "part of what follows the step that is fitted"),
         Quantity("noise", "", "", "model of the noise"),
         Quantity("loading", "", "", "where the loading is taken from"),
+        Quantity("filter", "", "", "filter that friction passed before it was recorded"),
     )
 
     def __post_init__(self) -> None:
@@ -167,6 +173,7 @@ class Fit(Measure):
             rule = "is that of a loading by steps"
             raise InvalidValue("free", "step_time", rule, remedy="Leave it out.")
         check_noise(self.noise)
+        Filter.parse(self.filter)
         posterior.check(self.posterior)
 
     @property
@@ -266,6 +273,7 @@ class Fit(Measure):
         scenes = [w.scene(scene, per_um) for w in windows]
         of_each = zip(windows, scenes, strict=True)
         parts = [w.model(one, self.free, self.loading, smooth, meter) for w, one in of_each]
+        parts = [replace(part, filter=Filter.parse(self.filter)) for part in parts]
         if self.noise == WHITE:  # the usual formula
             parts = [replace(part, moves=()) for part in parts]
         distances = self.slip_distance_guess, self.slip_distance_2_guess

@@ -33,6 +33,7 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
+from rsfstudy.analysis.fitting.averaging import Overlap
 from rsfstudy.analysis.fitting.noise_runs import (
     Run,
     count_processes,
@@ -76,12 +77,15 @@ class Noise:
         Standard deviations of the levels, relative to the first one.
     kept : ndarray of bool, shape (rows,), optional
         False for outliers, which are left out. All rows are kept by default.
+    overlap : Overlap, optional
+        Correlation by averaging, which is removed before that of the process.
     """
 
     runs: tuple[Run, ...]
     partial: np.ndarray
     sizes: np.ndarray
     kept: np.ndarray | None = None
+    overlap: Overlap | None = None
 
     @property
     def order(self) -> int:
@@ -100,6 +104,7 @@ class Noise:
         ndarray, shape (kept rows, columns)
         """
         columns = self.kept_rows(columns)
+        columns = columns if self.overlap is None else self.overlap.whitened(columns)
         scaled = columns / self.sizes[index_rows(self.runs, "level")][:, None]
         found = np.empty_like(columns)
         for run in self.runs:
@@ -120,7 +125,7 @@ class Noise:
     @property
     def log_determinant(self) -> float:
         """``ln|R|``."""
-        total = 0.0
+        total = 0.0 if self.overlap is None else self.overlap.log_determinant
         for first, last, number, before, level in self.runs:
             variances = self.predictors[number][1]
             early = variances[min(before, self.order) : min(before + last - first, self.order)]
@@ -137,7 +142,8 @@ class Noise:
         """
         power = self._power_at_zero
         lasts = ((run.last - run.first, run.number) for run in self.runs)
-        return sum(max(1.0, rows / max(power[n], 1.0)) for rows, n in lasts)
+        each = 1.0 if self.overlap is None else self.overlap.rows
+        return sum(max(1.0, rows / max(power[n], 1.0) / each) for rows, n in lasts)
 
     @property
     def _power_at_zero(self) -> list[float]:
@@ -172,6 +178,7 @@ def fitted(
     jacobian: np.ndarray,
     kept: np.ndarray | None = None,
     least: float = 0.0,
+    averaging: float = 0.0,
 ) -> Noise:
     """Estimate the noise from the residuals of a fit by restricted maximum likelihood.
 
@@ -187,6 +194,8 @@ def fitted(
         False for outliers. All rows are kept by default.
     least : float
         Smallest standard deviation of a level, for example that of rounding.
+    averaging : float
+        Averaging time of friction in s; 0 if it was not averaged.
 
     Returns
     -------
@@ -195,16 +204,19 @@ def fitted(
     """
     if kept is not None:
         time, residuals, jacobian = time[kept], residuals[kept], jacobian[kept]
+    overlap = Overlap(time, averaging) if averaging else None
+    if overlap is not None:
+        jacobian, residuals = overlap.whitened(jacobian), overlap.whitened(residuals)
     least = max(least, _QUIETEST * math.sqrt(float(np.mean(np.square(residuals)))), 1e-300)
     begin, first = _first_guess(name, find_runs(time), residuals, least)
     shape, order = begin.partial.shape, begin.order
     if not order and len(begin.sizes) == 1:
-        return replace(begin, kept=kept)
+        return replace(begin, kept=kept, overlap=overlap)
 
     def noise(x: np.ndarray) -> Noise:
         partial = _LARGEST * np.tanh(x[: begin.partial.size]).reshape(shape)
         sizes = np.exp(np.append(0.0, x[begin.partial.size :]))
-        return Noise(begin.runs, partial, np.maximum(sizes, least / first), kept)
+        return Noise(begin.runs, partial, np.maximum(sizes, least / first), kept, overlap)
 
     products = _Products(begin.runs, np.column_stack([jacobian, residuals]), order)
 

@@ -150,7 +150,9 @@ class Search:
                 break
             kept = find_kept_rows(left, self.model.friction - left, self.quantum)
             least = self.quantum / math.sqrt(12.0)
-            noise = noises.fitted(self.noise_model, self.model.time, left, jacobian, kept, least)
+            noise = noises.fitted(
+                self.noise_model, self.model.time, left, jacobian, kept, least, self.model.averaging
+            )
         found = self._result(x, noise)
         if not (self.has_converged or found.unidentified):
             text = f"the search did not end within {_CURVES} curves"
