@@ -8,12 +8,13 @@ the error names the function that the user called.
 from __future__ import annotations
 
 import bdb
+import difflib
 import functools
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, Self, TypeVar
 
 from rsfstudy.argument_checks import (
     check_lengths,
@@ -83,6 +84,35 @@ def guard_methods(kind: C) -> C:
     return kind
 
 
+class CheckedKeywords:
+    """Base of declarations that reports unknown keywords together with the valid ones.
+
+    Raises
+    ------
+    CallError
+        If a keyword is no parameter of the class.
+    """
+
+    def __new__(cls, *args: Any, **keywords: Any) -> Self:
+        """Create an instance once all keywords are known to be parameters."""
+        kind: type = cls
+        valid = _parameters(kind)
+        for name in keywords if valid else ():
+            if name not in valid:
+                text = f"{cls.__name__}() has no parameter {brief(name)!r}."
+                text += f"{_suggest(name, valid)} It takes {', '.join(valid)}."
+                raise CallError(text)
+        return super().__new__(cls)
+
+
+@functools.cache
+def _parameters(cls: type) -> tuple[str, ...]:
+    """Return the names of the parameters of a class; none if it takes any keyword."""
+    parameters = inspect.signature(cls.__init__).parameters  # type: ignore[misc]
+    takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters.values())
+    return () if takes_any else tuple(parameters)[1:]
+
+
 def user_stacklevel() -> int:
     """Return the ``stacklevel`` with which a warning shows the line of the user."""
     level, frame = 1, sys._getframe(1)
@@ -111,7 +141,8 @@ def _enclose(
             return signature.bind(*args, **options).arguments
         except TypeError as error:
             names = [n for n in signature.parameters if n not in ("self", "cls", "_cls")]
-            raise CallError(name, str(error), names) from None
+            text = f"{name}() {brief(error)}; it takes {', '.join(names) or 'nothing'}."
+            raise CallError(text + _suggest(next(reversed(options), ""), names)) from None
 
     @functools.wraps(function)
     def answer(*args: P.args, **options: P.kwargs) -> T:
@@ -144,6 +175,13 @@ def _enclose(
         return answered
 
     return answer
+
+
+def _suggest(name: str, valid: Iterable[str]) -> str:
+    """Return the valid name that resembles a name, as a sentence; empty if none does."""
+    names = list(valid)
+    close = [] if name in names else difflib.get_close_matches(brief(name), names, n=1)
+    return "".join(f" Did you mean {each!r}?" for each in close)
 
 
 def _is_internal() -> bool:
@@ -189,8 +227,8 @@ def check_file(name: str, path: str | Path) -> None:
     try:
         is_other = Path(path).exists() and not Path(path).is_file()
     except (OSError, ValueError) as error:
-        rule = f"is no path of a file ({in_words(error)})"
-        raise InvalidValue(name, str(path), rule) from error
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InvalidValue(name, str(path), f"cannot be the path of a file: {reason}") from error
     if is_other:
         remedy = "Name a file."
         raise InvalidValue(name, str(path), "is a directory, a pipe or a device", remedy=remedy)

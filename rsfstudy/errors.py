@@ -7,13 +7,15 @@ from __future__ import annotations
 import difflib
 import reprlib
 import signal
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 #: Most characters of a text, and most choices, that a message has room for; and the most that are
 #: listed beside those that look like what was given.
 _MOST_CHARACTERS, _MOST_CHOICES, _FEW = 200, 60, 20
 #: Most characters of a message.
 _LONGEST = 5000
+#: Number and length of the choices that are compared with a value, which bounds the time.
+_MOST_COMPARED, _LONGEST_COMPARED = 1000, 100
 
 
 class _Values(reprlib.Repr):
@@ -68,7 +70,8 @@ class InvalidValue(RsfStudyError, ValueError):
         choices = list(choices)
         shown = _values.repr(value)
         text = f"{brief(name)} = {shown}: {rule}."
-        close = difflib.get_close_matches(shown.strip("'\""), choices, n=3, cutoff=0.5)
+        compared = [c for c in choices[:_MOST_COMPARED] if len(c) <= _LONGEST_COMPARED]
+        close = difflib.get_close_matches(shown.strip("'\""), compared, n=3, cutoff=0.5)
         if close:
             text += f" Did you mean {' or '.join(map(repr, close))}?"
         if choices and not (close and (len(choices) > _FEW or len(choices) == len(close))):
@@ -90,25 +93,7 @@ class InvalidValue(RsfStudyError, ValueError):
 
 
 class CallError(RsfStudyError, TypeError):
-    """A call whose arguments do not fit the signature of the function.
-
-    Parameters
-    ----------
-    name : str
-        The function or class.
-    reason : str
-        The message of Python.
-    parameters : sequence of str
-        Names of the parameters, which the message lists.
-    """
-
-    def __init__(self, name: str, reason: str, parameters: Sequence[str]) -> None:
-        text = f"{brief(name)}() {brief(reason)}; it takes {', '.join(parameters) or 'nothing'}"
-        if "unexpected" in reason:
-            given = reason.rpartition(" ")[2].strip("'")
-            close = difflib.get_close_matches(brief(given), parameters, n=1, cutoff=0.6)
-            text += "".join(f". Did you mean {each!r}?" for each in close)
-        super().__init__(text)
+    """A call whose arguments do not fit the signature of the function."""
 
 
 class DataError(RsfStudyError):

@@ -40,6 +40,7 @@ class Status(IntEnum):
     )
 
     NOT_IDENTIFIED = 18, "the record does not tell a parameter, whose number means nothing"
+    ERRORS_NOT_VALID = 19, "the values stand, but their standard errors are not valid"
 
     # failures, from here on
     WORK_BUDGET_SPENT = 20, "the work budget was spent before an answer was reached"
@@ -55,6 +56,11 @@ class Status(IntEnum):
     def label(self) -> str:
         """Name as the flag meaning of the NetCDF variable."""
         return self.name.lower()
+
+    @property
+    def has_values(self) -> bool:
+        """True if the values of the cell stand, with or without valid standard errors."""
+        return self in (Status.OK, Status.ERRORS_NOT_VALID)
 
     @property
     def is_answer(self) -> bool:

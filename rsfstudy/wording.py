@@ -15,9 +15,9 @@ _LONG = re.compile(r"(?<![\w.])\d+\.\d{6,}(?:e[+-]?\d+)?")
 
 
 def flags_of(attributes: Mapping[str, Any]) -> dict[float, str]:
-    """What each value of a variable means, by its CF attributes; empty for one of numbers."""
+    """Return the meaning of each flag value by CF attributes; empty for a numeric variable."""
     words = str(attributes.get("flag_meanings", "")).split()
-    return dict(zip(np.ravel(attributes.get("flag_values", [])).tolist(), words, strict=True))
+    return dict(zip(np.ravel(attributes.get("flag_values", [])).tolist(), words, strict=False))
 
 
 def is_list(value: Any) -> bool:

@@ -231,14 +231,17 @@ def test_a_port_that_listens_and_says_nothing():
 # ---- the files of the page ----------------------------------------------------------------------
 
 
-def test_the_slurm_job_is_what_it_says():
+def test_the_slurm_job_is_what_it_says(tmp_path, monkeypatch):
     from dask_jobqueue import SLURMCluster
 
+    monkeypatch.setenv("HOME", str(tmp_path))  # where the certificates are written
     job = runpy.run_path(str(CLUSTERS / "slurm.py"))["JOB"]
     with SLURMCluster(**job, scheduler_options={"dashboard_address": "127.0.0.1:0"}) as cluster:
         script = cluster.job_script()
+        assert cluster.scheduler_address.startswith("tls://")
     assert "#SBATCH --cpus-per-task=16" in script
     assert re.search("--nthreads 1 .*--nworkers 16 ", script)
+    assert re.search("tls://.*--tls-ca-file ~/.dask-jobqueue", script)
 
 
 #: Jobs that are processes of this machine, in place of SLURM's.
@@ -247,13 +250,15 @@ import functools, runpy, sys
 from dask_jobqueue.local import LocalCluster
 
 def cluster(walltime, queue, **words):
-    return LocalCluster(**words)
+    started = LocalCluster(**words)
+    assert started.scheduler_address.startswith("tls://")
+    return started
 
 command = runpy.run_path(sys.argv[1])["command"]
 names = command.callback.__globals__
 names["main"] = functools.partial(
     names["main"], cluster=cluster, jobs=1, cores=1, processes=1, memory="2GB",
-    python=sys.executable, death_timeout=1200,
+    python=sys.executable, death_timeout=1200, shared_temp_directory=".",
     scheduler_options={"dashboard_address": "127.0.0.1:0"},
 )
 command(sys.argv[2:])

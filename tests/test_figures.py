@@ -1,7 +1,9 @@
 """Figures that a journal would print: of every named study, of any lattice, in any style."""
 
 import itertools
+import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -284,6 +286,73 @@ def test_a_style_of_the_users_own(tmp_path):
     assert larger.axes[0].xaxis.get_ticklabels()[0].get_size() == 11.0
     with pytest.raises(InvalidValue, match="style = 'nothing': is neither a style sheet"):
         rsfstudy.plot(dataset, style="nothing")
+
+
+@pytest.mark.parametrize(
+    ("style", "message"),
+    [
+        ("rsfstudy.plots", "is neither a style sheet"),
+        ("https://example.org/sheet.mplstyle", "cannot be read: No such file"),
+        ("plain.txt", "is neither a style sheet"),
+        (Path("plain.txt"), "is neither a style sheet"),
+        (5, "is neither a style sheet"),
+        ({"font.sise": 9}, "'font.sise': is not a setting of matplotlib. Did you mean 'font.size'"),
+        ({"font.size": "large-ish"}, "'large-ish': is not a valid value of font.size: Could not"),
+        ("unknown.mplstyle", "unknown.mplstyle, line 2: style = 'font.sise': is not a setting"),
+        ("text.mplstyle", "text.mplstyle, line 1: style = 'root': is not"),
+        ("latin.mplstyle", "cannot be read: it is not text in UTF-8"),
+        (["ggplot", "folder.mplstyle"], "is a directory"),
+    ],
+)
+def test_styles_are_checked_and_never_imported(style, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("plain.txt").write_text("font.size: 9\n")
+    Path("unknown.mplstyle").write_text("font.size: 9  # points\nfont.sise: 9\n")
+    Path("text.mplstyle").write_text("root:x\n")
+    Path("latin.mplstyle").write_bytes(b"font.family: \xe9\n")
+    Path("folder.mplstyle").mkdir()
+    with pytest.raises(InvalidValue, match=re.escape(message)), plots.styled(style):
+        pass
+    if isinstance(style, str):
+        ran = call("plot", "missing.nc", "--style", style)
+        assert (ran.returncode, ran.stdout) == (2, "")
+        assert len(ran.stderr) < 2000
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"axes.prop_cycle": "cycler('color', [])"},
+        {"font.size": math.nan},
+        {"savefig.dpi": 1e9},
+        {"figure.figsize": (1e6, 1e6)},
+    ],
+)
+def test_a_style_in_which_nothing_can_be_drawn_is_named(settings, tmp_path):
+    message = r"^style = \{.*: a figure cannot be drawn in it: .* Draw it without this style"
+    with pytest.raises(InvalidValue, match=message):
+        plots.save(lattice(RATES), tmp_path / "figure.png", style=settings)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_font_that_is_missing_is_named_once(tmp_path, monkeypatch):
+    sheet = tmp_path / "mine.mplstyle"
+    sheet.write_text("font.family: No Such Font\n")
+    file = tmp_path / "lattice.nc"
+    store.write(lattice(RATES), file)
+    ran = call("plot", file, "--style", sheet)
+    said = " ".join(ran.stderr.split())
+    assert (ran.returncode, said.count("Font family 'No Such Font' not found")) == (0, 1)
+
+
+def test_style_sheets_are_read_as_matplotlib_reads_them():
+    import matplotlib
+
+    sheets = [*Path(matplotlib.get_data_path(), "stylelib").glob("*.mplstyle"), _style.SHEET]
+    for sheet in sheets:
+        theirs = matplotlib.rc_params_from_file(sheet, use_default_template=False)
+        with plots.styled([{"font.size": 5.0}, sheet]):
+            assert {name: matplotlib.rcParams[name] for name in theirs} == dict(theirs)
 
 
 def test_ours_is_left_alone():

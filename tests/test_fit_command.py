@@ -17,6 +17,7 @@ from running import call
 import rsfstudy
 from rsfstudy.api import fit_results
 from rsfstudy.api.fit_results import with_error
+from rsfstudy.status import Status
 
 PAGES = Path(__file__).parent.parent / "studies" / "pages"
 #: Of the records below, by the slowness law: 1 -> 10 -> 1 um/s.
@@ -66,7 +67,7 @@ def test_it_prints_the_steps_and_a_table_that_is_never_broken(written):
     assert (
         len(re.findall(r"^ +[12] +slowness( +[\d.]+ \+- [\d.]+){3} +ok", short, re.MULTILINE)) == 2
     )
-    assert "residuals freed of correlation are white" in said
+    assert "whitened residuals show no autocorrelation up to lag" in said
     assert max(len(line.rstrip()) for line in said.splitlines()) <= 80
 
 
@@ -159,11 +160,13 @@ def test_a_stiffness_of_stress_is_taken_over_normal_stress(written):
 
 
 def test_a_number_has_the_digits_that_its_error_gives_it():
-    def told(value, error):
-        return with_error(xr.Dataset({"x": value, "x_stderr": error}), "x")
+    def told(value, error, status=0):
+        return with_error(xr.Dataset({"x": value, "x_stderr": error, "status": status}), "x")
 
     assert told(0.0100312, 0.00011) == "0.01003 +- 0.00011"
     assert told(12.345, 0.14) == "12.35 +- 0.14"
+    assert told(12.345, 0.14, Status.ERRORS_NOT_VALID) == "12.35 +- 0.14*"
+    assert told(math.nan, math.nan, Status.ERRORS_NOT_VALID) == "-"
     assert told(1234.5, 120.0) == "1234 +- 120"
     assert told(-5.29e-6, 3.7e-7) == "(-5.29 +- 0.37)e-06"
     assert told(1e-9, 4e-7) == "(0.0 +- 4.0)e-07"

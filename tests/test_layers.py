@@ -20,7 +20,7 @@ FLOORS = (
     ("errors", "status", "defaults", "wording"),
     ("argument_checks",),
     ("error_boundary",),
-    ("quantity",),
+    ("netcdf", "paths", "quantity"),
     ("slider",),
     ("axes", "motion", "vocabulary"),
     ("analysis", "reduce"),
@@ -44,7 +44,7 @@ HOMES = {
     "rich": {"cli", "api/progress"},
     "sqlite3": {"files/journal"},
     "zarr": set(),  # xarray writes and reads it
-    "msgspec": {"files/contents", "files/restore"},
+    "msgspec": {"files/contents", "files/restore", "referee/problem"},
 }
 
 

@@ -18,7 +18,7 @@ from referee_page import MARK, PAGE, parts
 from referee_ways import agrees, stated
 from running import call
 
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.referee import ours, theirs
@@ -150,7 +150,11 @@ def test_published_curves_pass_to_the_last_place_that_is_written(number):
     ("number", "wrong", "explanation"),
     [
         (1, lambda told, _p: {"friction": told["friction"] - 0.01 * math.log(2)}, "b ln 2"),
-        (2, lambda told, _p: {"slip_rate": told["slip_rate"] * 1e6}, "1e+06 times as much"),
+        (
+            2,
+            lambda told, _p: {"slip_rate": told["slip_rate"] * 1e6},
+            "slip_rate is 1e+06 times the known answer. With that undone, 1",
+        ),
         (
             12,
             lambda told, p: {
@@ -192,6 +196,51 @@ def test_conventions_of_the_problem_explain_a_difference(number, changes, explan
     found = verdict(*known(problem, shipped()[number].with_suffix(".csv")), told_of(table), ENOUGH)
     assert not found.passes
     assert explanation in found.explanation
+
+
+@pytest.mark.parametrize(
+    ("wrong", "explanation"),
+    [
+        (lambda rate: -rate, "growth_rate has the opposite sign. With that undone, 12.0 digits"),
+        (lambda rate: rate / (2.0 * math.pi), "growth_rate is 1/(2 pi) times the known answer"),
+        # a factor and a shift would explain any value
+        (lambda rate: 1.7 * rate, "no usual difference of conventions explains it"),
+        (lambda rate: -1.3 * rate, "no usual difference of conventions explains it"),
+    ],
+)
+def test_a_single_value_is_explained_by_usual_factors_only(wrong, explanation, tmp_path):
+    rate = told_by_second_way(20)["growth_rate"]
+    ran = call("verify", filed(tmp_path / "20.csv", 20, growth_rate=wrong(rate)))
+    assert ran.returncode == 1
+    assert explanation in " ".join(ran.stdout.split())
+
+
+@pytest.mark.parametrize("off", [3e-7, -3e-7])
+def test_a_factor_near_one_is_worded_by_its_difference_from_one(off, tmp_path):
+    rate = told_by_second_way(2)["slip_rate"]
+    ran = call("verify", filed(tmp_path / "02.csv", 2, slip_rate=rate * (1.0 + off)), "--digits", 7)
+    sign = "-" if off < 0.0 else "+"
+    said = " ".join(ran.stdout.split())
+    assert f"slip_rate is (1 {sign} 3e-07) times the known answer" in said
+
+
+def test_digits_that_do_not_pass_are_not_rounded_up(tmp_path):
+    """A relative difference of 1.05e-6 is 5.98 digits."""
+    told = told_by_second_way(2)
+    ran = call("verify", filed(tmp_path / "02.csv", 2, slip_rate=told["slip_rate"] * (1 + 1.05e-6)))
+    assert ran.returncode == 1
+    assert re.search(r"slip_rate +5\.9 digits", ran.stdout)
+
+
+def test_the_number_of_rows_is_checked_before_columns_are_converted(tmp_path):
+    """Shear stress is divided by normal stress at the times of the problem."""
+    told = told_by_second_way(15)
+    header = [h.replace("friction (1)", "shear_stress (Pa)") for h in of(15).header]
+    columns = [told[name][:-1] for name in of(15).columns]
+    ran = call("verify", write(tmp_path / "15.csv", header, columns))
+    count = len(told["time"])
+    said = " ".join(ran.stderr.split())
+    assert (ran.returncode, f"number of rows = {count - 1}: must be {count}." in said) == (2, True)
 
 
 def test_where_they_part_is_told(tmp_path):
@@ -358,8 +407,13 @@ def test_a_problem_of_ones_own(text, tmp_path):
         ("times = [1, 2, 5, 10, 20, 50]", "", "must list the times"),
         ('"slowness"', '"sloth"', "is unknown"),
         ("[1, 2, 5,", "[2, 1, 5,", "must increase"),
-        ("[1, 2, 5,", '["one", 2, 5,', "cannot be posed"),
-        ("[[loading]]", "[loading]", "must be a list of segments"),
+        ("[1, 2, 5,", '["one", 2, 5,', "must be a number, not a text"),
+        ('"slowness"', "5", "law = 5: must be a text, not a whole number"),
+        ('["friction", "slip_rate", "theta"]', "[]", "must list at least one quantity"),
+        ("a = 0.01", "a = 0", "a = 0: must be positive"),
+        ("times =", "digits = 99\ntimes =", "digits = 99: must lie between 1 and 15"),
+        ("times =", "number = 1\ntimes =", "key = 'number': is unknown"),
+        ("[[loading]]", "[loading]", "must be a list, not a table"),
         ('"slowness"', '"two_slip_states"', "must state b_2"),
         ("mu_star", "phi = 60.0\nmu_star", "has no meaning beside phi"),
     ],
@@ -368,6 +422,23 @@ def test_what_is_no_problem_is_refused(old, new, error, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(STEP.replace(old, new, 1))
     with pytest.raises(InvalidValue, match=re.escape(error)):
+        read(path)
+
+
+def test_a_file_nested_without_end_is_refused(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("title = " + "[" * 10_000)
+    with pytest.raises(DataError, match="nested too deeply"):
+        read(path)
+
+
+def test_the_number_of_peaks_is_bounded(tmp_path):
+    path = tmp_path / "mine.toml"
+    text = (
+        STEP.replace('"friction", ', "").replace(', "theta"]', "]").replace("times = [1, 2, 5,", "")
+    )
+    path.write_text(re.sub(r"( 10, 20, 50\])", 'report = "peaks"\ncount = 1000000000000', text))
+    with pytest.raises(InvalidValue, match="count = 1000000000000: must lie between 1 and 10,000"):
         read(path)
 
 

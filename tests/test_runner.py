@@ -113,6 +113,31 @@ def test_code_that_workers_do_not_import_needs_no_guard():
     assert (ran.returncode, ran.stdout.splitlines()[-1:]) == (0, [" [4. 9.]]"]), ran.stderr
 
 
+LOSES_TRACKER = """
+import pathlib, sys
+import psutil
+from rsfstudy.compute import clusters
+
+if __name__ == "__main__":
+    with clusters.local_cluster(1, pathlib.Path(sys.argv[1])) as client:
+        for child in psutil.Process().children():
+            if "resource_tracker" in " ".join(child.cmdline()):
+                child.kill()
+                print("killed")
+        print(client.submit(abs, -1).result())
+"""
+
+
+def test_a_lost_resource_tracker_causes_no_traceback(tmp_path):
+    """Python starts another one, which does not know the semaphores that are released later."""
+    script = tmp_path / "script.py"
+    script.write_text(LOSES_TRACKER)
+    words = [sys.executable, str(script), str(tmp_path / "workers.log")]
+    ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANGS)
+    assert (ran.returncode, ran.stdout) == (0, "killed\n1\n"), ran.stderr
+    assert "Traceback" not in ran.stderr
+
+
 def test_accuracy_reaches_the_cells():
     loose, tight = run(rtol=1e-4), run(rtol=1e-9)
     assert (loose.rhs_evaluations < tight.rhs_evaluations).all()

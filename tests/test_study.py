@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from running import cell_key
 
-from rsfstudy import Axis, Scene, Study
+import rsfstudy
+from rsfstudy import Axis, Claim, Scene, Study, check
 from rsfstudy.compute import cells
 from rsfstudy.compute.plan import Plan
 from rsfstudy.declare import catalogue, names
@@ -17,6 +18,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.files.lattice import coordinates
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.parts import number
 
@@ -106,6 +108,34 @@ def test_a_zipped_axis_bears_its_own_values_whatever_the_first_cell_needs(order)
     assert coordinates(study)["alpha"][1].tolist() == [0.25, 0.5]
 
 
+def test_claims_on_a_point_apply_if_its_value_is_given_again():
+    """A claim that names a point by its label is checked whatever list contains its value."""
+    place = {"case": "alpha = 0.5", "b_over_a": 2.0}
+    claim = Claim(
+        id="C1",
+        statement="critical stiffness falls with alpha",
+        source="closed form",
+        published=1.0,
+        tolerance=10.0,
+        reason="any finite number",
+        variable="critical_stiffness",
+        where=place,
+    )
+    points = {name: {"normal_stress": "variable", "alpha": a} for name, a in _ALPHAS.items()}
+    stability = declared(
+        axes=[Axis("case", points), Axis("b_over_a", [2.0, 3.0])],
+        measure=LinearStability(),
+        claims=[claim],
+    )
+    for values in ([0.5], [0.1, 0.5], [0.5, 0.3]):
+        dataset = rsfstudy.run(stability, alpha=values, workers=0, output=None, progress=False)
+        assert check(dataset).verdict.tolist() == ["reproduced"]
+
+
+#: Labels and values of the points of a zipped axis.
+_ALPHAS = {"alpha = 0.25": 0.25, "alpha = 0.5": 0.5}
+
+
 def test_a_new_value_does_not_take_the_place_of_a_point_with_its_name():
     points = {
         "first": {"alpha": 0.56, "stiffness_ratio": 2.0},
@@ -114,6 +144,36 @@ def test_a_new_value_does_not_take_the_place_of_a_point_with_its_name():
     (axis,) = declared(axes=[Axis("case", points)]).with_(alpha=[0.25]).axes
     assert [row["stiffness_ratio"] for row in axis.rows] == [2.0, 1.0]
     assert axis.labels == ("first, alpha = 0.25", "alpha = 0.25")
+
+
+@pytest.mark.parametrize(
+    "values", [[0.25], [0.56], [0.25, 0.56], [0.56, 0.25], [0.56, 0.3], [np.float64(0.56), 0.3]]
+)
+def test_labels_of_existing_points_do_not_depend_on_the_list_of_values(values):
+    (axis, _other) = catalogue.load("rate_step_boundary").with_(alpha=values).axes
+    assert axis.labels == ("constant normal stress", *(f"alpha = {value}" for value in values))
+    assert [row.get("alpha") for row in axis.rows] == [None, *values]
+
+
+@pytest.mark.parametrize("given", [0.1, [0.1, 1.0], [1, 0.1], [0.1, 0.1 + 1e-12]])
+def test_new_labels_identify_their_points(given):
+    """Also if a value alone does not, because other fields differ between the points."""
+    points = {
+        "held, alpha = 0": {"normal_stress": "imposed", "alpha": 0.0},
+        "held, alpha = 0.5": {"normal_stress": "imposed", "alpha": 0.5},
+        "coupled": {"normal_stress": "variable", "alpha": 0.5},
+    }
+    (axis,) = study(Axis("case", points)).with_(alpha=given).axes
+    names = {"imposed": "held", "variable": "coupled"}
+    values = given if isinstance(given, list) else [given]
+    texts = {1.0: "1", 0.1: "0.1"}
+    assert axis.labels == tuple(
+        f"{names[condition]}, alpha = {texts.get(value, repr(value))}"
+        for condition in names
+        for value in values
+    )
+    expected = [(condition, value) for condition in names for value in values]
+    assert [(row["normal_stress"], row["alpha"]) for row in axis.rows] == expected
 
 
 # ---- cells as columns of numbers -----------------------------------------------------------------

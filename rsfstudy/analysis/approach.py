@@ -245,17 +245,20 @@ def course(
     """
     seen, orbit, repels = list[Cycle](), None, False
     fine = accuracy.at(min(accuracy.rtol, _FINE))
-    by, look = ReturnMap(scene, fine, meter), min(_FIRST_LOOK, events)
+    look = min(_FIRST_LOOK, events)
     for cycle in cycles(scene, accuracy, meter, None):
         if cycle is None:
             return None
         seen.append(cycle)
         if len(seen) == look and not orbit:
             look = min(2 * look, events)
-            period, off = recurrence(scene, seen)
-            found = None
-            if off < _OFF:
-                found = by.orbit(section(cycle.end), period, cycle.swing)
+            found, off = None, math.inf
+            for counted in _counted(scene):
+                period, off = recurrence(scene, seen, counted)
+                if off < _OFF:
+                    by = ReturnMap(scene, fine, meter, counted=counted)
+                    found = by.orbit(section(cycle.end), period, cycle.swing)
+                    break
             repels = off >= _OFF or (found is not None and abs(found.multipliers[0]) > _REPELS)
             orbit = found if found is not None and found.attracts else None
         if len(seen) == events or (orbit and not to_its_end):
@@ -264,22 +267,53 @@ def course(
 
 
 def _on_its_way(seen: Sequence[Cycle]) -> bool:
-    """True if cycles are too few to say anything of them, or still grow or shrink all the time."""
-    growth = np.diff([cycle.swing for cycle in seen[len(seen) // 2 :]])
-    return len(seen) < _FIRST_LOOK or bool((growth > 0.0).all() or (growth < 0.0).all())
+    """Return True if the cycles are too few to judge, or still change in one direction.
+
+    The range of ln V, or a slow unknown, then grows or falls from each cycle to the next.
+    """
+    if len(seen) < _FIRST_LOOK:
+        return True
+    latest = [(cycle.swing, *cycle.end.psis) for cycle in seen[len(seen) // 2 :]]
+    changes = np.diff(latest, axis=0)
+    return bool(((changes > 0.0).all(axis=0) | (changes < 0.0).all(axis=0)).any())
 
 
-def recurrence(scene: Scene, seen: Sequence[Cycle]) -> tuple[int, float]:
-    """After how many cycles a motion comes closest to where it was, in all of the later half of its
-    cycles; and how far it is off then (infinitely, where there are too few cycles to say).
+def _counted(scene: Scene) -> tuple[tuple[int, ...], ...]:
+    """Return the states by which a cycle repeats: those that count, or only those of the law.
 
-    After n cycles it is off by the largest ``|Psi(i + n) - Psi(i)|`` of any state at the ends of
-    these cycles, over a times how far ln V swings; the smallest n that is within twice the least
-    of all counts.
+    An unknown that follows the motion slowly approaches its cycle long after the law has.
+    """
+    of_law = tuple(range(scene.parts.law.states))
+    return tuple(dict.fromkeys((scene.functions.friction.counted, of_law)))
+
+
+def recurrence(
+    scene: Scene, seen: Sequence[Cycle], counted: Sequence[int] | None = None
+) -> tuple[int, float]:
+    """Find the number of cycles after which a motion comes closest to repeating itself.
+
+    After n cycles the motion is off by the largest ``|Psi(i + n) - Psi(i)|`` of any state at the
+    ends of the later half of its cycles, relative to a times the range of ln V.
+
+    Parameters
+    ----------
+    scene : Scene
+    seen : sequence of Cycle
+    counted : sequence of int, optional
+        Places of the states that are compared. By default, all states that a part does not list in
+        `excluded_from_distance`.
+
+    Returns
+    -------
+    period : int
+        The smallest n that is within twice the smallest difference.
+    off : float
+        The difference after n cycles, infinite if there are too few cycles.
     """
     if len(seen) < 4:
         return 1, math.inf
-    states = np.array([cycle.end.psis for cycle in seen])
+    places = list(scene.functions.friction.counted if counted is None else counted)
+    states = np.array([cycle.end.psis for cycle in seen])[:, places]
     latest, scale = states[len(states) // 2 :], scene.a * seen[-1].swing
     longest = min(LONGEST, len(latest) // 2)
     off = np.array(

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.analysis.after_step import settles
+from rsfstudy.analysis.settling import is_attracted
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import (
@@ -104,7 +104,7 @@ def cycles(
     start: Point | None,
     recording: Recording | None = None,
 ) -> Iterator[Cycle | None]:
-    """The cycles of a motion, one after the other; None once it has settled to steady sliding.
+    """Yield the cycles of a motion, and None once it has settled to steady sliding.
 
     Without a `start` the motion begins with the step of the scene, and what precedes the first
     maximum of spring stress is left out.
@@ -119,7 +119,7 @@ def cycles(
             begin, fallen, seen, ahead = None, True, [], ahead - 1
         if ahead:
             continue
-        if kind is _SETTLED:
+        if kind is _SETTLED and is_attracted(scene):
             yield None
             return
         if kind is _START and start is not None:
@@ -131,7 +131,7 @@ def cycles(
         if begin is not None:
             cycle = _cycle(begin, begun, seen)
             swings.append(cycle.swing)
-            if swings[-1] < _STEADY or (_dies_down(swings) and settles(scene)):
+            if (swings[-1] < _STEADY or _dies_down(swings)) and is_attracted(scene):
                 yield None
                 return
             yield cycle

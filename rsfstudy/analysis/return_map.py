@@ -163,13 +163,25 @@ class ReturnMap:
         Charged with the motions.
     recorded : bool
         Whether to keep what the motions along an orbit do, besides its ends.
+    counted : sequence of int, optional
+        Places of the states that count for the distance between two sections. By default, all
+        states that a part does not list in `excluded_from_distance`.
     """
 
     def __init__(
-        self, scene: Scene, accuracy: Accuracy, meter: Meter, *, recorded: bool = False
+        self,
+        scene: Scene,
+        accuracy: Accuracy,
+        meter: Meter,
+        *,
+        recorded: bool = False,
+        counted: Sequence[int] | None = None,
     ) -> None:
         self.scene, self.accuracy, self._meter = scene, accuracy, meter
         self._recorded = recorded
+        places = scene.functions.friction.counted if counted is None else counted
+        #: Places in a section of the unknowns that count for the distance.
+        self._counted = [0, *(1 + place for place in places)]
 
     def point(self, at: np.ndarray) -> Point:
         """The slider at a section: on the slow manifold, or at V_0 where mass acts there.
@@ -269,15 +281,30 @@ class ReturnMap:
     def orbit(
         self, start: np.ndarray, count: int, swing: float, reach: float = _NEAR
     ) -> Orbit | None:
-        """The orbit of so many cycles, or of a divisor of them, within reach of a section; None
-        where there is none.
+        """Find the orbit of a number of cycles, or of a divisor of it, close to a section.
+
+        Parameters
+        ----------
+        start : ndarray
+            The section.
+        count : int
+            The number of cycles.
+        swing : float
+            Range of ln V.
+        reach : float
+            Largest distance of the orbit from the section, relative to `a` times the range of ln V.
+
+        Returns
+        -------
+        Orbit or None
+            None if there is no orbit.
         """
         scale = self.scene.a * swing
         slopes = self.slopes(start, count, scale)
         found = self._solve(start, slopes, scale, reach) if len(slopes) == count else None
         if found is None:
             return None
-        count = _cycles_until_repeat(found.cycles, scale)
+        count = self._cycles_until_repeat(found.cycles, scale)
         if np.abs(found.begin - start).max() > 10.0 * self.accuracy.rtol * scale:
             slopes = self.slopes(found.begin, count, scale)
         if len(slopes) < count:
@@ -310,22 +337,31 @@ class ReturnMap:
             if move is not None:
                 jacobian += off[:, None] * move / (move @ move)
             move = -dgesv(jacobian, off)[2]
-            size = max(map(abs, move.tolist()))
+            size = self._size(move, at, scale)
             # as close as asked for, or as errors of the motion let it come
             if size <= enough or 0.5 * last <= size <= 100.0 * enough:
                 work = self._meter.spent - spent
                 return Orbit(tuple(seen), tuple(slopes), move, self.accuracy, work, recording)
             at, last = at + move, size
-            if not max(map(abs, (at - start).tolist())) <= reach * scale:
+            if not np.abs((at - start)[self._counted]).max() <= reach * scale:
                 return None
         return None
 
+    def _size(self, move: np.ndarray, at: np.ndarray, scale: float) -> float:
+        """Return the largest change of a section.
 
-def _cycles_until_repeat(cycles: Sequence[Cycle], scale: float) -> int:
-    """After how many of its cycles an orbit begins anew."""
-    begin = section(cycles[0].begin)
-    for count in range(1, len(cycles)):
-        apart = np.abs(section(cycles[count - 1].end) - begin).max()
-        if len(cycles) % count == 0 and apart < 1e-4 * scale:
-            return count
-    return len(cycles)
+        The unknowns of a fluid may be huge. If they are larger than the scale of the states, their
+        changes are relative to their values, in units of that scale.
+        """
+        changes, first = np.abs(move), 1 + self.scene.parts.law.states
+        changes[first:] /= np.maximum(1.0, np.abs(at[first:]) / scale)
+        return float(changes.max())
+
+    def _cycles_until_repeat(self, cycles: Sequence[Cycle], scale: float) -> int:
+        """Return the number of cycles after which an orbit repeats itself."""
+        begin = section(cycles[0].begin)
+        for count in range(1, len(cycles)):
+            apart = self._size(section(cycles[count - 1].end) - begin, begin, scale)
+            if len(cycles) % count == 0 and apart < 1e-4 * scale:
+                return count
+        return len(cycles)

@@ -16,9 +16,12 @@ import xarray as xr
 from rsfstudy.analysis.fitting.joint import of_window, plain
 from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, fields_of, parameters_of
 from rsfstudy.analysis.fitting.noise import LAGS
+from rsfstudy.analysis.fitting.validity import SIGNIFICANT
 from rsfstudy.api.tables import Table
+from rsfstudy.compute import provenance
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import contents
+from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import LABELS, Status
@@ -42,8 +45,8 @@ _ANSWERS = (Status.OK.label, Status.NOT_IDENTIFIED.label)
 _BOUNDLESS = 1e4
 #: Difference of criteria that decides between laws.
 _DECIDES = 10.0
-#: Chance below which residuals are called correlated.
-_CHANCE = 0.01
+#: Mark of standard errors that are not valid.
+_MARK = "*"
 
 
 def is_fit(dataset: xr.Dataset) -> bool:
@@ -87,10 +90,13 @@ def shown(one: xr.Dataset) -> dict[str, str]:
 
 
 def table(dataset: xr.Dataset) -> pd.DataFrame:
-    """One row a fit, with the columns that laboratories use; lengths in um.
+    """Return a table with one row per fit and the column names that laboratories use.
 
-    ``_std`` are standard errors, ``_windows`` ranges of parameters among windows; NaN stands
-    where something was not looked for.
+    Lengths are in um. The columns ``<name>_std`` hold standard errors, which are not valid if the
+    status of the row is ``errors_not_valid``. The columns ``<name>_windows`` hold the range of a
+    parameter among windows, and ``p_value`` is that of the autocorrelation test of the whitened
+    residuals. ``normal_stress`` is the mean before the step in MPa, and ``k`` is the stiffness
+    divided by this normal stress in 1/um. The value is NaN for a parameter that was not free.
     """
     rows = []
     for one in cells(dataset):
@@ -102,11 +108,22 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
                 row[f"{short}_windows"] = one[f"{name}_windows"].item()
         row |= {"V0": one["velocity_before"].item(), "V1": one["velocity_after"].item()}
         row |= {"law": one["law"].item() if "law" in one.coords else ""}
+        row |= _normal_stresses(one)
+        if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
+            row["k"] = one["window_stiffness"].item()
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
         row["R2"], row["criterion"] = one["r_squared"].item(), one["criterion"].item()
-        row["status"] = status(one)
+        row["p_value"], row["status"] = one["whiteness"].item(), status(one)
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def _normal_stresses(one: xr.Dataset) -> dict[str, float]:
+    """Return the normal stress before the step in MPa; before each step, if there are several."""
+    names = [str(n) for n in one.data_vars if str(n).startswith("normal_stress_before_")]
+    stresses = {n: one[n].item() * 1e-6 for n in names or ["normal_stress_before"] if n in one}
+    known = {n: stress for n, stress in stresses.items() if math.isfinite(stress)}
+    return {n.replace("_before", ""): stress for n, stress in known.items()}
 
 
 def status(one: xr.Dataset) -> str:
@@ -133,10 +150,20 @@ def draw(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
     spread /= np.sqrt(rng.chisquare(degrees, n) / degrees)[:, None]
     drawn = np.where(logs, at * np.exp(np.where(logs, spread, 0.0)), at + spread)
     data = {
-        name: ("draw", drawn[:, place], {"units": one[name].attrs.get("units", "1")})
+        name: (
+            "draw",
+            drawn[:, place],
+            {key: one[name].attrs[key] for key in ("long_name", "units") if key in one[name].attrs},
+        )
         for place, name in enumerate(names)
     }
-    return xr.Dataset(data, coords={"draw": np.arange(n)})
+    number = {"long_name": "number of the sample", "units": "1"}
+    about = {
+        "title": "Samples of the parameters of a fit",
+        "Conventions": "CF-1.11",
+        **provenance.attributes("dataset.rsf.draw"),
+    }
+    return with_cf_encoding(xr.Dataset(data, {"draw": ("draw", np.arange(n), number)}, about))
 
 
 def scene(dataset: xr.Dataset) -> Scene:
@@ -153,6 +180,8 @@ def scene(dataset: xr.Dataset) -> Scene:
     )
     values = parameters_of(first, *distances)
     found = {n: one[n].item() for n in map(str, one["parameter"].values)}
+    if "window_stiffness" in one:
+        values["stiffness"] = one["window_stiffness"].item()
     values |= {n: value for n, value in of_window(found, 1).items() if n in values}
     before, after = one["velocity_before"].item(), one["velocity_after"].item()
     return first.with_(**fields_of(values, before), load_velocity_ratio=after / before)
@@ -181,7 +210,10 @@ def laboratory(dataset: xr.Dataset) -> Laboratory:
 
 
 def answered(dataset: xr.Dataset) -> bool:
-    """True where every fit has numbers that are verified."""
+    """Return True if all fits have verified values with valid standard errors.
+
+    A fit with the status `not_identified` counts as answered.
+    """
     return all(status(one) in _ANSWERS for one in cells(dataset))
 
 
@@ -234,6 +266,11 @@ def _table(where: str, fits: Sequence[xr.Dataset]) -> Table:
 def _column(one: xr.Dataset) -> dict[str, str]:
     """The parameters of a fit, how well it explains its rows, and the noise that is left."""
     found = {n + _units(plain(name)): with_error(one, name) for name, n in shown(one).items()}
+    if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
+        found["k" + _units("stiffness")] = f"{one['window_stiffness'].item():.6g}"
+    stresses = [f"{stress:.6g}" for stress in _normal_stresses(one).values()]
+    if stresses:
+        found["normal stress (MPa)"] = ", ".join(stresses)
     quality = dict.fromkeys(("R2", "criterion", "noise", "worth"), "-")
     if np.isfinite(one["rows_fitted"].item()):
         order = int(one["noise_order"].item())
@@ -267,8 +304,17 @@ def _window(one: xr.Dataset) -> str:
 
 
 def with_error(one: xr.Dataset, name: str) -> str:
-    """A number and its standard error, to two digits of the error."""
-    value, error = one[name].item(), one[f"{name}_stderr"].item()
+    """Format a value and its standard error, rounded to two digits of the error.
+
+    A standard error that is not valid is marked by an asterisk.
+    """
+    text = _rounded(one[name].item(), one[f"{name}_stderr"].item())
+    is_marked = " +- " in text and status(one) == Status.ERRORS_NOT_VALID.label
+    return text + _MARK * is_marked
+
+
+def _rounded(value: float, error: float) -> str:
+    """Format a value and its standard error."""
     if not math.isfinite(value):
         return "-"
     if error > _BOUNDLESS * abs(value) > 0.0:
@@ -286,9 +332,11 @@ def with_error(one: xr.Dataset, name: str) -> str:
 
 
 def _remarks(one: xr.Dataset) -> Iterator[str]:
-    """Remarks on a fit: what it does not tell, and whether noise is left that no error counts."""
+    """Yield the remarks on a fit: its message, the windows, the posterior and the p-value."""
     law, message = one["law"].item(), str(one["message"].item())
-    if message:
+    if status(one) == Status.ERRORS_NOT_VALID.label:
+        yield f"{law}: standard errors marked by {_MARK} are not valid: {message}"
+    elif message:
         yield f"{law}: {status(one).replace('_', ' ')}: {message}"
     short = shown(one)
     spreads = ((short[n], one[f"{n}_windows"].item()) for n in short if f"{n}_windows" in one)
@@ -302,9 +350,8 @@ def _remarks(one: xr.Dataset) -> Iterator[str]:
         )
         time = f"{one['autocorrelation_time'].item():.2g} steps"
         yield f"{law}: 95 % of the posterior: {each} (autocorrelation time {time})"
-    chance = one["whiteness"].item()
-    if math.isfinite(chance):
-        verdict = "white" if chance > _CHANCE else "still correlated"
-        apart = min(LAGS + int(one["noise_order"]), int(one["rows_fitted"]) // 4)
-        text = f"residuals freed of correlation are {verdict} over {apart} rows"
-        yield f"{law}: {text} (chance {chance:.2g})"
+    p_value = one["whiteness"].item()
+    if math.isfinite(p_value):
+        verdict = "are still autocorrelated" if p_value < SIGNIFICANT else "show no autocorrelation"
+        last = min(LAGS + int(one["noise_order"]), int(one["rows_fitted"]) // 4)
+        yield f"{law}: whitened residuals {verdict} up to lag {last} (p = {p_value:.2g})"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from rsfstudy.analysis.fitting import filters
 from rsfstudy.analysis.fitting.model import check_free, of_law
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.analysis.fitting.steps import Step
+from rsfstudy.analysis.fitting.window import Window
 from rsfstudy.api import runs
 from rsfstudy.axes.axis import Axis
 from rsfstudy.declare.study import Study
@@ -35,6 +38,8 @@ _EFFECTS = ("b", "b1", "b2")
 _STATES = "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
 #: Slip distance to begin with, as part of the load point displacement that is fitted after a step.
 _GUESS = 0.05
+#: Largest number of windows.
+_MOST_WINDOWS = 1000
 #: Shortest of several windows, as a part of what follows a step.
 _SHORTEST = 0.5
 #: First guesses of a scene: those of a record take their place.
@@ -57,6 +62,8 @@ def fit(
     windows: int = 1,
     noise: str = "ar",
     loading: str = "steps",
+    averaging: Any = None,
+    low_pass: str = "",
     posterior: int = 0,
     stiffness: Any = None,
     slip_distance: Any = None,
@@ -102,6 +109,12 @@ def fit(
     loading : {"steps", "recorded"}
         The load point as its steps say, or as it was recorded, and normal stress with it where that
         is no constant of the scene (``normal_stress="imposed"``).
+    averaging : quantity, optional
+        Time over which the data logger averaged friction about each row ("1 s", a plain number is
+        in s); "trailing 1 s" if the average ends at the row. The model is averaged in the same way.
+    low_pass : str, optional
+        Low-pass filter that friction passed, with its corner frequency: "first_order 2 Hz",
+        "butterworth_2 2 Hz" or "butterworth_4 2 Hz". The model passes through the same filter.
     posterior : int
         Draws from the posterior (``posterior``, along ``draw``), by emcee, with flat priors between
         the bounds of the search and the noise as the fit found it. A chain of some 1,000 to 10,000
@@ -109,8 +122,9 @@ def fit(
         as ``work_budget_spent``.
     stiffness : quantity, optional
         Of the machine, where no rig states it: over normal stress ("1.6e-3 1/um", a plain number
-        is in 1/um), or in MPa/um, over the mean of the normal stress that the record holds. The
-        first guess, where ``free`` names it.
+        is in 1/um), or in MPa/um. Stiffness in MPa/um is divided by the mean normal stress in the
+        window before each step. The first guess, if ``free`` names it. In a joint fit it is that of
+        the first window, and the other windows follow by their normal stress.
     slip_distance : quantity, optional
         First guess ("10 um", a plain number is in um); by default a twentieth of the way after the
         step. Five others are tried, a tenth to ten times as long.
@@ -130,8 +144,9 @@ def fit(
         error (``_error``); ``a_minus_b``; ``covariance`` and ``correlation``; what the noise is
         (``noise_size``, ``noise_order``, ``effective_samples``, ``whiteness``); the window; along
         the rows of the record, ``fitted_friction``, ``residual`` and ``innovation``, NaN outside
-        the window. Lengths are in um, rates in um/s. ``status`` is ``not_identified`` where the
-        record does not tell a parameter, and ``message`` names it. ``dataset.rsf.table()``,
+        the window. Lengths are in um, rates in um/s. ``status`` is ``not_identified`` if the record
+        does not constrain a parameter, and ``errors_not_valid`` if the values stand but their
+        standard errors do not; ``message`` gives the reason. ``dataset.rsf.table()``,
         ``.rsf.plot()``, ``.rsf.scene``, ``.rsf.laboratory`` and ``.rsf.draw()`` say more.
 
     Raises
@@ -163,12 +178,19 @@ def fit(
         if not isinstance(one, Record):
             remedy = "Make one by rsfstudy.read_record."
             raise InvalidValue("record", one, "is no record", remedy=remedy)
+    records = tuple(_with_normal_stress(one, rig) for one in records)
     numbers = _numbers(records, steps)
     guess = _guess(records[0], rig, numbers[0], slip_distance)
-    if "alpha" in free:
-        _check_stressed(records, loading)
+    if "alpha" in scene:
         scene = {"normal_stress": "imposed", **scene}
-    first = _first_scene(laws, scene, _stiffness(rig, stiffness, free, records[0]) * guess)
+    if "alpha" in free:
+        _check_stressed(records, loading, numbers)
+        scene = {"normal_stress": "imposed", **scene}
+    ratio, machine = _stiffness(rig, stiffness, free, records)
+    if machine:
+        _check_compressive(records, numbers)
+        ratio = machine / Window(records[0], numbers[0]).normal_stress
+    first = _first_scene(laws, scene, ratio * guess)
     sought = _of_laws(free, laws, first)
     there = tuple((one.name, n) for one in records for n in numbers if n <= len(one.found))
     measure = Fit(
@@ -182,7 +204,9 @@ def fit(
         after=_micrometres("after", after),
         noise=noise,
         loading=loading,
+        filter=_describe_filter(averaging, low_pass),
         posterior=posterior,
+        machine_stiffness=machine,
     )
     axes = [Axis("law", list(laws))]
     if len(records) > 1 and not together:
@@ -190,8 +214,9 @@ def fit(
     if len(numbers) > 1 and not together:
         axes.append(Axis("step", list(numbers)))
     reductions = []
-    if not isinstance(windows, int) or windows < 1:
-        raise InvalidValue("windows", windows, "must be a whole number, 1 or more")
+    if not isinstance(windows, int) or not 1 <= windows <= _MOST_WINDOWS:
+        rule = f"must be a whole number from 1 to {_MOST_WINDOWS:,}"
+        raise InvalidValue("windows", windows, rule)
     if windows > 1:
         axes.append(Axis("part", np.linspace(1.0, _SHORTEST, windows).tolist()))
         reductions = [Range(f"{n}_windows", n, over="part") for n in measure.parameters]
@@ -221,7 +246,7 @@ def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]
     count = max(len(one.found) for one in records)
     if not count:
         remedy = "State them: record.with_steps([(begins, ends, before, after)])."
-        rule = "has no step of load point velocity"
+        rule = "has no step of load point velocity or normal stress"
         raise InvalidValue("record", records[0].name, rule, remedy=remedy)
     numbers = tuple(steps) or tuple(range(1, count + 1))
     for number in numbers:
@@ -247,13 +272,17 @@ def _check_step(record: Record, number: int, step: Step) -> None:
         raise InvalidValue("displacement", told, rule, remedy=remedy)
 
 
-def _check_stressed(records: Sequence[Record], loading: str) -> None:
-    """Refuse to look for the effect of a normal stress that does not change."""
+def _check_stressed(records: Sequence[Record], loading: str, numbers: Sequence[int]) -> None:
+    """Refuse to fit the effect of a normal stress that does not change."""
     for record in records:
         stress = record.columns.get("normal_stress", np.zeros(1))
-        if loading != "recorded" or not np.ptp(stress) > 0.0:
-            rule = f"needs a normal stress that changes, and that of {record.name} is constant"
-            remedy = "Leave it out, or record normal stress, with --loading recorded (loading=)."
+        steps = [record.found[n - 1] for n in numbers if n <= len(record.found)]
+        by_steps = loading == "steps" and any(step.stress_ratio != 1.0 for step in steps)
+        if not by_steps and not (loading == "recorded" and np.ptp(stress) > 0.0):
+            rule = "needs a normal stress that changes: "
+            rule += f"that of {record.name} has no step among those that are fitted"
+            remedy = "Leave alpha out, name a step of normal stress (steps=), or follow the "
+            remedy += "recorded normal stress with --loading recorded (loading=)."
             raise InvalidValue("free", "alpha", rule, remedy=remedy)
 
 
@@ -268,29 +297,63 @@ def _guess(record: Record, rig: Laboratory | None, number: int, stated: Any) -> 
     return float(_GUESS * (moved[-1] - np.interp(begins, record.time, moved)))
 
 
-def _stiffness(rig: Laboratory | None, stated: Any, free: Sequence[str], record: Record) -> float:
-    """Stiffness over normal stress, in 1/um."""
+def _stiffness(
+    rig: Laboratory | None, stated: Any, free: Sequence[str], records: Sequence[Record]
+) -> tuple[float, float]:
+    """Read the stiffness to begin with, in units that it was stated in.
+
+    Returns
+    -------
+    ratio : float
+        Stiffness over normal stress in 1/um; 0 if the stiffness of the machine is stated.
+    machine : float
+        Stiffness of the machine in Pa/um, or 0.
+    """
     if stated is None:
         if rig is not None and rig.stiffness is not None:
-            return float(rig.stiffness / rig.normal_stress * 1e-6)
+            return 0.0, float(rig.stiffness * 1e-6)
         if "stiffness" in free:
-            return 1e-3
+            return 1e-3, 0.0
         remedy = "Give --stiffness (stiffness=), as in '1.6e-3 /um', "
         remedy += "or look for it: --free (free=)."
         raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
+    over_stress = isinstance(stated, Real) or is_friction(stated)
     if isinstance(stated, Real):
         found = float(stated)
-    elif is_friction(stated):
-        found = in_si("stiffness", stated, "1/m") * 1e-6
     else:
-        found, stress = in_si("stiffness", stated, "Pa/m"), record.columns.get("normal_stress")
-        if stress is None:
-            remedy = "Give --normal-stress (normal_stress of read_record), or stiffness in 1/um."
-            raise InvalidValue("stiffness", stated, "needs a normal stress", remedy=remedy)
-        found = found * 1e-6 / float(stress.mean())
+        found = in_si("stiffness", stated, "1/m" if over_stress else "Pa/m") * 1e-6
     if not found > 0.0:
         raise InvalidValue("stiffness", stated, "must be positive")
-    return found
+    if over_stress:
+        return found, 0.0
+    for record in records:
+        if "normal_stress" not in record.columns:
+            remedy = "Give --normal-stress (normal_stress of read_record), or stiffness in 1/um."
+            rule = f"needs a normal stress, and {record.name} has none"
+            raise InvalidValue("stiffness", stated, rule, remedy=remedy)
+    return 0.0, found
+
+
+def _check_compressive(records: Sequence[Record], numbers: Sequence[int]) -> None:
+    """Refuse a normal stress that is not positive before a step."""
+    for record in records:
+        for number in numbers:
+            if number > len(record.found):
+                continue
+            stress = Window(record, number).normal_stress
+            if not stress > 0.0:
+                rule = f"must be positive before step {number} of {record.name}, in Pa"
+                remedy = "Compression is positive: reverse the sign, as in columns={"
+                remedy += "'normal_stress': ('heading', 'MPa', -1.0)}."
+                raise InvalidValue("normal_stress", stress, rule, remedy=remedy)
+
+
+def _with_normal_stress(record: Record, rig: Laboratory | None) -> Record:
+    """Return the record with the normal stress of the rig, if it holds none itself."""
+    if rig is None or "normal_stress" in record.columns:
+        return record
+    stress = np.full(len(record), float(rig.normal_stress))
+    return replace(record, columns={**record.columns, "normal_stress": stress})
 
 
 def _first_scene(laws: Sequence[str], stated: Mapping[str, Any], stiffness: float) -> Scene:
@@ -314,6 +377,28 @@ def _of_laws(stated: Sequence[str], laws: Sequence[str], scene: Scene) -> tuple[
             rule = f"names no {'evolution effect' if names else 'parameter'} of law={law!r}"
             raise InvalidValue("free", free, rule, remedy=_STATES)
     return shared
+
+
+def _describe_filter(averaging: Any, low_pass: str) -> str:
+    """Return the filter as the measure takes it, with its size in s or Hz."""
+    if averaging is not None and low_pass:
+        remedy = "Pass `averaging=` or `low_pass=`."
+        raise InvalidValue("low_pass", low_pass, "cannot follow an averaging", remedy=remedy)
+    if averaging is not None:
+        kind, size = filters.MEAN, averaging
+        if isinstance(size, str) and size.startswith("trailing "):
+            kind, size = filters.TRAILING_MEAN, size.removeprefix("trailing ")
+        seconds = float(size) if isinstance(size, Real) else in_si("averaging", size, "s")
+    elif low_pass:
+        kind, _, size = str(low_pass).partition(" ")
+        if kind not in filters.LOW_PASS:
+            remedy = "Write it as in 'butterworth_2 2 Hz'."
+            choices = [*filters.LOW_PASS]
+            raise InvalidValue("low_pass", low_pass, "is unknown", choices=choices, remedy=remedy)
+        seconds = in_si("low_pass", size, "1/s")
+    else:
+        return ""
+    return f"{kind} {seconds!r}"
 
 
 def _micrometres(name: str, value: Any) -> float:

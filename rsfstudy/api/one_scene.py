@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from rsfstudy.api.trajectory import attributes_of
 from rsfstudy.compute import provenance
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import NoAnswer, RsfStudyWarning
@@ -18,6 +19,7 @@ from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import SCIPY, check_engine
+from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.rig.scales import scaled, scales_of
 from rsfstudy.rig.units import in_si
 from rsfstudy.slider.scene import Scene, check_scene
@@ -42,8 +44,9 @@ def critical_step(
     scene : Scene
         The slider; whatever value it holds for the quantity sought is ignored.
     of : {"load_velocity_ratio", "displacement_step", "normal_stress_step"}
-        What is stepped. After a step of displacement or of normal stress the load point is held
-        unless the scene states its `load_velocity_ratio`. Steps of normal stress, which trigger by
+        What is stepped; "velocity_step" is another name of "load_velocity_ratio". After a step of
+        displacement or of normal stress the load point is held unless the scene states its
+        `load_velocity_ratio`. Steps of normal stress, which trigger by
         a fall (`direction="down"`), need normal stress that is "imposed" or "variable".
     direction : {"up", "down"}
         Steps that increase, or decrease.
@@ -181,14 +184,15 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         values = outcome.values.get(name)
         if values is None:
             values = np.full([len(inner[dim]) for dim in dims], np.nan)
-        variables[name] = dims, values, quantity(name, own).attributes
+        variables[name] = dims, values, attributes_of(quantity(name, own), scene)
     work = "rhs_evaluations"
     variables[work] = (), outcome.rhs_evaluations, quantity(work).attributes
-    rate = (), scene.reference_rate, {"units": "s-1"}
+    rate = (), scene.reference_rate, quantity("reference_rate").attributes
     norm = (), math.exp(scene.log_norm_rate), quantity("instability_slip_rate").attributes
     what = measure.name.replace("_", " ").capitalize()
     about = {
         "title": f"{what} of a spring-slider, {scene.law} law",
+        "Conventions": "CF-1.11",
         "scene": json.dumps(scene.describe()),
         "rtol": accuracy.rtol,
         "engine": accuracy.engine,
@@ -196,6 +200,9 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         "message": outcome.message,
         **provenance.attributes(f"rsfstudy.{measure.name}"),
     }
-    return xr.Dataset(
-        variables, {**inner, "reference_rate": rate, "instability_slip_rate": norm}, about
-    )
+    coordinates: dict[str, Any] = {
+        **{name: (name, values, quantity(name, own).attributes) for name, values in inner.items()},
+        "reference_rate": rate,
+        "instability_slip_rate": norm,
+    }
+    return with_cf_encoding(xr.Dataset(variables, coordinates, about))

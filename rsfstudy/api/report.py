@@ -20,7 +20,7 @@ from rsfstudy.api import fit_results, runs, summaries, tables
 from rsfstudy.api.tables import Table
 from rsfstudy.compute import provenance, runner
 from rsfstudy.defaults import FIGURES, OUTPUT
-from rsfstudy.error_boundary import error_boundary, in_words
+from rsfstudy.error_boundary import check_file, error_boundary, in_words
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief
 from rsfstudy.files import contents, places, store
 from rsfstudy.quantity import Markup, as_html, table
@@ -83,6 +83,7 @@ def written(directory: str | Path, output: str | Path | None = None) -> tuple[Pa
     page = place / "report.html" if output is None else places.directory(output)
     if page is None or page.suffix != ".html" or page.is_dir():
         raise InvalidValue("output", str(output), "must be a file that ends in .html")
+    check_file("output", page)
     try:
         if page.exists() and _OURS not in page.read_bytes()[:1000]:
             remedy = "Choose another output, or move it away first."

@@ -29,6 +29,7 @@ from rsfstudy.files.comparison import Comparison, cell_number, compared, side_by
 from rsfstudy.files.journal import differences
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.engines import COMPILED, check_engine, own_stepper
+from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.quantity import table
 from rsfstudy.slider.registry import completed
 from rsfstudy.slider.scene import Scene
@@ -142,7 +143,7 @@ def run(
         command=command,
     )
     with Workers(workers, client, time_limit) as where:
-        results = prepared(declared, keeping, where, progress)()
+        results = with_cf_encoding(prepared(declared, keeping, where, progress)())
     told = [f"no {name}: {why}" for name, why in tables.refused(results).items()]
     if failed := runner.failures(results):
         each = ", ".join(f"{label} {number}" for label, number in failed.items())
@@ -234,9 +235,11 @@ def plot(
     variable : str, optional
         Draw this variable instead: as maps over two numeric axes, else as lines.
     style : path, str, dict or list of those, optional
-        What `matplotlib.style.use` takes, laid over the style that ships: a style sheet of yours,
-        ``"dark_background"``, or ``{"font.size": 9, "figure.figsize": (3.5, 2.6)}``, which is one
-        column of a journal in inches. All colours and line styles come from ``axes.prop_cycle``.
+        A style on top of the style of rsfstudy: a style sheet (a file that ends in
+        ``.mplstyle``), the name of a style in ``matplotlib.style.available``, or settings such as
+        ``{"font.size": 9, "figure.figsize": (3.5, 2.6)}``, which is one column of a journal in
+        inches. All colours and line styles come from ``axes.prop_cycle``. Unknown settings are
+        rejected.
     own : function or module, optional
         What draws it, where that is not part of rsfstudy: what ``Study(plot=...)`` was given.
 

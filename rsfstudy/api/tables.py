@@ -195,7 +195,7 @@ def headline(dataset: xr.Dataset) -> Table:
     if (few["status"] != int(Status.OK)).any():
         columns["status"] = "status", LABELS.__getitem__
     units, shown = units_of(dataset[name]), few["status"].size
-    caption = dataset[name].attrs.get("long_name", name) + f", in {units}" * (units != "1")
+    caption = str(dataset[name].attrs.get("long_name", name)) + f", in {units}" * (units != "1")
     if shown < size:
         full = dataset.sizes
         every = [f"{n} of {full[d]} {d}" for d, n in few.sizes.items() if n < full[d]]

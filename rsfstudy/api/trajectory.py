@@ -22,6 +22,7 @@ from rsfstudy.motion.events import Event, Kind, rise
 from rsfstudy.motion.meter import Halt, Meter, more_work
 from rsfstudy.motion.readings import friction_coefficient_of, load_point_of
 from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording, strictly_later
+from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.history import History
@@ -47,6 +48,8 @@ END = "end"
 #: Slip rate over that of the load point that counts as instability where the load point alone
 #: reaches the norm, as it may where the period is not that of the slider.
 _OVER_LOADING = 1e6
+#: Variables along motions that are made of spring stress.
+_OF_SPRING = ("shear_stress", "friction_coefficient")
 #: Those of our own dynamics; others stand behind them.
 _REGIMES = ("quasi_static", "slow_manifold", IN_RUPTURE, "quasi_dynamic")
 
@@ -61,6 +64,8 @@ def simulate(
     rtol: float = DEFAULT_RTOL,
     budget: int = DEFAULT_BUDGET,
     engine: Any = SCIPY,
+    accuracy: Accuracy | None = None,
+    meter: Meter | None = None,
 ) -> xr.Dataset:
     """Follow the motion of a scene from the instant after its step.
 
@@ -85,6 +90,10 @@ def simulate(
     engine : {"scipy", "python", "compiled"}, or type
         What integrates; compiled, which needs Numba, is much faster. A stepper of your own is given
         by its class.
+    accuracy, meter : Accuracy and Meter, optional
+        The arguments of `Measure.find`, if you call `simulate` in a user-defined measure. They
+        replace `rtol`, `budget` and `engine`; the right-hand sides count as work of the cell, and a
+        motion that cannot go on ends the cell with its status.
 
     Returns
     -------
@@ -99,7 +108,9 @@ def simulate(
         Time strictly increases: where a quantity jumps at an instant, what it was is kept at that
         time and what it then is a few floating-point numbers later, as are the points of a rupture
         too short for its times to differ. A motion that cannot go on ends early, with its
-        ``status`` and ``message`` in the attributes. Beyond the instability norm a motion with
+        ``status`` and ``message`` in the attributes. With radiation damping, ``shear_stress`` is
+        the spring stress less the damping stress at V_*, :math:`\\eta V_*`, so that it equals the
+        frictional stress in steady sliding at V_*. Beyond the instability norm a motion with
         neither mass nor radiation damping is no physics: from when on, say ``instability_time`` and
         the attribute ``beyond_instability_norm``. (Where the load point itself is beyond the norm:
         from a million times its velocity.)
@@ -133,11 +144,16 @@ def simulate(
     if not (known and 0.0 < duration < math.inf):
         remedy = "It is in D_c/V_*; rig.dimensionless converts units of a laboratory."
         raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
-    accuracy = Accuracy(rtol, budget, engine=engine)
+    if (accuracy is None) != (meter is None):
+        remedy = "Pass accuracy=accuracy, meter=meter, as Measure.find receives them."
+        raise InvalidValue("accuracy, meter", (accuracy, meter), "need each other", remedy=remedy)
+    is_alone = accuracy is None
+    accuracy = accuracy or Accuracy(rtol, budget, engine=engine)
     check_engine(accuracy.engine)
-    if not scene.is_disturbed:
+    if is_alone and not scene.is_disturbed:
         warnings.warn(_UNSTEPPED, NoAnswer, stacklevel=3)
-    meter = Meter(budget, engine=accuracy.engine)
+    meter = meter or Meter(budget, engine=accuracy.engine)
+    spent, by_regime = meter.spent, dict(meter.by_regime)
     recording = Recording(list(_REGIMES), at)
     status, message, limit, passed = Status.OK, "", _limit(scene), math.nan
     watches = [rise("log_slip_rate", limit)] if limit < math.inf else []
@@ -148,6 +164,8 @@ def simulate(
             if math.isnan(passed) and (last.watch or last.point.log_slip_rate >= limit):
                 passed = last.time
     except Halt as halt:
+        if not is_alone:
+            raise
         status, message = halt.status, str(halt)
         if status is Status.WORK_BUDGET_SPENT:
             message += more_work(budget)
@@ -161,14 +179,17 @@ def simulate(
         columns |= {_state(i + 1): seen[:, STATES + i] for i in of_law}
     columns[quantity("load_point_displacement")] = load_point_of(scene, seen)
     columns[quantity("friction_coefficient")] = friction_coefficient_of(seen)
-    dataset = xr.Dataset({q.name: ("time", values, q.attributes) for q, values in columns.items()})
+    dataset = xr.Dataset(
+        {q.name: ("time", values, attributes_of(q, scene)) for q, values in columns.items()}
+    )
     regimes = {
         "long_name": quantity("regime").long_name,
         "flag_values": np.arange(len(recording.regimes), dtype=np.int8),
         "flag_meanings": " ".join(recording.regimes),
     }
     dataset["regime"] = "time", seen[:, REGIME].astype(np.int8), regimes
-    dataset["reference_rate"] = (), scene.reference_rate, {"units": "s-1"}
+    about_rate = quantity("reference_rate").attributes
+    dataset["reference_rate"] = (), scene.reference_rate, about_rate
     dataset = dataset.set_coords(["slip", "reference_rate"])
     dataset = dataset.assign_attrs(
         {
@@ -180,11 +201,13 @@ def simulate(
             "message": message,
             "duration": duration,
             "told": "as it moves" if at is None else "at times that were asked for",
-            "rtol": rtol,
-            "budget": budget,
+            "rtol": accuracy.rtol,
+            "budget": accuracy.budget,
             "engine": accuracy.engine,
-            "rhs_evaluations": meter.spent,
-            "rhs_evaluations_by_regime": json.dumps(meter.by_regime),
+            "rhs_evaluations": meter.spent - spent,
+            "rhs_evaluations_by_regime": json.dumps(
+                {regime: n - by_regime.get(regime, 0) for regime, n in meter.by_regime.items()}
+            ),
             **provenance.attributes("rsfstudy.simulate"),
         }
     )
@@ -196,11 +219,23 @@ def simulate(
         text = f"from {passed:.9g} D_c/V_* on, with neither mass nor radiation damping: no physics"
         dataset[_INSTABILITY_TIME.name] = ((), passed, _INSTABILITY_TIME.attributes)
         dataset = dataset.assign_attrs({BEYOND: text})
-        warnings.warn(f"beyond the instability norm {text}", NoAnswer, stacklevel=3)
+        if is_alone:
+            warnings.warn(f"beyond the instability norm {text}", NoAnswer, stacklevel=3)
     if status is not Status.OK:
         text = f"the motion ends after {max([0.0, *seen[-1:, 0]]):.6g} of {duration:g} D_c/V_*"
         warnings.warn(f"{text}: {status.label} ({message})", Incomplete, stacklevel=3)
-    return dataset
+    return with_cf_encoding(dataset)
+
+
+def attributes_of(about: Quantity, scene: Scene) -> dict[str, Any]:
+    """Return the attributes of a variable along a motion.
+
+    Radiation damping is relative to that at V_*, so that spring stress and friction agree there.
+    """
+    attributes = about.attributes
+    if about.name in _OF_SPRING and scene.dynamics.damping(0.0):
+        attributes["long_name"] += " less the radiation damping stress at V_star"
+    return attributes
 
 
 def _state(number: int) -> Quantity:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import CheckedKeywords, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.slider.registry import name_of
@@ -23,7 +23,7 @@ Row = Mapping[str, Any]
 
 @guard_methods
 @dataclass(frozen=True, init=False)
-class Axis:
+class Axis(CheckedKeywords):
     """One dimension of a lattice.
 
     Parameters
@@ -182,11 +182,11 @@ class Axis:
             return  # of equal ones one is computed
         seen: set[frozenset[tuple[str, Any]]] = set()
         for row in self.rows:
-            point = frozenset(row.items())
-            if point in seen:
+            key = point_key(row)
+            if key in seen:
                 value = row.get(self.dimension, dict(row))
                 raise InvalidValue(self.dimension, value, "stands twice on its axis")
-            seen.add(point)
+            seen.add(key)
 
     @cached_property
     def fields(self) -> tuple[str, ...]:
@@ -255,6 +255,11 @@ def places_by_kind(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
         yield tuple(np.flatnonzero(of == n) for of, n in zip(every, kind, strict=True))
 
 
+def point_key(row: Row) -> frozenset[tuple[str, Any]]:
+    """Return the fields and values of a row as a dictionary key."""
+    return frozenset(row.items())
+
+
 def _kind(row: Row) -> tuple[Any, ...]:
     return tuple(
         (name, type(value), bool(value) if isinstance(value, float) else value)
@@ -290,52 +295,6 @@ def _numbered(dimension: str, values: Mapping[str, Sequence[Any]]) -> tuple[Row,
 def columns(rows: Sequence[Row]) -> dict[str, list[Any]]:
     """Values of each field at points that all set the same fields."""
     return {name: [row[name] for row in rows] for name in rows[0]}
-
-
-def select(axis: Axis, points: Sequence[Any]) -> Axis:
-    """The points of an axis that bear these labels, or numbers; of samples, the first ones are a
-    sample still.
-    """
-    rows: dict[Any, Row] = dict(zip(axis.labels or range(len(axis)), axis.rows, strict=True))
-    for point in points:
-        if point not in rows:
-            rule, choices = "is no point of the axis", axis.labels or ()
-            if axis.is_numbered:
-                rule += f": they are numbered from 0 to {len(axis) - 1}"
-            raise InvalidValue(axis.dimension, point, rule, choices=choices)
-    if axis.labels is not None:
-        return Axis(axis.dimension, {label: rows[label] for label in points}, axis.units)
-    first = list(points) == list(range(len(points)))
-    drawn = {**axis.drawn, "n": len(points)} if axis.drawn and first else {}
-    return axis.with_rows([rows[number] for number in points], axis.units, drawn)
-
-
-def with_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
-    """An axis of several fields whose points that use one of them take new values of it; the
-    others stay. Numbered points take one value, and are drawn no more.
-    """
-    if axis.is_numbered:
-        if len(values) != 1:
-            rule = f"varies along the axis {axis.dimension}: all of its points take one value"
-            raise InvalidValue(name, values, rule, remedy="Give one value.")
-        return axis.with_rows([{**row, name: values[0]} for row in axis.rows], axis.units)
-    assert axis.labels is not None
-    points: dict[str, Row] = {}
-    for label, row in zip(axis.labels, axis.rows, strict=True):
-        if name not in row:
-            points[label] = row
-            continue
-        for value in values:
-            changed = {**row, name: plain(name, value)}
-            if changed in points.values():
-                continue
-            new = f"{name} = {value}"
-            if changed == row:
-                new = label
-            elif new in points or new in axis.labels:
-                new = f"{label}, {new}"
-            points[new] = changed
-    return Axis(axis.dimension, points, axis.units)
 
 
 def check_text(name: str, text: object) -> None:

@@ -5,12 +5,12 @@ loaded when it is called, so that help and the list of studies answer at once.
 from __future__ import annotations
 
 import io
+import logging
 import os
 import shlex
 import signal
 import sys
 import warnings
-from pathlib import Path
 from typing import Any
 
 import click
@@ -69,6 +69,7 @@ def main() -> None:
     warnings.filterwarnings("always", category=UserWarning, module="rsfstudy")
     warnings.filterwarnings("ignore", category=Incomplete)  # commands print it themselves
     warnings.showwarning = lambda message, *_place: _warn(message)
+    logging.getLogger("matplotlib").addHandler(_LOG)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # which may be unable to say what a file says
             stream.reconfigure(errors="backslashreplace")
@@ -78,7 +79,7 @@ def main() -> None:
     try:
         sys.exit(cli(standalone_mode=False) or OK)
     except click.ClickException as error:
-        error.message = brief(error.message)  # type: ignore[misc]
+        error.message = spelt(brief(error.message))  # type: ignore[misc]
         error.show()
         sys.exit(WRONG_USAGE)
     except (click.Abort, KeyboardInterrupt):
@@ -91,12 +92,22 @@ def main() -> None:
     except Exception as error:
         if os.environ.get("RSFSTUDY_TRACEBACK"):
             raise
-        words = brief(shlex.join(sys.argv[1:]))
-        _say(
-            f"error: rsfstudy {words}: {in_words(error)}. Look at what it names: a file may be "
-            "damaged, or no place to write to. RSFSTUDY_TRACEBACK=1 shows where it arose."
-        )
+        _say(f"error: rsfstudy {brief(shlex.join(sys.argv[1:]))}: {_explain(error)}")
         sys.exit(FAILED)
+
+
+def _explain(error: Exception) -> str:
+    """Explain an error that no command expects."""
+    if isinstance(error, OSError) and error.strerror:
+        place = f" ({brief(error.filename)})" if error.filename else ""
+        remedy = "Check that the place exists, may be written to, and is not full."
+        return f"{error.strerror}{place}. {remedy}"
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for it. Ask for fewer or smaller values."
+    return (
+        f"{in_words(error)}. Look at what it names: a file may be damaged, or no place to write "
+        "to. RSFSTUDY_TRACEBACK=1 shows where it arose."
+    )
 
 
 def _end(number: int, _frame: object) -> None:
@@ -104,6 +115,24 @@ def _end(number: int, _frame: object) -> None:
     for other in _ENDING:
         signal.signal(other, signal.SIG_IGN)
     raise Signalled(number)
+
+
+class _Log(logging.Handler):
+    """Print each message of a library once, as a warning: Matplotlib logs one for each text."""
+
+    def __init__(self, level: int) -> None:
+        super().__init__(level)
+        self._printed: set[str] = set()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print the message of a record unless it was printed before."""
+        text = record.getMessage()
+        if text not in self._printed:
+            self._printed.add(text)
+            _warn(text)
+
+
+_LOG = _Log(logging.WARNING)
 
 
 def _warn(message: Warning | str) -> None:
@@ -208,8 +237,13 @@ def plot() -> None:
 
 
 @cli.command()
-@click.argument("directory", default=OUTPUT, type=click.Path(path_type=Path))
-@click.option("--output", metavar="FILE", help="The page.  [default: DIRECTORY/report.html]")
+@click.argument("directory", default=OUTPUT, type=options.FilePath())
+@click.option(
+    "--output",
+    type=options.FilePath(dir_okay=False),
+    metavar="FILE",
+    help="The page.  [default: DIRECTORY/report.html]",
+)
 def report() -> None:
     """Write one page of HTML of all results in a directory.
 
@@ -232,7 +266,7 @@ def compare() -> None:
 
 
 @cli.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=options.FilePath())
 @click.option(
     "--cell",
     "place",
@@ -253,13 +287,13 @@ def rerun() -> None:
 
 
 @cli.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=options.FilePath())
 @click.option("--csv", is_flag=True, help="Without what never changes.")
 @click.option("--mat", is_flag=True, help="For MATLAB: every variable.")
 @click.option("--units", nargs=3, metavar="STRESS LENGTH TIME", help="Of a rig, as in MPa um s.")
 @click.option(
     "--output",
-    type=click.Path(path_type=Path),
+    type=options.FilePath(dir_okay=False),
     help="The file to write; .csv and .mat take the place of its ending.  [default: beside FILE]",
 )
 def export() -> None:

@@ -25,7 +25,7 @@ from rsfstudy.motion.engines import ENGINES, SCIPY
 @click.option(
     "--protocol",
     "protocol_file",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=options.FilePath(dir_okay=False),
     help="CSV file of what the load point does: a header such as 'velocity (um/s), duration (s)', "
     "or, of a record, 'time (s), displacement (um)'. The same as --set loading=FILE.",
 )
@@ -76,7 +76,7 @@ def _quantity(name: str, words: str, default: str | None = None) -> Callable[[F]
 
 
 @click.command(cls=options.Command, does="commands_motions")
-@click.argument("records", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("records", nargs=-1, required=True, type=options.FilePath())
 @click.option(
     "--columns",
     metavar="NAME=HEADING,...",
@@ -119,6 +119,18 @@ def _quantity(name: str, words: str, default: str | None = None) -> Callable[[F]
     default="steps",
     help="The load point by its steps, or as it was recorded.",
 )
+@_quantity(
+    "--averaging",
+    "Time over which the data logger averaged friction, as in '1 s', or 'trailing 1 s' if the "
+    "average ends at the row.  [default: none]",
+)
+@click.option(
+    "--low-pass",
+    default="",
+    show_default=False,
+    help="Low-pass filter that friction passed: first_order, butterworth_2 or butterworth_4 with "
+    "its corner frequency, as in 'butterworth_2 2 Hz'.  [default: none]",
+)
 @click.option(
     "--posterior",
     type=click.IntRange(0),
@@ -143,13 +155,14 @@ def fit() -> None:
     Prints the steps that are found, and a table of a, b, D_c and their standard errors, which count
     the correlation of the noise. Says what the record does not tell, and writes figure and data.
 
-    Exit status 1 where a fit gives no numbers, or none that are verified; 2 for wrong usage; else
-    0, also where a parameter is not identified.
+    The exit status is 1 if a fit has no values, values that are not verified or standard errors
+    that are not valid, and 2 for wrong usage. Otherwise it is 0, also if a parameter is not
+    identified.
     """
 
 
 @click.command(cls=options.Command, does="commands_referee")
-@click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("directory", metavar="DIR", type=options.FilePath())
 def problems() -> None:
     """Write the problems of the referee into a new directory.
 
@@ -158,9 +171,7 @@ def problems() -> None:
 
 
 @click.command(cls=options.Command, does="commands_referee")
-@click.argument(
-    "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path)
-)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=options.FilePath())
 @click.option(
     "--problem",
     metavar="N|TOML",

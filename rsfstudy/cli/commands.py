@@ -5,6 +5,7 @@ loads this when one is called.
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 import traceback
 import warnings
@@ -31,6 +32,7 @@ from rsfstudy.compute.workers import Workers
 from rsfstudy.declare import catalogue, names, rigs
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FIGURES, OUTPUT
+from rsfstudy.error_boundary import check_file
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError
 from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import cell_number
@@ -194,11 +196,11 @@ def export(given: Given) -> int:
     asked = [ending for ending in writers if getattr(given, ending)]
     if not asked:
         raise click.UsageError("say --csv or --mat, or both")
+    dataset = store.read_any(given.file)
     paths = {ending: (given.output or given.file).with_suffix(f".{ending}") for ending in asked}
     for path in paths.values():
-        if path.exists():
+        if os.path.lexists(path):
             raise InvalidValue("--output", str(path), "is there already", remedy="Name another.")
-    dataset = store.read_any(given.file)
     if given.units:
         dataset = dataset.rsf.in_units(**dict(zip(_UNITS, given.units, strict=True)))
     for ending, path in paths.items():
@@ -278,6 +280,7 @@ def _target(given: Given) -> Path | None:
     if ending in FIGURES:
         if given.every or given.form not in (None, ending):
             raise click.UsageError(f"{output} is one figure: no --all, nor another --figure")
+        check_file("--output", output)
         return output
     if not output.is_dir():
         rule = "ends in no format that figures are written in"

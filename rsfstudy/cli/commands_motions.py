@@ -9,6 +9,7 @@ import xarray as xr
 
 from rsfstudy import plots
 from rsfstudy.analysis.fitting.record import Record
+from rsfstudy.analysis.fitting.steps import Step
 from rsfstudy.api import fit_results, fitting, summaries
 from rsfstudy.api.tables import Table
 from rsfstudy.api.trajectory import BEYOND
@@ -17,6 +18,7 @@ from rsfstudy.cli import assignments, layout, terminal
 from rsfstudy.cli.console import console
 from rsfstudy.cli.options import Given
 from rsfstudy.compute import provenance
+from rsfstudy.error_boundary import check_file
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import store
 from rsfstudy.plots._motion import picture
@@ -32,7 +34,7 @@ _NO_PHYSICS = 3
 _MOST_STEPS = 24
 #: Options that `rsfstudy.fit` takes as they are.
 _TAKEN = ("stiffness", "slip_distance", "laws", "free", "together", "before", "after", "windows",
-    "noise", "loading", "posterior", "budget", "engine")  # fmt: skip
+    "noise", "loading", "averaging", "low_pass", "posterior", "budget", "engine")  # fmt: skip
 
 
 def simulate(given: Given) -> int:
@@ -124,6 +126,7 @@ def _number(text: str) -> int:
 def _list_steps(record: Record) -> None:
     """Print the steps of a record."""
     console.print(f"{record.name}: {len(record):,} rows, {len(record.found)} steps")
+    stressed = any(step.stress_ratio != 1.0 for step in record.found)
     rows = [
         {
             "step": str(number),
@@ -131,6 +134,7 @@ def _list_steps(record: Record) -> None:
             "lasts (s)": f"{step.ends - step.begins:.6g}",
             "V0 (um/s)": f"{step.before:.6g}",
             "V1 (um/s)": f"{step.after:.6g}",
+            **_normal_stresses(step, stressed),
         }
         for number, step in enumerate(record.found[:_MOST_STEPS], start=1)
     ]
@@ -139,8 +143,15 @@ def _list_steps(record: Record) -> None:
         console.print(f"and {left} more")
 
 
+def _normal_stresses(step: Step, listed: bool) -> dict[str, str]:
+    """Format the normal stresses of a step, if those of a record are listed."""
+    stresses = {"sigma0 (MPa)": step.stress_before, "sigma1 (MPa)": step.stress_after}
+    return {heading: f"{of * 1e-6:.6g}" for heading, of in stresses.items() if listed}
+
+
 def _check_replaceable(data: Path, is_one: Callable[[xr.Dataset], bool], kind: str) -> None:
-    """What is there may be an earlier one of its kind, and nothing else."""
+    """Raise InvalidValue if a file of another kind would be replaced."""
+    check_file("--output", data)
     if not data.exists():
         return
     try:

@@ -13,7 +13,7 @@ from rsfstudy.cli.options import Given
 from rsfstudy.errors import InvalidValue
 from rsfstudy.referee import theirs
 from rsfstudy.referee.problem import Problem, read, shipped, write
-from rsfstudy.referee.verdict import Verdict, known, verdict
+from rsfstudy.referee.verdict import Verdict, known, shown_digits, verdict
 
 
 def problems(given: Given) -> int:
@@ -58,7 +58,7 @@ def _tell(file: Path, one: Verdict) -> None:
     outcome = "passed" if one.passes else "not passed"
     console.print(f"{file}: {problem.title} ({name}): {outcome}", style="bold")
     for agreement in one.agreements:
-        text = f"  {agreement.quantity:20s} {agreement.digits:4.1f} digits"
+        text = f"  {agreement.quantity:20s} {shown_digits(agreement.digits):4.1f} digits"
         if agreement.to_the_last_place:
             text += ", to the last place that is written"
         elif agreement.digits == problem.digits:

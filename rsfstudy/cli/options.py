@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import os
 import shlex
 import sys
 from collections.abc import Callable
@@ -16,8 +17,10 @@ from typing import Any, TypeVar
 import click
 
 from rsfstudy.defaults import FIGURES, OUTPUT, TIME_LIMIT
+from rsfstudy.error_boundary import check_file
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import ENGINES
+from rsfstudy.paths import check_path
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -59,6 +62,21 @@ class Command(click.Command):
         return getattr(module, str(self.name))(Given(**context.params))
 
 
+class FilePath(click.Path):
+    """The type of arguments and options that are paths: not empty, and accepted by the system."""
+
+    def __init__(self, **kind: Any) -> None:
+        super().__init__(path_type=Path, **kind)
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str | bytes | os.PathLike[str]:
+        """Return a path; raise `InvalidValue` if it cannot be one."""
+        name = param.opts[0] if isinstance(param, click.Option) else str(param and param.name)
+        check_path(name, value)
+        return super().convert(value, param, ctx)
+
+
 def together(*several: Callable[[Any], Any]) -> Callable[[F], F]:
     """Several options as one, in their order."""
     return lambda command: functools.reduce(lambda c, each: each(c), reversed(several), command)
@@ -70,17 +88,9 @@ def count(name: str, default: int | None, words: str) -> Callable[[F], F]:
     return click.option(name, type=kind, metavar="N", default=default, help=words)
 
 
-def _directory(_context: click.Context, _option: click.Parameter, value: str | None) -> Path | None:
-    """A directory for results."""
-    from rsfstudy.files import places
-
-    return places.directory(value)
-
-
 def into(words: str, default: Path | None = None, **kind: bool) -> Callable[[F], F]:
     """The option that says where results go."""
-    path = click.Path(**kind)  # type: ignore[arg-type]
-    return click.option("--output", type=path, callback=_directory, default=default, help=words)
+    return click.option("--output", type=FilePath(**kind), default=default, help=words)
 
 
 named = together(
@@ -131,7 +141,7 @@ computing = together(
 )
 study = click.option(
     "--study",
-    type=click.Path(path_type=Path),
+    type=FilePath(),
     help="File that declares the study, if its measure, a part or the figure is its own.",
 )
 
@@ -147,7 +157,7 @@ against = click.option(
 
 
 def _style(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
-    """A style that there is, found out before any work."""
+    """Return a style; raise InvalidValue before any work if it cannot be used."""
     if value is not None:
         from rsfstudy.plots import styled
 
@@ -166,24 +176,27 @@ looks = together(
     ),
     click.option(
         "--style",
-        metavar="FILE",
+        metavar="STYLE",
         callback=_style,
-        help="Style sheet of matplotlib, or the name of one, to be laid over ours.",
+        help="Style sheet of matplotlib (FILE.mplstyle), or the name of one, on top of ours.",
     ),
 )
 
 
 def _image(_context: click.Context, option: click.Parameter, value: Path | None) -> Path | None:
-    """A file that can be a figure."""
-    if value is not None and value.suffix not in (".png", ".pdf", ".svg"):
+    """Return the path of a figure, which replaces nothing but a file."""
+    if value is None:
+        return None
+    if value.suffix not in (".png", ".pdf", ".svg"):
         rule = "must end in .png, .pdf or .svg"
         raise InvalidValue(option.opts[0], str(value), rule)
+    check_file(option.opts[0], value)
     return value
 
 
 def image(name: str, default: Path | None, words: str) -> Callable[[F], F]:
     """An option that names the file of a figure."""
-    kind = click.Path(path_type=Path, dir_okay=False)
+    kind = FilePath(dir_okay=False)
     return click.option(name, type=kind, callback=_image, default=default, help=words)
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import ast
 import asyncio
 import contextlib
+import functools
 import linecache
 import logging
 import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from multiprocessing import resource_tracker
 from pathlib import Path
 from types import FrameType
@@ -85,6 +86,30 @@ def _interrupts_held() -> Iterator[None]:
             handlers[held[0]](held[0], None)
 
 
+def _unregister_safely(unregister: Callable[..., None]) -> Any:
+    """Wrap `resource_tracker.unregister` for names that the tracker does not know.
+
+    If the tracker process is killed, Python starts another, which knows none of the semaphores
+    that exist already and prints a traceback for each one that is released. Registering a name
+    twice does no harm, so we register it before we release it.
+    """
+
+    @functools.wraps(unregister)
+    def unregister_known(name: str, kind: str) -> None:
+        resource_tracker.register(name, kind)
+        unregister(name, kind)
+
+    return unregister_known
+
+
+def _survive_lost_tracker() -> None:
+    """Install `_unregister_safely` for the rest of the process, because semaphores are released
+    whenever they are garbage-collected.
+    """
+    if not hasattr(resource_tracker.unregister, "__wrapped__"):
+        resource_tracker.unregister = _unregister_safely(resource_tracker.unregister)
+
+
 @contextlib.contextmanager
 def local_cluster(workers: int, log: Path) -> Iterator[Any]:
     """A Dask client of worker processes on this machine, with one thread each.
@@ -121,6 +146,7 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
         ),
     }
     with dask.config.set(quiet), contextlib.ExitStack() as stack:
+        _survive_lost_tracker()
         resource_tracker.ensure_running()  # before workers start, because it unblocks signals
         with _interrupts_held():
             try:

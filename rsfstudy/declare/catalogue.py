@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import importlib.util
+import os
 import sys
 import traceback
 from dataclasses import replace
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.declare.names import PACKAGE, names
 from rsfstudy.errors import InvalidValue
+from rsfstudy.paths import check_path
 
 if TYPE_CHECKING:
     from rsfstudy.declare.study import Study
@@ -28,12 +30,13 @@ def load(name: str) -> Study:
         For a name there is no study of, with close matches, and for a file that is not there,
         raises, or declares no study.
     """
+    check_path("study", name)
     if name.endswith(".py"):
         return replace(_declared_in(_run(Path(name)), name), declared_in=name)
     if name not in names():
         near = difflib.get_close_matches(name, names(), n=3, cutoff=0.5)
         remedy = "`rsfstudy list` shows all; or name a file: path/to/study.py."
-        if Path(f"{name}.py").is_file():
+        if os.path.isfile(f"{name}.py"):
             near, remedy = [], f"There is a file {name}.py here: name it {name}.py."
         raise InvalidValue("study", name, "is unknown", choices=near, remedy=remedy)
     study: Study = importlib.import_module(f"{PACKAGE}.{name}").study

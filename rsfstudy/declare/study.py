@@ -14,13 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes.axis import Axis, Row, check_text, plain_values, select, with_values
+from rsfstudy.axes.axis import Axis, Row, check_text, plain_values
+from rsfstudy.axes.overrides import select, with_values
 from rsfstudy.declare import checks, rigs
 from rsfstudy.declare.cell import Cell, Changes
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
 from rsfstudy.declare.shown import study_html
-from rsfstudy.error_boundary import error_boundary, guard_methods
+from rsfstudy.error_boundary import CheckedKeywords, error_boundary, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.motion.accuracy import Accuracy
@@ -49,11 +50,13 @@ from rsfstudy.wording import is_list
 _LONGEST_NAME = 200
 #: Fields that decide what fills a slot.
 _CHOOSING = frozenset({*SLOT_NAMES, *CALLERS})
+#: Most bytes of the name of a study, which leaves room for the suffixes of its files.
+_LONGEST_NAME = 200
 
 
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
-class Study:
+class Study(CheckedKeywords):
     """A parameter study, declared.
 
     Parameters

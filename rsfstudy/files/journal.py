@@ -137,27 +137,41 @@ class Journal:
                 if fresh:
                     _remove(path)
             self._db = _open_exclusively(path or ":memory:")
-            with self._db:
-                self._db.executescript(_TABLES)
-                others = self._db.execute(_FOREIGN).fetchall()
-                row = self._db.execute("SELECT json FROM fingerprint").fetchone()
-                if row is None:
-                    self._db.execute("INSERT INTO fingerprint VALUES (?)", (wanted,))
         except (OSError, sqlite3.Error) as error:
-            told = f"cannot use {self._path}: {error}. {_REMEDY}"
-            if _is_locked(error):
-                told = f"another run uses {self._path}: let it end, or choose another --output."
-            raise DataError(told) from error
-        if others:
+            raise self._unusable(error) from error
+        try:
+            theirs = self._fingerprint_or(wanted)
+            if theirs != wanted:
+                self._accept(theirs, ours)
+        except sqlite3.Error as error:
             self._db.close()
-            found = brief(others[0][0])
-            raise DataError(f"{self._path} holds {found}, which is not ours. {_REMEDY}")
-        if row is not None and row[0] != wanted:
-            self._accept(row[0], ours)
+            raise self._unusable(error) from error
+        except BaseException:
+            self._db.close()  # an open connection would keep the journal locked
+            raise
+
+    def _unusable(self, error: Exception) -> DataError:
+        if _is_locked(error):
+            rule = f"another run uses {self._path}: let it end, or choose another --output."
+            return DataError(rule)
+        return DataError(f"cannot use {self._path}: {error}. {_REMEDY}")
+
+    def _fingerprint_or(self, ours: str) -> Any:
+        """Return the fingerprint of the journal; a new journal is given `ours`."""
+        with self._db:
+            self._db.executescript(_TABLES)
+            others = self._db.execute(_FOREIGN).fetchall()
+            if others:
+                found = brief(others[0][0])
+                raise DataError(f"{self._path} holds {found}, which is not ours. {_REMEDY}")
+            row = self._db.execute("SELECT json FROM fingerprint").fetchone()
+            if row is None:
+                self._db.execute("INSERT INTO fingerprint VALUES (?)", (ours,))
+        return ours if row is None else row[0]
 
     def _accept(self, theirs: Any, ours: Mapping[str, Any]) -> None:
-        """Take over a journal of another fingerprint, where nothing differs but the work allowed,
-        which is more now: no answer depends on it. Any other is refused.
+        """Take over a journal with another fingerprint if only the work budget differs and has
+        become larger, because no answer depends on it. Refuse any other journal.
         """
         try:
             differ = differences(dict(json.loads(theirs)), ours)
@@ -170,9 +184,8 @@ class Journal:
                 f"{name}: {brief(there, 70)} there, {brief(now, 70)} now"
                 for name, (there, now) in differ.items()
             )
-        except (TypeError, ValueError):
+        except (AttributeError, RecursionError, TypeError, ValueError):
             told = "its fingerprint is damaged"
-        self._db.close()
         raise DataError(
             f"{self._path} holds cells computed differently: {told}. "
             "Mixing them would be wrong: start over with --fresh (fresh=True), or choose "
@@ -279,7 +292,7 @@ def timed(path: Path) -> Timed | None:
             (known,) = db.execute("SELECT json FROM fingerprint").fetchone()
             seconds = db.execute("SELECT key, seconds FROM cells WHERE typeof(seconds) = 'real'")
             return Timed(dict(json.loads(known)), dict(seconds))
-    except (OSError, sqlite3.Error, TypeError, ValueError):
+    except (OSError, RecursionError, sqlite3.Error, TypeError, ValueError):
         return None
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rsfstudy.axes.axis import check_text
 from rsfstudy.declare import catalogue, names
 from rsfstudy.defaults import OUTPUT
 from rsfstudy.errors import DataError, InvalidValue, brief
+from rsfstudy.paths import check_path
 
 
 def directory(output: str | Path | None) -> Path | None:
@@ -22,15 +22,7 @@ def directory(output: str | Path | None) -> Path | None:
         return None
     if not isinstance(output, str | Path):
         raise InvalidValue("output", output, "must be a path, or None")
-    check_text("output", str(output))
-    if output == "":
-        remedy = "Name a directory; . is the one you are in."
-        raise InvalidValue("output", output, "is empty", remedy=remedy)
-    try:
-        Path(output).exists()
-    except OSError as error:
-        raise InvalidValue("output", str(output), f"cannot be used ({error.strerror})") from error
-    return Path(output)
+    return check_path("output", output)
 
 
 def results(name: str | Path, output: str | Path | None) -> Path:
@@ -43,6 +35,7 @@ def results(name: str | Path, output: str | Path | None) -> Path:
     DataError, InvalidValue
         If there are none.
     """
+    check_path("study", name)
     path = Path(name)
     if path.suffix in (".nc", ".zarr"):
         return path

@@ -1,6 +1,9 @@
-"""NetCDF files: written under a temporary name, read back, compared, and only then renamed. Each
-ends with a digest of all its bytes, where HDF5 ignores it. It is checked before HDF5 opens the
-file, because HDF5 may hang on damaged bytes. Other programs write none when they save a dataset.
+"""NetCDF files: written under a temporary name, read back, compared, and only then renamed.
+
+Each file ends with a digest of all its bytes, which HDF5 ignores. It is checked before HDF5 opens
+the file, because HDF5 may hang on damaged bytes. A file without it, because another program saved
+the file or because its end was cut off, is checked against the digest of its contents
+(`content_digest`).
 """
 
 from __future__ import annotations
@@ -19,9 +22,12 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.error_boundary import user_stacklevel
-from rsfstudy.errors import DataError, RsfStudyWarning, brief
-from rsfstudy.files import contents
+from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, brief
+from rsfstudy.files import content_digest, contents
+from rsfstudy.files.attributes import check_attributes
 from rsfstudy.files.contents import LAYOUT
+from rsfstudy.netcdf import fill_value_encoding, with_cf_encoding
+from rsfstudy.paths import check_path
 
 #: How Zarr stores are opened: lazily, and none of an older format.
 ZARR: Mapping[str, Any] = {
@@ -55,17 +61,21 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
         If the directory cannot be written, or what is read back differs from what was written.
     """
     clean = clean_attributes(dataset.assign_attrs({"layout": LAYOUT, **dataset.attrs}))
+    clean.attrs.pop(content_digest.ATTRIBUTE, None)
+    digest = {content_digest.ATTRIBUTE: content_digest.compute_content_digest(clean)}
+    stored = clean.assign_attrs(digest)
     beside = path.with_name(f".{path.name}.new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         beside.unlink(missing_ok=True)  # were it a link or a pipe, writing would go elsewhere
         # with a Dask client, xarray would wait for a lock of the cluster, perhaps for ever
+        how: dict[str, Any] = {"engine": "netcdf4", "format": "NETCDF4"}
         with dask.config.set(scheduler="synchronous"):
-            clean.to_netcdf(beside, engine="netcdf4", format="NETCDF4", encoding=_encoding(clean))
+            stored.to_netcdf(beside, **how, encoding=fill_value_encoding(clean))
         with open(beside, "ab") as file:
             file.write(_MARK + _digest_of_bytes(beside, beside.stat().st_size))
         with xr.open_dataset(beside, engine="netcdf4") as back:
-            if not clean.identical(back.load()):
+            if not stored.identical(back.load()):
                 raise DataError(f"{path} was not written: what was read back differs.")
         with open(beside, "rb") as file:
             os.fsync(file.fileno())
@@ -90,6 +100,19 @@ def _digest_of_bytes(path: Path, size: int) -> bytes:
             digest.update(part)
             size -= len(part)
     return digest.hexdigest().encode()
+
+
+def open_store(path: Path) -> xr.Dataset:
+    """Open a Zarr store lazily, with flags of the type of their variables.
+
+    Zarr keeps attributes as JSON, which has one type of number.
+    """
+    dataset = xr.open_dataset(path, **ZARR)
+    for variable in dataset.variables.values():
+        if "flag_values" in variable.attrs:
+            flags = np.asarray(variable.attrs["flag_values"], dtype=variable.dtype)
+            variable.attrs["flag_values"] = flags
+    return dataset
 
 
 def seal(store: Path) -> None:
@@ -162,17 +185,22 @@ def read_any(path: Path) -> xr.Dataset:
         if path.is_dir():
             _check_codecs(path)
             sealed = _check_store(path)
-            dataset = xr.open_dataset(path, **ZARR)
+            dataset = open_store(path)
         else:
             sealed = _check_bytes(path)
             dataset = xr.load_dataset(path, engine="netcdf4")
-    except DataError:
+            if not sealed:
+                content_digest.check_content(dataset, where)
+            dataset.attrs.pop(content_digest.ATTRIBUTE, None)
+    except RsfStudyError:
         raise
     except Exception as error:  # HDF5, Zarr and xarray raise almost anything on damaged data
         raise DataError(f"{where} cannot be read: {brief(error)}") from error
-    if contents.is_of_a_scene(dataset):
-        return dataset  # which users write by xarray, without a digest
+    dataset = with_cf_encoding(dataset)
     try:
+        check_attributes(dataset)
+        if contents.is_of_a_scene(dataset):
+            return dataset  # which users write by xarray, without a digest
         contents.check(dataset)
     except DataError as error:
         raise DataError(f"{where}: {error}") from error
@@ -183,7 +211,8 @@ def read_any(path: Path) -> xr.Dataset:
 
 
 def _check_there(path: Path, where: str) -> None:
-    """Refuse anything but a file or a Zarr store: opening a pipe could wait for ever."""
+    """Refuse anything but a file or a Zarr store, because opening a pipe could wait forever."""
+    check_path("file", path)
     if not path.exists():
         raise DataError(f"{where} does not exist. Run the study first, or name another file.")
     if path.is_dir() and not (path / "zarr.json").is_file():
@@ -229,12 +258,3 @@ def _plain(value: Any) -> Any:
         values = np.asarray(value)
         return values if values.size > 1 else _plain(values.item()) if values.size else ""
     return value
-
-
-def _encoding(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
-    """No fill values on coordinates and flags, where they would mean that data are missing."""
-    plain: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in dataset.coords}
-    for name, values in dataset.data_vars.items():
-        if values.dtype.kind in "iu":
-            plain[name] = {"_FillValue": None}
-    return plain

@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib.util
 import math
 import shutil
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -19,12 +20,12 @@ from rsfstudy.declare.study import Study
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files.journal import Columns, Layout
 from rsfstudy.files.lattice import attributes, coordinates, variables
-from rsfstudy.files.store import ZARR, seal
+from rsfstudy.files.store import ZARR, open_store, seal
 from rsfstudy.status import Status
 
 #: Numbers in one piece, 32 MB of float64: whole rows along the first axis, one at least.
 _NUMBERS = 4_000_000
-#: How stores are written; consolidated metadata have no specification in Zarr's format 3.
+#: How slabs are written; the metadata are consolidated once, with the reductions.
 _STORE: Mapping[str, Any] = {"consolidated": False, "zarr_format": 3}
 
 #: What is known of some cells, in row-major order.
@@ -62,18 +63,21 @@ def write(
     try:
         shutil.rmtree(beside, ignore_errors=True)
         finished = _write_lattice(study, read, beside)
-        lattice = xr.open_dataset(beside, **ZARR)
+        lattice = open_store(beside)
         results = reduce(lattice)
         reductions = _as_objects(results.drop_vars(list(lattice.variables)))
         about = {**attributes(study, finished, provenance), **results.attrs}
-        reductions.assign_attrs(about).to_zarr(beside, mode="a", **_STORE)
+        with warnings.catch_warnings():
+            # Zarr's format 3 does not specify consolidated metadata yet, but xarray looks for them.
+            warnings.filterwarnings("ignore", "Consolidated metadata")
+            reductions.assign_attrs(about).to_zarr(beside, mode="a", zarr_format=3)
         seal(beside)
         beside.rename(path)
     except OSError as error:
         raise DataError(f"cannot write {path}: {error}.") from error
     finally:
         shutil.rmtree(beside, ignore_errors=True)
-    return xr.open_dataset(path, **ZARR)
+    return open_store(path)
 
 
 def _as_objects(dataset: xr.Dataset) -> xr.Dataset:

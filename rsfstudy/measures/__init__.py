@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import CheckedKeywords, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import _checks
 from rsfstudy.measures._checks import Plain
@@ -59,7 +59,7 @@ TAKEN = frozenset({"status", "message", "rhs_evaluations", "wall_time", *FIELDS,
 
 @guard_methods
 @dataclass(frozen=True)
-class Measure:
+class Measure(CheckedKeywords):
     """Base of all measures: runs `find` under a work budget and turns a `Halt` into a status.
 
     What one writes, in a frozen dataclass whose fields are the options of the measure::
@@ -71,9 +71,11 @@ class Measure:
         find(self, scene, accuracy, meter) -> Outcome
 
     `find` returns ``Outcome(status, values)``. `values` has a number for each name of `outputs`,
-    and one called ``<name>_error`` for each with ``error=True``. `accuracy` holds what is asked
-    for (``accuracy.rtol``), and motions charge `meter`, which stops one that takes too much work.
-    Optional is what makes a cell ``unverified`` where its estimates are far too large::
+    and one called ``<name>_error`` for each with ``error=True``. `accuracy` holds the requested
+    accuracy (``accuracy.rtol``), and `meter` counts right-hand sides and stops a motion that takes
+    too many. To follow a motion, pass both on: ``rsfstudy.simulate(scene, accuracy=accuracy,
+    meter=meter)``. To use another measure, call its `charged`. Override `scales` to report a cell
+    as ``unverified`` if its error estimates are far too large::
 
         scales(self, scene, values) -> Mapping[str, float]
     """
@@ -232,7 +234,7 @@ class Measure:
         meter = Meter(accuracy.budget, dict(accuracy.methods), accuracy.engine)
         try:
             outcome = self._checked(self.find(scene, accuracy, meter))
-            if outcome.status is Status.OK:
+            if outcome.status.has_values:
                 outcome = self._held_to(accuracy.rtol, scene, outcome)
         except Halt as halt:
             outcome = Outcome(halt.status, message=str(halt))
@@ -266,7 +268,7 @@ class Measure:
             else _checks.number(declared, inner, name, value)
             for name, value in given
         }
-        lacking = self._lacking(values) if outcome.status is Status.OK else None
+        lacking = self._lacking(values) if outcome.status.has_values else None
         if lacking:
             why = f"{lacking} = {values.get(lacking, math.nan)}"
             return Outcome(Status.NOT_FINITE, values, why)

@@ -13,6 +13,8 @@ _NUMBERS = (
     Output("a_minus_b", "$a-b$", "1", "rate dependence of steady friction"),
     Output("a_minus_b_stderr", "", "1", "standard error of a - b"),
     Output("noise_size", "", "1", "standard deviation of the noise"),
+    Output("outliers", "", "1", "number of rows that were left out as outliers"),
+    Output("friction_quantum", "", "1", "quantum to which friction is rounded, 0 if it is not"),
     Output("noise_order", "", "1", "order of the autoregressive process of the noise"),
     Output("effective_samples", "", "1", "number of independent samples that tell as much"),
     Output("degrees_of_freedom", "", "1", "degrees of freedom of the intervals"),
@@ -26,6 +28,7 @@ _NUMBERS = (
     Output("load_point_noise", "", "um", "standard deviation of noise of the recorded load point"),
     Output("rows_fitted", "", "1", "number of rows in the window"),
     Output("normal_stress_before", r"$\sigma_*$", "Pa", "mean normal stress before the step"),
+    Output("window_stiffness", "$k$", "um-1", "stiffness over normal stress before the step"),
     *(
         Output(name, "", "1", f"{name} of parameters", dims=("parameter", "other_parameter"))
         for name in ("covariance", "correlation")
@@ -59,12 +62,24 @@ _DRAWN = (
 )
 
 
-def outputs_of(parameters: Sequence[str], drawn: bool) -> tuple[Output, ...]:
-    """Each parameter with its errors, draws of all if there are any, numbers that go with them, and
-    the rows of the record.
+def outputs_of(parameters: Sequence[str], drawn: bool, windows: int) -> tuple[Output, ...]:
+    """List the outputs of a fit: parameters with errors, draws, other numbers, and rows.
+
+    Parameters
+    ----------
+    parameters : sequence of str
+    drawn : bool
+        Include draws from the posterior.
+    windows : int
+        Number of windows that are fitted together. If there are several, the normal stress before
+        the step is an output for each.
     """
     found = [output for name in parameters for output in _of_parameter(name)]
-    return (*found, *(_DRAWN if drawn else ()), *_NUMBERS, *_ROWS_OF)
+    stresses = [
+        Output(f"normal_stress_before_{n}", "", "Pa", f"mean normal stress before step {n}")
+        for n in range(1, windows + 1 if windows > 1 else 1)
+    ]
+    return (*found, *(_DRAWN if drawn else ()), *_NUMBERS, *stresses, *_ROWS_OF)
 
 
 def _of_parameter(name: str) -> Iterator[Output]:

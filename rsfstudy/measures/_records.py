@@ -17,6 +17,7 @@ from rsfstudy.motion.accuracy import Accuracy, error_between
 from rsfstudy.motion.course import follow
 from rsfstudy.motion.events import Event, EventSpecification, Kind
 from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.neglected_inertia import estimate_neglected_inertia
 from rsfstudy.motion.readings import friction_coefficient_of
 from rsfstudy.motion.recording import PLACE, Recording
 from rsfstudy.motion.starting import before_start
@@ -63,6 +64,9 @@ class Record(NamedTuple):
         The last event.
     rows : ndarray
         What was recorded, shape (rows, columns): see `motion.recording`.
+    neglected : ndarray
+        Error of ln V by the inertia that is neglected up to each row: see
+        `motion.neglected_inertia`.
     """
 
     begun: list[Event]
@@ -70,11 +74,17 @@ class Record(NamedTuple):
     peak: Event | None
     end: Event
     rows: np.ndarray
+    neglected: np.ndarray
 
     @property
     def begin(self) -> Event:
         """Where the record begins."""
         return self.begun[0]
+
+    def neglected_until(self, time: float) -> float:
+        """Return the error of ln V by the inertia that is neglected up to a time."""
+        row = min(int(np.searchsorted(self.rows[:, 0], time)), len(self.rows) - 1)
+        return float(self.neglected[row])
 
 
 def followed(
@@ -125,14 +135,17 @@ def followed(
     except Halt:
         if peak is None or not halts:
             raise
-    rows = recording.seen(scene)
-    rows = rows[rows[:, 0] >= begun[first].time]
+    rows, start = recording.seen(scene), before_start(scene)
+    slow = recording.number(scene.dynamics.regime)
+    neglected = estimate_neglected_inertia(scene, rows, slow, start.log_slip_rate)
+    shown = rows[:, 0] >= begun[first].time
+    rows, neglected = rows[shown], neglected[shown]
     rows[0, PLACE] = 0.0  # of the step that ends there, no other rows are left
     friction, later = friction_coefficient_of(rows), begun[max(first, 1) :]
     before = [float(friction[rows[:, 0] == each.time][0]) for each in later]
     if first == 0:
-        before.insert(0, before_start(scene).reading)
-    return Record(begun[first:], before, peak, event, rows)
+        before.insert(0, start.reading)
+    return Record(begun[first:], before, peak, event, rows, neglected)
 
 
 def since(begin: Event, path: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -162,15 +175,20 @@ class Recorded(Measure):
 
 
 def error_of(
-    value: float, refined: float, by_friction: float, scene: Scene, accuracy: Accuracy
+    value: float,
+    refined: float,
+    by_friction: float,
+    scene: Scene,
+    accuracy: Accuracy,
+    neglected: float = 0.0,
 ) -> float:
-    """Error estimate of a number that is read at single instants.
+    """Estimate the error of a number that is read at single instants.
 
     On a stiff machine stability limits the steps, so that the errors of two runs may agree at an
     instant by chance. What that hides is a part of the number, and of the friction that it is a
     difference of: of a, by which friction changes where ln V does by 1. So of y, of y' by the
-    refined run, and with eps the accuracy asked for, the error is ``3 |y - y'| + 0.01 eps |y| + 0.1
-    eps a |dy/dmu|``.
+    refined run, with eps the accuracy asked for and e the neglected inertia, the error is ``3 |y -
+    y'| + 0.01 eps |y| + (0.1 eps + e) a |dy/dmu|``.
 
     Parameters
     ----------
@@ -180,13 +198,15 @@ def error_of(
         Change of the number by that of a friction coefficient which it is read from, dy/dmu.
     scene : Scene
     accuracy : Accuracy
+    neglected : float
+        Error of ln V that both runs share, because both neglect the same part of inertia.
 
     Returns
     -------
     float
         In the units of the number.
     """
-    friction = _AT_AN_INSTANT * accuracy.rtol * scene.a
+    friction = (_AT_AN_INSTANT * accuracy.rtol + neglected) * scene.a
     chance = BY_CHANCE * accuracy.rtol
     return error_between(value, refined, chance) + friction * abs(by_friction)
 
@@ -197,9 +217,13 @@ def errors_of(
     by_friction: Mapping[str, float],
     scene: Scene,
     accuracy: Accuracy,
+    neglected: Mapping[str, float] | None = None,
 ) -> dict[str, float]:
-    """Error estimates of several numbers, as `<name>_error` (see `error_of`)."""
+    """Estimate the errors of several numbers, as `<name>_error` (see `error_of`)."""
+    shared = neglected or dict.fromkeys(values, 0.0)
     return {
-        f"{name}_error": error_of(value, refined[name], by_friction[name], scene, accuracy)
+        f"{name}_error": error_of(
+            value, refined[name], by_friction[name], scene, accuracy, shared[name]
+        )
         for name, value in values.items()
     }

@@ -40,6 +40,8 @@ KINDS: Mapping[str, type[Steps]] = {
     "normal_stress_step": NormalStressSteps,
 }
 DIRECTIONS = ("up", "down")
+#: Other names of what is stepped; fields of scenes have the names of `KINDS`.
+SYNONYMS: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
 #: Accuracy of a boundary that is a limit cycle, whatever is asked for.
 _CAREFUL = 1e-8
@@ -76,7 +78,8 @@ class CriticalStep(Measure):
     Parameters
     ----------
     of : {"load_velocity_ratio", "displacement_step", "normal_stress_step"}
-        What is stepped, whatever value the scene holds for it. After a step of displacement or of
+        What is stepped, whatever value the scene holds for it; "velocity_step" is another name of
+        "load_velocity_ratio". After a step of displacement or of
         normal stress the load point is held (V_0 = 0) unless the scene states its
         `load_velocity_ratio`. Normal stress that is constant has no steps; falls of it trigger
         (direction "down", and a negative number).
@@ -96,7 +99,9 @@ class CriticalStep(Measure):
     clocks: ClassVar[tuple[bool, ...]] = (False,)
 
     def __post_init__(self) -> None:
-        if self.of not in KINDS:
+        if isinstance(self.of, str):
+            object.__setattr__(self, "of", SYNONYMS.get(self.of, self.of))
+        if not isinstance(self.of, str) or self.of not in KINDS:
             raise InvalidValue("of", self.of, "cannot be stepped", choices=KINDS)
         if self.direction not in DIRECTIONS:
             raise InvalidValue("direction", self.direction, "is unknown", choices=DIRECTIONS)

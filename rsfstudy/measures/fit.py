@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rsfstudy.analysis.fitting import posterior
+from rsfstudy.analysis.fitting.filters import Filter
 from rsfstudy.analysis.fitting.intervals import interval
 from rsfstudy.analysis.fitting.joint import Joint, is_own, numbered, plain
 from rsfstudy.analysis.fitting.model import (
@@ -24,8 +25,9 @@ from rsfstudy.analysis.fitting.model import (
 from rsfstudy.analysis.fitting.noise import WHITE, check_noise, whiteness
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
-from rsfstudy.analysis.fitting.steps import Step, noise_variance
-from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess
+from rsfstudy.analysis.fitting.steps import Step
+from rsfstudy.analysis.fitting.validity import find_reasons, name_outliers
+from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess, stiffness_factors
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
@@ -102,6 +104,12 @@ class Fit(Measure):
     loading : {"steps", "recorded"}
         The load point moves steadily between its steps; or as recorded, and normal stress with it,
         unless that of the scene is constant.
+    machine_stiffness : float
+        Stiffness of the machine in Pa/um. It is divided by the normal stress before the step of
+        each window. Zero: stiffness over normal stress is that of the scene in all windows.
+    filter : str
+        Filter that friction passed before it was recorded, such as "mean 1.0" (see
+        `analysis.fitting.filters.Filter`). Empty if there is no filter.
     posterior : int
         Draws from the posterior (see `analysis.fitting.posterior`); none, unless asked for.
 
@@ -124,7 +132,9 @@ class Fit(Measure):
     part: float = 1.0
     noise: str = "ar"
     loading: str = "steps"
+    filter: str = ""
     posterior: int = 0
+    machine_stiffness: float = 0.0
     name: ClassVar[str] = "fit"
     typical_work = 250_000
     dimensions = (
@@ -138,6 +148,7 @@ class Fit(Measure):
         Quantity("part", "", "1", "part of what follows the step that is fitted"),
         Quantity("noise", "", "", "model of the noise"),
         Quantity("loading", "", "", "where the loading is taken from"),
+        Quantity("filter", "", "", "filter that friction passed before it was recorded"),
     )
 
     def __post_init__(self) -> None:
@@ -164,6 +175,7 @@ class Fit(Measure):
             rule = "is that of a loading by steps"
             raise InvalidValue("free", "step_time", rule, remedy="Leave it out.")
         check_noise(self.noise)
+        Filter.parse(self.filter)
         posterior.check(self.posterior)
 
     @property
@@ -197,7 +209,7 @@ class Fit(Measure):
     @property
     def outputs(self) -> Sequence[Output]:
         """Each parameter with its errors, what goes with all of them, and the rows."""
-        return outputs_of(self.parameters, self.posterior > 0)
+        return outputs_of(self.parameters, self.posterior > 0, len(self._steps))
 
     @property
     def quantities(self) -> Sequence[Quantity]:
@@ -259,7 +271,11 @@ class Fit(Measure):
             return self._widened(replace(self, free=own).find(scene, accuracy, meter))
         smooth = accuracy.at(min(accuracy.rtol, _SMOOTH))
         windows = self._windows
-        parts = [w.model(scene, self.free, self.loading, smooth, meter) for w in windows]
+        per_um = self.machine_stiffness * self.slip_distance_guess
+        scenes = [w.scene(scene, per_um) for w in windows]
+        of_each = zip(windows, scenes, strict=True)
+        parts = [w.model(one, self.free, self.loading, smooth, meter) for w, one in of_each]
+        parts = [replace(part, filter=Filter.parse(self.filter)) for part in parts]
         if self.noise == WHITE:  # the usual formula
             parts = [replace(part, moves=()) for part in parts]
         distances = self.slip_distance_guess, self.slip_distance_2_guess
@@ -269,13 +285,18 @@ class Fit(Measure):
             first = guess | first
             if len(windows) > 1:
                 first |= {f"{n}_{number}": v for n, v in guess.items() if is_own(n)}
-        model = Joint(tuple(parts))
+        one_machine = self.machine_stiffness > 0.0 or "stiffness" in self.free
+        model = Joint(tuple(parts), stiffness_factors(windows) if one_machine else ())
         search = Search(model, first, self.parameters, self.noise)
         found = search.run()
         unidentified = self._unidentified(found, parts[0], windows[0].step)
         rows = [window.rows + self._first_rows[window.record] for window in windows]
         values = self._told(found, np.concatenate(rows), model)
-        values |= (place := _place(windows[0]))
+        values |= (place := windows[0].about)
+        values["window_stiffness"] = found.values["stiffness"]
+        if len(windows) > 1:
+            stresses = enumerate(windows, start=1)
+            values |= {f"normal_stress_before_{n}": w.normal_stress for n, w in stresses}
         for name in self.parameters:
             told = name not in unidentified
             ends = interval(search, found, name) if told else search.bounds(name)
@@ -290,7 +311,10 @@ class Fit(Measure):
                 text += "; friction does not change at the step as velocity does: "
                 text += "see whether columns (time and displacement, say) are exchanged"
             return Outcome(Status.NOT_IDENTIFIED, values, text)
-        return Outcome(Status.OK, values, self._remark(found, place["load_point_noise"]))
+        remarks = (name_outliers(found.outliers), self._remark(found, place["load_point_noise"]))
+        reasons = find_reasons(found, model.friction)
+        status = Status.ERRORS_NOT_VALID if reasons else Status.OK
+        return Outcome(status, values, "; ".join(filter(None, (*reasons, *remarks))))
 
     def _widened(self, outcome: Outcome) -> Outcome:
         """An outcome of fewer parameters, with NaN in matrices where those of other laws stand."""
@@ -355,17 +379,18 @@ class Fit(Measure):
             variance_of_rate = float(signs @ covariance @ signs)
         b = sum(found.values.get(name, 0.0) for name in ("b", "b1", "b2"))
         trend = model.trend(found.values)
-        left = model.friction - found.curve - trend
         variance = float(np.var(model.friction)) or math.nan
         values |= {
             "a_minus_b": found.values["a"] - b,
             "a_minus_b_stderr": math.sqrt(max(variance_of_rate, 0.0)),
             "noise_size": found.noise_sd,
+            "outliers": len(found.outliers),
+            "friction_quantum": found.quantum,
             "noise_order": found.noise.order,
             "effective_samples": found.noise.effective_samples,
             "degrees_of_freedom": found.degrees_of_freedom,
             "whiteness": whiteness(found.innovations, found.noise.order),
-            "r_squared": 1.0 - float(np.var(left)) / variance,
+            "r_squared": 1.0 - float(np.var(found.residuals)) / variance,
             "rows_fitted": len(rows),
             "criterion": found.criterion,
             "covariance": covariance,
@@ -375,8 +400,8 @@ class Fit(Measure):
             "fitted_friction": found.curve + trend,
             "fitted_friction_stderr": found.band,
             "detrended_friction": found.curve,
-            "residual": left,
-            "innovation": found.innovations,
+            "residual": found.residuals,
+            "innovation": found.all_innovations,
         }
         for name in (about.name for about in COLUMNS[:3]):
             whole = [record.columns[name] for record in self._first_rows]
@@ -385,20 +410,3 @@ class Fit(Measure):
             values[name] = along_rows = np.full(len(self.inner_coordinates["row"]), math.nan)
             along_rows[slice(len(column)) if name.startswith("record_") else rows] = column
         return values
-
-
-def _place(window: Window) -> dict[str, float]:
-    """Velocities of the step of a window, its ends, normal stress before the step, and how noisy
-    the load point is.
-    """
-    record, rows = window.record, window.rows
-    moved, time = record.columns["displacement"][rows], record.time[rows]
-    stress = record.columns.get("normal_stress", np.full(len(record), math.nan))[rows]
-    return {
-        "load_point_noise": math.sqrt(noise_variance(time, moved)),
-        "velocity_before": window.step.before,
-        "velocity_after": window.step.after,
-        "window_begins": moved[0],
-        "window_ends": moved[-1],
-        "normal_stress_before": stress[: max(np.searchsorted(time, window.step.begins), 1)].mean(),
-    }

@@ -9,14 +9,21 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from rsfstudy.analysis.settling import is_attracted
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures._records import Record, Recorded, errors_of, followed, recorded, since
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.events import Event, maximum, settling
+from rsfstudy.motion.events import Event, Kind, maximum, settling
 from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.readings import friction_coefficient_of, load_point_of, unsteady, watched
+from rsfstudy.motion.readings import (
+    friction_coefficient_of,
+    growth_along_path,
+    load_point_of,
+    unsteady,
+    watched,
+)
 from rsfstudy.motion.recording import READ, along_path
 from rsfstudy.quantity import Output
 from rsfstudy.slider.loading import Segment
@@ -98,6 +105,8 @@ class Healing(Recorded):
             "; ".join(filter(None, ("no peak of friction on reloading", said))),
         )
         if first.peak is None:
+            if first.end.kind is Kind.SETTLED:
+                is_attracted(scene)  # halts if that is undecided
             return peakless
         again = _follow(scene, hold, accuracy.refined(), meter, self._end(scene, hold, first.peak))
         if again.peak is None:
@@ -106,10 +115,16 @@ class Healing(Recorded):
             _read(scene, record, peak)
             for record, peak in ((first, first.peak), (again, again.peak))
         )
+        history = scene.parts.loading.segments
         # friction peaks where slip rate passes that of the load point, ln V being friction over a
-        turning = 1.0 / (scene.a * first.peak.point.growth) if first.peak.point.growth else math.inf
+        growth = growth_along_path(scene, first.peak, history[hold + 1].load_velocity)
+        turning = 1.0 / (scene.a * growth) if growth else math.inf
         by_friction = {"healing": 1.0, "relaxation": 1.0, "peak_displacement": turning}
-        errors = errors_of(values, refined, by_friction, scene, accuracy)
+        neglected = dict.fromkeys(values, first.neglected_until(first.peak.time))
+        neglected["relaxation"] = first.neglected_until(first.begun[1].time)
+        # the displacement depends on the growth of friction there, whose error rises earlier
+        neglected["peak_displacement"] = first.neglected_until(math.inf)
+        errors = errors_of(values, refined, by_friction, scene, accuracy, neglected)
         above = again.peak.point.reading - float(friction_coefficient_of(again.rows)[-1])
         # beside steady sliding friction turns within the tolerance, where two runs may agree
         if above <= max(errors["healing_error"], _TURNS * accuracy.refined().solver):

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from rsfstudy.analysis.settling import is_attracted
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
@@ -123,10 +124,11 @@ class StepResponse(Recorded):
         for event in follow(scene, accuracy, meter, asked, clock=True, recording=recording):
             if event.kind is Kind.MAXIMUM or _tops_at_start(scene, event):
                 peaks.append(event.point.log_slip_rate / LN10)
-            if event.kind is Kind.SETTLED and not peaks:
+            settles = event.kind is Kind.SETTLED and is_attracted(scene)
+            if settles and not peaks:
                 text = "slip rate has no maximum: it changes steadily to that of the load point"
                 raise Halt(Status.NOT_APPLICABLE, text)
-            if len(peaks) == self.peaks or event.kind is Kind.SETTLED:
+            if len(peaks) == self.peaks or settles:
                 return np.array(peaks), recording.seen(scene, until=event)
         raise AssertionError("a motion never ends by itself")
 

@@ -8,13 +8,15 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from numbers import Real
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import CheckedKeywords, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import SCIPY, named
 
 DEFAULT_RTOL = 1e-7
 TIGHTEST_RTOL, LOOSEST_RTOL = 1e-11, 1e-2
 DEFAULT_BUDGET = 500_000
+#: More than any computer evaluates; files hold it.
+LARGEST_BUDGET = 10**15
 #: The loosest accuracy that decides where to leave the slow manifold: its series in mass turns back
 #: at a change of ln V of 0.08, which a motion that is to leave it beyond would never reach.
 _LOOSEST_SWITCH = 2e-5
@@ -27,7 +29,7 @@ ROUNDING = 1e-13
 
 @guard_methods
 @dataclass(frozen=True)
-class Accuracy:
+class Accuracy(CheckedKeywords):
     """The accuracy a result must meet, and the work it may cost.
 
     Parameters
@@ -69,8 +71,9 @@ class Accuracy:
                 f"must lie between {TIGHTEST_RTOL:g} and {LOOSEST_RTOL:g}",
                 remedy="Below that, rounding decides; above it, nothing is resolved.",
             )
-        if not 1 <= self.budget < math.inf or self.budget % 1:
-            raise InvalidValue("budget", self.budget, "must be a whole number from 1")
+        if not 1 <= self.budget <= LARGEST_BUDGET or self.budget % 1:
+            rule = f"must be a whole number from 1 to {LARGEST_BUDGET:,}"
+            raise InvalidValue("budget", self.budget, rule)
         object.__setattr__(self, "budget", int(self.budget))
         object.__setattr__(self, "engine", named(self.engine))
         if self.methods and self.engine != SCIPY:

@@ -19,6 +19,7 @@ from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.places import BEGINS, ENDS_AT, LOADING, LOG_LOAD_RATE, LOG_VELOCITY
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import FOR_EVER, Scene
+from rsfstudy.slider.stability import largest_growth_rate
 
 
 def follow(
@@ -78,7 +79,7 @@ def follow(
         elif number:
             start = jumped(acting, start)
         goes_on = number == len(chains) - 1 and not acting.parts.loading.unknowns
-        asked = specs if goes_on else _without_settling(specs)
+        asked = specs if goes_on and _may_settle(scene, specs) else _without_settling(specs)
         table = _up_to(table, until)
         end = float(table[-1, ENDS_AT])
         motion = runner_of(acting, meter.engine, clock=clock).run(
@@ -161,6 +162,17 @@ def _begun(
     for spec, point in happening(*before, event.point, acting.numbers, specs):
         # slip from the first point: the spring may have jumped with the load point
         yield event._replace(kind=spec.kind, watch=spec, point=point)
+
+
+def _may_settle(scene: Scene, specs: Sequence[EventSpecification]) -> bool:
+    """Return False if small changes of steady sliding grow under the last segment of loading.
+
+    The growth rate is computed only if settling is among the specifications.
+    """
+    if scene.log_load_rate == -math.inf or all(spec.kind is not Kind.SETTLED for spec in specs):
+        return True
+    growth = largest_growth_rate(scene.acting(-1), scene.log_load_rate)
+    return growth is None or not growth.is_positive
 
 
 def _without_settling(specs: Sequence[EventSpecification]) -> list[EventSpecification]:

@@ -6,10 +6,10 @@ Who measures a motion asks to be told of
 
     maximum(of), minimum(of)    an extremum of a quantity
     rise(of, to), fall(of, to)  its crossing of a level, on the way up or down
-    settling(part)              how far the slider is from steady sliding has become less than a
-                                part of the farthest so far (told at the end of each step while so,
-                                in the segment of loading that goes on for ever, and not
-                                where that goes on changing normal stress)
+    settling(part)              the distance from steady sliding is below a fraction of the largest
+                                distance so far. The event is reported at the end of each such step
+                                in the last segment of loading, unless normal stress goes on
+                                changing there or small changes of steady sliding grow.
 
 and of nothing else. Each may end the motion. Quantities are the numbers of a `Point`, and the
 friction coefficient that is read, ``reading`` (see `readings`); extrema are told of
@@ -80,8 +80,10 @@ def fall(of: str, to: float, *, ends: bool = False, waits: bool = False) -> Even
 
 
 def settling(part: float, *, ends: bool = False) -> EventSpecification:
-    """Close to steady sliding: within a part of the largest distance so far, in ln V or in the
-    state over b.
+    """Return the specification of a motion that comes close to steady sliding.
+
+    The distance, in ln V or in a state over b, must fall below a fraction of the largest distance
+    so far. Unknowns that a part lists in `excluded_from_distance` do not count.
     """
     return EventSpecification(Kind.SETTLED, level=part, ends=ends)
 

@@ -101,7 +101,7 @@ SLOW, FAST = 0, 1
 FUNCTIONS = 4
 
 #: Columns of the table of event specifications.
-SPECIFIED = KIND, OF, LEVEL, ENDS, WAITS, FARTHEST = 0, 1, 2, 3, 4, 5
+SPECIFIED = KIND, OF, LEVEL, ENDS, WAITS, FARTHEST, FARTHEST_FRICTION = 0, 1, 2, 3, 4, 5, 6
 MAXIMUM, MINIMUM, RISE, FALL, SETTLED = range(5)
 
 #: When the slider is recorded: never, evenly within each step, or at clocks or times asked for.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from rsfstudy.errors import RsfStudyError
 from rsfstudy.motion.engines import SCIPY
 from rsfstudy.status import Status
 
@@ -20,7 +21,7 @@ def more_work(budget: int) -> str:
     return f"; --budget {4 * budget} (budget=) allows more"
 
 
-class Halt(Exception):
+class Halt(RsfStudyError):
     """A motion that cannot go on, with the status that says why."""
 
     def __init__(self, status: Status, message: str) -> None:

@@ -6,9 +6,15 @@ import math
 
 import numpy as np
 
+from rsfstudy.motion.events import Event
 from rsfstudy.motion.recording import OBSERVED, READ
+from rsfstudy.slider.equations import IN_RUPTURE
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
+from rsfstudy.slider.system import UNITS, path_metric
+
+#: Smallest square of a direction cosine of the path in a rupture, where ln V changes at once.
+LEAST = 1e-12
 
 
 def unsteady(scene: Scene, point: Point, load_velocity: float) -> float:
@@ -20,6 +26,26 @@ def unsteady(scene: Scene, point: Point, load_velocity: float) -> float:
         abs(point.log_slip_rate - math.log(abs(load_velocity))),
         point.distance_from_steady_state / size,
     )
+
+
+def growth_along_path(scene: Scene, event: Event, load_velocity: float) -> float:
+    """Compute the growth of ln V at an event along the path between ruptures.
+
+    In a rupture the clock is the path in inertial time, which is another unit of length.
+
+    Parameters
+    ----------
+    scene : Scene
+    event : Event
+    load_velocity : float
+        V_0/V_*.
+    """
+    growth = event.point.growth
+    if event.regime != IN_RUPTURE:
+        return growth
+    norm = scene.inertial_time * (math.exp(event.point.log_slip_rate) + load_velocity)
+    slant = growth / (UNITS * math.sqrt(max(1.0 - (growth / UNITS) ** 2, LEAST)) * norm)
+    return UNITS * slant * path_metric(slant)
 
 
 def watched(scene: Scene) -> tuple[str, float]:

@@ -19,8 +19,10 @@ from rsfstudy.motion.layout import (
     ENDS,
     EVENT_REGIME,
     FARTHEST,
+    FARTHEST_FRICTION,
     FRICTION,
     GROWTH,
+    IMBALANCE,
     KIND,
     KINK,
     LEVEL,
@@ -56,6 +58,9 @@ from rsfstudy.slider.places import LOAD_VELOCITY, LOG_LOAD_RATE, STIFFNESS, B
 #: less that which is looked for, and how far the motion is from its end.
 #: Not whole numbers, of each of which the compiler would make a case of its own.
 EXCESS, PASSED, MARGIN = -1.0, -2.0, -3.0
+#: Level of settling for slip rate and the sum of the states of the law, relative to the level for
+#: all unknowns. One huge unknown cannot end a motion whose slip rate still changes.
+LENIENT = 10.0
 #: Where something happens between two points.
 NOWHERE, BEFORE, AFTER = range(3)
 
@@ -209,8 +214,11 @@ def detect(motion, space):
                 continue
             apart = abs(space.after[LOG_RATE] - p[LOG_LOAD_RATE])
             away = max(apart, space.after[DISTANCE] / abs(p[B]))
+            friction = max(apart, abs(space.after[IMBALANCE]) / abs(p[B]))
             spec[FARTHEST] = max(spec[FARTHEST], away)
-            if away < spec[LEVEL] * spec[FARTHEST]:
+            spec[FARTHEST_FRICTION] = max(spec[FARTHEST_FRICTION], friction)
+            near = away < spec[LEVEL] * spec[FARTHEST]
+            if near and friction < LENIENT * spec[LEVEL] * spec[FARTHEST_FRICTION]:
                 space.when[w] = motion.end
         else:
             before, after = quantity(spec, space.before, p), quantity(spec, space.after, p)

@@ -88,7 +88,8 @@ def figure(
     variable : str, optional
         Draw this variable instead: as maps over two numeric axes, else as lines.
     style : path, str, dict or list of those, optional
-        What `matplotlib.style.use` takes, to be laid over the style that ships.
+        Style sheets (files that end in ``.mplstyle``), names of styles of matplotlib, or settings,
+        applied on top of the style of rsfstudy.
 
     Raises
     ------
@@ -271,7 +272,7 @@ def save(
         raise
     except Exception as error:
         rule = f"does not fit these results ({type(error).__name__}: {error})"
-        raise InvalidValue("plot", declaration(dataset).plot, rule, choices=NAMES) from error
+        raise InvalidValue("plot", declaration(dataset).plot, rule) from error
     write_image(image, path)
 
 

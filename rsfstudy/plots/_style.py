@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from matplotlib import rcParams, style
+from matplotlib import RcParams, rcParams, style
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 from matplotlib.container import ErrorbarContainer
@@ -24,11 +24,13 @@ from matplotlib.text import Text
 from matplotlib.transforms import blended_transform_factory, offset_copy
 
 from rsfstudy.error_boundary import check_file
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import InvalidValue, RsfStudyError, brief
 from rsfstudy.plots._text import length, wrapped
 
 #: The style sheet that ships.
 SHEET = Path(__file__).with_name("rsfstudy.mplstyle")
+#: Ending of style sheets.
+_SUFFIX = ".mplstyle"
 MM = 1.0 / 25.4
 #: Between the two columns of a journal, in inches.
 _GAP = 6.0 * MM
@@ -39,30 +41,105 @@ _BAR = 0.24
 
 @contextlib.contextmanager
 def styled(over: Any = None) -> Iterator[None]:
-    """Draw in the style that ships, with another laid over it.
+    """Apply the style sheet of rsfstudy, and other styles on top of it.
 
     Parameters
     ----------
     over : path, str, dict or list of those, optional
-        What `matplotlib.style.use` takes: a style sheet, the name of one, or settings.
+        A style sheet (a file that ends in ``.mplstyle``), the name of a style in
+        ``matplotlib.style.available``, or settings of matplotlib.
 
     Raises
     ------
     InvalidValue
-        Where there is no such style.
+        If a style is none of these, if it contains a setting that matplotlib does not have, or if
+        a figure cannot be drawn in it, for example because it needs a LaTeX that is not installed.
     """
     others = over if isinstance(over, list | tuple) else [over]
-    sheets = [SHEET, *(other for other in others if other is not None)]
-    for other in others:
-        if isinstance(other, str | Path):
-            check_file("style", other)
-    with contextlib.ExitStack() as stack:
+    settings = [_settings_of(other) for other in others if other is not None]
+    with style.context([SHEET, *settings]):
         try:
-            stack.enter_context(style.context(sheets))
-        except (OSError, TypeError, UnicodeDecodeError) as error:
-            rule = "is neither a style sheet of matplotlib nor the name of one"
-            raise InvalidValue("style", str(over), rule) from error
-        yield
+            yield
+        except (RsfStudyError, OSError):
+            raise
+        except Exception as error:  # settings that are valid alone may not be together
+            if not settings:
+                raise
+            rule = f"a figure cannot be drawn in it: {brief(error).rstrip('.')}"
+            remedy = "Draw it without this style to find out if the style is the reason."
+            raise InvalidValue("style", _plain(over), rule, remedy=remedy) from error
+
+
+def _settings_of(over: Any) -> str | dict[str, Any]:
+    """Return what `matplotlib.style.use` takes: the name of a style, or checked settings.
+
+    Matplotlib itself would import a package for a dotted name, download a style sheet, and read
+    any text file as a style sheet, with a warning for each of its lines.
+    """
+    if isinstance(over, Mapping):
+        return _checked(over)
+    if isinstance(over, str) and over in ("default", *style.available):
+        return over
+    if isinstance(over, str | Path) and Path(over).suffix == _SUFFIX:
+        return _read_sheet(Path(over))
+    rule = f"is neither a style sheet, which ends in {_SUFFIX}, nor the name of a style"
+    raise InvalidValue("style", _plain(over), rule, choices=["default", *style.available])
+
+
+def _plain(over: Any) -> Any:
+    return str(over) if isinstance(over, Path) else over
+
+
+def _checked(settings: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return settings as matplotlib converts them; reject unknown names and invalid values."""
+    checked: Any = RcParams()
+    for name, value in settings.items():
+        if name not in rcParams:
+            rule = "is not a setting of matplotlib"
+            raise InvalidValue("style", name, rule, choices=rcParams)
+        try:
+            checked[name] = value
+        except Exception as error:  # validators of matplotlib raise anything
+            reason = brief(error).removeprefix(f"Key {name}: ").rstrip(".")
+            rule = f"is not a valid value of {name}: {reason}"
+            raise InvalidValue("style", value, rule) from error
+    return dict(checked)
+
+
+def _read_sheet(path: Path) -> dict[str, Any]:
+    """Return the settings of a style sheet."""
+    check_file("style", path)
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is not text in UTF-8"
+        raise InvalidValue("style", str(path), f"cannot be read: {reason}") from error
+    settings: dict[str, Any] = {}
+    for number, line in enumerate(lines, start=1):
+        name, colon, value = _without_comment(line).partition(":")
+        if not name.strip():
+            continue
+        try:
+            if not colon:
+                raise InvalidValue("style", line, "must read NAME: VALUE")
+            settings |= _checked({name.strip(): _without_quotes(value.strip())})
+        except InvalidValue as error:
+            raise error.at(f"{path}, line {number}") from error
+    return settings
+
+
+def _without_comment(line: str) -> str:
+    """Return a line up to the first # outside double quotes, as matplotlib reads it."""
+    parts = line.split('"')
+    for number in range(0, len(parts), 2):
+        before, mark, _comment = parts[number].partition("#")
+        if mark:
+            return '"'.join([*parts[:number], before])
+    return line
+
+
+def _without_quotes(value: str) -> str:
+    return value[1:-1] if len(value) > 1 and value[0] == value[-1] == '"' else value
 
 
 def size(columns: int, rows: int, height: float | None = None) -> tuple[float, float]:

@@ -51,7 +51,7 @@ __all__ = [
 ]
 
 #: What tells of the quality of a result, by the ends of their names.
-_BESIDE = ("error", "stderr", "misfit", "points")
+_BESIDE = ("error", "stderr", "misfit", "points", "status")
 
 
 @error_boundary
@@ -77,7 +77,13 @@ def reduced(
         if not reduction.of_failures:
             own = drawn.get(reduction.of, own)
         support = known(support, reduction.of, own)
-        made = carried(reduction, support, reduction(support))
+        found: object = reduction(support)  # user-defined reductions may return anything
+        if not isinstance(found, xr.Dataset):
+            rule = "must return an xarray.Dataset of the new variables"
+            remedy = "Write return self.results('how it was found', {'': values})."
+            what = f"result of {reduction.kind}"
+            raise InvalidValue(what, type(found).__name__, rule, remedy=remedy)
+        made = carried(reduction, support, found)
         stated = {q.name: q for q in reduction.quantities}
         quantities = described(reduction, dataset, made)
         for name, values in made.data_vars.items():

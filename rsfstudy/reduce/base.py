@@ -10,7 +10,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import CheckedKeywords, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.status import Status
@@ -26,30 +26,35 @@ Fields = Mapping[str, Sequence[str]]
 
 #: How a result comes by its error, for the attributes of that.
 COMMENT = "errors of the cells it draws on, each times the derivative by it, in absolute value"
+#: Endings of the names of variables that hold statistical errors.
+_STATISTICAL = ("_stderr", "_low", "_high", "covariance", "correlation")
 #: Rounding error by which a coordinate value may miss a range and still count as in it.
 ROUNDING = 1e-9
 
 
 @guard_methods
 @dataclass(frozen=True)
-class Reduction:
+class Reduction(CheckedKeywords):
     """Base of all reductions: ``reduction(dataset)`` gives a dataset of the new variables.
 
-    What one writes, in a frozen dataclass whose fields beside `name` and `of` are its options::
+    A user-defined reduction is a frozen dataclass derived from this class. Its fields besides
+    `name` and `of` are its options. The only method that it must define is::
 
-        kind: ClassVar[str]
         __call__(self, dataset) -> xarray.Dataset
 
-    `name` is what the result is called, and `of` the variable that is reduced. Cells that failed
-    hold NaN in `dataset`, which has their `status`. Optional are what tells names and units, and
-    what carries numerical errors of cells over to ``<name>_error``::
+    `name` is the name of the result, and `of` the variable to reduce. Failed cells hold NaN in
+    `dataset`, which also has their `status`. Optional class attributes and methods define the name
+    of the reduction in files (`kind`, by default the class name), the long names and units of its
+    results, and the derivatives that carry the numerical errors of cells over to
+    ``<name>_error``::
 
+        kind: ClassVar[str]
         long_names: ClassVar[Mapping[str, str]]
         measured_in: ClassVar[Mapping[str, Sequence[str]]]
         derivatives(self, dataset) -> Sequence[tuple[xarray.DataArray, Mapping]]
     """
 
-    #: Name of the kind in declarations.
+    #: Name of the kind in declarations; by default that of the class.
     kind: ClassVar[str]
     #: Long names of its results that are pure numbers, by what follows `name` in theirs; "{name}"
     #: in them is `name` in words.
@@ -63,8 +68,13 @@ class Reduction:
     name: str
     of: str
 
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "kind" not in vars(cls) and not cls.__name__.startswith("_"):
+            cls.kind = cls.__name__
+
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """The new variables."""
+        """Return the new variables."""
         raise TypeError(f"{type(self).__name__} reduces nothing")
 
     def results(self, comment: str, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
@@ -110,10 +120,14 @@ def worst(status: xr.DataArray, dims: Collection[Hashable]) -> xr.DataArray:
 
 
 def known(dataset: xr.Dataset, of: str, status: xr.DataArray) -> xr.Dataset:
-    """The dataset for a reduction of `of`: with the status of the cells that `of` draws on, and
-    without the numbers of those that failed.
+    """Return the dataset for a reduction of `of`, with NaN for values that must not be used.
+
+    The status is that of the cells that `of` depends on. The values of failed cells become NaN,
+    and so do standard errors and confidence intervals that are not valid.
     """
     bad = failed(status)
+    if of.endswith(_STATISTICAL):
+        bad = bad | (status == int(Status.ERRORS_NOT_VALID))
     if bool(bad.any()) and dataset[of].dtype.kind == "f":
         dataset = dataset.assign({of: dataset[of].where(~bad)})
     return dataset.assign(status=status)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
 
 from rsfstudy.error_boundary import guard_methods
+from rsfstudy.quantity import Quantity
+from rsfstudy.reduce._crossing import FEWEST, Verdict, find_crossing
 from rsfstudy.reduce.base import Derivatives, Fields, Reduction, dimension_of, refused
 
 #: Change of ln(value) by which derivatives of an interpolant are taken.
@@ -106,14 +107,17 @@ class Boundary(Reduction):
 @guard_methods
 @dataclass(frozen=True)
 class Inverse(Reduction):
-    """Place along a coordinate where a smooth, monotone variable reaches a level, by logarithms.
+    """Place along a coordinate where a monotone variable reaches a level, by logarithms.
 
     Parameters
     ----------
     name : str
-        Name of the result; ``<name>_error`` comes with it: what the uncertainty of the level does,
-        how far chords through the neighbours on either side are from the result, and what the
-        numerical errors of the cells make of it.
+        Name of the result. Two more variables come with it. ``<name>_error`` adds the uncertainty
+        of the level, the distance to the farthest place where a curve through the cells may reach
+        the level, and the numerical errors of the cells. ``<name>_status`` is `ok`, or says why the
+        result is NaN: the level is `out_of_reach`, its place is `not_unique`, the cells leave it
+        `unresolved` because the variable seems to oscillate between them, or there are
+        `too_few_points`.
     of : str
         Variable that reaches the level; positive.
     on : str
@@ -134,8 +138,14 @@ class Inverse(Reduction):
     kind: ClassVar[str] = "inverse"
     measured_in: ClassVar[Fields] = {"": ("on",)}
 
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        flags = tuple(verdict.name.lower() for verdict in Verdict)
+        text = f"status of {self.name.replace('_', ' ')}"
+        return [Quantity(f"{self.name}_status", "", "1", text, flags=flags)]
+
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Interpolate along the dimension of `on`; NaN where the level is out of reach.
+        """Interpolate along the dimension of `on`.
 
         Raises
         ------
@@ -143,25 +153,26 @@ class Inverse(Reduction):
             Where `on` is no coordinate along one dimension.
         """
         dimension = dimension_of(dataset, self.on)
-        if dataset.sizes[dimension] < 4:
+        if dataset.sizes[dimension] < FEWEST:
             return xr.Dataset()
         values = dataset[self.of].where(~refused(dataset, self.of, dimension))
-        crossing, error = xr.apply_ufunc(
+        crossing, error, verdict = xr.apply_ufunc(
             _inverse,
             values,
             dataset[self.on].astype(float),
             self._labelled(dataset, self.levels),
             self._labelled(dataset, self.uncertainty),
             input_core_dims=[[dimension], [dimension], [], []],
-            output_core_dims=[[], []],
+            output_core_dims=[[], [], []],
             vectorize=True,
         )
         note = f"{self.on} at which {self.of} reaches {self.levels}"
-        missed = "distance of chords beside the bracket, and what uncertainty of the level changes"
+        missed = "places where a curve through the cells may be, and uncertainty of the level"
         return xr.Dataset(
             {
                 self.name: crossing.assign_attrs(comment=note),
                 f"{self.name}_error": error.assign_attrs(comment=missed),
+                f"{self.name}_status": verdict.assign_attrs(comment=note),
             }
         )
 
@@ -189,23 +200,27 @@ class Inverse(Reduction):
 
 def _inverse(
     values: np.ndarray, on: np.ndarray, level: float, uncertainty: float
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
     x, y, _places = _logarithms(values, on)
-    if np.isnan(level) or level <= 0.0 or x.size < 4:
-        return np.nan, np.nan
-    fine = _reaches(x, y, np.log(level))
-    ends = [_reaches(x, y, np.log(level) + d) for d in (-uncertainty, uncertainty)]
-    error = _unseen(x, y, np.log(level), fine) + float(np.max(np.abs(fine - np.array(ends))))
-    return float(np.exp(fine)), float(np.exp(fine) * error)
+    if np.isnan(level) or level <= 0.0:
+        return np.nan, np.nan, float(Verdict.OUT_OF_REACH)
+    found = find_crossing(x, y, np.log(level))
+    if found.verdict is not Verdict.OK:
+        return np.nan, np.nan, float(found.verdict)
+    ends = [find_crossing(x, y, np.log(level) + d).place for d in (-uncertainty, uncertainty)]
+    place, first, last = np.exp([found.place, found.first, found.last]).tolist()
+    error = max(place - first, last - place)
+    error += place * float(np.max(np.abs(found.place - np.array(ends))))
+    return place, error, float(found.verdict)
 
 
 def _moved(values: np.ndarray, on: np.ndarray, level: float) -> np.ndarray:
     """Derivatives of the place where the level is reached by all values; 0 where there is none."""
     x, y, places = _logarithms(values, on)
     slopes = np.zeros(values.size)
-    if np.isnan(level) or level <= 0.0 or x.size < 4:
+    if np.isnan(level) or level <= 0.0:
         return slopes
-    fine = _reaches(x, y, np.log(level))
+    fine = find_crossing(x, y, np.log(level)).place
     if np.isnan(fine):
         return slopes
     # each value moved in turn: the interpolant is smooth in them, but for kinks
@@ -213,46 +228,6 @@ def _moved(values: np.ndarray, on: np.ndarray, level: float) -> np.ndarray:
     rise = float(PchipInterpolator(x, y)(fine, 1)) or np.nan  # at a flat end errors have no bound
     slopes[places] = (moved - np.log(level)) / _STEP / rise * np.exp(fine) / values[places]
     return slopes
-
-
-def _unseen(x: np.ndarray, y: np.ndarray, level: float, fine: float) -> float:
-    """Error of the place that was found for where a smooth variable reaches the level.
-
-    Where its slope rises, or falls, all along, the variable lies between the chord of the bracket
-    and the nearer of the chords on either side, extended. Where it does not, or there is a chord on
-    one side only, it may be as far from the chord as the farthest, to either side. The bracket
-    bounds all.
-    """
-    if np.isnan(fine):
-        return np.nan
-    slopes = np.diff(y) / np.diff(x)
-    first = int(np.clip(np.searchsorted(x, fine) - 1, 0, slopes.size - 1))
-    chord = x[first] + (level - y[first]) / slopes[first]
-    extended = []
-    for beside, shared in ((first - 1, first), (first + 1, first + 1)):
-        if 0 <= beside < slopes.size:
-            same_way = slopes[beside] * slopes[first] > 0.0
-            reached = x[shared] + (level - y[shared]) / slopes[beside] if same_way else np.inf
-            extended.append(reached)
-    bends = np.diff(slopes[max(first - 1, 0) : first + 2])
-    if bends.size == 2 and bends[0] * bends[1] >= 0.0:
-        nearer = min(extended, key=lambda place: abs(place - chord))
-        off = max(abs(chord - fine), abs(nearer - fine))
-    else:
-        off = abs(chord - fine) + max(abs(place - chord) for place in extended)
-    return float(min(off, np.max(np.abs(x[first : first + 2] - fine))))
-
-
-def _reaches(x: np.ndarray, y: np.ndarray, level: float) -> float:
-    """Place where the interpolant through the points reaches the level; NaN unless it is one."""
-    off, curve = y - level, PchipInterpolator(x, y)
-    places = x[off == 0.0].tolist()
-    # between two points it is monotone, and at them it is the points, which rounding misses
-    known = dict(zip(x.tolist(), off.tolist(), strict=True))
-    for first in np.flatnonzero(off[:-1] * off[1:] < 0.0):
-        ends = x[first : first + 2].tolist()
-        places.append(brentq(lambda x: known.get(x, curve(x) - level), *ends, xtol=1e-15))
-    return float(places[0]) if len(places) == 1 else np.nan
 
 
 def _logarithms(values: np.ndarray, on: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -6,23 +6,26 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 import shutil
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from operator import add
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
+import msgspec
 import numpy as np
 from scipy.special import lambertw
 
 from rsfstudy.error_boundary import check_file, in_words
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.errors import DataError, InvalidValue, brief
 from rsfstudy.motion.events import Event, Kind
 from rsfstudy.motion.meter import Halt
 from rsfstudy.motion.starting import at_rate, on_slow_manifold
+from rsfstudy.paths import check_path
 from rsfstudy.rig.laboratory import Laboratory
 from rsfstudy.rig.units import in_si
 from rsfstudy.slider import registry
@@ -58,6 +61,16 @@ _LAWS = (
     "slip", "slowness", "family", "perrin_rice_zheng", "composite", "two_slip_states",
     "two_slowness_states",
 )  # fmt: skip
+
+
+#: How msgspec names a mismatch, and its kinds of values in words.
+_MISMATCH = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$(.*)`)?")
+_KINDS = {
+    "array": "a list", "object": "a table", "str": "a text", "int": "a whole number",
+    "float": "a number", "bool": "true or false", "null": "nothing", "date": "a date",
+}  # fmt: skip
+#: Largest number of digits of an answer, and of peaks.
+_MOST_DIGITS, _MOST_PEAKS = 15, 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,6 +124,11 @@ class Problem:
     def __post_init__(self) -> None:
         if self.report not in REPORTS:
             raise InvalidValue("report", self.report, "is unknown", choices=REPORTS)
+        if not self.quantities:
+            rule = "must list at least one quantity"
+            raise InvalidValue("quantities", self.quantities, rule, choices=self.units)
+        if not 1 <= self.digits <= _MOST_DIGITS:
+            raise InvalidValue("digits", self.digits, f"must lie between 1 and {_MOST_DIGITS}")
         for name in self.quantities:
             if name not in self.units:
                 raise InvalidValue("quantities", name, "is unknown", choices=self.units)
@@ -119,8 +137,9 @@ class Problem:
             raise InvalidValue("times", self.times, "must list the times of a series, in s")
         if (np.diff(times, prepend=-1e-300) <= 0.0).any():
             raise InvalidValue("times", self.times, "must increase, from 0 or later")
-        if self.report == "peaks" and self.count < 1:
-            raise InvalidValue("count", self.count, "must be 1 or more: how many peaks to tell")
+        if self.report == "peaks" and not 1 <= self.count <= _MOST_PEAKS:
+            rule = f"must lie between 1 and {_MOST_PEAKS:,}: it is the number of peaks to report"
+            raise InvalidValue("count", self.count, rule)
         if self.law not in _LAWS:
             raise InvalidValue("law", self.law, "is unknown", choices=_LAWS)
         two = ("b_2", "D_c_2") if self.law.startswith("two") else ()
@@ -184,7 +203,7 @@ class Problem:
     @cached_property
     def scene(self) -> Scene:
         """The scene that the problem states, but for how it begins."""
-        rig, si, a = self.rig, self.si, in_si("a", self.parameters["a"], "1")
+        rig, si, a = self.rig, self.si, _positive("a", self.parameters["a"], "1")
         fields = {n: v for n, v in self.parameters.items() if n not in {*_RIG, *_UNITS}}
         fields |= {"law": self.law, "a": a}
         if len(self.b) == 1:
@@ -273,13 +292,16 @@ def read(path: Path) -> Problem:
     check_file("problem", path)
     try:
         stated = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeError, tomllib.TOMLDecodeError) as error:
-        raise DataError(f"{path}: cannot be read as TOML ({error})") from error
-    known = [f.name for f in fields(Problem)]
+    except RecursionError as error:
+        raise DataError(f"{path}: cannot be read as TOML (it is nested too deeply)") from error
+    except (OSError, ValueError) as error:  # of the text, its encoding or the digits of a number
+        raise DataError(f"{path}: cannot be read as TOML ({brief(error)})") from error
+    known = {name: kind for name, kind in get_type_hints(Problem).items() if name != "number"}
     try:
-        for name in stated:
+        for name, value in stated.items():
             if name not in known:
                 raise InvalidValue("key", name, "is unknown", choices=known)
+            _check_type(name, value, known[name])
         for name in ("title", "law", "quantities", "parameters"):
             if name not in stated:
                 raise InvalidValue("problem", [*stated], f"must state {name}")
@@ -293,6 +315,19 @@ def read(path: Path) -> Problem:
         rule = f"cannot be posed ({in_words(error)})"
         remedy = "rsfstudy problems DIR writes files of problems to begin with."
         raise InvalidValue("problem", str(path), rule, remedy=remedy) from error
+
+
+def _check_type(name: str, value: Any, kind: Any) -> None:
+    """Raise InvalidValue if a value of a problem does not have the declared type."""
+    try:
+        msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        found = _MISMATCH.search(str(error))
+        if found is None:
+            raise InvalidValue(name, value, str(error)) from error
+        wanted, actual = (_KINDS.get(kind, kind) for kind in found.groups()[:2])
+        place = f"{name}{found[3] or ''}"
+        raise InvalidValue(place, value, f"must be {wanted}, not {actual}") from error
 
 
 def shipped() -> dict[int, Path]:
@@ -311,6 +346,7 @@ def write(directory: Path) -> None:
     DataError
         Where it cannot be written.
     """
+    check_path("DIR", directory)
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
         remedy = "Name a new one: nothing is replaced."
         raise InvalidValue("DIR", str(directory), "is there already", remedy=remedy)

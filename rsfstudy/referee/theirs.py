@@ -43,6 +43,13 @@ def read(
         For a column that is missing, units of another kind, a gap, other times or another length.
     """
     table = read_table(path, columns)
+    # first, because columns are converted at the times of the problem
+    rows, count = problem.rows, max((len(column.values) for column in table.values()), default=0)
+    if count != len(rows):
+        remedy = f"Give a row for each {problem.key} of the problem. Rows are not interpolated."
+        rule = f"must be {len(rows)}"
+        wrong = InvalidValue("number of rows", count, rule, remedy=remedy if problem.key else "")
+        raise wrong.at(str(path))
     asked = {*problem.columns, *_UNITS}
     found = {key: _plain(key, column, problem) for key, column in table.items() if key in asked}
     for name, (other, _units) in _INSTEAD.items():
@@ -55,10 +62,6 @@ def read(
             remedy = f"Head it {name} ({problem.units[name]}), or say --columns '{name}=...'."
             wrong = InvalidValue("column", name, "is missing", choices=table, remedy=remedy)
             raise wrong.at(str(path))
-    rows, count = problem.rows, len(found[problem.columns[0]].values)
-    if count != len(rows):
-        rule = f"must be {len(rows)}: nothing is interpolated"
-        raise InvalidValue("number of rows", count, rule).at(str(path))
     if problem.key:
         _check_rows(table[problem.key], found[problem.key].values, rows, problem)
     return {name: found[name] for name in problem.columns}

@@ -29,6 +29,16 @@ _ROUNDED = 1.51
 _FROM_ZERO = ("slip", "pore_pressure")
 #: Conventions of radiation damping, and factors of eta.
 _DAMPING = {"twice as much (G/c_s for G/(2 c_s))": 2.0, "half as much": 0.5, "left out": 0.0}
+#: Factors between usual conventions: units, decades, angles, and kinds of logarithms.
+_USUAL_FACTORS = {
+    "2": 2.0, "0.5": 0.5, "pi": math.pi, "1/pi": 1.0 / math.pi, "2 pi": 2.0 * math.pi,
+    "1/(2 pi)": 0.5 / math.pi, "ln 10": math.log(10.0), "1/ln 10": 1.0 / math.log(10.0),
+    **{f"{unit:g}": unit for unit in (60.0, 3600.0, 86400.0)},
+    **{f"1/{unit:g}": 1.0 / unit for unit in (60.0, 3600.0, 86400.0)},
+    **{f"{10.0**power:g}": 10.0**power for power in range(-15, 16) if power},
+}  # fmt: skip
+#: Relative difference below which a factor is a usual one: of many values, and of a single value.
+_SAME_FACTOR, _SIMILAR_FACTOR = 1e-6, 1e-3
 #: Accuracies of ours where a problem has no answer yet; what candidates need.
 _TWICE, _ROUGH = (1e-9, 1e-11), 1e-8
 
@@ -121,7 +131,13 @@ def verdict(
         return found
     best, words = max(_explained(problem, values, answer), default=(0.0, ""))
     better = best >= max(_EXPLAINS, found.digits + _MORE)
-    return replace(found, explanation=f"{words}: {best:.1f} digits then" if better else "")
+    explanation = f"{words}. With that undone, {shown_digits(best):.1f} digits agree"
+    return replace(found, explanation=explanation if better else "")
+
+
+def shown_digits(digits: float) -> float:
+    """Round digits down to a tenth, so that a failed problem never shows the digits of a pass."""
+    return math.floor(10.0 * digits) / 10.0
 
 
 def _agreements(
@@ -187,10 +203,35 @@ def _read_otherwise(problem: Problem, theirs: Table, answer: Table) -> Iterator[
             yield words, theirs | {"friction": at_fault}
     for name in problem.quantities:
         factor = float(np.median(theirs[name] / np.where(answer[name], answer[name], np.nan)))
-        if math.isfinite(factor) and factor:
-            yield f"{name} is {factor:.6g} times as much", theirs | {name: theirs[name] / factor}
-        apart = float(np.median(theirs[name] - answer[name]))
-        yield f"{name} is shifted by {apart:.6g}", theirs | {name: theirs[name] - apart}
+        # any factor and any shift would explain a quantity of one value
+        several = len(answer[name]) > 1
+        usual = _usual_factor(factor, _SAME_FACTOR if several else _SIMILAR_FACTOR)
+        if usual is not None:
+            yield f"{name} {usual[0]}", theirs | {name: theirs[name] / usual[1]}
+        elif several and math.isfinite(factor) and factor:
+            words = f"{name} is {_format_factor(factor)} times the known answer"
+            yield words, theirs | {name: theirs[name] / factor}
+        if several:
+            apart = float(np.median(theirs[name] - answer[name]))
+            words = f"{name} is shifted by {apart:.6g} {problem.units[name]}".removesuffix(" 1")
+            yield words, theirs | {name: theirs[name] - apart}
+
+
+def _usual_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
+    """Return the usual factor that is equal to a factor within a tolerance, after its wording."""
+    if math.isclose(factor, -1.0, rel_tol=tolerance):
+        return "has the opposite sign", -1.0
+    for words, usual in _USUAL_FACTORS.items():
+        if math.isclose(abs(factor), usual, rel_tol=tolerance):
+            sign = "-" if factor < 0.0 else ""
+            return f"is {sign}{words} times the known answer", math.copysign(usual, factor)
+    return None
+
+
+def _format_factor(factor: float) -> str:
+    """Format a factor so that it can be told from 1."""
+    text, beyond = f"{factor:.6g}", factor - 1.0
+    return text if text != "1" else f"(1 {'-' if beyond < 0.0 else '+'} {abs(beyond):.2g})"
 
 
 def _posed_otherwise(problem: Problem) -> Iterator[tuple[str, Problem]]:

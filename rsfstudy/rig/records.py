@@ -13,7 +13,15 @@ import pandas as pd
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.error_boundary import check_file, error_boundary
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.table import HEADING, Column, Selected, picked, read_table, selected
+from rsfstudy.rig.table import (
+    HEADING,
+    Column,
+    Selected,
+    check_headings,
+    picked,
+    read_table,
+    selected,
+)
 from rsfstudy.rig.units import factor, in_si
 
 #: SI units of what a record may hold, and what turns them into those of `Record`.
@@ -163,6 +171,7 @@ def _of_text(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Colu
 def _of_arrays(source: Any, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
     """Columns of arrays by name, or by headings where they, or `columns`, state units."""
     headings = [*map(str, source)]
+    check_headings(headings, "record")
     if columns is None and not any("(" in key or "[" in key for key in headings):
         return picked(source, {key: (key,) for key in headings})
     told = _completed(columns or {}, headings, "record")
@@ -225,8 +234,12 @@ def _selected(key: str, told: Any, headings: Sequence[str]) -> Selected:
 
 
 def _is_binary(path: Path) -> bool:
-    with path.open("rb") as file:
-        return b"\0" in file.read(_BEGIN)
+    """Return True if a file begins with bytes that text does not contain."""
+    try:
+        with path.open("rb") as file:
+            return b"\0" in file.read(_BEGIN)
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
 
 
 def _of_xlook(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:

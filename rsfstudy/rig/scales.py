@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.quantity import factors, quotient
 from rsfstudy.rig.units import factor
 
@@ -229,9 +230,8 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
         named = str(variable.attrs.get("ancillary_variables", "")).split()
         if named:
             variable.attrs["ancillary_variables"] = " ".join(new.get(name, name) for name in named)
-    return result.assign_attrs(
-        {SCALES: ", ".join(f"{n} = {_range(s.factor)} {s.units}" for n, s in by.items())}
-    )
+    told = ", ".join(f"{n} = {_range(s.factor)} {s.units}" for n, s in by.items())
+    return with_cf_encoding(result.assign_attrs({SCALES: told}))
 
 
 def renamed(name: str) -> str:

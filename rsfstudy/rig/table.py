@@ -6,7 +6,8 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,6 +26,8 @@ _NUMBER = r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 _RAW = re.compile(rf"(.*\S)\s*\*\s*(-?){_NUMBER}(?:([-+]){_NUMBER})?")
 #: A heading, with its units in brackets or without.
 HEADING = re.compile(r"\s*([^(\[]+?)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
+#: Most characters of a heading; the patterns take quadratic time on longer texts.
+_LONGEST_HEADING = 200
 
 
 class Selected(NamedTuple):
@@ -42,13 +45,38 @@ class Selected(NamedTuple):
 Choose = Callable[[list[str], str], dict[str, Selected]]
 
 
-def selected(told: Any, headings: Sequence[str]) -> Selected:
-    """The column that is named by heading, units, scale and offset; or by a text such as ``lp (um)
-    * 0.1 + 5``, whose units stand in brackets, in the file too or not.
+def check_heading(heading: str) -> None:
+    """Raise `InvalidValue` if a heading is too long to be parsed."""
+    if len(heading) > _LONGEST_HEADING:
+        rule = f"must have at most {_LONGEST_HEADING} characters (it has {len(heading):,})"
+        raise InvalidValue("heading", heading, rule, remedy=f"Write it as in {_EXAMPLE}.")
+
+
+def check_headings(headings: Iterable[str], place: str) -> None:
+    """Check the length of all headings of a file, and name the place in errors."""
+    for column, heading in enumerate(headings, start=1):
+        try:
+            check_heading(heading)
+        except InvalidValue as error:
+            raise error.at(f"{place}, column {column}") from error
+
+
+def selected(told: Any, headings: Collection[str]) -> Selected:
+    """Parse the choice of a column.
+
+    Parameters
+    ----------
+    told : str or sequence
+        Heading, units, scale and offset; or a text such as ``lp (um) * 0.1 + 5``, with or without
+        units in brackets, whether or not the heading in the file contains them.
+    headings : collection of str
+        The headings of the file.
     """
     if not isinstance(told, str):
         heading, units, *numbers = (*told, "")[: max(2, len(told))]
+        check_heading(str(heading))
         return Selected(str(heading), str(units), *map(float, numbers))
+    check_heading(told)
     raw = None if told in headings else _RAW.fullmatch(told)
     scale, offset = 1.0, 0.0
     if raw:
@@ -106,7 +134,8 @@ def picked(source: Any, columns: Mapping[str, Any]) -> dict[str, Column]:
     columns : mapping of str to str, tuple or Selected
         What is wanted, as `selected` takes it.
     """
-    names = [*map(str, source.variables if hasattr(source, "data_vars") else source)]
+    variables = source.variables if hasattr(source, "data_vars") else source
+    names = dict.fromkeys(map(str, variables))  # keeps the order, and is fast to search
     found = {}
     for key, told in columns.items():
         heading, units, scale, offset = selected(told, names)
@@ -174,6 +203,7 @@ def read_table(
             rows = [(n, row) for n, row in enumerate(read, start=line + 1) if any(row)]
     except (OSError, UnicodeError, csv.Error) as error:
         raise DataError(f"{path}: cannot be read as CSV ({error})") from error
+    check_headings(headings, f"{path}, line {line}")
     if not header:
         remedy = f"Its first line reads, for instance, {_EXAMPLE}."
         raise InvalidValue("table", str(path), "has no header", remedy=remedy)
@@ -194,11 +224,12 @@ def read_table(
         rule = "must be a mapping, or a function that returns one"
         raise InvalidValue("columns", columns, rule)
     found = {}
+    places, counts = {h: n for n, h in enumerate(headings)}, Counter(headings)
     for name, (heading, units, scale, offset) in wanted.items():
-        if headings.count(heading) != 1:
-            rule = f"heads {headings.count(heading)} columns, and must head one"
+        if counts[heading] != 1:
+            rule = f"heads {counts[heading]} columns, and must head one"
             raise InvalidValue("column", heading, rule, choices=headings).at(f"{path}, line {line}")
-        place = headings.index(heading)
+        place = places[heading]
         column = Column(np.empty(0), units, place + 1, lines, str(path))
         below = (
             [_number(name, row[place], column, n) for n, (_line, row) in enumerate(rows)]

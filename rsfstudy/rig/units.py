@@ -55,6 +55,8 @@ _UNIT = re.compile(
 _SPACED = "must read start:stop:count, two finite numbers and a count"
 _LOGARITHMIC = "For logarithmic spacing write start:stop:count:log, as in hold_time=1:1e5:30:log."
 _MOST_POINTS = 1_000_000
+#: Most characters of a quantity; the patterns above take quadratic time on longer texts.
+_LONGEST_TEXT = 200
 _PINT = "Install pint (pip install 'rsfstudy[units]')"
 
 
@@ -163,7 +165,11 @@ def _rounded(number: Fraction | float) -> float:
 
 
 def _of_text(name: str, text: str, units: str) -> Fraction | float:
-    """A quantity in SI units; the number itself where that is not finite."""
+    """Convert a text to SI units; a number that is not finite is returned as it is."""
+    if len(text) > _LONGEST_TEXT:
+        rule = f"is no quantity, because it has more than {_LONGEST_TEXT} characters"
+        remedy = f"Write a number and its units, as in '2.5 {units.removesuffix('1')}'."
+        raise InvalidValue(name, text, rule, remedy=remedy)
     match = _NUMBER.match(text.strip())
     powers = _powers(text.strip()[match.end() :].strip()) if match else None
     if match is None or powers is None:

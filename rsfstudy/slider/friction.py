@@ -83,6 +83,8 @@ class Friction(NamedTuple):
         its change, ``(changes)``.
     states : int
         How many states there are.
+    counted : tuple of int
+        Places of the states that count for the distance from steady sliding.
     """
 
     strength: Function
@@ -98,6 +100,7 @@ class Friction(NamedTuple):
     imposed: Function
     imposed_change: Function
     states: int
+    counted: tuple[int, ...]
 
 
 # ---- the friction relation -----------------------------------------------------------------------
@@ -299,6 +302,8 @@ class Parts(NamedTuple):
         their end: -1 where P is that; 0 where there is none.
     displaces : bool
         Whether the unknown that stands last is shear stress K D, and no pressure.
+    excluded : tuple of int
+        Places, among all states, of those that do not count for the distance from steady sliding.
     """
 
     states: int
@@ -312,6 +317,7 @@ class Parts(NamedTuple):
     auxiliary_steady_states: Function | None
     outside: int
     displaces: bool = False
+    excluded: tuple[int, ...] = ()
 
 
 @cache
@@ -330,6 +336,7 @@ def friction_of(parts: Parts) -> Friction:
         evolutions = with_auxiliary(evolutions, parts.auxiliary_rates, parts.states)
         steady_states = with_auxiliary_at_rest(steady_states, parts.auxiliary_steady_states)
     by_last = by_pressure_of(effective, effect) if pressure else None
+    states = parts.states + parts.unknowns
     if parts.displaces:
         strength, effective, outer = map(with_load_point_stress, (strength, effective, outer))
         by_last = slopes_of(strength)
@@ -346,5 +353,6 @@ def friction_of(parts: Parts) -> Friction:
         states_at=states_at_of(parts.states),
         imposed=load_point_stress if parts.displaces else no_load_point_stress,
         imposed_change=pressure_at(-1 if parts.displaces else 0),
-        states=parts.states + parts.unknowns,
+        states=states,
+        counted=tuple(place for place in range(states) if place not in parts.excluded),
     )

@@ -17,7 +17,7 @@ from __future__ import annotations
 import importlib
 import math
 import pkgutil
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 from numbers import Real
@@ -66,6 +66,14 @@ class Part:
     equations: ClassVar[frozenset[str]] = frozenset()
     #: Unknowns of a fluid or a loading, and the functions of them (see `fluid.Fluid`).
     unknowns: ClassVar[tuple[Quantity, ...]] = ()
+    #: Names of unknowns that do not count for the distance from steady sliding, for example because
+    #: their steady values are huge at the slip rate of a rupture. Motions may settle, and limit
+    #: cycles are recognised, whatever these unknowns do.
+    excluded_from_distance: ClassVar[tuple[str, ...]] = ()
+    #: Quantities that the rates of a part need, and those that the functions of its slot receive
+    #: (names of `requirements.QUANTITIES`). A scene refuses a part if it cannot provide a quantity.
+    needs: ClassVar[Collection[str]] = frozenset()
+    receives: ClassVar[frozenset[str]] = frozenset()
     auxiliary_rates: ClassVar[Function | None] = None
     auxiliary_steady_states: ClassVar[Function | None] = None
     #: Where values of other parts of the slot have no meaning, and what would give them one.
@@ -83,9 +91,11 @@ class Part:
                     setattr(cls, name, vars(base)[name])
 
     def numbers(self, scene: Scene) -> Numbers:
-        """Numbers that its functions read from the place of its slot on, such as ``p[LAW]``.
+        """Return the numbers that its functions read, from the place of its slot on.
 
-        A law may have any number of them, others as many as there are places (see `places`).
+        A law may have any number of them, other parts as many as there are places (see `places`).
+        Fields that a subclass declares by `number` follow in the order of their declaration, so
+        that you override this method only if the functions read something else.
         """
         return ()
 
@@ -167,6 +177,21 @@ def names_of(part: type[Part]) -> tuple[str, ...]:
     """
     names = (f.name for f in fields(part) if "about" in f.metadata)
     return tuple(sorted(names, key=lambda name: name != part.called_by))
+
+
+@cache
+def _appended(part: type[Part]) -> tuple[str, ...]:
+    """Return the names of number fields that were declared below the last override of `numbers`."""
+    overriding = next(kind for kind in part.__mro__ if "numbers" in vars(kind))
+    known = vars(overriding).get("__dataclass_fields__", {})
+    return tuple(name for name in names_of(part) if name not in known and not is_flag(part, name))
+
+
+def numbers_of(part: Part, scene: Scene) -> Numbers:
+    """Return the numbers of a part as `numbers` gives them, then its other fields."""
+    values = (getattr(part, name) for name in _appended(type(part)))  # type: ignore[arg-type]
+    others = (math.nan if value is None else float(value) for value in values)
+    return (*part.numbers(scene), *others)
 
 
 def quantities_of(part: type[Part]) -> list[Quantity]:

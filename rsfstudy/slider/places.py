@@ -11,7 +11,7 @@ import math
 from typing import TYPE_CHECKING
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import Numbers, Part, Scene
+from rsfstudy.slider.parts import Numbers, Part, Scene, numbers_of
 
 if TYPE_CHECKING:
     from rsfstudy.slider.fluid._recharged import Recharged
@@ -63,14 +63,14 @@ def numbers_of_friction(scene: Scene) -> Numbers:
         *_filled_up(scene.pressure_source, scene, DYNAMICS - FLUID),
         *_filled_up(parts.dynamics, scene, LAW - DYNAMICS),
     )
-    return (*common, *own, *law.numbers(scene))
+    return (*common, *own, *numbers_of(law, scene))
 
 
 def _filled_up(part: Part | Recharged, scene: Scene, most: int) -> Numbers:
     """The numbers of a part, and NaN in the places that it leaves, so that who reads there reads
     nothing.
     """
-    own = part.numbers(scene)
+    own = numbers_of(part, scene) if isinstance(part, Part) else part.numbers(scene)
     if len(own) > most:
         rule = f"states {len(own)} numbers, and there are places for {most}"
         raise InvalidValue("numbers", part.name, rule, remedy="Make fewer of them, as quotients.")

@@ -23,7 +23,8 @@ class Point(NamedTuple):
     imbalance : float
         Its distance from steady sliding at this slip rate, Theta + b ln(V/V_*) for most laws.
     distance_from_steady_state : float
-        The largest such distance of a state, without sign.
+        The largest such distance of a state, without sign. States that a part lists in
+        `excluded_from_distance` are left out.
     coefficient : float
         Friction coefficient.
     normal_stress : float

@@ -21,6 +21,7 @@ from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
 from rsfstudy.slider.numbers import Slider
 from rsfstudy.slider.parts import Part, is_flag, names_of, quantities_of
 from rsfstudy.slider.protocol import Stated
+from rsfstudy.slider.requirements import check_declaration
 from rsfstudy.slider.synonyms import law_name
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -187,11 +188,26 @@ def _check(slot: Slot, part: Any) -> None:
         raise InvalidValue(slot.name, part, "must be a frozen dataclass", remedy=remedy)
     _check_name(slot, part)
     _check_fields(slot, part)
+    _check_excluded(slot, part)
+    check_declaration(slot.name, part)
     for name in part.functions():
         function = getattr_static(part, name, None)
         if not isinstance(getattr(function, "__func__", None), FunctionType):
             rule, remedy = f"states no {name}", f"Write {name} = staticmethod(a plain function)."
             raise InvalidValue(slot.name, part, rule, remedy=remedy)
+
+
+def _check_excluded(slot: Slot, part: type[Part]) -> None:
+    """Raise InvalidValue if `excluded_from_distance` names something that is not an unknown."""
+    excluded: Any = part.excluded_from_distance
+    unknowns = [about.name for about in part.unknowns]
+    if isinstance(excluded, str):
+        rule, remedy = "must be a tuple of names", f"Write ({excluded!r},)."
+        raise InvalidValue("excluded_from_distance", excluded, rule, remedy=remedy)
+    for name in excluded:
+        if name not in unknowns:
+            rule = f"is not an unknown of the {slot.name} {part.name}"
+            raise InvalidValue("excluded_from_distance", name, rule, choices=unknowns)
 
 
 def _check_name(slot: Slot, part: Own) -> None:

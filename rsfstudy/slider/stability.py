@@ -32,24 +32,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.slider.equations import relation_of, steady_states_of
+from rsfstudy.slider.derived import once
+from rsfstudy.slider.equations import relation_of
+from rsfstudy.slider.law_slopes import LawSlopes, Matrix, slopes_of_law
 from rsfstudy.slider.parts import Scene
 from rsfstudy.slider.steady import Steady, steady_sliding
 
-#: Step of the differences that give the slopes of a law, in ln V, and their weights: order eight.
-#: States take a part of it over b; each of several, over what ln V moves it by, if it does.
-_STEP, _PART, _MOVES = 0.05, 0.05, 1e-9
-_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
-
 #: Critical stiffness over a, and growth per slip in D_c, that rounding leaves where there is none.
 _ROUNDING, _STILL = 1e-12, 1e-9
+#: Rounding error of growth rates, relative to the largest.
+_ROUNDING_OF_ROOTS = 64.0 * 2.0**-52
 
 #: Part of the next coefficient below which the one of mass is small, and steps of Newton from the
 #: growth rates without it.
 _LIGHT, _POLISHED = 1e-6, 2
 
 Polynomial = list[float]
-Matrix = list[list[float]]
 
 
 def critical_stiffness(scene: Scene, log_slip_rate: float, *, quasi_static: bool = False) -> float:
@@ -108,10 +106,12 @@ class _Around(NamedTuple):
     norm: float
 
 
-def _around(scene: Scene, steady: Steady, *, quasi_static: bool = False) -> _Around:
+def _around(
+    scene: Scene, steady: Steady, slopes: LawSlopes | None = None, *, quasi_static: bool = False
+) -> _Around:
     damping = 0.0 if quasi_static else scene.dynamics.damping(steady.log_slip_rate)
     norm = 0.0 if quasi_static else scene.dynamics.norm(scene, steady.log_slip_rate)
-    return _Around(*response(scene, steady), damping, norm)
+    return _Around(*response(scene, steady, slopes), damping, norm)
 
 
 def _crossings(around: _Around, least: float) -> list[float]:
@@ -156,9 +156,13 @@ def _grows(around: _Around, stiffness: float) -> bool:
     return bool(_rates(around, stiffness)[0].real > _STILL)
 
 
-def response(scene: Scene, steady: Steady) -> tuple[Polynomial, Polynomial]:
-    """Friction against slip around steady sliding, ``G(p) = p above(p)/below(p)``: coefficients of
-    the two polynomials, from the constant one up.
+def response(
+    scene: Scene, steady: Steady, slopes: LawSlopes | None = None
+) -> tuple[Polynomial, Polynomial]:
+    """Compute the response of friction to slip around steady sliding.
+
+    The response is ``G(p) = p above(p)/below(p)``; the result holds the coefficients of the two
+    polynomials, from the constant one up.
 
     ``G(p) = p [a + 1.(p - M)^-1 E_x]/[D - S 1.(p - M)^-1 E_s]``, as at the top of this file; by a
     law of one state at constant normal stress ``G(p) = p [a - b/(p + 1)]``, over sigma_*/D_c.
@@ -167,13 +171,16 @@ def response(scene: Scene, steady: Steady) -> tuple[Polynomial, Polynomial]:
     ----------
     scene : Scene
     steady : Steady
+    slopes : LawSlopes, optional
+        Derivatives of the state evolution. By default they are computed.
 
     References
     ----------
     Rice and Ruina (1983), J. Appl. Mech. 50, 343-349.
     """
     _value, slope, _shift, shift_slope = relation_of(scene)(steady.friction)
-    by_rate, by_shift, by_state = slopes_of_law(scene, steady)
+    by_rate, by_shift, by_state, _error = slopes or slopes_of_law(scene, steady)
+    by_state = [list(row) for row in by_state]
     weights, shifting = _actions(scene, steady)
     for row, of_shift in zip(by_state, by_shift, strict=True):
         row[-1] += of_shift * shifting
@@ -199,44 +206,6 @@ def _actions(scene: Scene, steady: Steady) -> tuple[list[float], float]:
 
 def _dot(first: Sequence[float], second: Sequence[float]) -> float:
     return sum(map(mul, first, second))
-
-
-def slopes_of_law(scene: Scene, steady: Steady) -> tuple[list[float], list[float], Matrix]:
-    """Derivatives of the evolution of the states per unit slip at steady sliding: with respect to
-    ln V and to the shift, both of shape (states,), and to each state, of shape (states, states).
-
-    By central differences of order eight: ``f' = sum of w_n [f(x + n h) - f(x - n h)]/h``, n from 1
-    to 4.
-    """
-    evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
-    shift = relation_of(scene)(steady.friction)[2]
-    at, columns = [steady.log_slip_rate, shift, *steady.psis], []
-    for place, (value, scale) in enumerate(zip(at, _scales(scene, steady, shift), strict=True)):
-        step = _STEP * scale
-        slopes = [0.0] * len(steady.psis)
-        for number, weight in _WEIGHTS:
-            at[place] = value + number * step
-            ahead = evolutions(at[0], tuple(at[2:]), at[1], 1.0, p)
-            at[place] = value - number * step
-            behind = evolutions(at[0], tuple(at[2:]), at[1], 1.0, p)
-            changes = zip(slopes, ahead, behind, strict=True)
-            slopes = [slope + weight * (more - less) / step for slope, more, less in changes]
-        at[place] = value
-        columns.append(slopes)
-    by_rate, by_shift, *by_state = columns
-    return by_rate, by_shift, [list(row) for row in zip(*by_state, strict=True)]
-
-
-def _scales(scene: Scene, steady: Steady, shift: float) -> list[float]:
-    """Scales over which the evolution bends: in ln V, in the shift, and in each state."""
-    size = _PART * scene.a * scene.parts.law.size_over_a
-    # b of several states may be next to nothing where each has a large one
-    of_shift = size if scene.parts.law.states > 1 else _PART * abs(scene.b) or size
-    if len(steady.psis) == 1:
-        return [1.0, of_shift, size]
-    slow, fast = (steady_states_of(scene, steady.log_slip_rate + x, shift) for x in (-1.0, 1.0))
-    moved = [0.5 * abs(y - x) for x, y in zip(slow, fast, strict=True)]
-    return [1.0, of_shift, *(by if by > _MOVES * size else size for by in moved)]
 
 
 def resolvent(matrix: Matrix) -> tuple[Polynomial, list[Matrix]]:
@@ -281,6 +250,65 @@ def growth_rates(scene: Scene, log_slip_rate: float) -> np.ndarray:
     return _rates(_around(scene, _sliding(scene, log_slip_rate)), scene.stiffness)
 
 
+class GrowthRate(NamedTuple):
+    """Largest growth rate of small changes of steady sliding, per slip in D_c.
+
+    Attributes
+    ----------
+    value, error : float
+        The real part of the growth rate, and its error estimate.
+    """
+
+    value: float
+    error: float
+
+    @property
+    def is_positive(self) -> bool:
+        """True if small changes grow, beyond the error."""
+        return self.value > self.error
+
+    @property
+    def is_undecided(self) -> bool:
+        """True if the growth rate is zero within its error."""
+        return abs(self.value) <= self.error
+
+
+@once
+def largest_growth_rate(scene: Scene, log_slip_rate: float) -> GrowthRate | None:
+    """Compute the largest growth rate at the stiffness of the scene, with its error.
+
+    The error includes that of the derivatives of the law and the rounding error of the roots.
+
+    Parameters
+    ----------
+    scene : Scene
+    log_slip_rate : float
+        ln(V/V_*).
+
+    Returns
+    -------
+    GrowthRate or None
+        None if there is no steady sliding.
+    """
+    scene = scene.unforced
+    steady = steady_sliding(scene, log_slip_rate)
+    if steady is None:
+        return None
+    slopes = slopes_of_law(scene, steady)
+    error = slopes.relative_error
+
+    def rates(part: float) -> np.ndarray:
+        changed = slopes.with_relative_change(part)
+        return _rates(_around(scene, steady, changed), scene.stiffness)
+
+    found = rates(0.0)
+    changes = [abs(rates(part)[0].real - found[0].real) for part in (error, -error)]
+    # the root that a small mass sends far off is found apart from the others
+    sizes = np.sort(np.abs(found))[: -1 if scene.has_mass else None]
+    rounding = _ROUNDING_OF_ROOTS * float(sizes.max(initial=0.0))
+    return GrowthRate(float(found[0].real), float(max(changes)) + rounding + _STILL)
+
+
 def response_to_normal_stress(scene: Scene, log_slip_rate: float, frequency: float) -> complex:
     """Spring stress over imposed normal stress in small oscillations around steady sliding, of a
     scene whose loading goes on changing that.
@@ -307,7 +335,7 @@ def response_to_normal_stress(scene: Scene, log_slip_rate: float, frequency: flo
     psis = (*steady.psis, *(0.0 for _unknown in scene.pressure_source.unknowns))
     by_pressure, p = scene.functions.friction.by_pressure, scene.numbers_of_friction
     gained, shifted = by_pressure(steady.friction, psis, p)
-    _by_rate, by_shift, by_state = slopes_of_law(still, steady)
+    _by_rate, by_shift, by_state, _error = slopes_of_law(still, steady)
     denominator, adjugate = resolvent(by_state)
     forced = [gained * x for x in denominator]
     for power, matrix in enumerate(adjugate):

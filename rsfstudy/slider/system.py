@@ -187,7 +187,7 @@ def point_of(made: Friction) -> Function:
 
     A rig reads the friction coefficient ``(mu_* + f)/s``, s outside the fault.
     """
-    steady_states, state_sum, count = made.steady_states, made.state_sum, made.states
+    steady_states, state_sum, counted = made.steady_states, made.state_sum, made.counted
     effective_stress, stress = made.effective_stress, made.outer_stress
     pressure, imposed, imposed_change = made.outer_pressure, made.imposed, made.imposed_change
 
@@ -203,7 +203,7 @@ def point_of(made: Friction) -> Function:
         f, f_change, g, g_change = forces
         steady = steady_states(x, shift, p)
         psi, distance = state_sum(psis), 0.0
-        for i in range(count):
+        for i in counted:
             distance = max(distance, abs(psis[i] - steady[i]))
         ratio = 1.0 + effective_stress(g, psis, p)[0]
         excess, slope = stress(g, psis, p)
@@ -342,6 +342,13 @@ def system_of(
     return System(made, balance, slow, full, *of_rigid)
 
 
+def excluded_places(scene: Scene) -> tuple[int, ...]:
+    """Return the places, among all states, of those that do not count for the distance."""
+    law, source = scene.parts.law, scene.pressure_source
+    unknowns = enumerate(source.unknowns, start=law.states)
+    return tuple(n for n, about in unknowns if about.name in source.excluded_from_distance)
+
+
 def functions(scene: Scene, dynamics: Dynamics | None = None) -> System:
     """The functions of a scene, with other dynamics than its own where some are given."""
     law, stress, source = scene.parts.law, scene.parts.normal_stress, scene.pressure_source
@@ -360,5 +367,6 @@ def functions(scene: Scene, dynamics: Dynamics | None = None) -> System:
         auxiliary_steady_states=source.auxiliary_steady_states,
         outside=-1 - len(scene.parts.fluid.unknowns) if scene.parts.loading.presses else 0,
         displaces=scene.parts.loading.displaces,
+        excluded=excluded_places(scene),
     )
     return system_of(parts, acting.slip_rate, acting.rupture_rate)

@@ -26,7 +26,11 @@ JOB = {
     "walltime": "02:00:00",
     "queue": "normal",  # your partition
     # "account": "...", "interface": "ib0", as your site asks for
-    # "security": True, so that nobody else on the login node runs code in your name
+    # encryption, with certificates for this cluster only: without it, everybody on the login node
+    # could run code in your name
+    "security": True,
+    # a directory of yours that all nodes see; workers read the certificates from it
+    "shared_temp_directory": "~",
 }
 JOBS = 4
 

@@ -28,9 +28,6 @@ class SaturatingLaw(Law):
     name = "saturating"
     evolution = staticmethod(evolution)
 
-    def numbers(self, scene):
-        return (*super().numbers(scene), self.sharpness)
-
     def check(self, scene):
         super().check(scene)
         if self.sharpness > 1.0:

@@ -12,7 +12,11 @@ from typing import TypeVar
 import numpy as np
 from scipy.linalg import block_diag
 
+from rsfstudy.analysis.fitting.filters import LOW_PASS
 from rsfstudy.analysis.fitting.model import FINE, Differences, Model, Values
+from rsfstudy.errors import InvalidValue
+from rsfstudy.motion.meter import Halt
+from rsfstudy.status import Status
 
 T = TypeVar("T")
 #: What parameters that each window may have for itself begin with.
@@ -52,9 +56,18 @@ def of_window(values: Mapping[str, T], number: int) -> dict[str, T]:
 
 @dataclass(frozen=True)
 class Joint:
-    """The models of one window or several, with the interface of a model."""
+    """The models of one or several windows, with the interface of a model.
+
+    Attributes
+    ----------
+    parts : tuple of Model
+    stiffness_factors : tuple of float
+        Stiffness over normal stress of each window, relative to the first window. Empty if all
+        windows have the same value.
+    """
 
     parts: tuple[Model, ...]
+    stiffness_factors: tuple[float, ...] = ()
 
     @cached_property
     def time(self) -> np.ndarray:
@@ -65,6 +78,17 @@ class Joint:
     def friction(self) -> np.ndarray:
         """Friction of all rows."""
         return np.concatenate([part.friction for part in self.parts])
+
+    @property
+    def averaging(self) -> float:
+        """Averaging time of friction in s; 0 if it was not averaged."""
+        passed = self.parts[0].filter
+        return passed.size if passed is not None and passed.kind not in LOW_PASS else 0.0
+
+    @property
+    def frictions(self) -> list[np.ndarray]:
+        """Friction of the rows of each window."""
+        return [part.friction for part in self.parts]
 
     @cached_property
     def displacement(self) -> np.ndarray:
@@ -80,9 +104,13 @@ class Joint:
         return self.parts[max(parted(name)[1] - 1, 0)].latest
 
     def check(self, values: Values) -> None:
-        """Raise InvalidValue for parameters that make no scene."""
-        for part, own in self._each(values):
-            part.scene_of(own)
+        """Raise Halt if a scene cannot have these parameters."""
+        try:
+            for part, own in self._each(values):
+                part.scene_of(own)
+        except InvalidValue as wrong:
+            text = f"no slider has the first guess of the parameters: {wrong}"
+            raise Halt(Status.NOT_APPLICABLE, text) from wrong
 
     def curve(self, values: Values, *, refined: bool = False, checked: bool = False) -> np.ndarray:
         """Friction along the rows of all windows, without trends (see `Model.curve`)."""
@@ -111,6 +139,8 @@ class Joint:
         return np.asarray(block_diag(*(part.by_loading(own) for part, own in self._each(values))))
 
     def _each(self, values: Values) -> Iterator[tuple[Model, dict[str, float]]]:
-        """The models, each with the parameters of its window."""
-        for number, part in enumerate(self.parts, start=1):
-            yield part, of_window(values, number)
+        """Iterate over the models, each with the parameters of its window."""
+        factors = self.stiffness_factors or (1.0,) * len(self.parts)
+        for number, (part, factor) in enumerate(zip(self.parts, factors, strict=True), start=1):
+            own = of_window(values, number)
+            yield part, own | {"stiffness": factor * own["stiffness"]}

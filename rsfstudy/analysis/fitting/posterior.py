@@ -23,6 +23,8 @@ from rsfstudy.motion.meter import Halt
 if TYPE_CHECKING:
     from rsfstudy.analysis.fitting.search import Fitted, Search
 
+#: Largest number of draws.
+_MOST = 1_000_000
 #: Steps between two looks at a chain, autocorrelation times that it must be long, and times that
 #: are left out at its beginning.
 _STEPS, _LONG, _BURNT = 100, 50.0, 5.0
@@ -31,9 +33,9 @@ _TAILS = 5.0
 
 
 def check(draws: int) -> None:
-    """Raise InvalidValue for a number of draws that is none, or without emcee."""
-    if not isinstance(draws, int) or draws < 0:
-        raise InvalidValue("posterior", draws, "must be a whole number, 0 or more")
+    """Raise InvalidValue for an invalid number of draws, or if emcee is not installed."""
+    if not isinstance(draws, int) or not 0 <= draws <= _MOST:
+        raise InvalidValue("posterior", draws, f"must be a whole number from 0 to {_MOST:,}")
     if draws and importlib.util.find_spec("emcee") is None:
         remedy = "pip install 'rsfstudy[posterior]'."
         raise InvalidValue("posterior", draws, "needs emcee, which is missing", remedy=remedy)

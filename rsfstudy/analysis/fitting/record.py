@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,8 +13,14 @@ import xarray as xr
 from scipy.optimize import isotonic_regression
 
 from rsfstudy.analysis.fitting.steps import Step, steps_of
+from rsfstudy.analysis.fitting.stress_steps import (
+    find_stress_steps,
+    with_levels,
+    with_stress_steps,
+)
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
+from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.quantity import Quantity, is_name
 
 #: Its columns.
@@ -22,6 +29,16 @@ COLUMNS = (
     Quantity("displacement", r"$\delta_0$", "um", "load point displacement"),
     Quantity("friction", r"$\mu$", "1", "friction coefficient"),
     Quantity("normal_stress", r"$\sigma$", "Pa", "normal stress"),
+)
+
+#: Columns of the table of its velocity steps, in the order of `Step`.
+_STEP_COLUMNS = (
+    Quantity("begins", "$t$", "s", "time at which the step begins"),
+    Quantity("ends", "$t$", "s", "time at which the step ends"),
+    Quantity("velocity_before", "$V_0$", "um s-1", "load point velocity before the step"),
+    Quantity("velocity_after", "$V_1$", "um s-1", "load point velocity after the step"),
+    Quantity("normal_stress_before", r"$\sigma$", "Pa", "normal stress before the step"),
+    Quantity("normal_stress_after", r"$\sigma$", "Pa", "normal stress after the step"),
 )
 
 #: Pieces of steady velocity that stand for a ramp: at their ends displacement is exact.
@@ -109,50 +126,77 @@ class Record:
         return replace(self, columns={n: v[rows] for n, v in self.columns.items()})
 
     def with_steps(self, steps: Sequence[Sequence[float]]) -> Record:
-        """The record with its steps stated: times in s at which velocity begins and ends to change,
-        and velocities before and after in um/s.
+        """Return the record with stated steps in place of those that are detected.
+
+        Parameters
+        ----------
+        steps : sequence of (float, float, float, float) or of six floats
+            Times in s at which the change begins and ends, load point velocities in um/s before
+            and after, and, if normal stress changes, normal stresses in Pa before and after. By
+            default the normal stresses are those of the record.
+
+        Returns
+        -------
+        Record
         """
         stated: list[Step] = []
         for step in steps:
             try:
                 stated.append(Step(*map(float, step)))
             except (TypeError, ValueError) as error:
-                rule = "must be four numbers: begins, ends, velocity before and after"
+                rule = "must be four or six numbers: begins, ends, velocity before and after, "
+                rule += "and normal stress before and after"
                 raise InvalidValue("step", step, rule) from error
         for step in stated:
-            if not step.begins <= step.ends or min(step.before, step.after) < 0.0:
-                rule = "is no step: begins, ends, velocity before and after"
-                raise InvalidValue("step", tuple(step), rule)
+            negative = min(step.before, step.after) < 0.0 or step.stress_ratio <= 0.0
+            if not step.begins <= step.ends or negative:
+                rule = "is no step: begins, ends, velocity before and after, and, if it changes, "
+                rule += "normal stress before and after"
+                raise InvalidValue("step", tuple(step)[: len(steps[0])], rule)
         return replace(self, stated=tuple(stated))
 
     @cached_property
     def found(self) -> tuple[Step, ...]:
-        """The steps of its load point: those stated, else those that displacement tells."""
-        if self.stated is not None:
-            return self.stated
-        return steps_of(self.time, self.columns["displacement"])
+        """The steps that are stated, or else those of displacement and normal stress."""
+        stress, moved = self.columns.get("normal_stress"), self.columns["displacement"]
+        steps = self.stated if self.stated is not None else steps_of(self.time, moved)
+        if stress is None:
+            return steps
+        changes = find_stress_steps(self.time, stress)
+        if self.stated is None:
+            velocity = float(np.polyfit(self.time - self.time[0], moved, 1)[0])
+            steps = with_stress_steps(steps, changes, velocity)
+        return with_levels(steps, changes, self.time, stress)
 
     def steps(self) -> xr.Dataset:
-        """The steps of its load point, along ``step``, numbered from 1: ``begins``, ``ends`` (s),
-        ``velocity_before`` and ``velocity_after`` (um/s).
+        """List the steps of load point velocity and normal stress, numbered from 1.
+
+        Returns
+        -------
+        xarray.Dataset
+            Along ``step``, numbered from 1: ``begins``, ``ends`` (s), ``velocity_before``,
+            ``velocity_after`` (um/s), and, if normal stress was recorded,
+            ``normal_stress_before`` and ``normal_stress_after`` (Pa).
         """
         rows = np.array(self.found, dtype=float).reshape(-1, len(Step._fields))
-        names = ("begins", "ends", "velocity_before", "velocity_after")
-        units = ("s", "s", "um s-1", "um s-1")
-        data = {
-            name: ("step", rows[:, n], {"units": of})
-            for n, (name, of) in enumerate(zip(names, units, strict=True))
-        }
-        return xr.Dataset(data, coords={"step": np.arange(1, len(rows) + 1)})
+        shown = _STEP_COLUMNS if "normal_stress" in self.columns else _STEP_COLUMNS[:4]
+        data = {about.name: ("step", rows[:, n], about.attributes) for n, about in enumerate(shown)}
+        number = {"long_name": "number of the step", "units": "1"}
+        steps = {"step": ("step", np.arange(1, len(rows) + 1), number)}
+        return with_cf_encoding(xr.Dataset(data, steps, self._attributes("Detected steps")))
 
     def to_dataset(self) -> xr.Dataset:
-        """The record along ``time``."""
+        """Return the record as a dataset along ``time``."""
         about = {column.name: column for column in COLUMNS}
         data = {
             name: ("time", values, {"long_name": about[name].long_name, "units": about[name].units})
             for name, values in self.columns.items()
         }
-        return xr.Dataset(data)
+        return with_cf_encoding(xr.Dataset(data, attrs=self._attributes("Laboratory record")))
+
+    def _attributes(self, title: str) -> dict[str, str]:
+        """Return the attributes of a dataset that was derived from the record."""
+        return {"title": f"{title}: {self.name}", "Conventions": "CF-1.11"}
 
 
 def loading_of(record: Record, begins: float, ends: float, *, recorded: bool) -> np.ndarray:
@@ -172,7 +216,12 @@ def loading_of(record: Record, begins: float, ends: float, *, recorded: bool) ->
     """
     steps = steps_between(record, begins, ends)
     if recorded:
-        return _by_rows(record.window(begins, ends), steps[0].before if steps else 0.0)
+        part, first = record.window(begins, ends), steps[0] if steps else None
+        if first is None:
+            return _by_rows(part, 0.0, math.nan)
+        sliding = part.time < first.begins
+        stress = part.columns.get("normal_stress", np.array([]))[: int(sliding.sum())]
+        return _by_rows(part, first.before, float(stress.mean()) if stress.size else math.nan)
     return by_steps(begins, steps)
 
 
@@ -182,19 +231,32 @@ def steps_between(record: Record, begins: float, ends: float) -> list[Step]:
 
 
 def by_steps(begins: float, steps: Sequence[Step]) -> np.ndarray:
-    """Pieces of loading by steps, from a time on."""
-    pieces = [(begins, steps[0].before if steps else 0.0)]
+    """Make the pieces of loading by steps, from a time on."""
+    pieces, level = [(begins, steps[0].before if steps else 0.0, 1.0, 0.0)], 1.0
     for step in steps:
-        for part in np.arange(_RAMP if step.ends > step.begins else 0) / _RAMP:
-            at = step.begins + part * (step.ends - step.begins)
+        lasts, rises = step.ends - step.begins, level * (step.stress_ratio - 1.0)
+        count = 0 if not lasts > 0.0 else _RAMP if step.changes_velocity else 1
+        for part in np.arange(count) / max(count, 1):
             speed = step.before + (part + 0.5 / _RAMP) * (step.after - step.before)
-            pieces.append((float(at), float(speed)))
-        pieces.append((step.ends, step.after))
-    return np.array([(time, speed, 1.0, 0.0) for time, speed in pieces])
+            at = step.begins + part * lasts
+            pieces.append((float(at), float(speed), level + part * rises, rises / lasts))
+        level += rises
+        pieces.append((step.ends, step.after, level, 0.0))
+    return np.array(pieces)
 
 
-def _by_rows(record: Record, first: float) -> np.ndarray:
-    """Pieces of loading from each row to the next."""
+def _by_rows(record: Record, first: float, before: float) -> np.ndarray:
+    """Make the pieces of loading from each row to the next.
+
+    Parameters
+    ----------
+    record : Record
+    first : float
+        Load point velocity in um/s of the first piece.
+    before : float
+        Normal stress in Pa before the first step, to which normal stress is relative; that of the
+        first row, if it is unknown.
+    """
     lasts = np.diff(record.time)
     moved = isotonic_regression(record.columns["displacement"]).x
     table = np.zeros((len(record), 4))
@@ -203,6 +265,7 @@ def _by_rows(record: Record, first: float) -> np.ndarray:
     table[-1, 1], table[0, 1] = table[-2, 1], first
     if "normal_stress" in record.columns:
         stress = record.columns["normal_stress"]
-        table[:, 2] = stress / stress[0]
+        table[:, 2] = stress / (before if before > 0.0 else stress[0])
+        table[0, 2] = 1.0  # the motion begins in steady sliding
         table[:-1, 3] = np.diff(table[:, 2]) / lasts
     return table

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -37,26 +37,43 @@ _SHORT, _FEW = 0.05, 15
 _NORMAL = 1.4826
 
 
+#: Sum of squares that remains of rows i to j.
+Squares = Callable[[np.ndarray | int, np.ndarray | int], np.ndarray]
 #: Displacement at time 0, and velocity.
 _Line = tuple[float, float]
 
 
 @guard_methods
 class Step(NamedTuple):
-    """A change of load point velocity.
+    """A change of load point velocity, of normal stress, or of both.
 
     Attributes
     ----------
     begins, ends : float
-        Times in s; the same, unless velocity changes over several samples.
+        Times in s; the same, unless the change takes several samples.
     before, after : float
-        Velocities in um/s; 0 of a load point that is held.
+        Load point velocities in um/s; 0 if the load point is held.
+    stress_before, stress_after : float
+        Normal stresses in Pa; NaN if normal stress was not recorded.
     """
 
     begins: float
     ends: float
     before: float
     after: float
+    stress_before: float = math.nan
+    stress_after: float = math.nan
+
+    @property
+    def changes_velocity(self) -> bool:
+        """True if the load point velocity changes."""
+        return self.before != self.after
+
+    @property
+    def stress_ratio(self) -> float:
+        """Normal stress after the step over that before; 1 if it does not change."""
+        ratio = self.stress_after / self.stress_before
+        return ratio if math.isfinite(ratio) else 1.0
 
 
 def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
@@ -81,9 +98,11 @@ def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
     if len(t) < 2 * _FEWEST:
         return ()
     t0, x0 = t[0], x[0]
-    sums = _Sums(t - t0, x - x0)
+    sums = RunningSums(t - t0, x - x0)
     variance = noise_variance(t, x)
-    knots = _merged(sums, sorted(_parted(sums, 0, len(t), variance)), t, variance)
+    knots = _merged(
+        sums, sorted(part_rows(sums.residual_squares, 0, len(t), variance)), t, variance
+    )
     lines = [sums.line(i, j) for i, j in itertools.pairwise(knots)]
     meets = [
         _meeting(lines[n], lines[n + 1], (t[k - 1] - t0, t[k] - t0), variance)
@@ -106,8 +125,8 @@ def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
     return tuple(found)
 
 
-class _Sums:
-    """Running sums of samples, which tell the line through any part of them at once."""
+class RunningSums:
+    """Running sums of samples, from which the line through any part of them follows at once."""
 
     def __init__(self, t: np.ndarray, x: np.ndarray) -> None:
         columns = np.array([np.ones(len(t)), t, x, t * t, t * x, x * x])
@@ -123,6 +142,10 @@ class _Sums:
         """Sum of squares that the line through rows i to j leaves."""
         _mt, _mx, tt, tx, xx = self.between(i, j)
         return np.asarray(np.maximum(xx - tx * tx / tt, 0.0))
+
+    def squares_about_mean(self, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
+        """Compute the sum of squares about the mean of rows i to j."""
+        return np.asarray(np.maximum(self.between(i, j)[4], 0.0))
 
     def line(self, i: int, j: int) -> _Line:
         """Displacement at time 0, and velocity, of the line through rows i to j."""
@@ -142,23 +165,37 @@ def noise_variance(t: np.ndarray, x: np.ndarray) -> float:
     return max(spread, least) ** 2
 
 
-def _parted(sums: _Sums, first: int, last: int, variance: float) -> set[int]:
-    """The rows that part rows `first` to `last` into straight pieces, both of these among them."""
+def part_rows(squares: Squares, first: int, last: int, variance: float) -> set[int]:
+    """Part rows by binary segmentation, if parts explain them by far better than chance does.
+
+    Parameters
+    ----------
+    squares : callable
+        Sum of squares that remains of rows i to j.
+    first, last : int
+    variance : float
+        Variance of the noise.
+
+    Returns
+    -------
+    set of int
+        Rows at which parts begin, with `first` and `last`.
+    """
     open_parts, found = [(first, last)], {first, last}
     while open_parts:
         i, j = open_parts.pop()
         at = np.arange(i + _FEWEST, j - _FEWEST + 1)
         if not len(at):
             continue
-        both = sums.residual_squares(i, at) + sums.residual_squares(at, j)
+        both = squares(i, at) + squares(at, j)
         best = int(at[np.argmin(both)])
-        if sums.residual_squares(i, j) - both.min() > _WORTH * math.log(j - i) * variance:
+        if squares(i, j) - both.min() > _WORTH * math.log(j - i) * variance:
             found.add(best)
             open_parts += [(i, best), (best, j)]
     return found
 
 
-def _merged(sums: _Sums, knots: list[int], t: np.ndarray, variance: float) -> list[int]:
+def _merged(sums: RunningSums, knots: list[int], t: np.ndarray, variance: float) -> list[int]:
     """Knots without those between pieces that tell no step, the least one first."""
     while len(knots) > 2:
         pieces = [*itertools.pairwise(knots)]
@@ -195,7 +232,7 @@ def _refined(
     middle = int(np.searchsorted(time, at))
     i, j = max(middle - 20 * reach, 0), min(middle + 20 * reach, len(time))
     t, x = time[i:j] - at, displacement[i:j]
-    sums, places = _Sums(t, x - x[0]), np.arange(_FEWEST, j - i - _FEWEST)
+    sums, places = RunningSums(t, x - x[0]), np.arange(_FEWEST, j - i - _FEWEST)
     both = sums.residual_squares(0, places) + sums.residual_squares(places, j - i)
     best = int(places[np.argmin(both)])
     lines = sums.line(0, best), sums.line(best, j - i)

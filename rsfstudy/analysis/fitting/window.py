@@ -9,11 +9,13 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 
-from rsfstudy.analysis.fitting.load_point import moved_steps
+from rsfstudy.analysis.fitting.load_point import integrated_displacement, moved_steps
 from rsfstudy.analysis.fitting.model import Model, parameters_of
 from rsfstudy.analysis.fitting.record import Record, by_steps, loading_of, steps_between
-from rsfstudy.analysis.fitting.steps import Step
+from rsfstudy.analysis.fitting.steps import Step, noise_variance
+from rsfstudy.analysis.fitting.stress_steps import CHANGES
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt, Meter
 from rsfstudy.slider.scene import Scene
@@ -24,6 +26,11 @@ _BACK, _ROWS = 0.5, 3
 #: Part of the time before the first step by which loading may come late.
 _LATE = 0.2
 LOADINGS = ("steps", "recorded")
+#: Rows of the running median by which noise of normal stress is reduced, the quantile of departures
+#: that is compared, and the standard deviations of noise by which it may exceed the limit.
+_SMOOTHED, _MOST_OF, _NOISE_ALLOWED = 5, 0.99, 2.0
+#: Logarithm of the ratio of velocities below which a step shows neither a nor b at a glance.
+_LEAST_RATIO = 0.02
 
 
 @dataclass(frozen=True)
@@ -62,7 +69,7 @@ class Window:
         """
         found = self.record.found
         if self.number > len(found):
-            text = f"{self.record.name} has {len(found)} steps of load point velocity"
+            text = f"{self.record.name} has {len(found)} steps"
             raise Halt(Status.NO_STEP, text)
         return found[self.number - 1]
 
@@ -71,6 +78,43 @@ class Window:
         """The rows of the record."""
         time = self.record.time
         return np.flatnonzero((time >= self._opens(self.step)) & (time <= self._closes()))
+
+    @property
+    def normal_stress(self) -> float:
+        """Mean normal stress in Pa before the step; NaN if it was not recorded."""
+        time, stress = self.record.time, self.record.columns.get("normal_stress")
+        if stress is None:
+            return math.nan
+        first, last = np.searchsorted(time, (self._opens(self.step), self.step.begins))
+        return float(stress[min(first, len(time) - 1) : max(first + 1, last)].mean())
+
+    @property
+    def about(self) -> dict[str, float]:
+        """Velocities of the step, ends of the window, normal stress and noise of the load point."""
+        record, rows = self.record, self.rows
+        moved, time = record.columns["displacement"][rows], record.time[rows]
+        return {
+            "load_point_noise": math.sqrt(noise_variance(time, moved)),
+            "velocity_before": self.step.before,
+            "velocity_after": self.step.after,
+            "window_begins": moved[0],
+            "window_ends": moved[-1],
+            "normal_stress_before": self.normal_stress,
+        }
+
+    def scene(self, scene: Scene, machine_stiffness: float) -> Scene:
+        """Return a scene with the stiffness of a machine over the normal stress before the step.
+
+        Parameters
+        ----------
+        scene : Scene
+        machine_stiffness : float
+            In Pa, for a displacement of the slip distance of the scene. Zero: the stiffness of the
+            scene stays as it is.
+        """
+        if not machine_stiffness:
+            return scene
+        return scene.with_(stiffness=machine_stiffness / self.normal_stress)
 
     def _closes(self) -> float:
         """Time in s at which it ends."""
@@ -125,10 +169,11 @@ class Window:
         Raises
         ------
         Halt
-            For too few rows, friction that is not positive, and a window that begins in a hold.
+            For too few rows, friction that is not positive, a window that begins in a hold, and
+            a normal stress that varies by more than the loading of the model does.
         """
         record, step, rows = self.record, self.step, self.rows
-        time, moved = record.time[rows], record.columns["displacement"][rows]
+        time = record.time[rows]
         friction = record.columns["friction"][rows]
         if len(rows) < _ROWS * len(free) or not step.begins < self._closes():
             text = f"the window holds {len(rows)} rows, too few for {len(free)} parameters"
@@ -141,16 +186,61 @@ class Window:
         pieces = loading_of(record, begins, ends, recorded=loading == "recorded")
         if scene.parts.normal_stress.name == "constant":
             pieces[:, 2:] = 1.0, 0.0  # what was recorded is noise
-        between = steps_between(record, begins, ends) if loading == "steps" else []
-        moves = [by_steps(begins, steps) for steps in moved_steps(record, between)]
+        moves = self._moves(begins, ends) if loading == "steps" else []
         if "step_time" in free:
             for each in (pieces, *moves):
                 each[0, 0] -= _LATE * (step.begins - begins)
         if not pieces[0, 1] > 0.0:
             text = "the window begins in a hold: a fit begins with steady sliding"
             raise Halt(Status.NOT_APPLICABLE, text)
-        moved = moved - np.interp(step.begins, time, moved)
+        self._check_normal_stress(rows, pieces)
+        steady = by_steps(begins, steps_between(record, begins, ends))
+        moved = integrated_displacement(steady, time, step.begins)
         return Model(scene, time, moved, friction, pieces, accuracy, meter, moves)
+
+    def _moves(self, begins: float, ends: float) -> list[np.ndarray]:
+        """Make the loading with steps that are moved by errors of displacement."""
+        steps = steps_between(self.record, begins, ends)
+        others = [step for step in steps if not step.changes_velocity]
+        moved = moved_steps(self.record, [step for step in steps if step.changes_velocity])
+        return [by_steps(begins, sorted([*each, *others])) for each in moved]
+
+    def _check_normal_stress(self, rows: np.ndarray, pieces: np.ndarray) -> None:
+        """Raise Halt if the recorded normal stress departs from that of the loading."""
+        record = self.record
+        if "normal_stress" not in record.columns:
+            return
+        time, before = record.time[rows], self.normal_stress
+        stress = record.columns["normal_stress"][rows] / before
+        piece = np.maximum(np.searchsorted(pieces[:, 0], time, side="right") - 1, 0)
+        modelled = pieces[piece, 2] + pieces[piece, 3] * (time - pieces[piece, 0])
+        apart = np.abs(median_filter(stress - modelled, _SMOOTHED, mode="nearest"))
+        noise = math.sqrt(noise_variance(time, stress))
+        varies = float(np.quantile(apart, _MOST_OF)) - _NOISE_ALLOWED * noise
+        if varies > CHANGES:
+            stress *= before * 1e-6
+            text = (
+                f"normal stress varies from {stress.min():.4g} to {stress.max():.4g} MPa within "
+                f"the window, and is {before * 1e-6:.4g} MPa before the step; the model accounts "
+                f"for changes of {100.0 * CHANGES:g} % at most. Shorten the window with --before "
+                "and --after (before=, after=), or model the normal stress: --set "
+                "normal_stress=imposed (normal_stress=) for its steps, with --loading recorded "
+                "(loading=) row by row; alpha is then free or stated"
+            )
+            raise Halt(Status.NOT_APPLICABLE, text)
+
+
+def stiffness_factors(windows: Sequence[Window]) -> tuple[float, ...]:
+    """Compute stiffness over normal stress in windows of one machine, relative to the first.
+
+    Returns
+    -------
+    tuple of float
+        Empty if the normal stress of a window is unknown.
+    """
+    stresses = np.array([window.normal_stress for window in windows])
+    known = bool(np.isfinite(stresses).all() and stresses.all())
+    return tuple((stresses[0] / stresses).tolist()) if known else ()
 
 
 def first_guess(
@@ -178,6 +268,9 @@ def first_guess(
         values["mu_star"] = float(np.mean(before))
     if step.after > 0.0 and len(before):
         ratio = math.log(step.after / step.before)
+    else:
+        ratio = 0.0
+    if abs(ratio) > _LEAST_RATIO:
         peak = later.max() if ratio > 0.0 else later.min()
         read_a = max((peak - values["mu_star"]) / ratio, 1e-3)
         read_b = (peak - float(np.mean(later[-max(len(later) // 10, 1) :]))) / ratio

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.parts import Numbers, Part, found_in
+from rsfstudy.slider.requirements import PORE_PRESSURE, SLIP_RATE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,10 +22,15 @@ class Fluid(Part):
     - ``auxiliary_rates(log_slip_rate, states, fraction, p)``: their changes per unit slip in D_c,
       times a fraction;
     - ``auxiliary_steady_states(log_slip_rate, p)``: what they are in steady sliding, where P is 0.
+
+    A case may list unknowns in `excluded_from_distance`. The distance from steady sliding, by which
+    a motion settles or a cycle repeats, then leaves them out. This is meant for unknowns whose
+    steady values are huge at the slip rate of a rupture.
     """
 
     conclusions = ("highest_pressure",)
     equations = frozenset({"auxiliary_rates", "numbers"})
+    receives = frozenset({SLIP_RATE, PORE_PRESSURE})
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
         """Bound of pore pressure from now on, while ln(V/V_*) is at most `log_slip_rate`; infinite

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.fluid import Fluid
-from rsfstudy.slider.parts import Function, Numbers, Scene
+from rsfstudy.slider.parts import Function, Numbers, Scene, numbers_of
 from rsfstudy.slider.places import DYNAMICS, FLUID, LARGEST_SLOWNESS, RECHARGE
 
 if TYPE_CHECKING:
@@ -68,6 +68,11 @@ class Recharged:
         return (*self.loading.unknowns, *self.fluid.unknowns)
 
     @property
+    def excluded_from_distance(self) -> tuple[str, ...]:
+        """Names of the unknowns of both parts that do not count for the distance."""
+        return (*self.loading.excluded_from_distance, *self.fluid.excluded_from_distance)
+
+    @property
     def auxiliary_rates(self) -> Function:
         """Theirs."""
         assert self.fluid.auxiliary_rates is not None
@@ -81,6 +86,6 @@ class Recharged:
 
     def numbers(self, scene: Scene) -> Numbers:
         """Those of the fluid, and the rate of the loading in the last place."""
-        own = self.fluid.numbers(scene)
+        own = numbers_of(self.fluid, scene)
         between = (math.nan,) * (DYNAMICS - FLUID - 1 - len(own))
-        return (*own, *between, *self.loading.numbers(scene))
+        return (*own, *between, *numbers_of(self.loading, scene))

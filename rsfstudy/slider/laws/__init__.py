@@ -25,6 +25,7 @@ from rsfstudy.slider.parts import (
     found_in,
     number,
 )
+from rsfstudy.slider.requirements import LAW_RECEIVES
 
 #: Exponents of evolution laws beyond this occur in trial steps only, which the integrator rejects:
 #: the equations of motion stop at slip rates of 10^-290 V_*.
@@ -50,7 +51,14 @@ def cutoff_velocity() -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class LawOfStates(Part):
-    """Base of all laws; one with a single b is derived from `Law`.
+    """Base class of all laws. Laws with a single b are derived from `Law`.
+
+    The functions of a law receive ln(V/V_*), the states and the numbers of the law. The friction
+    coefficient ``tau/sigma = mu_* + a ln(V/V_*) + sum of Theta_i`` of forward slip follows from
+    these. The functions do not receive shear stress, normal stress or pore pressure. A law whose
+    state evolves with one of these lists it in `needs`, for example ``needs = {"shear_stress"}``.
+    It is then accepted only in scenes with constant effective normal stress, where shear stress
+    over sigma_* is the friction coefficient.
 
     A law states ``evolution(log_slip_rate, state, p)``: the change of its state variable per unit
     of slip in D_c, at constant normal stress. It comes to rest at Theta = -b ln(V/V_*), unless it
@@ -64,10 +72,8 @@ class LawOfStates(Part):
     shift each state has; the parts add up to all of it. What the states together have for b it says
     as `b_over_a`, a field or a property; `two_slip_states` is an example.
 
-    Any unknown that friction depends on may be such a state, temperature for one, written as what
-    it adds to friction. Its change may read slip rate, the states and the numbers of the law, and
-    with them friction of slip forward, ``mu_* + a ln(V/V_*)`` and the sum of the states. It cannot
-    read normal stress or pore pressure, which evolutions are not given.
+    Any unknown that friction depends on may be a state, for example temperature, if it is written
+    as the friction coefficient that it adds.
     """
 
     stress_dependence: float = number(
@@ -82,6 +88,7 @@ class LawOfStates(Part):
 
     conclusions = ("orbits_close", "scale_free", "relaxation")
     equations = frozenset({"evolution", "evolutions"})
+    receives = LAW_RECEIVES
     #: How many states the law has.
     states: ClassVar[int] = 1
     #: Whether every orbit closes at critical stiffness, where friction alone acts and stress has no
@@ -110,6 +117,10 @@ class LawOfStates(Part):
     def b_over_a(self) -> float:
         """Evolution effect of all states together, over the direct effect."""
         raise TypeError(f"{type(self).__name__} states no b_over_a")
+
+    def numbers(self, scene: Scene) -> Numbers:
+        """Return the numbers that all laws have in their places: none."""
+        return ()
 
     @property
     def size_over_a(self) -> float:
@@ -156,17 +167,18 @@ class Law(LawOfStates):
         evolution(log_slip_rate, state, p) -> float
 
     It returns dTheta per unit of slip in D_c, at constant normal stress. `log_slip_rate` is
-    ln(V/V_*) and `state` is Theta. ``p[LAW]`` is b (`rsfstudy.slider.places.LAW`); numbers of
-    the law's own follow it. A law that has some adds fields, by `rsfstudy.slider.parts.number`,
-    and::
+    ln(V/V_*) and `state` is Theta. ``p[LAW]`` is b (`rsfstudy.slider.places.LAW`). Parameters of
+    the law are fields declared by `rsfstudy.slider.parts.number`; they follow b in the order of
+    their declaration, as ``p[LAW + 1]``, ``p[LAW + 2]`` and so on. Optional methods are::
 
         numbers(self, scene) -> tuple[float, ...]
         check(self, scene) -> None
 
-    The first returns ``(*super().numbers(scene), ...)``, the second raises `InvalidValue`. The law
-    is named by ``name``. Optional are `relaxation`, `steady_states` and `state_effect`. A law with
-    one b may have several states, too, and then states `evolutions` and `steady_states`, as
-    `LawOfStates` says.
+    Override the first, which returns ``(*super().numbers(scene), ...)``, if `evolution` reads other
+    numbers than the fields, such as their logarithms. The second raises `InvalidValue` if values
+    contradict each other. The class attribute ``name`` names the law. `relaxation`,
+    `steady_states` and `state_effect` are optional, too. A law with one b may have several states,
+    and then defines `evolutions` and `steady_states`, as described for `LawOfStates`.
     """
 
     b_over_a: float = number(2.0, "$b/a$", "1", "ratio of evolution effect to direct effect")

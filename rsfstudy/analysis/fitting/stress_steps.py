@@ -1,0 +1,197 @@
+"""Steps of normal stress in a record: changes from one level to another.
+
+The mean of a number of rows is compared with that of as many rows before. A step is where both
+differ by 2 % of normal stress, and by far more than they usually do. The drift of the whole record
+and noise, which may be correlated, are part of the usual difference. A ramp from one level to
+another is a step that lasts; a drift that begins before the record or ends after it is no step.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import find_objects, label
+
+from rsfstudy.analysis.fitting.steps import Step
+
+#: Least change of level, relative to the level before, and relative to the robust standard
+#: deviation of differences.
+CHANGES, _STANDS_OUT = 0.02, 6.0
+#: Share of a change by which levels over longer parts may differ: else it is part of a ramp.
+_LEVEL = 0.25
+#: Share of the least change down to which a change is followed.
+_FOLLOWED = 0.4
+#: Most rows at once (of a longer record, means of several rows), parts of the record that are
+#: compared, and the fewest rows of a part.
+_ROWS, _PARTS, _SHORTEST = 20_000, (400, 100, 25), 8
+#: Shares of the change of level between which rows determine the line of a ramp, and fewest rows.
+_RAMP, _FEWEST = (0.1, 0.9), 3
+#: Standard deviation over the median of absolute deviations of Gaussian noise.
+_NORMAL = 1.4826
+
+
+class StressStep(NamedTuple):
+    """A change of normal stress.
+
+    Attributes
+    ----------
+    begins, ends : float
+        Times in s. Normal stress changes between them at a steady rate.
+    before, after : float
+        Levels of normal stress in Pa.
+    """
+
+    begins: float
+    ends: float
+    before: float
+    after: float
+
+
+def find_stress_steps(time: np.ndarray, stress: np.ndarray) -> list[StressStep]:
+    """Find the steps of normal stress in a record.
+
+    Parameters
+    ----------
+    time, stress : ndarray, shape (rows,)
+        In s and Pa.
+
+    Returns
+    -------
+    list of StressStep
+        In the order of time. Changes of less than 2 % are left out.
+    """
+    every = max(1, math.ceil(len(time) / _ROWS))
+    count = len(time) // every * every
+    t, s = (v[:count].reshape(-1, every).mean(axis=1) for v in (time, stress))
+    found: list[tuple[slice, StressStep]] = []
+    windows = sorted({max(len(t) // parts, _SHORTEST) for parts in _PARTS})
+    for window, longer in itertools.pairwise([*windows, 0]):
+        for rows in _changes(s, window):
+            if any(rows.start < other.stop and other.start < rows.stop for other, _ in found):
+                continue
+            before, after = _levels(s, rows, window, window)
+            lasting = _levels(s, rows, window, longer) if longer else (before, after)
+            change = abs(after - before)
+            goes_on = max(abs(before - lasting[0]), abs(after - lasting[1])) > _LEVEL * change
+            if change > CHANGES * abs(before) and not goes_on:
+                found.append((rows, _step(t[rows], s[rows], before, after)))
+    return sorted(step for _rows, step in found)
+
+
+def _levels(stress: np.ndarray, rows: slice, window: int, reach: int) -> tuple[float, float]:
+    """Compute levels before and after a change, over so many rows outside of it."""
+    first, last = rows.start + window, rows.stop - window
+    before, after = stress[max(first - reach, 0) : first], stress[last : last + reach]
+    return float(np.median(before)), float(np.median(after))
+
+
+def _changes(stress: np.ndarray, window: int) -> list[slice]:
+    """Find the rows around changes of the mean, with a window of level rows on either side."""
+    if len(stress) < 4 * window:
+        return []
+    sums = np.concatenate([[0.0], np.cumsum(stress - stress.mean())])
+    change = sums[2 * window :] - 2.0 * sums[window:-window] + sums[: -2 * window]
+    change = change / window - np.median(change) / window
+    spread = _NORMAL * float(np.median(np.abs(change)))
+    least = max(CHANGES * abs(float(np.mean(stress))), _STANDS_OUT * spread)
+    found: list[slice] = []
+    for signed in (change, -change):
+        joined: list[slice] = []
+        for (rows,) in find_objects(label(signed > _FOLLOWED * least)[0]):
+            if joined and rows.start < joined[-1].stop + window:  # noise interrupts a ramp
+                joined[-1] = slice(joined[-1].start, rows.stop)
+            elif signed[rows].max() > least:
+                joined.append(rows)
+        found += joined
+    # at the ends of the record a change has no level on one side
+    inside = [rows for rows in found if rows.start > 0 and rows.stop < len(change)]
+    return [slice(rows.start, rows.stop - 1 + 2 * window) for rows in inside]
+
+
+def with_stress_steps(
+    steps: Sequence[Step], changes: Sequence[StressStep], velocity: float
+) -> tuple[Step, ...]:
+    """Add steps of normal stress to those of load point velocity.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+        Steps of load point velocity. A change of normal stress during a step belongs to it.
+    changes : sequence of StressStep
+    velocity : float
+        Load point velocity in um/s, if it has no steps.
+
+    Returns
+    -------
+    tuple of Step
+        In the order of time.
+    """
+    found = []
+    for step in steps:
+        during = [change for change in changes if _overlap(step, change)]
+        begins = min([step.begins, *(change.begins for change in during)])
+        ends = max([step.ends, *(change.ends for change in during)])
+        found.append(step._replace(begins=begins, ends=ends))
+    for change in changes:
+        if not any(_overlap(step, change) for step in steps):
+            earlier = [step.after for step in steps if step.ends <= change.begins]
+            speed = (earlier or [step.before for step in steps[:1]] or [velocity])[-1]
+            found.append(Step(change.begins, change.ends, speed, speed))
+    return tuple(sorted(found, key=lambda step: step.begins))
+
+
+def with_levels(
+    steps: Sequence[Step], changes: Sequence[StressStep], time: np.ndarray, stress: np.ndarray
+) -> tuple[Step, ...]:
+    """Add the normal stresses of a record to steps that do not state them.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+    changes : sequence of StressStep
+        Detected steps of normal stress. Without one during a step, normal stress is the same before
+        and after.
+    time, stress : ndarray, shape (rows,)
+        In s and Pa.
+    """
+    ends = [-math.inf, *(step.ends for step in steps)]
+    begins = [*(step.begins for step in steps[1:]), math.inf]
+    found = []
+    for step, earlier, later in zip(steps, ends, begins, strict=False):
+        during = [change for change in changes if _overlap(step, change)]
+        if math.isnan(step.stress_before):
+            rows = stress[(time >= earlier) & (time <= later)]
+            level = float(np.median(rows)) if rows.size else math.nan
+            before, after = (during[0].before, during[-1].after) if during else (level, level)
+            step = step._replace(stress_before=before, stress_after=after)
+        if step.begins == step.ends and step.stress_ratio != 1.0:
+            # a change of normal stress takes a sample at least
+            row = int(np.clip(np.searchsorted(time, step.begins, "right"), 1, len(time) - 1))
+            step = step._replace(begins=float(time[row - 1]), ends=float(time[row]))
+        found.append(step)
+    return tuple(found)
+
+
+def _overlap(step: Step, change: StressStep) -> bool:
+    """Return True if a change of normal stress takes place during a step."""
+    near = change.ends - change.begins
+    return step.begins - near <= change.ends and change.begins <= step.ends + near
+
+
+def _step(time: np.ndarray, stress: np.ndarray, before: float, after: float) -> StressStep:
+    """Locate the ramp between two levels, by the line through the rows on its way."""
+    share = (stress - before) / (after - before)
+    middle = int(np.argmax(np.cumsum(0.5 - share)))  # where rows part best by the half
+    first = int(np.flatnonzero(share[: middle + 1] <= _RAMP[0]).max(initial=0))
+    reached = np.flatnonzero(share[middle:] >= _RAMP[1])
+    last = middle + int(reached[0]) if len(reached) else len(share) - 1
+    on_way = np.arange(first + 1, last)
+    if len(on_way) < _FEWEST:
+        return StressStep(float(time[first]), float(time[last]), before, after)
+    slope, offset = np.polyfit(time[on_way] - time[first], share[on_way], 1)
+    begins, ends = (time[first] + (x - offset) / slope for x in (0.0, 1.0))
+    return StressStep(float(max(begins, time[0])), float(min(ends, time[-1])), before, after)

@@ -1,0 +1,98 @@
+"""Overrides of zipped and numbered axes: selected points, and new values of one field."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+from rsfstudy.axes.axis import Axis, Row, plain, point_key
+from rsfstudy.errors import InvalidValue
+from rsfstudy.wording import short
+
+
+def select(axis: Axis, points: Sequence[Any]) -> Axis:
+    """Select points of a zipped axis by their labels, or of a numbered axis by their numbers.
+
+    The first `n` points of a set of samples keep the record of how they were drawn.
+    """
+    rows: dict[Any, Row] = dict(zip(axis.labels or range(len(axis)), axis.rows, strict=True))
+    for point in points:
+        if point not in rows:
+            rule, choices = "is no point of the axis", axis.labels or ()
+            if axis.is_numbered:
+                rule += f": they are numbered from 0 to {len(axis) - 1}"
+            raise InvalidValue(axis.dimension, point, rule, choices=choices)
+    if axis.labels is not None:
+        return Axis(axis.dimension, {label: rows[label] for label in points}, axis.units)
+    first = list(points) == list(range(len(points)))
+    drawn = {**axis.drawn, "n": len(points)} if axis.drawn and first else {}
+    return axis.with_rows([rows[number] for number in points], axis.units, drawn)
+
+
+def with_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
+    """Replace the values of one field of a zipped or numbered axis.
+
+    Parameters
+    ----------
+    axis : Axis
+        Axis that sets several fields at each point.
+    name : str
+        Field to override. Points that do not set it stay as they are.
+    values : sequence
+        New values; a numbered axis takes exactly one.
+
+    Returns
+    -------
+    Axis
+        A zipped axis has one point for each combination of a new value and the other fields. A
+        point that the axis already has keeps its label, and all other labels depend only on the
+        point, not on the rest of the list. A numbered axis no longer records how it was drawn.
+    """
+    if axis.is_numbered:
+        if len(values) != 1:
+            rule = f"varies along the axis {axis.dimension}: all of its points take one value"
+            raise InvalidValue(name, values, rule, remedy="Give one value.")
+        return axis.with_rows([{**row, name: values[0]} for row in axis.rows], axis.units)
+    assert axis.labels is not None
+    existing = {point_key(row): label for label, row in zip(axis.labels, axis.rows, strict=True)}
+    others = {point_key({**row, name: None}) for row in axis.rows if name in row}
+    points: dict[str, Row] = {}
+    for label, row in zip(axis.labels, axis.rows, strict=True):
+        if name not in row:
+            points[label] = row
+            continue
+        for value in map(partial(plain, name), values):
+            changed = {**row, name: value}
+            if changed in points.values():
+                continue
+            new = existing.get(point_key(changed), "")
+            if not new:
+                new = _new_label(label, name, row[name], value, is_unique=len(others) == 1)
+                while new in points or new in axis.labels:
+                    new = f"{label}, {new}"
+            points[new] = changed
+    return Axis(axis.dimension, points, axis.units)
+
+
+def _new_label(label: str, name: str, old: Any, new: Any, *, is_unique: bool) -> str:
+    """Return the label of a point in which one field has another value.
+
+    A label that contains the old value, such as ``"imposed, alpha = 0.25"``, has it replaced. Any
+    other label becomes ``"alpha = 0.3"`` if the value identifies the point (`is_unique`), and
+    otherwise precedes the value.
+    """
+    text = f"{name} = {_exact(new)}"
+    stated = rf"(?<!\w){re.escape(name)} = {re.escape(_exact(old))}(?![\w.])"
+    replaced, count = re.subn(stated, lambda _found: text, label)
+    if count:
+        return replaced
+    return text if is_unique else f"{label}, {text}"
+
+
+def _exact(value: Any) -> str:
+    """Return a value as text, with six digits if they represent a float exactly."""
+    short_text = short(value)
+    is_rounded = isinstance(value, float) and float(short_text) != value
+    return repr(value) if is_rounded else short_text

@@ -1,0 +1,57 @@
+"""Checks of the attributes of variables in a file, which may come from any program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.errors import DataError, brief
+
+#: Attributes that must be texts, and the most characters of each.
+_TEXTS = {
+    "long_name": 2000,
+    "units": 200,
+    "scale": 200,
+    "symbol": 500,
+    "flag_meanings": 20_000,
+    "comment": 100_000,
+    "loading": 200,
+}
+_REMEDY = "Correct it with xarray, or run the study again."
+
+
+def check_attributes(dataset: xr.Dataset) -> None:
+    """Check the type and the length of the attributes that rsfstudy uses.
+
+    Raises
+    ------
+    DataError
+        If one has the wrong type, is too long, or if flags and their meanings do not match.
+    """
+    for name, values in dataset.variables.items():
+        for key, most in _TEXTS.items():
+            if key in values.attrs:
+                _check_text(f"{brief(name)}.{key}", values.attrs[key], most)
+        _check_flags(str(name), values.attrs)
+
+
+def _check_text(path: str, value: object, most: int) -> None:
+    if not isinstance(value, str):
+        raise DataError(f"{path} is {brief(value)}, and must be a text. {_REMEDY}")
+    if len(value) > most:
+        raise DataError(f"{path} has {len(value):,} characters, at most {most:,}. {_REMEDY}")
+
+
+def _check_flags(name: str, attributes: Mapping[Any, Any]) -> None:
+    if not {"flag_values", "flag_meanings"} & set(attributes):
+        return
+    values = np.ravel(attributes.get("flag_values", ()))
+    meanings = str(attributes.get("flag_meanings", "")).split()
+    if values.dtype.kind not in "iuf" or len(values) != len(meanings):
+        raise DataError(
+            f"{brief(name)}.flag_values must be numbers, one for each of the {len(meanings)} "
+            f"flag_meanings (got {brief(values.tolist())}). {_REMEDY}"
+        )

@@ -1,0 +1,53 @@
+"""Checks of paths before the file system is asked about them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rsfstudy.errors import InvalidValue
+
+#: Most bytes of a file name and of a path on the usual file systems.
+LONGEST_NAME, LONGEST_PATH = 255, 4096
+
+
+def check_path(name: str, path: str | Path) -> Path:
+    """Check that a file or a directory can have a path, whether it exists or not.
+
+    Parameters
+    ----------
+    name : str
+        The argument or option, for the error.
+    path : str or Path
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InvalidValue
+        If the path is empty or not text, if it or one of its parts is too long, or if the system
+        does not accept it.
+    """
+    text = str(path)
+    if not text:
+        remedy = "Name a file or a directory; . is the directory you are in."
+        raise InvalidValue(name, text, "is empty", remedy=remedy)
+    try:
+        parts = [len(part.encode()) for part in (text, *Path(text).parts)]
+    except UnicodeError as error:  # neither NetCDF nor the attributes of a file could hold it
+        raise InvalidValue(name, text, "must be a text that UTF-8 can hold") from error
+    if "\0" in text:
+        raise InvalidValue(name, text, "must be a path, without the null character")
+    rule = ""
+    if parts[0] > LONGEST_PATH:
+        rule = f"must have at most {LONGEST_PATH:,} bytes (it has {parts[0]:,})"
+    elif max(parts[1:], default=0) > LONGEST_NAME:
+        rule = f"must have at most {LONGEST_NAME} bytes in each part (got {max(parts[1:]):,})"
+    if rule:
+        raise InvalidValue(name, text, rule, remedy="Choose a shorter name.")
+    try:
+        Path(path).exists()
+    except OSError as error:
+        raise InvalidValue(name, text, f"cannot be used: {error.strerror}") from error
+    return Path(path)

@@ -1,0 +1,164 @@
+"""Crossing of a level by a sampled curve, and bounds of where it may be between the samples."""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
+
+#: Number of samples at least.
+FEWEST = 4
+#: Intervals on either side of the bracket in which the curve is examined.
+_NEAR = 3
+#: Changes of slope, relative to the largest slope, that count as rounding errors.
+_ROUNDING = 1e-9
+#: The same, relative to the largest change nearby, that count for an oscillation.
+_NOTICEABLE = 0.1
+
+
+class Verdict(IntEnum):
+    """Outcome of the search for a crossing; its number stands in files."""
+
+    OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW_POINTS = range(5)
+
+
+class Crossing(NamedTuple):
+    """Place where a curve reaches a level, the first and last place possible, and the verdict."""
+
+    place: float
+    first: float
+    last: float
+    verdict: Verdict
+
+
+def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
+    """Find the place where a curve through samples reaches a level.
+
+    Between two samples, a curve departs from their chord at u of the interval h by no more than
+    ``T u (h - u)/h``, where T is the total change of its slope within the interval. The estimate of
+    T is the change of slope from the chord before to the chord after, which is exact for one kink
+    and twice the change of a parabola. In the first and the last interval, a kink may also be next
+    to the end, so that the curve follows the neighbouring chord. If the slope does not rise, or
+    fall, all along the nearest intervals, twice the largest T of these is used for each, because
+    changes of opposite signs cancel in part. If they alternate, the samples may hide an
+    oscillation, and the place is bounded by its interval at best.
+
+    Parameters
+    ----------
+    x, y : ndarray
+        Samples, with x ascending.
+    level : float
+
+    Returns
+    -------
+    Crossing
+        NaN unless there is exactly one crossing of the samples. The verdict is `UNRESOLVED` if an
+        oscillation that the samples may hide could reach the level in other intervals.
+    """
+    if x.size < FEWEST:
+        return _nowhere(Verdict.TOO_FEW_POINTS)
+    places = crossings(x, y, level)
+    if len(places) != 1:
+        return _nowhere(Verdict.NOT_UNIQUE if places else Verdict.OUT_OF_REACH)
+    place, widths = places[0], np.diff(x)
+    slopes = np.diff(y) / widths
+    bracket = int(np.clip(np.searchsorted(x, place) - 1, 0, slopes.size - 1))
+    near = range(max(bracket - _NEAR, 0), min(bracket + _NEAR + 1, slopes.size))
+    turns, alternates = _turns(slopes, near)
+    bounds, far = [place], False
+    for n in near if alternates else (bracket,):
+        span = _span(slopes[n], turns[n], widths[n], level - y[n])
+        if span:
+            bounds += [x[n] + end for end in span]
+            far |= abs(n - bracket) >= _NEAR
+    if alternates:
+        bounds += [x[bracket], x[bracket + 1]]
+    if bracket in (0, slopes.size - 1):
+        span = _span_at_end(slopes, widths, level - y[bracket], is_first=bracket == 0)
+        bounds += [x[bracket] + end for end in span]
+    verdict = Verdict.UNRESOLVED if far else Verdict.OK
+    return Crossing(place, float(min(bounds)), float(max(bounds)), verdict)
+
+
+def crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float]:
+    """Places where the interpolant through the samples reaches the level."""
+    off, curve = y - level, PchipInterpolator(x, y)
+    places: list[float] = x[off == 0.0].tolist()
+    # between two samples it is monotone, and at them it has their values but for rounding
+    known = dict(zip(x.tolist(), off.tolist(), strict=True))
+    for first in np.flatnonzero(off[:-1] * off[1:] < 0.0):
+        ends = x[first : first + 2].tolist()
+        places.append(brentq(lambda x: known.get(x, curve(x) - level), *ends, xtol=1e-15))
+    return places
+
+
+def _nowhere(verdict: Verdict) -> Crossing:
+    return Crossing(math.nan, math.nan, math.nan, verdict)
+
+
+def _turns(slopes: np.ndarray, near: range) -> tuple[dict[int, float], bool]:
+    """Total change of slope within each of some intervals, and True if its changes alternate."""
+    bends = np.diff(slopes)
+    sizes = np.abs(bends)
+    turns = {}
+    for n in near:
+        beside = sizes[max(n - 1, 0) : n + 1]
+        turns[n] = 2.0 * float(beside.mean())  # at an end, the other change is not known
+    within = bends[near.start : near.stop - 1]
+    if not _reversals(within, _ROUNDING * float(np.abs(slopes).max())):
+        return turns, False
+    # the small changes on either side of a kink do not make an oscillation of it
+    alternates = _reversals(within, _NOTICEABLE * float(np.abs(within).max())) > 1
+    return dict.fromkeys(near, 2.0 * max(turns.values())), alternates
+
+
+def _reversals(bends: np.ndarray, least: float) -> int:
+    """Number of reversals among changes of slope, without those smaller than the least."""
+    counted = bends[np.abs(bends) > least]
+    return int((counted[1:] * counted[:-1] < 0.0).sum())
+
+
+def _span(slope: float, turn: float, width: float, rise: float) -> tuple[float, float] | None:
+    """First and last place in an interval where a level may be reached that is `rise` above its
+    first sample; None if it is out of reach.
+    """
+    if slope < 0.0:
+        slope, rise = -slope, -rise
+    if rise > slope * width:  # seen from the other end, it is below the sample
+        mirrored = _span(slope, turn, width, slope * width - rise)
+        return None if mirrored is None else (width - mirrored[1], width - mirrored[0])
+    if rise < 0.0:
+        excess = turn - slope
+        root = excess**2 + 4.0 * turn / width * rise
+        if excess <= 0.0 or root < 0.0:
+            return None
+        middle, half = 0.5 * width * excess / turn, 0.5 * width * math.sqrt(root) / turn
+        return middle - half, middle + half
+    rises, falls = slope + turn, slope - turn
+    steeper = math.sqrt(max(rises**2 - 4.0 * turn / width * rise, 0.0))
+    flatter = math.sqrt(falls**2 + 4.0 * turn / width * rise)
+    first = 2.0 * rise / (rises + steeper) if rises else 0.0
+    last = 2.0 * rise / (falls + flatter) if falls > 0.0 else width * (flatter - falls) / (2 * turn)
+    return min(first, width), min(last, width)
+
+
+def _span_at_end(
+    slopes: np.ndarray, widths: np.ndarray, rise: float, is_first: bool
+) -> tuple[float, float]:
+    """First and last place in an end interval where a curve with one kink may reach the level.
+
+    The curve departs from the chord by no more than the change of slope to the neighbouring chord,
+    times the distance from the neighbour.
+    """
+    slope, following = (slopes[0], slopes[1]) if is_first else (slopes[-1], slopes[-2])
+    width = float(widths[0] if is_first else widths[-1])
+    if slope < 0.0:
+        slope, following, rise = -slope, -following, -rise
+    bend, climb = abs(following - slope), rise if is_first else slope * width - rise
+    first = max((climb - bend * width) / (slope - bend), 0.0) if slope > bend else 0.0
+    last = min((climb + bend * width) / (slope + bend), width)
+    return (first, last) if is_first else (width - last, width - first)

@@ -1,0 +1,135 @@
+"""Derivatives of the state evolution in steady sliding, by finite differences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple, cast
+
+from rsfstudy.slider.equations import relation_of, steady_states_of
+from rsfstudy.slider.parts import Numbers, Scene
+from rsfstudy.slider.steady import Steady
+
+#: Largest step of the differences, relative to the scale of each argument, and the weights of
+#: central differences of order eight.
+_STEP = 0.05
+_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
+#: Scale of a state relative to b, and the change of a steady state with ln V, relative to b, below
+#: which the scale of a state does not follow that change.
+_PART, _MOVES = 0.05, 1e-9
+#: Most halvings of a step, the relative difference between two steps that counts as converged, and
+#: the rounding error of a difference in units of the machine precision.
+_HALVINGS, _CONVERGED, _ROUNDED = 9, 1e-12, 8.0 * 2.0**-52
+
+Matrix = list[list[float]]
+
+
+class LawSlopes(NamedTuple):
+    """Derivatives of the state evolution per unit slip in steady sliding, with their error.
+
+    Attributes
+    ----------
+    by_rate, by_shift : list of float
+        Derivatives with respect to ln V and to the shift, of shape (states,).
+    by_state : list of list of float
+        Derivatives with respect to each state, of shape (states, states).
+    relative_error : float
+        Largest relative error estimate of a derivative.
+    """
+
+    by_rate: list[float]
+    by_shift: list[float]
+    by_state: Matrix
+    relative_error: float
+
+    def with_relative_change(self, part: float) -> LawSlopes:
+        """Return derivatives that differ by a relative change, of opposite sign for states."""
+        by_rate, by_shift = ([x * (1.0 + part) for x in row] for row in self[:2])
+        by_state = [[x * (1.0 - part) for x in row] for row in self.by_state]
+        return self._replace(by_rate=by_rate, by_shift=by_shift, by_state=by_state)
+
+
+def slopes_of_law(scene: Scene, steady: Steady) -> LawSlopes:
+    """Compute the derivatives of the state evolution in steady sliding.
+
+    The step of the differences is halved until two estimates agree, so that laws that bend within
+    a fraction of a unit of ln V are resolved.
+    """
+    evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
+    shift = relation_of(scene)(steady.friction)[2]
+    arguments = [steady.log_slip_rate, shift, *steady.psis]
+    scales, columns, errors = _scales(scene, steady, shift), [], []
+    # changes that count as much as a unit of ln V, to which rounding errors are relative
+    units = [scales[0], *(scale / _PART for scale in scales[1:])]
+    rounding = _ROUNDED * (1.0 + max(abs(x) / y for x, y in zip(arguments, units, strict=True)))
+    for place, (scale, unit) in enumerate(zip(scales, units, strict=True)):
+
+        def evolve(change: float, place: int = place) -> Numbers:
+            x, shift, *psis = (y + change * (n == place) for n, y in enumerate(arguments))
+            return cast(Numbers, evolutions(x, tuple(psis), shift, 1.0, p))
+
+        derivatives, error = _derivatives(evolve, _STEP * scale, rounding * unit)
+        columns.append(derivatives)
+        errors.append(error)
+    by_rate, by_shift, *by_state = columns
+    rows = [list(row) for row in zip(*by_state, strict=True)]
+    return LawSlopes(by_rate, by_shift, rows, max(errors))
+
+
+def _derivatives(
+    function: Callable[[float], Numbers], step: float, rounding: float
+) -> tuple[list[float], float]:
+    """Differentiate a function of a change at zero; also return the relative error.
+
+    Two steps of which the second is half of the first have converged if their derivatives differ by
+    no more than the rounding error. The derivatives are then those of the longer step, which has
+    the smaller rounding error. If no two steps converge, the pair with the smallest difference
+    decides.
+    """
+    (coarse, _sizes), best, smallest = _order_eight(function, step), list[float](), math.inf
+    for _ in range(_HALVINGS):
+        step *= 0.5
+        fine, sizes = _order_eight(function, step)
+        pairs = zip(fine, coarse, sizes, strict=True)
+        error = max(abs(x - y) / size if x != y else 0.0 for x, y, size in pairs)
+        noise = _CONVERGED + rounding / step
+        if error <= noise:
+            return coarse, noise
+        if not best or error + noise < smallest:
+            best, smallest = fine, error + noise
+        coarse = fine
+    return best, smallest
+
+
+def _order_eight(
+    function: Callable[[float], Numbers], step: float
+) -> tuple[list[float], list[float]]:
+    """Differentiate by central differences of order eight.
+
+    Returns
+    -------
+    derivatives, sizes : list of float
+        The derivatives, and the largest quotient of a value and the step, to which the rounding
+        error is relative.
+    """
+    slopes = [0.0] * len(function(0.0))
+    sizes = slopes
+    for number, weight in _WEIGHTS:
+        ahead, behind = function(number * step), function(-number * step)
+        changes = zip(slopes, ahead, behind, strict=True)
+        slopes = [slope + weight * (more - less) / step for slope, more, less in changes]
+        values = zip(sizes, ahead, behind, strict=True)
+        sizes = [max(size, abs(more) / step, abs(less) / step) for size, more, less in values]
+    return slopes, sizes
+
+
+def _scales(scene: Scene, steady: Steady, shift: float) -> list[float]:
+    """Return the scales of ln V, of the shift and of each state."""
+    size = _PART * scene.a * scene.parts.law.size_over_a
+    # b of several states may be next to nothing where each has a large one
+    of_shift = size if scene.parts.law.states > 1 else _PART * abs(scene.b) or size
+    if len(steady.psis) == 1:
+        return [1.0, of_shift, size]
+    slow, fast = (steady_states_of(scene, steady.log_slip_rate + x, shift) for x in (-1.0, 1.0))
+    moved = [0.5 * abs(y - x) for x, y in zip(slow, fast, strict=True)]
+    return [1.0, of_shift, *(by if by > _MOVES * size else size for by in moved)]

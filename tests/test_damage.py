@@ -1,0 +1,138 @@
+"""Damaged results files are refused, also without the digest at their end."""
+
+from __future__ import annotations
+
+import shutil
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from running import run
+from test_strangers import TINY
+
+import rsfstudy
+from rsfstudy.errors import DataError
+from rsfstudy.files import content_digest, contents, store
+
+#: With many claims the declaration is so long that HDF5 keeps no checksum of it.
+STUDY = replace(
+    TINY, claims=[replace(TINY.claims[0], id=f"C{number}", reason="x" * 50) for number in range(30)]
+)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory) -> Path:
+    output = tmp_path_factory.mktemp("damage")
+    run(STUDY, output=output)
+    return output / "tiny.nc"
+
+
+def cut(file: Path) -> bytes:
+    """Return the bytes of a file without the digest at its end."""
+    content = file.read_bytes()
+    return content[: content.rindex(b"\nrsfstudy sha256 ")]
+
+
+def test_a_file_without_its_end_opens_with_a_warning(written, tmp_path):
+    (tmp_path / "tiny.nc").write_bytes(cut(written))
+    with pytest.warns(UserWarning, match="has no digest: another program saved it"):
+        opened = rsfstudy.open(tmp_path / "tiny.nc")
+    xr.testing.assert_identical(opened, rsfstudy.open(written))
+    assert content_digest.ATTRIBUTE not in opened.attrs
+
+
+@pytest.mark.parametrize("damaged", ["declaration", "number", "text", "content_digest"])
+def test_damage_is_refused_without_the_end(damaged, written, tmp_path):
+    """One byte differs, which HDF5 does not notice."""
+    content, dataset = bytearray(cut(written)), rsfstudy.open(written)
+    digest = xr.load_dataset(written).attrs["content_digest"].encode()
+    original = {
+        "declaration": b'"published": 0.0145',
+        "number": dataset["critical_stiffness"].values[1].tobytes(),
+        "text": b"variable",
+        "content_digest": digest[100:],
+    }[damaged]
+    places = [n for n in range(len(content)) if content.startswith(original, n)]
+    assert places
+    for place in places:
+        content[place + len(original) - 1] ^= 1
+    (tmp_path / "tiny.nc").write_bytes(content)
+    with pytest.raises(DataError, match=r"tiny.nc (is damaged, or was edited|cannot be read)"):
+        rsfstudy.open(tmp_path / "tiny.nc")
+
+
+def test_random_damage_is_refused_or_changes_nothing(written, tmp_path):
+    content, whole = cut(written), rsfstudy.open(written)
+    random, file = np.random.default_rng(11), tmp_path / "tiny.nc"
+    refused = 0
+    for _ in range(60):
+        damaged = bytearray(content)
+        damaged[int(random.integers(len(damaged)))] ^= 1 << int(random.integers(8))
+        file.write_bytes(damaged)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                opened = rsfstudy.open(file)
+            except DataError:
+                refused += 1
+                continue
+        for name, values in whole.variables.items():
+            np.testing.assert_array_equal(opened[name].values, values.values)
+        assert opened.attrs["declaration"] == whole.attrs["declaration"]
+    assert refused > 0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda dataset: dataset.assign(log=np.log(dataset["critical_stiffness"])),
+        lambda dataset: dataset.isel(load_velocity_ratio=[0, 2]),
+        lambda dataset: dataset.drop_vars("slope_stderr"),
+        lambda dataset: dataset.assign_attrs(title="Mine"),
+        lambda dataset: dataset.rsf.to_si(normal_stress=5e6, slip_distance=1e-5),
+        lambda dataset: dataset.copy(),
+    ],
+    ids=["added", "selected", "dropped", "titled", "converted", "unchanged"],
+)
+def test_a_file_that_another_program_saved_opens_with_a_warning(change, written, tmp_path):
+    change(xr.load_dataset(written)).to_netcdf(tmp_path / "mine.nc")
+    with pytest.warns(UserWarning, match=r"mine.nc has no digest: another program saved it"):
+        rsfstudy.open(tmp_path / "mine.nc")
+
+
+def test_a_number_that_another_program_changed_is_refused_with_the_remedy(written, tmp_path):
+    dataset = xr.load_dataset(written)
+    dataset["critical_stiffness"][0, 0] += 1e-9
+    dataset.to_netcdf(tmp_path / "mine.nc")
+    with pytest.raises(DataError, match="critical_stiffness is not what .*delete the attribute"):
+        rsfstudy.open(tmp_path / "mine.nc")
+    del dataset.attrs["content_digest"]
+    dataset.to_netcdf(tmp_path / "mine.nc")
+    with pytest.warns(UserWarning, match="has no digest"):
+        rsfstudy.open(tmp_path / "mine.nc")
+
+
+def test_a_dataset_that_is_written_again_gets_a_digest_of_its_own(written, tmp_path):
+    dataset = xr.load_dataset(written)
+    dataset["critical_stiffness"][0, 0] += 1e-9
+    store.write(dataset, tmp_path / "again.nc")
+    (tmp_path / "tiny.nc").write_bytes(cut(tmp_path / "again.nc"))
+    with pytest.warns(UserWarning, match="has no digest"):
+        rsfstudy.open(tmp_path / "tiny.nc")
+
+
+def test_a_damaged_motion_is_refused(tmp_path):
+    motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=1.0, rtol=1e-3)
+    store.write(motion, tmp_path / "whole.nc")
+    content = bytearray(cut(tmp_path / "whole.nc"))
+    place = content.index(motion["slip"].values[-3:].tobytes())
+    content[place + 3] ^= 1
+    (tmp_path / "motion.nc").write_bytes(content)
+    with pytest.raises(DataError, match=r"slip is not what was written"):
+        store.read_any(tmp_path / "motion.nc")
+    shutil.copy(tmp_path / "whole.nc", tmp_path / "motion.nc")
+    again = store.read_any(tmp_path / "motion.nc")
+    xr.testing.assert_identical(again, motion.assign_attrs(layout=contents.LAYOUT))
