@@ -318,7 +318,7 @@ def composed(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[
         columns = {**known["record"].columns, **options}
         return rsfstudy.read_record(columns).steps()
 
-    named = {"study": "linear_stability", "b_over_a": [2.0], "law": ["slip"], **still}
+    named = {"b_over_a": [2.0], "law": ["slip"], "stiffness_ratio": 1.1}
     quick = {"kind": CriticalStep, "scene": known["scene"], "accuracy": rsfstudy.Accuracy(1e-2)}
     found: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         "study_with": (study_with, {**declared, "reductions": [], "claims": [], "plot": "lines",
@@ -338,7 +338,7 @@ def composed(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[
                           "b_over_a": 2.0, "stiffness_ratio": 1.5, "inertia": False}),
         "loaded": (loaded, {"segments": [{"velocity": 2.0, "duration": 1.0}, {"velocity": 1.0}]}),
         "recorded": (recorded, dict(known["record"].columns)),
-        "run a named study": (rsfstudy.run, named),
+        "with other values": (rsfstudy.studies()["linear_stability"].with_, named),
     }  # fmt: skip
     uses: dict[str, Callable[[Path], Any]] = {
         "open": rsfstudy.open,
