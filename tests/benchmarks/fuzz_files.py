@@ -17,18 +17,12 @@ import contextlib
 import functools
 import io
 import json
-import os
-import pickle
 import random
 import re
-import resource
-import select
 import shutil
-import signal
 import sqlite3
 import sys
 import tempfile
-import time
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -37,6 +31,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from file_mutations import damaged, hostile_dataset, hostile_text
+from forked import call_in_child
 
 import rsfstudy
 from rsfstudy.errors import RsfStudyError
@@ -45,8 +40,6 @@ from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import LinearFit
 from rsfstudy.referee import problem, theirs
 
-#: Seconds of CPU time, the factor on the clock, and bytes of memory that a case may take.
-LIMIT, PATIENCE, MEMORY = 20, 4.0, 8 * 2**30
 STUDY = rsfstudy.Study(
     name="small",
     title="A small lattice",
@@ -339,42 +332,8 @@ def run_case(case: Case, whole: Path, truths: dict[str, Any]) -> Answer:
             copied(whole / each, copy / each)
         checked = change(copy / file, chance)
         truth = truths.get(KINDS[file].name) if checked else None
-        return in_child(functools.partial(read, reader, copy / file, truth), copy)
-
-
-def in_child(call: Callable[[], Answer], place: Path) -> Answer:
-    """Call a function in a forked process with limits of time and memory."""
-    reads, writes = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.close(reads)
-        os.chdir(place)
-        os.setsid()
-        resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT))
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-        try:
-            content = pickle.dumps(call())
-            with os.fdopen(writes, "wb") as pipe:
-                pipe.write(content)
-        finally:
-            os._exit(0)
-    os.close(writes)
-    content, end = b"", time.monotonic() + PATIENCE * LIMIT
-    while select.select([reads], [], [], max(0.0, end - time.monotonic()))[0]:
-        part = os.read(reads, 2**16)
-        if not part:
-            break
-        content += part
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(child, signal.SIGKILL)
-    os.close(reads)
-    _, status = os.waitpid(child, 0)
-    try:
-        return Answer(*pickle.loads(content))
-    except (EOFError, pickle.UnpicklingError):
-        number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
-        hangs = number in (0, signal.SIGXCPU, signal.SIGKILL)
-        return Answer("hangs" if hangs else f"dies of signal {number}", "", "", "")
+        answer, how = call_in_child(functools.partial(read, reader, copy / file, truth), copy)
+        return Answer(how, "", "", "") if answer is None else answer
 
 
 # ---- faults --------------------------------------------------------------------------------------
