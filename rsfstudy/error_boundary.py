@@ -60,7 +60,7 @@ class CheckedKeywords:
         """Create an instance once all keywords are known to be parameters."""
         kind: type = cls
         valid = _parameters(kind)
-        for name in keywords:
+        for name in keywords if valid else ():
             if name not in valid:
                 close = difflib.get_close_matches(name, valid, n=1)
                 hint = f" Did you mean {close[0]!r}?" if close else ""
@@ -73,8 +73,10 @@ class CheckedKeywords:
 
 @functools.cache
 def _parameters(cls: type) -> tuple[str, ...]:
-    """Return the names of the parameters of a class."""
-    return tuple(inspect.signature(cls.__init__).parameters)[1:]  # type: ignore[misc]
+    """Return the names of the parameters of a class; none if it takes any keyword."""
+    parameters = inspect.signature(cls.__init__).parameters  # type: ignore[misc]
+    takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters.values())
+    return () if takes_any else tuple(parameters)[1:]
 
 
 def user_stacklevel() -> int:

@@ -69,9 +69,11 @@ class Measure(CheckedKeywords):
         find(self, scene, accuracy, meter) -> Outcome
 
     `find` returns ``Outcome(status, values)``. `values` has a number for each name of `outputs`,
-    and one called ``<name>_error`` for each with ``error=True``. `accuracy` holds what is asked
-    for (``accuracy.rtol``), and motions charge `meter`, which stops one that takes too much work.
-    Optional is what makes a cell ``unverified`` where its estimates are far too large::
+    and one called ``<name>_error`` for each with ``error=True``. `accuracy` holds the requested
+    accuracy (``accuracy.rtol``), and `meter` counts right-hand sides and stops a motion that takes
+    too many. To follow a motion, pass both on: ``rsfstudy.simulate(scene, accuracy=accuracy,
+    meter=meter)``. To use another measure, call its `charged`. Override `scales` to report a cell
+    as ``unverified`` if its error estimates are far too large::
 
         scales(self, scene, values) -> Mapping[str, float]
     """
