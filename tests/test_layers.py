@@ -42,7 +42,7 @@ HOMES = {
     "rich": {"cli", "api/progress"},
     "sqlite3": {"files/journal"},
     "zarr": set(),  # xarray writes and reads it
-    "msgspec": {"files/contents", "files/restore"},
+    "msgspec": {"files/contents", "files/restore", "referee/problem"},
 }
 
 

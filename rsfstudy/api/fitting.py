@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from rsfstudy.analysis.fitting import filters
 from rsfstudy.analysis.fitting.model import check_free, of_law
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.analysis.fitting.steps import Step
@@ -60,6 +61,8 @@ def fit(
     windows: int = 1,
     noise: str = "ar",
     loading: str = "steps",
+    averaging: Any = None,
+    low_pass: str = "",
     posterior: int = 0,
     stiffness: Any = None,
     slip_distance: Any = None,
@@ -105,6 +108,12 @@ def fit(
     loading : {"steps", "recorded"}
         The load point as its steps say, or as it was recorded, and normal stress with it where that
         is no constant of the scene (``normal_stress="imposed"``).
+    averaging : quantity, optional
+        Time over which the data logger averaged friction about each row ("1 s", a plain number is
+        in s); "trailing 1 s" if the average ends at the row. The model is averaged in the same way.
+    low_pass : str, optional
+        Low-pass filter that friction passed, with its corner frequency: "first_order 2 Hz",
+        "butterworth_2 2 Hz" or "butterworth_4 2 Hz". The model passes through the same filter.
     posterior : int
         Draws from the posterior (``posterior``, along ``draw``), by emcee, with flat priors between
         the bounds of the search and the noise as the fit found it. A chain of some 1,000 to 10,000
@@ -191,6 +200,7 @@ def fit(
         after=_micrometres("after", after),
         noise=noise,
         loading=loading,
+        filter=_describe_filter(averaging, low_pass),
         posterior=posterior,
         machine_stiffness=machine,
     )
@@ -361,6 +371,28 @@ def _of_laws(stated: Sequence[str], laws: Sequence[str], scene: Scene) -> tuple[
             rule = f"names no {'evolution effect' if names else 'parameter'} of law={law!r}"
             raise InvalidValue("free", free, rule, remedy=_STATES)
     return shared
+
+
+def _describe_filter(averaging: Any, low_pass: str) -> str:
+    """Return the filter as the measure takes it, with its size in s or Hz."""
+    if averaging is not None and low_pass:
+        remedy = "Pass `averaging=` or `low_pass=`."
+        raise InvalidValue("low_pass", low_pass, "cannot follow an averaging", remedy=remedy)
+    if averaging is not None:
+        kind, size = filters.MEAN, averaging
+        if isinstance(size, str) and size.startswith("trailing "):
+            kind, size = filters.TRAILING_MEAN, size.removeprefix("trailing ")
+        seconds = float(size) if isinstance(size, Real) else in_si("averaging", size, "s")
+    elif low_pass:
+        kind, _, size = str(low_pass).partition(" ")
+        if kind not in filters.LOW_PASS:
+            remedy = "Write it as in 'butterworth_2 2 Hz'."
+            choices = [*filters.LOW_PASS]
+            raise InvalidValue("low_pass", low_pass, "is unknown", choices=choices, remedy=remedy)
+        seconds = in_si("low_pass", size, "1/s")
+    else:
+        return ""
+    return f"{kind} {seconds!r}"
 
 
 def _micrometres(name: str, value: Any) -> float:

@@ -28,10 +28,13 @@ _FOLLOWS = (
     "b at constant a is b_over_a; of a time in s, D_c is 1 + stiffness - reference_rate, normal "
     "stress is -stiffness, and V_* is reference_rate - 1."
 )
-#: Longest step of ln p.
-_LONGEST = 0.1
-#: Slopes that are none, and how much more than by curvature alone the third derivative may be.
-_FLAT, _MOST_CURVED = 1e-9, 4.0
+#: Longest step of ln p, of which the formula spans four.
+_LONGEST = 0.05
+#: Places of the levels of a derivative, in steps; and weights of their fourth difference.
+_PLACES, _FOURTH = (-2.0, -1.0, 1.0, 2.0), (1.0, -4.0, 6.0, -4.0, 1.0)
+#: Part of the correction from the second to the fourth order that counts as an error; at most 0.14
+#: of it is left in random scenes, by the longest steps.
+_CORRECTED = 0.25
 #: Parts of a step that are tried where there is no number on one side of it, or an error of more
 #: than a part of the slope; and right-hand sides that a measurement takes then at most, over those
 #: of the number itself.
@@ -49,24 +52,29 @@ class _Level(NamedTuple):
 
 @dataclass(frozen=True)
 class Elasticities(Measure):
-    """The headline y of a measure with its elasticities, d ln|y|/d ln p by each number p of the
-    scene, all others held: 2 where y doubles twice as p doubles once.
+    """Primary output y of a measure and its elasticities, d ln|y|/d ln p, by scene parameters p.
 
-    They are central differences over a step of ln p that balances what is left out with the error
-    of y, which the measure tells: h = (e/2)^(1/3). The error estimate adds both: e/h, and three
-    times what is left out of a logarithm, or a power, that ends at a boundary and has the slope and
-    curvature of ln y. There are two measurements of each number and one more. Where only one side
-    has a number, steps of an eighth, and so on three times, find both sides of a number that is
-    near the end of answers; at the end itself, as at the critical stiffness, the difference is
-    one-sided, and its error adds twice what the last two steps differ by. `elasticity` and
-    `elasticity_error` are pure numbers of the shape (parameters,).
+    Each elasticity is a partial derivative: the other parameters stay fixed. For example, it is 2
+    if y is proportional to the square of p. The elasticity and its error are dimensionless and
+    have the shape (parameters,).
+
+    The derivatives are central differences of the fourth order, from points at ln p = -2h, -h, h
+    and 2h. The step h = (e/2)^(1/3) follows from e, the error estimate of y. The error estimate
+    of an elasticity is 1.5 e/h for the errors of y, plus a quarter of the difference between the
+    formulas of the fourth and of the second order, plus a bound by the fourth difference. The
+    measure is thus evaluated four times per parameter, and once at the scene itself.
+
+    If y has no value on one side, for example near a stability boundary, up to three shorter steps
+    are tried, each an eighth of the one before. At the boundary itself, for example at the critical
+    stiffness, the difference is one-sided.
 
     Parameters
     ----------
     measure : Measure
     parameters : sequence of str
-        Numbers of the scene, along the dimension ``parameter``; by default all that the measure
-        does not solve for. NaN stands for one that a scene does not have, or that is zero there.
+        Scene parameters, along the dimension ``parameter``. By default, all parameters that the
+        measure does not solve for. The elasticity is NaN for a parameter that a scene does not
+        have, or that is zero.
     """
 
     measure: Measure
@@ -116,7 +124,7 @@ class Elasticities(Measure):
 
     @property
     def typical_work(self) -> int:
-        return self.measure.typical_work * (2 * min(_USUAL, len(self.parameters)) + 1)
+        return self.measure.typical_work * (4 * min(_USUAL, len(self.parameters)) + 1)
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
@@ -170,13 +178,14 @@ class Elasticities(Measure):
         """
         found: list[tuple[bool, float, float]] = []
         for part, accuracy in zip(_SHORTER, accuracies, strict=True):
+            size = part * step
             try:
-                sides = [self._at(scene, name, by * step, accuracy, meter) for by in (-part, part)]
+                sides = [self._at(scene, name, by * size, accuracy, meter) for by in _PLACES]
             except Halt:
                 if not found:
                     raise
                 break  # beside the end of answers some take long
-            slope, error, of_levels = _derivative(here, sides, part * step)
+            slope, error, of_levels = _derivative(here, sides, size)
             if found and not all(sides):  # the longer step leaves out eight times as much
                 error += 2.0 * abs(slope - found[-1][2])
             found.append((not all(sides), error, slope))
@@ -220,17 +229,31 @@ class Elasticities(Measure):
 def _derivative(
     here: _Level, sides: Sequence[_Level | None], step: float
 ) -> tuple[float, float, float]:
-    """The derivative of ln|y| by ln p, its error, and the part of that which errors of y make, from
-    levels below and above, as far as there are any.
+    """Compute the derivative of ln|y| by ln p from levels at `_PLACES`, as far as there are any.
+
+    Returns
+    -------
+    slope, error, of_levels : float
+        The derivative, its error, and the part of the error that follows from errors of y; NaN
+        without a level on either side.
     """
-    below, above = sides
+    far_below, below, above, far_above = sides
+    if far_below and below and above and far_above:
+        near = (above.value - below.value) / (2.0 * step)
+        far = (far_above.value - far_below.value) / (4.0 * step)
+        of_levels = (above.error + below.error) / 1.5 + (far_above.error + far_below.error) / 12.0
+        of_levels /= step
+        correction = (near - far) / 3.0
+        levels = far_below, below, here, above, far_above
+        fourth = abs(sum(w * level.value for w, level in zip(_FOURTH, levels, strict=True)))
+        # the fifth derivative is at most the fourth one over the span of the levels
+        left = _CORRECTED * abs(correction) + fourth / (12.0 * step)
+        return near + correction, left + of_levels, of_levels
     if below and above:
         slope = (above.value - below.value) / (2.0 * step)
-        curved = abs(above.value - 2.0 * here.value + below.value) / step**2
-        # of c ln(x - x_0), slope and curvature tell half of the third derivative
-        third = curved**1.5 * min(max(1.0, curved**0.5 / max(abs(slope), _FLAT)), _MOST_CURVED)
+        bend = abs(above.value - 2.0 * here.value + below.value) / step
         of_levels = (above.error + below.error) / (2.0 * step)
-        return slope, step**2 * max(1.0, third) + of_levels, of_levels
+        return slope, max(step**2, bend) + of_levels, of_levels
     for beside, sign in ((below, -1.0), (above, 1.0)):
         if beside:
             slope = sign * (beside.value - here.value) / step

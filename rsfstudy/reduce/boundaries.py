@@ -205,9 +205,10 @@ def _inverse(
     if found.verdict is not Verdict.OK:
         return np.nan, np.nan, float(found.verdict)
     ends = [find_crossing(x, y, np.log(level) + d).place for d in (-uncertainty, uncertainty)]
-    place, *bounds = np.exp([found.place, found.first, found.last, *ends])
-    errors = np.abs(place - np.array(bounds))
-    return float(place), float(errors[:2].max() + errors[2:].max()), float(found.verdict)
+    place, first, last = np.exp([found.place, found.first, found.last]).tolist()
+    error = max(place - first, last - place)
+    error += place * float(np.max(np.abs(found.place - np.array(ends))))
+    return place, error, float(found.verdict)
 
 
 def _moved(values: np.ndarray, on: np.ndarray, level: float) -> np.ndarray:

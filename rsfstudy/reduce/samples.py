@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import sys
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -81,6 +82,13 @@ class _Statistic(Reduction):
         return self.results(f"{self.text} of {self.of} over {self.over}", found)
 
 
+def standard_deviation(of: xr.DataArray, over: str) -> xr.DataArray:
+    """Compute the standard deviation of samples; NaN for fewer than two of them."""
+    with warnings.catch_warnings():  # older versions of xarray let it through
+        warnings.filterwarnings("ignore", "Degrees of freedom", RuntimeWarning)
+        return of.std(over, ddof=1)
+
+
 @dataclass(frozen=True)
 class Mean(_Statistic):
     """Mean over samples."""
@@ -91,7 +99,7 @@ class Mean(_Statistic):
     def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
         """The mean, and sd/sqrt(n)."""
         count = of.notnull().sum(self.over)
-        return of.mean(self.over), of.std(self.over, ddof=1) / count**0.5
+        return of.mean(self.over), standard_deviation(of, self.over) / count**0.5
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """1/n."""
@@ -120,13 +128,13 @@ class StandardDeviation(_Statistic):
         rest = (apart**2).sum(self.over) - apart**2 * count / (count - 1.0)
         without = (rest.clip(min=0.0) / (count - 2.0).where(count > 2)) ** 0.5
         scatter = without.std(self.over) * (count - 1.0) ** 0.5
-        return of.std(self.over, ddof=1), scatter
+        return standard_deviation(of, self.over), scatter
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """(y - mean)/((n - 1) sd)."""
         of = _of(self, dataset)
         freedom = of.notnull().sum(self.over) - 1
-        by = (of - of.mean(self.over)) / (freedom * of.std(self.over, ddof=1))
+        by = (of - of.mean(self.over)) / (freedom * standard_deviation(of, self.over))
         return [(by.fillna(0.0), {})]
 
 

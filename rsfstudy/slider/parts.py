@@ -17,7 +17,7 @@ from __future__ import annotations
 import importlib
 import math
 import pkgutil
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 from numbers import Real
@@ -68,6 +68,10 @@ class Part:
     #: their steady values are huge at the slip rate of a rupture. Motions may settle, and limit
     #: cycles are recognised, whatever these unknowns do.
     excluded_from_distance: ClassVar[tuple[str, ...]] = ()
+    #: Quantities that the rates of a part need, and those that the functions of its slot receive
+    #: (names of `requirements.QUANTITIES`). A scene refuses a part if it cannot provide a quantity.
+    needs: ClassVar[Collection[str]] = frozenset()
+    receives: ClassVar[frozenset[str]] = frozenset()
     auxiliary_rates: ClassVar[Function | None] = None
     auxiliary_steady_states: ClassVar[Function | None] = None
     #: Where values of other parts of the slot have no meaning, and what would give them one.

@@ -31,6 +31,7 @@ from rsfstudy.slider.fluid._recharged import Recharged
 from rsfstudy.slider.loading.step import Step
 from rsfstudy.slider.numbers import Slider
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.requirements import check_needs
 from rsfstudy.slider.states import check_steady_states
 
 #: Critical stiffnesses that are kept: studies come back to those along their other axes.
@@ -165,6 +166,7 @@ class Scene(Assembled):
     )
 
     def _check(self) -> None:
+        check_needs(self)
         # the law last: it may ask what all of friction makes of steady sliding
         for part in (*self.parts[:1], *reversed(self.parts[2:]), self.parts.law):
             part.check(self)
@@ -349,8 +351,7 @@ class Scene(Assembled):
     @property
     def begins_elsewhere(self) -> bool:
         """True if it begins with other stress or state than those of steady sliding at V_*."""
-        slider = self.parts.slider
-        return bool(slider.initial_stress or slider.initial_state)
+        return bool(self.parts.slider.initial_stress or self.parts.slider.initial_state)
 
     @derived
     def inertial_time(self) -> float:

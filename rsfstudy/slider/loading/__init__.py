@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.parts import NOT_NEGATIVE, Numbers, Part, Scene, found_in, number
+from rsfstudy.slider.requirements import SLIP_RATE
 
 #: Duration of a segment in D_c/V_* below which no step of an integrator is taken; from a time of 1
 #: on rounding is longer.
@@ -73,6 +74,7 @@ class Loading(Part):
     #: Whether the last of them is, instead, shear stress by a load point that is ahead of its mean
     #: motion, less what stands as third of its numbers.
     displaces: ClassVar[bool] = False
+    receives = frozenset({SLIP_RATE})
     #: Whether the fall of normal stress is pore pressure: beside a fluid that has unknowns, that of
     #: its surroundings.
     of_pressure: ClassVar[bool] = True
