@@ -312,7 +312,8 @@ class Fit(Measure):
         remarks = (name_outliers(found.outliers), self._remark(found, place["load_point_noise"]))
         reasons = find_reasons(found, model.friction)
         status = Status.ERRORS_NOT_VALID if reasons else Status.OK
-        return Outcome(status, values, "; ".join(filter(None, (*reasons, *remarks))))
+        cuts = [cut for window in windows for cut in window.cuts]
+        return Outcome(status, values, "; ".join(filter(None, (*reasons, *cuts, *remarks))))
 
     def _widened(self, outcome: Outcome) -> Outcome:
         """An outcome of fewer parameters, with NaN in matrices where those of other laws stand."""
