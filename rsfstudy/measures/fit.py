@@ -26,7 +26,8 @@ from rsfstudy.analysis.fitting.noise import WHITE, check_noise, whiteness
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
 from rsfstudy.analysis.fitting.steps import Step
-from rsfstudy.analysis.fitting.validity import find_reasons, name_outliers
+from rsfstudy.analysis.fitting.unstated_filter import find_averaging
+from rsfstudy.analysis.fitting.validity import find_reasons, is_rounded, name_outliers
 from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess, stiffness_factors
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
@@ -311,6 +312,8 @@ class Fit(Measure):
             return Outcome(Status.NOT_IDENTIFIED, values, text)
         remarks = (name_outliers(found.outliers), self._remark(found, place["load_point_noise"]))
         reasons = find_reasons(found, model.friction)
+        if not self.filter and self.noise != WHITE and not is_rounded(found):
+            reasons = (*find_averaging(found, model.time, self.noise), *reasons)
         status = Status.ERRORS_NOT_VALID if reasons else Status.OK
         cuts = [cut for window in windows for cut in window.cuts]
         return Outcome(status, values, "; ".join(filter(None, (*reasons, *cuts, *remarks))))
