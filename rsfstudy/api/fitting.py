@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from rsfstudy.axes.axis import Axis
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FIT_BUDGET as BUDGET
 from rsfstudy.error_boundary import error_boundary
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import InvalidValue, brief
 from rsfstudy.measures.fit import Fit
 from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
@@ -70,7 +71,7 @@ def fit(
     posterior: int = 0,
     stiffness: Any = None,
     slip_distance: Any = None,
-    engine: Any = None,
+    engine: str | type | None = None,
     rtol: float = DEFAULT_RTOL,
     budget: int = BUDGET,
     workers: int = 0,
@@ -173,6 +174,9 @@ def fit(
     if "law" in scene:
         remedy = f"Write laws={np.atleast_1d(scene['law']).tolist()}."
         raise InvalidValue("law", scene["law"], "is given as laws, each fitted", remedy=remedy)
+    if isinstance(record, str | Path):
+        remedy = f"Read the file first: record = rsfstudy.read_record({brief(record)!r})."
+        raise InvalidValue("record", record, "is no record", remedy=remedy)
     records: tuple[Any, ...] = (record,) if isinstance(record, Record) else tuple(record)
     for one in records:
         if not isinstance(one, Record):
@@ -220,7 +224,9 @@ def fit(
     if windows > 1:
         axes.append(Axis("part", np.linspace(1.0, _SHORTEST, windows).tolist()))
         reductions = [Range(f"{n}_windows", n, over="part") for n in measure.parameters]
-    engine = engine or (COMPILED if is_installed(COMPILED) else SCIPY)
+    chosen: Any = engine
+    if engine is None:
+        chosen = COMPILED if is_installed(COMPILED) else SCIPY
     study = Study(
         name="fit",
         title="Friction parameters of a record",
@@ -229,7 +235,7 @@ def fit(
         measure=measure,
         reductions=reductions,
         plot="fits",
-        accuracy=Accuracy(rtol, budget, engine=engine),
+        accuracy=Accuracy(rtol, budget, engine=chosen),
     )
     return runs.run(
         study, workers=workers, output=None, progress=False, keep_going=True, command=command

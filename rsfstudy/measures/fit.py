@@ -29,6 +29,7 @@ from rsfstudy.analysis.fitting.steps import Step
 from rsfstudy.analysis.fitting.unstated_filter import find_averaging
 from rsfstudy.analysis.fitting.validity import find_reasons, is_rounded, name_outliers
 from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess, stiffness_factors
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
 from rsfstudy.measures._fit_outputs import outputs_of
@@ -54,6 +55,7 @@ _SOUGHT = (
 _LEAST = 1.001
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Fit(Measure):
     """Friction parameters by least squares, under the noise that the residuals tell.

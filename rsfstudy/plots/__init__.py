@@ -97,6 +97,10 @@ def figure(
         Where the declaration names no module of `rsfstudy.plots`; nothing else is ever imported.
         Where there is no such variable or style.
     """
+    draws = own is None or isinstance(own, str | Declared) or callable(getattr(own, "draw", own))
+    if not draws:
+        rule = "must be a Figure, or a function or module of yours that draws"
+        raise InvalidValue("own", own, rule, remedy="Write def name(dataset, axes): ...")
     dataset = in_units_of_rig(dataset)
     with styled(style):
         drawing, dataset = _fitting(dataset, own, variable)

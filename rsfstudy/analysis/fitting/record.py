@@ -7,7 +7,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,6 +18,7 @@ from rsfstudy.analysis.fitting.stress_steps import (
     with_levels,
     with_stress_steps,
 )
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.quantity import Quantity, is_name
@@ -45,6 +45,7 @@ _STEP_COLUMNS = (
 _RAMP = 16
 
 
+@guard_methods
 @dataclass(frozen=True, eq=False)
 class Record:
     """A record of an experiment.
@@ -124,7 +125,7 @@ class Record:
             raise InvalidValue("window", (begins, ends), rule)
         return replace(self, columns={n: v[rows] for n, v in self.columns.items()})
 
-    def with_steps(self, steps: Sequence[Any]) -> Record:
+    def with_steps(self, steps: Sequence[Sequence[float]]) -> Record:
         """Return the record with stated steps in place of those that are detected.
 
         Parameters

@@ -19,6 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
+from rsfstudy.error_boundary import guard_methods
+
 #: Rows among which steps are looked for at once: of a longer record, the means of as many.
 _ROWS = 20_000
 #: Fewest rows of a piece, part of the faster velocity by which the next one must differ, and by how
@@ -45,6 +47,7 @@ Squares = Callable[[np.ndarray | int, np.ndarray | int], np.ndarray]
 _Line = tuple[float, float]
 
 
+@guard_methods
 class Step(NamedTuple):
     """A change of load point velocity, of normal stress, or of both.
 
