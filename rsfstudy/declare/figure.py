@@ -14,7 +14,7 @@ import numpy as np
 
 from rsfstudy.axes.axis import check_text
 from rsfstudy.declare.names import names
-from rsfstudy.error_boundary import CheckedKeywords
+from rsfstudy.error_boundary import CheckedKeywords, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 
@@ -35,6 +35,7 @@ ANY_LATTICE = frozenset(
 )
 
 
+@guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Panel(CheckedKeywords):
     """One panel of a figure, or one for each point of some axes.
@@ -116,6 +117,7 @@ class Panel(CheckedKeywords):
     as_marked: bool = False
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Figure(CheckedKeywords):
     """Panels, from left to right and from top to bottom.
