@@ -18,7 +18,9 @@ FILES = sorted(ROOT.rglob("*.py"))
 #: From the bottom up: each imports from lower floors alone. The studies and their pages are above.
 FLOORS = (
     ("errors", "status", "defaults", "wording"),
-    ("error_boundary", "netcdf", "paths", "quantity"),
+    ("argument_checks",),
+    ("error_boundary",),
+    ("netcdf", "paths", "quantity"),
     ("slider",),
     ("axes", "motion", "vocabulary"),
     ("analysis", "reduce"),

@@ -222,6 +222,13 @@ def test_outliers_are_found_and_peaks_of_the_model_are_not() -> None:
     assert find_kept_rows(1e-3 * rng.normal(size=500), curve, 0.0) is None
 
 
+@pytest.mark.parametrize("change", [130, 160])
+def test_rows_after_a_change_of_the_noise_level_are_no_outliers(change: int) -> None:
+    left = 1e-4 * np.random.default_rng(16).normal(size=500)
+    left[change:] *= 10.0
+    assert find_kept_rows(left, np.zeros(500), 0.0) is None
+
+
 def test_the_quantum_of_values_is_found() -> None:
     rng = np.random.default_rng(15)
     values = 0.6 + 2e-3 * rng.normal(size=400)

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import CheckedKeywords
+from rsfstudy.error_boundary import CheckedKeywords, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import _checks
 from rsfstudy.measures._checks import Plain
@@ -31,6 +31,7 @@ from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Outcome:
     """Findings of a measure in one scene.
@@ -47,7 +48,7 @@ class Outcome:
     """
 
     status: Status
-    values: Mapping[str, Value] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""
     rhs_evaluations: int = 0
 
@@ -56,6 +57,7 @@ class Outcome:
 TAKEN = frozenset({"status", "message", "rhs_evaluations", "wall_time", *FIELDS, *DERIVED})
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Measure(CheckedKeywords):
     """Base of all measures: runs `find` under a work budget and turns a `Halt` into a status.

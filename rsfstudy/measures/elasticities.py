@@ -11,6 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
 from rsfstudy.motion.accuracy import Accuracy
@@ -50,6 +51,7 @@ class _Level(NamedTuple):
     error: float
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Elasticities(Measure):
     """Primary output y of a measure and its elasticities, d ln|y|/d ln p, by scene parameters p.

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from rsfstudy.analysis.settling import settled_flag
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures._records import Record, Recorded, errors_of, followed, recorded, since
@@ -76,6 +77,7 @@ class _Step(NamedTuple):
         return math.log(self.after / self.before)
 
 
+@guard_methods
 @dataclass(frozen=True)
 class VelocityStep(Recorded):
     """Response to one step of load point velocity, by the definitions of the laboratory.

@@ -5,6 +5,7 @@ phase plane.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ _ROUNDING = 1e-6
 _FRICTION = r"Friction coefficient, $\mu$"
 
 
-@error_boundary
+@partial(error_boundary, is_inner=True)
 def picture(
     motion: xr.Dataset, laboratory: Laboratory | None = None, *, against: str | None = None
 ) -> Figure:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import xarray as xr
 
+from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.reduce.base import (
     Reduction,
@@ -53,6 +54,7 @@ __all__ = [
 _BESIDE = ("error", "stderr", "misfit", "points", "status")
 
 
+@error_boundary
 def reduced(
     dataset: xr.Dataset, reductions: tuple[Reduction, ...], *, despite_failures: bool = False
 ) -> xr.Dataset:

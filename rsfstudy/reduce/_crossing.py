@@ -16,6 +16,8 @@ FEWEST = 4
 _NEAR = 3
 #: Changes of slope, relative to the largest slope, that count as rounding errors.
 _ROUNDING = 1e-9
+#: The same, relative to the largest change nearby, that count for an oscillation.
+_NOTICEABLE = 0.1
 
 
 class Verdict(IntEnum):
@@ -39,9 +41,11 @@ def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
     Between two samples, a curve departs from their chord at u of the interval h by no more than
     ``T u (h - u)/h``, where T is the total change of its slope within the interval. The estimate of
     T is the change of slope from the chord before to the chord after, which is exact for one kink
-    and twice the change of a parabola. If the slope does not rise, or fall, all along the nearest
-    intervals, the largest T of these is used for each. If its changes alternate, the samples may
-    hide an oscillation: T is doubled, and the place is bounded by its interval at best.
+    and twice the change of a parabola. In the first and the last interval, a kink may also be next
+    to the end, so that the curve follows the neighbouring chord. If the slope does not rise, or
+    fall, all along the nearest intervals, twice the largest T of these is used for each, because
+    changes of opposite signs cancel in part. If they alternate, the samples may hide an
+    oscillation, and the place is bounded by its interval at best.
 
     Parameters
     ----------
@@ -65,16 +69,19 @@ def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
     bracket = int(np.clip(np.searchsorted(x, place) - 1, 0, slopes.size - 1))
     near = range(max(bracket - _NEAR, 0), min(bracket + _NEAR + 1, slopes.size))
     turns, alternates = _turns(slopes, near)
-    found = {n: _span(slopes[n], turns[n], widths[n], level - y[n]) for n in near}
-    spans = [(n, x[n] + span[0], x[n] + span[1]) for n, span in found.items() if span]
-    if not alternates:
-        spans = [span for span in spans if span[0] == bracket]
-    firsts, lasts = [place, *(first for _n, first, _last in spans)], [place, *(s[2] for s in spans)]
+    bounds, far = [place], False
+    for n in near if alternates else (bracket,):
+        span = _span(slopes[n], turns[n], widths[n], level - y[n])
+        if span:
+            bounds += [x[n] + end for end in span]
+            far |= abs(n - bracket) >= _NEAR
     if alternates:
-        firsts, lasts = [*firsts, x[bracket]], [*lasts, x[bracket + 1]]
-    far = any(abs(n - bracket) >= _NEAR for n, _first, _last in spans)
+        bounds += [x[bracket], x[bracket + 1]]
+    if bracket in (0, slopes.size - 1):
+        span = _span_at_end(slopes, widths, level - y[bracket], is_first=bracket == 0)
+        bounds += [x[bracket] + end for end in span]
     verdict = Verdict.UNRESOLVED if far else Verdict.OK
-    return Crossing(place, float(min(firsts)), float(max(lasts)), verdict)
+    return Crossing(place, float(min(bounds)), float(max(bounds)), verdict)
 
 
 def crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float]:
@@ -102,12 +109,17 @@ def _turns(slopes: np.ndarray, near: range) -> tuple[dict[int, float], bool]:
         beside = sizes[max(n - 1, 0) : n + 1]
         turns[n] = 2.0 * float(beside.mean())  # at an end, the other change is not known
     within = bends[near.start : near.stop - 1]
-    within = within[np.abs(within) > _ROUNDING * np.abs(slopes).max()]
-    reversals = int((within[1:] * within[:-1] < 0.0).sum())
-    if reversals:
-        largest = max(turns.values()) * (2.0 if reversals > 1 else 1.0)
-        turns = dict.fromkeys(near, largest)
-    return turns, reversals > 1
+    if not _reversals(within, _ROUNDING * float(np.abs(slopes).max())):
+        return turns, False
+    # the small changes on either side of a kink do not make an oscillation of it
+    alternates = _reversals(within, _NOTICEABLE * float(np.abs(within).max())) > 1
+    return dict.fromkeys(near, 2.0 * max(turns.values())), alternates
+
+
+def _reversals(bends: np.ndarray, least: float) -> int:
+    """Number of reversals among changes of slope, without those smaller than the least."""
+    counted = bends[np.abs(bends) > least]
+    return int((counted[1:] * counted[:-1] < 0.0).sum())
 
 
 def _span(slope: float, turn: float, width: float, rise: float) -> tuple[float, float] | None:
@@ -132,3 +144,21 @@ def _span(slope: float, turn: float, width: float, rise: float) -> tuple[float, 
     first = 2.0 * rise / (rises + steeper) if rises else 0.0
     last = 2.0 * rise / (falls + flatter) if falls > 0.0 else width * (flatter - falls) / (2 * turn)
     return min(first, width), min(last, width)
+
+
+def _span_at_end(
+    slopes: np.ndarray, widths: np.ndarray, rise: float, is_first: bool
+) -> tuple[float, float]:
+    """First and last place in an end interval where a curve with one kink may reach the level.
+
+    The curve departs from the chord by no more than the change of slope to the neighbouring chord,
+    times the distance from the neighbour.
+    """
+    slope, following = (slopes[0], slopes[1]) if is_first else (slopes[-1], slopes[-2])
+    width = float(widths[0] if is_first else widths[-1])
+    if slope < 0.0:
+        slope, following, rise = -slope, -following, -rise
+    bend, climb = abs(following - slope), rise if is_first else slope * width - rise
+    first = max((climb - bend * width) / (slope - bend), 0.0) if slope > bend else 0.0
+    last = min((climb + bend * width) / (slope + bend), width)
+    return (first, last) if is_first else (width - last, width - first)

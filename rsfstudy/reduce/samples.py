@@ -18,6 +18,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Derivatives, Fields, Reduction, refused
@@ -89,6 +90,7 @@ def standard_deviation(of: xr.DataArray, over: str) -> xr.DataArray:
         return of.std(over, ddof=1)
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Mean(_Statistic):
     """Mean over samples."""
@@ -107,6 +109,7 @@ class Mean(_Statistic):
         return [(has / has.sum(self.over), {})]
 
 
+@guard_methods
 @dataclass(frozen=True)
 class StandardDeviation(_Statistic):
     """Standard deviation over samples, of three at least.
@@ -138,6 +141,7 @@ class StandardDeviation(_Statistic):
         return [(by.fillna(0.0), {})]
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Quantile(_Statistic):
     """Quantile over samples, between neighbours by their distance; its standard error is half the
@@ -200,6 +204,7 @@ def _between(of: xr.DataArray, over: str, level: xr.DataArray) -> xr.DataArray:
     return (weights * of.where(weights > 0.0, 0.0)).sum(over)
 
 
+@guard_methods
 @dataclass(frozen=True)
 class StatusShares(Reduction):
     """Share of the samples that ended by each status, failures among them; its standard error is
@@ -247,6 +252,7 @@ class StatusShares(Reduction):
         return xr.Dataset({name: values.where(known) for name, values in found.items()})
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Logarithm(Reduction):
     """Natural logarithm of a variable, in each cell where that is positive. Slopes of it over

@@ -23,6 +23,7 @@ from functools import cache
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 
@@ -48,6 +49,7 @@ Function = Callable[..., Any]
 Numbers = tuple[float, ...]
 
 
+@guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Part:
     """Base of all parts.

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import (
     dynamics,
@@ -40,6 +41,7 @@ _KEPT = 4096
 FOR_EVER = np.array([[0.0, math.inf, *[math.nan] * 4]])
 
 
+@guard_methods
 @dataclass(frozen=True, init=False, repr=False)
 class Scene(Assembled):
     """A spring-slider with rate- and state-dependent friction, sliding steadily at V_* until a step

@@ -33,6 +33,7 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
+from rsfstudy.analysis.fitting.averaging import Overlap
 from rsfstudy.analysis.fitting.noise_runs import (
     Run,
     count_processes,
@@ -76,12 +77,15 @@ class Noise:
         Standard deviations of the levels, relative to the first one.
     kept : ndarray of bool, shape (rows,), optional
         False for outliers, which are left out. All rows are kept by default.
+    overlap : Overlap, optional
+        Correlation by averaging, which is removed before that of the process.
     """
 
     runs: tuple[Run, ...]
     partial: np.ndarray
     sizes: np.ndarray
     kept: np.ndarray | None = None
+    overlap: Overlap | None = None
 
     @property
     def order(self) -> int:
@@ -100,6 +104,7 @@ class Noise:
         ndarray, shape (kept rows, columns)
         """
         columns = self.kept_rows(columns)
+        columns = columns if self.overlap is None else self.overlap.whitened(columns)
         scaled = columns / self.sizes[index_rows(self.runs, "level")][:, None]
         found = np.empty_like(columns)
         for run in self.runs:
@@ -120,7 +125,7 @@ class Noise:
     @property
     def log_determinant(self) -> float:
         """``ln|R|``."""
-        total = 0.0
+        total = 0.0 if self.overlap is None else self.overlap.log_determinant
         for first, last, number, before, level in self.runs:
             variances = self.predictors[number][1]
             early = variances[min(before, self.order) : min(before + last - first, self.order)]
@@ -137,7 +142,8 @@ class Noise:
         """
         power = self._power_at_zero
         lasts = ((run.last - run.first, run.number) for run in self.runs)
-        return sum(max(1.0, rows / max(power[n], 1.0)) for rows, n in lasts)
+        each = 1.0 if self.overlap is None else self.overlap.rows
+        return sum(max(1.0, rows / max(power[n], 1.0) / each) for rows, n in lasts)
 
     @property
     def _power_at_zero(self) -> list[float]:
@@ -172,6 +178,7 @@ def fitted(
     jacobian: np.ndarray,
     kept: np.ndarray | None = None,
     least: float = 0.0,
+    averaging: float = 0.0,
 ) -> Noise:
     """Estimate the noise from the residuals of a fit by restricted maximum likelihood.
 
@@ -187,26 +194,27 @@ def fitted(
         False for outliers. All rows are kept by default.
     least : float
         Smallest standard deviation of a level, for example that of rounding.
+    averaging : float
+        Averaging time of friction in s; 0 if it was not averaged.
 
     Returns
     -------
     Noise
         With a process for each sampling interval, and a level for each segment.
     """
-    if kept is not None:
-        time, residuals, jacobian = time[kept], residuals[kept], jacobian[kept]
-    least = max(least, _QUIETEST * math.sqrt(float(np.mean(np.square(residuals)))), 1e-300)
-    begin, first = _first_guess(name, find_runs(time), residuals, least)
+    begin, least = guess_noise(name, time, residuals, kept, least, averaging)
     shape, order = begin.partial.shape, begin.order
     if not order and len(begin.sizes) == 1:
-        return replace(begin, kept=kept)
+        return begin
 
     def noise(x: np.ndarray) -> Noise:
         partial = _LARGEST * np.tanh(x[: begin.partial.size]).reshape(shape)
         sizes = np.exp(np.append(0.0, x[begin.partial.size :]))
-        return Noise(begin.runs, partial, np.maximum(sizes, least / first), kept)
+        return Noise(begin.runs, partial, np.maximum(sizes, least), kept, begin.overlap)
 
-    products = _Products(begin.runs, np.column_stack([jacobian, residuals]), order)
+    columns = begin.kept_rows(np.column_stack([jacobian, residuals]))
+    columns = columns if begin.overlap is None else begin.overlap.whitened(columns)
+    products = _Products(begin.runs, columns, order)
 
     def misfit(x: np.ndarray) -> float:
         return products.misfit(noise(x))
@@ -216,6 +224,28 @@ def fitted(
         return noise(x)
     found = minimize(misfit, x, method="BFGS", options={"gtol": _ENOUGH})
     return noise(found.x if found.fun <= misfit(x) else x)
+
+
+def guess_noise(
+    name: str,
+    time: np.ndarray,
+    residuals: np.ndarray,
+    kept: np.ndarray | None = None,
+    least: float = 0.0,
+    averaging: float = 0.0,
+) -> tuple[Noise, float]:
+    """Estimate the noise by moments, and the least size of a level relative to the first one.
+
+    The parameters are those of `fitted`.
+    """
+    if kept is not None:
+        time, residuals = time[kept], residuals[kept]
+    overlap = Overlap(time, averaging) if averaging else None
+    if overlap is not None:
+        residuals = overlap.whitened(residuals)
+    least = max(least, _QUIETEST * math.sqrt(float(np.mean(np.square(residuals)))), 1e-300)
+    found, first = _first_guess(name, find_runs(time), residuals, least)
+    return replace(found, kept=kept, overlap=overlap), least / first
 
 
 def _first_guess(
@@ -260,6 +290,18 @@ def whiteness(innovations: np.ndarray, order: int) -> float:
     correlations = np.array([seen[lag:] @ seen[:-lag] for lag in lags]) / (seen @ seen)
     size = count * (count + 2.0) * float(np.sum(correlations**2 / (count - lags)))
     return float(chi2.sf(size, max(len(lags) - order, 1)))
+
+
+def compute_criterion(innovations: np.ndarray, noise: Noise, parameters: int, count: int) -> float:
+    """Compute Akaike's criterion, corrected for few samples (Hurvich and Tsai, 1989).
+
+    It is ``n [ln(2 pi S/n) + 1] + ln|R| + 2 k n/(n - k - 1)`` for n rows, a sum of squares S of the
+    innovations and k parameters, including those of the noise and one for each outlier.
+    """
+    parameters, size = parameters + count - len(innovations), float(innovations @ innovations)
+    every = parameters + noise.partial.size + len(noise.sizes)
+    likelihood = count * (math.log(2.0 * math.pi * size / count) + 1.0) + noise.log_determinant
+    return likelihood + 2.0 * every * count / max(count - every - 1.0, 1.0)
 
 
 class _Products:

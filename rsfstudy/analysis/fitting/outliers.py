@@ -58,7 +58,8 @@ def find_kept_rows(residuals: np.ndarray, curve: np.ndarray, quantum: float) -> 
     blocks = np.array_split(np.abs(off), max(len(off) // _BLOCK, 1))
     least = max(0.5 * quantum, 0.1 * _NORMAL * float(np.median(np.abs(off))))
     scales = [max(_NORMAL * float(np.median(block)), least) for block in blocks]
-    scale = np.repeat(scales, [len(block) for block in blocks])
+    # the noise level may change within a block, and then one of the neighbours has that level
+    scale = np.repeat(maximum_filter(scales, 3), [len(block) for block in blocks])
     peaked = maximum_filter(np.abs(curve - _median_of_neighbours(curve)), 2 * _REACH + 1)
     found = np.abs(off) > np.maximum(_FAR * scale, _PEAKED * peaked)
     return ~found if found.any() and scale.min() > 0.0 else None

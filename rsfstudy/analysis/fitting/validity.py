@@ -80,12 +80,17 @@ def _misfit(found: Fitted, friction: np.ndarray) -> Iterator[str]:
 
 def _rounding(found: Fitted) -> Iterator[str]:
     """Yield a reason if friction is rounded to a quantum that the noise does not cover."""
-    variance = (found.noise_sd * float(found.noise.sizes.min())) ** 2 - found.quantum**2 / 12.0
-    if variance < (_LEAST_NOISE * found.quantum) ** 2:
+    if is_rounded(found):
         yield (
             f"friction is rounded to {found.quantum:.2g}, more than 2.5 times the noise, so "
             "rounding errors are not random: export the record with more digits"
         )
+
+
+def is_rounded(found: Fitted) -> bool:
+    """Return True if friction is rounded to a quantum that the noise does not cover."""
+    variance = (found.noise_sd * float(found.noise.sizes.min())) ** 2 - found.quantum**2 / 12.0
+    return variance < (_LEAST_NOISE * found.quantum) ** 2
 
 
 def _outliers(found: Fitted) -> Iterator[str]:
