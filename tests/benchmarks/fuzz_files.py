@@ -171,7 +171,8 @@ def tamper(path: Path, chance: random.Random) -> bool:
     extra = ("DELETE FROM fingerprint", "DROP TABLE cells", "CREATE VIEW v AS SELECT 1",
              "INSERT INTO fingerprint VALUES ('{}')", "ALTER TABLE cells ADD COLUMN x")  # fmt: skip
     sql = (f"UPDATE {table} SET {column} = ?", (value,))
-    with contextlib.closing(sqlite3.connect(path)) as database, database:
+    refused = contextlib.suppress(sqlite3.Error)
+    with refused, contextlib.closing(sqlite3.connect(path)) as database, database:
         database.execute(*(sql if chance.random() < 0.7 else (chance.choice(extra),)))
     return True
 
