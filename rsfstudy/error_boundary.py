@@ -1,7 +1,8 @@
-"""Error boundary of public functions: what they raise is an error of rsfstudy.
+"""Error boundary of the public functions and classes.
 
-Whatever goes wrong within one, and is no error of ours yet, becomes one that says
-what was asked, what went wrong and what to do.
+An exception that leaves the boundary is an error of rsfstudy: it names the argument that is
+responsible, the rule and the remedy. Calls from inside rsfstudy pass through unchanged, so that
+the error names the function that the user called.
 """
 
 from __future__ import annotations
@@ -11,94 +12,216 @@ import difflib
 import functools
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, ParamSpec, Self, TypeVar
 
-from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief
+from rsfstudy.argument_checks import (
+    check_lengths,
+    find_mismatch,
+    find_text_for_list,
+    find_unusable,
+)
+from rsfstudy.errors import CallError, DataError, InvalidValue, RsfStudyError, brief
 
 P = ParamSpec("P")
 T = TypeVar("T")
+C = TypeVar("C", bound=type)
+
+#: Exceptions that leave the boundary as they are.
+_PASSED = (RsfStudyError, Warning, bdb.BdbQuit)
+#: Special methods that users call, in addition to methods without a leading underscore.
+_SPECIAL = ("__init__", "__new__", "__call__", "__getitem__")
+#: Modules that call a function on behalf of their own caller.
+_BETWEEN = ("dataclasses", "functools")
 
 
-def error_boundary(function: Callable[P, T]) -> Callable[P, T]:
-    """The function, with errors of ours only.
+def error_boundary(
+    function: Callable[P, T],
+    *,
+    is_inner: bool = False,
+    passed: tuple[type[Exception], ...] = _PASSED,
+) -> Callable[P, T]:
+    """Return a function that raises errors of rsfstudy only.
 
-    Of a call with a dataset, or on one, any other becomes a `DataError`, of all others an
-    `InvalidValue`; where it arose is kept as the cause. A call that does not fit the signature is
-    Python's own `TypeError`; what is a warning stays one, and who quits a debugger leaves.
+    Parameters
+    ----------
+    function : callable
+        A public function or method.
+    is_inner : bool
+        Guard the calls from inside rsfstudy as well.
+    passed : tuple of type
+        Exceptions that leave the boundary as they are. By default these are errors of rsfstudy,
+        warnings, and the exception by which a debugger quits.
+
+    Returns
+    -------
+    callable
+        If the arguments do not fit the signature, it raises `CallError`, a TypeError that lists
+        the parameters. Any other exception becomes an `InvalidValue`, or a `DataError` if a
+        dataset is responsible, with the original exception as its cause.
     """
-    signature = inspect.signature(function)
+    return _enclose(function, is_inner=is_inner, passed=passed)
 
-    @functools.wraps(function)
-    def answered(*args: P.args, **options: P.kwargs) -> T:
-        try:
-            given = signature.bind(*args, **options).arguments
-        except TypeError as error:
-            taken = ", ".join(signature.parameters)
-            raise TypeError(f"{function.__name__}() {error}; it takes {taken}") from None
-        try:
-            return function(*args, **options)
-        except (RsfStudyError, Warning, bdb.BdbQuit):
-            raise
-        except Exception as error:
-            raise _told(function.__name__, given, error) from error
 
-    return answered
+def guard_methods(kind: C) -> C:
+    """Put the constructor and the public methods of a class within the error boundary.
+
+    A constructor also rejects arguments that do not match their annotations, because most
+    dataclasses store whatever they are given and would fail much later. Static methods stay
+    as they are, because the engines compile those of parts.
+    """
+    for name, member in list(vars(kind).items()):
+        if name.startswith("_") and name not in _SPECIAL:
+            continue
+        is_constructor = name in ("__init__", "__new__")
+        is_static = isinstance(member, staticmethod)
+        if isinstance(member, classmethod) or (is_static and is_constructor):
+            guarded = _enclose(member.__func__, is_strict=is_constructor)
+            setattr(kind, name, type(member)(guarded))
+        elif inspect.isfunction(member):
+            setattr(kind, name, _enclose(member, is_strict=is_constructor))
+    return kind
 
 
 class CheckedKeywords:
-    """Base of declarations that reports unknown keywords together with the valid ones.
+    """Base of classes from which users derive their own, for example measures.
+
+    It reports unknown keywords of a derived class, which `guard_methods` has not seen, together
+    with the valid ones.
 
     Raises
     ------
-    TypeError
+    CallError
         If a keyword is no parameter of the class.
     """
 
     def __new__(cls, *args: Any, **keywords: Any) -> Self:
         """Create an instance once all keywords are known to be parameters."""
-        valid = _parameters(cls)
-        for name in keywords:
+        kind: type = cls
+        valid = _parameters(kind)
+        for name in keywords if valid else ():
             if name not in valid:
-                close = difflib.get_close_matches(name, valid, n=1)
-                hint = f" Did you mean {close[0]!r}?" if close else ""
-                names = ", ".join(valid)
-                raise TypeError(
-                    f"{cls.__name__}() has no parameter {name!r}.{hint} It takes {names}."
-                )
+                raise _unknown_keyword(cls.__name__, name, valid)
         return super().__new__(cls)
 
 
 @functools.cache
 def _parameters(cls: type) -> tuple[str, ...]:
-    """Return the names of the parameters of a class."""
-    return tuple(inspect.signature(cls.__init__).parameters)[1:]  # type: ignore[misc]
+    """Return the names of the parameters of a class; none if it takes any keyword."""
+    parameters = inspect.signature(cls.__init__).parameters  # type: ignore[misc]
+    takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters.values())
+    return () if takes_any else tuple(parameters)[1:]
 
 
 def user_stacklevel() -> int:
-    """The ``stacklevel`` by which a warning of whoever asks names the line of the user's."""
+    """Return the ``stacklevel`` with which a warning shows the line of the user."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back and frame.f_globals.get("__name__", "").startswith("rsfstudy."):
         level, frame = level + 1, frame.f_back
     return level
 
 
-def _told(name: str, given: dict[str, Any], error: Exception) -> RsfStudyError:
-    """The error for a call that went wrong."""
-    why = in_words(error)
-    if any(hasattr(value, "data_vars") or name == "self" for name, value in given.items()):
-        return DataError(
-            f"{name} cannot be had of this dataset ({why}): it is not as rsfstudy made it. "
-            "Ask the dataset as it was opened, or run the study again."
-        )
-    shown = {key: value for key, value in given.items() if value is not None}
-    remedy = f"help(rsfstudy.{name}) says what it takes."
-    return InvalidValue(name, shown, f"cannot be answered ({why})", remedy=remedy)
+def _enclose(
+    function: Callable[P, T],
+    *,
+    is_inner: bool = False,
+    is_strict: bool = False,
+    passed: tuple[type[Exception], ...] = _PASSED,
+) -> Callable[P, T]:
+    """Return a function within the boundary, which if strict checks the annotations as well.
+
+    It checks them last, because the function itself knows better what to say.
+    """
+    signature = inspect.signature(inspect.unwrap(function))
+    name = function.__qualname__.removesuffix(".__init__").removesuffix(".__new__")
+    remedy = f"See the documentation of {name}."
+
+    def bind(args: tuple[Any, ...], options: dict[str, Any]) -> dict[str, Any]:
+        try:
+            return signature.bind(*args, **options).arguments
+        except TypeError as error:
+            names = [n for n in signature.parameters if n not in ("self", "cls", "_cls")]
+            unknown = [keyword for keyword in options if keyword not in names]
+            if unknown:
+                raise _unknown_keyword(name, unknown[0], names) from None
+            text = f"{name}() {brief(error)}. It takes {', '.join(names) or 'nothing'}."
+            raise CallError(text) from None
+
+    @functools.wraps(function)
+    def answer(*args: P.args, **options: P.kwargs) -> T:
+        if not is_inner and _is_internal():
+            try:
+                return function(*args, **options)
+            except TypeError:
+                bind(args, options)
+                raise
+        arguments = bind(args, options)
+        check_lengths(arguments)
+        try:
+            answered = function(*args, **options)
+        except InvalidValue as error:
+            if wrong := find_text_for_list(function, arguments, error):
+                raise wrong from error
+            raise
+        except passed:
+            raise
+        except Exception as error:
+            wrong = find_mismatch(function, arguments, remedy)
+            wrong = wrong or find_unusable(arguments, error, remedy)
+            raise wrong or _explain(name, arguments, error) from error
+        if is_strict:
+            # the constructor may have converted arguments to other types
+            made = getattr(arguments.get("self"), "__dict__", {})
+            stored = {name: made.get(name, value) for name, value in arguments.items()}
+            if wrong := find_mismatch(function, stored, remedy):
+                raise wrong
+        return answered
+
+    return answer
+
+
+def _unknown_keyword(name: str, keyword: str, valid: Iterable[str]) -> CallError:
+    """Return the error for a keyword that a function or a class does not take."""
+    names = list(valid)
+    close = difflib.get_close_matches(brief(keyword), names, n=1)
+    hint = "".join(f" Did you mean {each!r}?" for each in close)
+    takes = ", ".join(names) or "nothing"
+    return CallError(f"{name}() has no parameter {brief(keyword)!r}.{hint} It takes {takes}.")
+
+
+def _is_internal() -> bool:
+    """Return True if a module of rsfstudy (other than the command line) made the call."""
+    frame = sys._getframe(2)
+    while frame.f_back and frame.f_globals.get("__name__") in _BETWEEN:
+        frame = frame.f_back
+    module = str(frame.f_globals.get("__name__"))
+    return module.startswith("rsfstudy.") and not module.startswith("rsfstudy.cli.")
+
+
+def _explain(name: str, arguments: dict[str, Any], error: Exception) -> RsfStudyError:
+    """Return the error for a call that failed although its arguments have the right types."""
+    reason = in_words(error)
+    if any(
+        hasattr(value, "data_vars") or hasattr(value, "_dataset") for value in arguments.values()
+    ):
+        rule = f"is not as rsfstudy made it ({brief(error)})"
+        if isinstance(error, KeyError) and len(error.args) == 1:
+            # xarray lists all variables after the first sentence
+            missing = str(error.args[0]).partition(". ")[0].removeprefix("No variable named ")
+            if missing.strip("'").isidentifier():
+                rule = f"has no {missing}, which datasets of rsfstudy have"
+        remedy = "Pass the dataset as it was opened, or run the study again."
+        return DataError(f"{name}: the dataset {rule}. {remedy}")
+    if isinstance(error, MemoryError):
+        return InvalidValue(name, "...", f"needs more memory than there is ({brief(error)})")
+    given = {key: value for key, value in arguments.items() if value is not None}
+    remedy = f"See the documentation of {name}."
+    return InvalidValue(name, given, f"cannot be answered ({reason})", remedy=remedy)
 
 
 def in_words(error: BaseException) -> str:
-    """Kind of an error and what it says, if it can say anything."""
+    """Return the type of an exception and its message, if it has one."""
     try:
         return f"{type(error).__name__}: {brief(error)}"
     except Exception:  # its text may raise as well
@@ -106,7 +229,7 @@ def in_words(error: BaseException) -> str:
 
 
 def check_file(name: str, path: str | Path) -> None:
-    """Refuse what is there and no file: reading a pipe or a device may never end."""
+    """Reject a path that exists but is not a file: reading a pipe or a device may never end."""
     try:
         is_other = Path(path).exists() and not Path(path).is_file()
     except (OSError, ValueError) as error:

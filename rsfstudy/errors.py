@@ -92,6 +92,10 @@ class InvalidValue(RsfStudyError, ValueError):
         return placed
 
 
+class CallError(RsfStudyError, TypeError):
+    """A call whose arguments do not fit the signature of the function."""
+
+
 class DataError(RsfStudyError):
     """A file that is missing, damaged, or not a results file of rsfstudy."""
 
@@ -117,13 +121,20 @@ class Signalled(KeyboardInterrupt):
         self.exit_status = 128 + number
 
 
-class NoAnswer(UserWarning):
+class RsfStudyWarning(UserWarning):
+    """Base of the warnings, whose text is safe to print on a terminal."""
+
+    def __str__(self) -> str:
+        return spelt(brief(super().__str__(), _LONGEST))
+
+
+class NoAnswer(RsfStudyWarning):
     """What was asked of one scene has no number for an answer, nothing happens in it, or what
     happens is no physics.
     """
 
 
-class Incomplete(UserWarning):
+class Incomplete(RsfStudyWarning):
     """A motion that ended early, or cells of a run that failed."""
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from rsfstudy.errors import InvalidValue
@@ -35,9 +34,9 @@ def check_path(name: str, path: str | Path) -> Path:
         remedy = "Name a file or a directory; . is the directory you are in."
         raise InvalidValue(name, text, "is empty", remedy=remedy)
     try:
-        parts = [len(os.fsencode(part)) for part in (text, *Path(text).parts)]
-    except UnicodeError as error:
-        raise InvalidValue(name, text, "must be a path, in characters that exist") from error
+        parts = [len(part.encode()) for part in (text, *Path(text).parts)]
+    except UnicodeError as error:  # neither NetCDF nor the attributes of a file could hold it
+        raise InvalidValue(name, text, "must be a text that UTF-8 can hold") from error
     if "\0" in text:
         raise InvalidValue(name, text, "must be a path, without the null character")
     rule = ""

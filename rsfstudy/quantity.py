@@ -13,12 +13,14 @@ from html import escape
 from html.entities import html5
 from typing import Any
 
-from rsfstudy.errors import InvalidValue
+from rsfstudy.error_boundary import guard_methods
+from rsfstudy.errors import InvalidValue, spelt
 
 #: A heading of a table.
 _HEADING = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Quantity:
     """One named quantity.
@@ -59,6 +61,7 @@ class Quantity:
         return {"flag_values": values, "flag_meanings": " ".join(self.flags)} if self.flags else {}
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Output(Quantity):
     """A number that a measure gives; the vocabulary, or its name, describes one that states no
@@ -136,6 +139,11 @@ _RAISED = {"_": "sub", "^": "sup"}
 _CELL = 'style="text-align: left; vertical-align: top"'
 
 
+def as_html(text: object) -> str:
+    """Return a text as HTML, with control characters spelt out, which no browser shows."""
+    return escape(spelt(str(text)))
+
+
 class Markup(str):
     """A text that is HTML already."""
 
@@ -183,14 +191,14 @@ class ShownAsTable:
 
 def folded(caption: str, content: Markup) -> Markup:
     """Content that is shown once its caption is clicked."""
-    return Markup(f"<details><summary>{escape(caption)}</summary>{content}</details>")
+    return Markup(f"<details><summary>{as_html(caption)}</summary>{content}</details>")
 
 
 def symbol(formula: str) -> Markup:
     """A symbol as `Quantity` states it, without the need of MathJax."""
     if "$" not in formula:
-        return Markup(escape(formula))
-    text = escape(formula.strip("$"))
+        return Markup(as_html(formula))
+    text = as_html(formula.strip("$"))
     text = re.sub(r"\\([A-Za-z]+)", lambda found: _command(found[1]), text)
     text = re.sub(r"([_^])(?:\{([^{}]*)\}|(&\w+;|.))", _raised, text)
     bare = re.sub(r"[{}]|\\.", "", text)
@@ -202,7 +210,7 @@ def unit(about: Quantity) -> Markup:
     if about.scale:
         scale = about.scale.replace("sigma", r"\sigma")
         return symbol(f"${scale}$")
-    return Markup(escape(about.units if about.units != "1" else ""))
+    return Markup(as_html(about.units if about.units != "1" else ""))
 
 
 def _command(name: str) -> str:
@@ -222,4 +230,4 @@ def _cell(value: Any) -> str:
         return "yes" if value else "no"
     if isinstance(value, float):
         return "" if math.isnan(value) else f"{value:.6g}"
-    return escape(str(value))
+    return as_html(value)

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from rsfstudy.analysis.settling import settled_flag
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures._records import KEPT, Recorded, errors_of, recorded
@@ -268,10 +269,11 @@ class NormalStressTransient(Recorded):
         """
         rows, friction = record.rows, friction_coefficient_of(record.rows)
         late = rows[:, 0] >= (1.0 - _LAST) * self.record
+        is_flat = bool(np.ptp(friction[late]) < _STAYS * abs(record.left(self.fit_from)))
         path = along_path(rows, self.phases, READ)
         return {
             "direct_change": _direct(scene, record),
-            "settled": float(np.ptp(friction[late]) < _STAYS * abs(record.left(self.fit_from))),
+            "settled": settled_flag(scene.acting(-1), is_flat=is_flat),
             "closed_form_departure": self._departure(scene, record),
             "time": path["time"],
             "load_point_displacement": path["time"],

@@ -87,3 +87,53 @@ def test_the_regressor_of_the_trend_has_no_noise(seed: int) -> None:
         if f"{name}_stderr" in found:  # of 10 numbers one is off by 3.5 once in 200 records
             assert abs(synthetic.off(found, name, true)) < 3.5, name
     assert float(found.slip_distance_stderr) < 2.0
+
+
+def test_outliers_are_left_out_and_named() -> None:
+    noise = synthetic.correlated(400, 0.0, 3e-4, 3)
+    noise[[100, 222, 390]] += [0.02, -0.02, 0.02]
+    options = OPTIONS | {"noise": "ar", "laws": ["slowness"]}
+    found = rsfstudy.fit(record_with(noise), **options).squeeze()
+    assert found.status.item() == Status.OK
+    assert int(found.outliers) == 3
+    assert np.isnan(found.innovation.values[[100, 222, 390]]).all()
+    assert "3 outliers were left out: rows 101, 223, 391" in found.message.item()
+    clean = rsfstudy.fit(record_with(synthetic.correlated(400, 0.0, 3e-4, 3)), **options).squeeze()
+    assert float(found.a_stderr) == pytest.approx(float(clean.a_stderr), rel=0.1)
+    for name in ("a", "b", "slip_distance"):
+        assert abs(synthetic.off(found, name, TRUTH[name])) < 3.5, name
+
+
+@pytest.mark.parametrize(("quantum", "valid"), [(2e-4, True), (4e-4, False)])
+def test_rounded_friction_has_valid_errors_if_the_noise_covers_it(
+    quantum: float, valid: bool
+) -> None:
+    """The noise is 1e-4."""
+    record = record_with(synthetic.correlated(400, 0.0, 1e-4, 4))
+    rounded = quantum * np.rint(record.columns["friction"] / quantum)
+    columns = record.columns | {"friction": rounded}
+    options = OPTIONS | {"noise": "ar", "laws": ["slowness"]}
+    found = rsfstudy.fit(rsfstudy.read_record(columns), **options).squeeze()
+    assert float(found.friction_quantum) == pytest.approx(quantum)
+    assert (found.status.item() == Status.OK) == valid
+    assert ("friction is rounded to" in found.message.item()) != valid
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_errors_include_the_rounding_of_displacement(seed: int) -> None:
+    """An encoder: displacement is rounded to 0.5 um, and the step lies between two rows."""
+    shift = np.random.default_rng(seed).uniform(0.0, 0.5, 2)
+    loading = ((0.0, 1.0), (40.0 + shift[0], 10.0))
+    time = np.arange(0.0, 52.0, 0.1)
+    moved = 0.5 * np.rint(synthetic.load_point(loading, time) / 0.5 + shift[1])
+    friction = synthetic.motion("slowness", time, loading)[0]
+    friction += synthetic.correlated(len(time), 0.0, 1e-4, seed)
+    record = rsfstudy.read_record({"time": time, "displacement": moved, "friction": friction})
+    options = OPTIONS | {"noise": "ar", "laws": ["slowness"]}
+    found = rsfstudy.fit(record, **options).squeeze()
+    for name in ("a", "b", "slip_distance"):
+        assert abs(synthetic.off(found, name, TRUTH[name])) < 3.0, name
+    begins = loading[1][0]
+    exact = record.with_steps([(begins, begins, 1.0, 10.0)])
+    stated = rsfstudy.fit(exact, **options).squeeze()
+    assert float(found.a_stderr) > 1.5 * float(stated.a_stderr)

@@ -203,6 +203,6 @@ def test_slip_counts_that_noise_moves_the_place_of_an_event():
             stress[at:] -= 5.0
             moved[at:] += 10.0
         found = rsfstudy.events(time=np.arange(count), shear_stress=stress, displacement=moved)
-        assert (found.slip_error < 0.01).all()
+        assert (found.slip_error < 0.02).all()  # half of a 95 % interval: two standard errors
         off += ((found.slip - 10.0) / found.slip_error).values.tolist()
     assert np.abs(off).max() < 5.0

@@ -80,7 +80,7 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypat
 
 def test_what_reads_back_differently_is_not_put_in_place(tmp_path, monkeypatch):
     path = tmp_path / "trial.nc"
-    monkeypatch.setattr(store, "_encoding", lambda _d: {"v": {"dtype": "float32"}})
+    monkeypatch.setattr(store, "fill_value_encoding", lambda _d: {"v": {"dtype": "float32"}})
     with pytest.raises(DataError, match="what was read back differs"):
         store.write(dataset(0.1), path)
     assert os.listdir(tmp_path) == []

@@ -20,6 +20,12 @@ FREE = ("b", "slip_distance", "mu_star")
 class Relaxation:
     """``mu_star - b (1 - exp(-x/D_c))`` over 30 um, in place of the model of a record."""
 
+    averaging = 0.0
+
+    @property
+    def frictions(self) -> list[np.ndarray]:
+        return [self.friction]
+
     def __init__(self, truth: Values, seed: int = 2) -> None:
         self.time = self.displacement = np.linspace(0.0, 30.0, ROWS)
         noise = np.random.default_rng(seed).standard_normal(ROWS)

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
 from fuzz_commands import STUDIES, Answer, Line, damage, faults, line_of
 from running import call, called
 
+from rsfstudy.cli import command_line
 from rsfstudy.cli.command_line import cli
+from rsfstudy.cli.console import Plain
 
 LONG = "x" * 300
+TOO_LONG = "must have at most 255 bytes in each part"
 
 
 @pytest.mark.parametrize(
@@ -24,22 +30,23 @@ LONG = "x" * 300
         ("export .. --csv", ".. is a directory"),
         ("export motion.nc --csv --output .", "'--output': File '.' is a directory"),
         ("export motion.nc --csv --output ''", "--output = '': is empty"),
-        (f"export {LONG}.nc --csv", "cannot be used: File name too long"),
-        (f"simulate --output {LONG}.png", "cannot be used: File name too long"),
-        (f"simulate --protocol {LONG}.csv", "cannot be used: File name too long"),
-        (f"run stresses.py --output {LONG}", "cannot be used: File name too long"),
-        (f"fit {LONG}.csv", "cannot be used: File name too long"),
+        (f"export {LONG}.nc --csv", TOO_LONG),
+        (f"simulate --output {LONG}.png", TOO_LONG),
+        (f"simulate --protocol {LONG}.csv", TOO_LONG),
+        (f"run stresses.py --output {LONG}", TOO_LONG),
+        (f"fit {LONG}.csv", TOO_LONG),
         (f"verify 01.csv --problem {LONG}.toml", "cannot be the path of a file: File name too"),
         ("report . --output ''", "--output = '': is empty"),
         ("report . --output .", "'--output': File '.' is a directory"),
-        (f"report . --output {LONG}.html", "cannot be used: File name too long"),
+        (f"report . --output {LONG}.html", TOO_LONG),
         ("problems ''", "is empty. Name a file or a directory"),
-        (f"problems {LONG}", "cannot be used: File name too long"),
-        (f"run {LONG}", "is unknown. `rsfstudy list` shows all"),
-        (f"show {LONG}", "is unknown. `rsfstudy list` shows all"),
-        (f"show {LONG}.py", "is no file (File name too long)"),
-        (f"check {LONG}", "has no results in outputs"),
-        (f"compare {LONG}.nc motion.nc", "File name too long"),
+        (f"problems {LONG}", TOO_LONG),
+        (f"run {LONG}", TOO_LONG),
+        (f"show {LONG}", TOO_LONG),
+        (f"show {LONG}.py", TOO_LONG),
+        (f"check {LONG}", TOO_LONG),
+        (f"compare {LONG}.nc motion.nc", TOO_LONG),
+        ("fit /proc/self/mem", "/proc/self/mem: cannot be read: Input/output error"),
         ("rerun ''", "file = '': is empty"),
         ("plot motion.nc --output ''", "--output = '': is empty"),
     ],
@@ -47,6 +54,8 @@ LONG = "x" * 300
 def test_paths_are_refused_by_a_rule(words, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("motion.nc").touch()
+    if "/proc" in words and not Path("/proc/self/mem").exists():
+        pytest.skip("only Linux has a file that opens and cannot be read")
     status, said = called(shlex.split(words))
     assert message in said.replace(" x", "x")
     assert "Error:" not in said.replace("Error: Invalid", "").removeprefix("error:")
@@ -102,6 +111,33 @@ def test_usage_errors_print_no_control_characters(words):
     ran = call(*words)
     assert ran.returncode == 2
     assert all(c.isprintable() or c == "\n" for c in ran.stderr)
+
+
+def test_a_full_disk_is_named_whatever_prints(monkeypatch):
+    """Click prints lists and help by itself."""
+    said = io.StringIO()
+    with open("/dev/full", "w") as full, monkeypatch.context() as patch:
+        patch.setattr(sys, "argv", ["rsfstudy", "list"])
+        patch.setattr(sys, "stderr", said)
+        patch.setattr(sys, "stdout", full)
+        with pytest.raises(SystemExit) as ended:
+            command_line.main()
+        patch.undo()
+        with contextlib.suppress(OSError):
+            full.flush()
+    text = " ".join(said.getvalue().split())
+    assert text.startswith("error: rsfstudy list: No space left on device. Check that the place")
+    assert ended.value.code == 1
+
+
+@pytest.mark.parametrize(
+    ("columns", "width"), [("0", 20), ("1", 20), ("120", 120), ("9" * 11, 1000)]
+)
+def test_any_width_of_the_environment_is_bounded(columns, width):
+    printed = Plain(file=io.StringIO(), _environ={"COLUMNS": columns})
+    assert printed.width == width
+    printed.print("a study")
+    assert printed.file.getvalue() == "a study\n"
 
 
 # ---- the fuzzer ----------------------------------------------------------------------------------

@@ -18,7 +18,9 @@ FILES = sorted(ROOT.rglob("*.py"))
 #: From the bottom up: each imports from lower floors alone. The studies and their pages are above.
 FLOORS = (
     ("errors", "status", "defaults", "wording"),
-    ("error_boundary", "netcdf", "paths", "quantity"),
+    ("argument_checks",),
+    ("error_boundary",),
+    ("netcdf", "paths", "quantity"),
     ("slider",),
     ("axes", "motion", "vocabulary"),
     ("analysis", "reduce"),
@@ -42,7 +44,7 @@ HOMES = {
     "rich": {"cli", "api/progress"},
     "sqlite3": {"files/journal"},
     "zarr": set(),  # xarray writes and reads it
-    "msgspec": {"files/contents", "files/restore"},
+    "msgspec": {"files/contents", "files/restore", "referee/problem"},
 }
 
 

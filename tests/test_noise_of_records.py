@@ -11,7 +11,9 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from rsfstudy.analysis.fitting import noise as noises
-from rsfstudy.analysis.fitting.noise import Noise, Run
+from rsfstudy.analysis.fitting.noise import Noise
+from rsfstudy.analysis.fitting.noise_runs import Run, find_level_changes, find_runs
+from rsfstudy.analysis.fitting.outliers import find_kept_rows, find_quantum
 
 #: Coefficients of an autoregressive process of third order, with a pair of complex roots.
 AR3 = -np.real(np.poly([0.8, 0.5 + 0.4j, 0.5 - 0.4j]))[1:]
@@ -34,11 +36,11 @@ def partial(coefficients: np.ndarray) -> np.ndarray:
 
 
 #: Runs of two processes, of which one is shorter than their order.
-RUNS = (Run(0, 40, 0, 0), Run(40, 42, 1, 0), Run(42, 90, 0, 0), Run(90, 130, 1, 0))
+RUNS = (Run(0, 40, 0, 0, 0), Run(40, 42, 1, 0, 1), Run(42, 90, 0, 0, 0), Run(90, 130, 1, 0, 1))
 SIZES = [1.0, 0.3]
 BOTH = Noise(RUNS, np.array([partial(AR3), [0.9, 0.0, 0.0]]), np.array(SIZES))
 #: One process whose size changes, first after fewer rows than its order.
-JOINED = (Run(0, 2, 0, 0), Run(2, 42, 1, 2), Run(42, 90, 0, 42), Run(90, 130, 1, 90))
+JOINED = (Run(0, 2, 0, 0, 0), Run(2, 42, 1, 2, 1), Run(42, 90, 0, 42, 0), Run(90, 130, 1, 90, 1))
 CHANGING = Noise(JOINED, np.array([partial(AR3)] * 2), np.array(SIZES))
 
 
@@ -86,21 +88,23 @@ def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices(noise:
 
 
 def test_independent_samples_of_first_order() -> None:
-    one = Noise((Run(0, 500, 0, 0),), np.array([[0.9]]), np.ones(1))
+    one = Noise((Run(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
     assert one.effective_samples == pytest.approx(500 * 0.1 / 1.9)
 
 
 def test_degrees_of_freedom_count_the_coefficients_that_are_found() -> None:
     """In closed form for first order; else by how the power at zero frequency scatters."""
-    one = Noise((Run(0, 500, 0, 0),), np.array([[0.9]]), np.ones(1))
+    one = Noise((Run(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
     assert one.degrees == pytest.approx(500 / (1 + 2 * 1.9 / 0.1))
     assert noises.white(np.arange(500.0)).degrees == 500
     rng, logs = np.random.default_rng(7), []
     for _ in range(400):
         drawn = lfilter([1.0], [1.0, *(-AR3)], rng.normal(size=3_200))[200:]
-        found = Noise((Run(0, 3_000, 0, 0),), np.array([noises._partial([drawn], 3)]), np.ones(1))
+        found = Noise(
+            (Run(0, 3_000, 0, 0, 0),), np.array([noises._partial([drawn], 3)]), np.ones(1)
+        )
         logs.append(math.log(np.var(drawn) / found.effective_samples))
-    exact = Noise((Run(0, 3_000, 0, 0),), np.array([partial(AR3)]), np.ones(1)).degrees
+    exact = Noise((Run(0, 3_000, 0, 0, 0),), np.array([partial(AR3)]), np.ones(1)).degrees
     # a variance of 400 draws has a standard error of a fourteenth
     assert 2.0 / np.var(logs) == pytest.approx(exact, rel=0.25)
 
@@ -149,7 +153,7 @@ def test_noise_of_other_sampling_intervals_is_another() -> None:
         assert found.partial[number, 0] == pytest.approx(exact, abs=0.12)
     for noise in (found, noises.fitted("white", time, left, np.ones((1_500, 1)))):
         # 900 samples at .95 are 23 independent ones, which tell a size to 15 per cent
-        sizes = noise.sizes[[run.number for run in noise.runs]]
+        sizes = noise.sizes[[run.level for run in noise.runs]]
         assert sizes[1] / sizes[0] == pytest.approx(3.0, rel=0.5)
 
 
@@ -158,7 +162,7 @@ def test_a_clock_that_is_uneven_is_one_process(quantum: float) -> None:
     """Intervals that vary, or that a logger has rounded to one or two ticks, tell one noise."""
     rng = np.random.default_rng(6)
     time = np.cumsum(np.where(rng.random(2_000) < 0.5, 1.0, 2.0 if quantum else 1.2)) * 0.01
-    assert noises._runs(time) == (Run(0, 2_000, 0, 0),)
+    assert find_runs(time) == (Run(0, 2_000, 0, 0, 0),)
 
 
 @pytest.mark.parametrize("order", [0, 3])
@@ -174,3 +178,62 @@ def test_whiteness_is_that_of_ljung_and_box(order: int) -> None:
     assert told == pytest.approx(noises.whiteness(left, order), rel=1e-9)
     # means and sizes of parts are not those of the whole: a few lags in 300
     assert chi2.isf(told, 20) == pytest.approx(size, rel=0.1)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.8])
+def test_the_noise_level_may_change(rho: float) -> None:
+    rng = np.random.default_rng(11)
+    left = lfilter([1.0], [1.0, -rho], rng.normal(size=900))
+    left[300:] *= 4.0
+    found = noises.fitted("ar", np.arange(900.0), left, np.ones((900, 1)))
+    assert len(found.sizes) == 2
+    assert abs(found.runs[1].first - 300) < 30
+    assert found.sizes[1] == pytest.approx(4.0, rel=0.3)
+    # the level, not the whole record, decides on the error of the quiet part
+    weights = found.whitened(np.ones((900, 1)))[:, 0] ** 2
+    assert weights[:250].sum() > 4.0 * weights[350:600].sum()
+
+
+def test_a_steady_level_does_not_change() -> None:
+    rng = np.random.default_rng(12)
+    changes = [find_level_changes(rng.normal(size=600)) for _ in range(100)]
+    assert sum(map(bool, changes)) <= 3
+
+
+def test_a_clock_with_jitter_keeps_its_two_sampling_rates() -> None:
+    rng = np.random.default_rng(13)
+    gaps = np.repeat([0.2, 0.02], [200, 1_000])
+    time = np.cumsum(gaps) + 0.3 * gaps * rng.uniform(-1.0, 1.0, 1_200)
+    runs = find_runs(time)
+    assert [run.number for run in runs] == [1, 0] or [run.number for run in runs] == [0, 1]
+    assert abs(runs[0].last - 200) < 10
+
+
+def test_outliers_are_found_and_peaks_of_the_model_are_not() -> None:
+    rng = np.random.default_rng(14)
+    left, curve = 1e-3 * rng.normal(size=500), np.zeros(500)
+    spikes = [7, 120, 121, 333]
+    left[spikes] += 0.02
+    curve[250:] = 0.05 * np.exp(-np.arange(250) / 2.0)
+    left[250] += 0.02  # a misfit at the step
+    kept = find_kept_rows(left, curve, 0.0)
+    assert kept is not None
+    assert np.flatnonzero(~kept).tolist() == spikes
+    assert find_kept_rows(1e-3 * rng.normal(size=500), curve, 0.0) is None
+
+
+@pytest.mark.parametrize("change", [130, 160])
+def test_rows_after_a_change_of_the_noise_level_are_no_outliers(change: int) -> None:
+    left = 1e-4 * np.random.default_rng(16).normal(size=500)
+    left[change:] *= 10.0
+    assert find_kept_rows(left, np.zeros(500), 0.0) is None
+
+
+def test_the_quantum_of_values_is_found() -> None:
+    rng = np.random.default_rng(15)
+    values = 0.6 + 2e-3 * rng.normal(size=400)
+    assert find_quantum(np.round(values, 3)) == pytest.approx(1e-3)
+    assert find_quantum(values) == 0.0
+    assert find_quantum(np.full(10, 0.6)) == 0.0
+    shear = 0.0025 * np.rint(20.0 * values / 0.0025)
+    assert find_quantum(shear / 20.0) == pytest.approx(0.0025 / 20.0)

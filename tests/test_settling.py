@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene
-from rsfstudy.analysis.settling import is_attracted
+from rsfstudy.analysis.settling import is_attracted, settled_flag
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
@@ -167,3 +167,10 @@ def test_growth_of_zero_is_undecided(off, settles):
         assert "undecided" in outcome.message
         with pytest.raises(Halt, match="undecided"):
             is_attracted(scene)
+
+
+@pytest.mark.parametrize(("ratio", "flag"), [(0.99, 0.0), (1.0, math.nan), (1.2, 1.0)])
+def test_a_flat_record_has_settled_only_if_small_changes_decay(ratio, flag):
+    scene = Scene(law="slip", normal_stress="constant", a=0.01, stiffness_ratio=ratio)
+    assert settled_flag(scene, is_flat=True) == pytest.approx(flag, nan_ok=True)
+    assert settled_flag(scene, is_flat=False) == 0.0

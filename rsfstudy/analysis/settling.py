@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from rsfstudy.motion.meter import Halt
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.stability import largest_growth_rate
@@ -34,3 +36,27 @@ def is_attracted(scene: Scene) -> bool:
             f"{growth.error:.1e}. Change stiffness= by more than that.",
         )
     return growth.value < 0.0
+
+
+def settled_flag(scene: Scene, *, is_flat: bool) -> float:
+    """Return the flag of a record that has settled if it ends flat.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene under the segment of loading at the end of the record.
+    is_flat : bool
+        Whether friction hardly changes at the end of the record.
+
+    Returns
+    -------
+    float
+        1 if the record ends flat, and 0 if not or if small changes of steady sliding grow; NaN if
+        their growth rate is zero within its error.
+    """
+    if not is_flat:
+        return 0.0
+    growth = largest_growth_rate(scene, scene.log_load_rate)
+    if growth is not None and growth.is_undecided:
+        return math.nan
+    return 0.0 if growth is not None and growth.is_positive else 1.0

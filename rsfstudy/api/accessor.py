@@ -45,8 +45,9 @@ class Accessor:
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
 
+    @error_boundary
     def _repr_html_(self) -> str:
-        """The numbers of a dataset and the verdicts on them, or of the parameters of fits."""
+        """Return the numbers of a dataset with the verdicts of its claims as HTML."""
         from rsfstudy.api import report
 
         self._must_be_ours()

@@ -12,9 +12,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.ndimage import find_objects, label
-from scipy.stats import norm
 
+from rsfstudy.analysis.drop_detection import SAMPLES, SHORTEST, Detection
+from rsfstudy.analysis.drop_slip import moves_with_drops, numbers_of, place_of
+from rsfstudy.analysis.drops import find_drops
+from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.compute import provenance
 from rsfstudy.error_boundary import error_boundary, user_stacklevel
 from rsfstudy.errors import InvalidValue, NoAnswer
@@ -43,24 +45,13 @@ QUANTITIES = {
 }
 #: What quantities are measured in: as these variables, by their scales.
 _MEASURED_AS = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
-#: What is read of displacement.
+#: Quantities that are read from displacement.
 _OF_SLIP = ("slip", "peak_slip_rate", "dynamic_stress_drop")
 #: What part of an event is missing, by its flag.
 _CUT = ("whole", "begins_before", "lasts_beyond", "both")
 
-#: Chance that a record of Gaussian noise holds any event: one record in 10,000.
-_CHANCE = 1e-4
-#: Shortest windows in samples, and how many samples a record has for each sample of the longest,
-#: so that the spread of what windows differ by is known to a quarter.
-_SHORTEST, _SAMPLES = 4, 100
-#: Standard deviations by which a drop must exceed the threshold to be found but once in 1,000.
-_FOUND = 3.1
-#: Standard deviations down to which an event is followed from where it is found.
-_FOLLOWED = 2.0
-#: Standard deviations by which slip exceeds what moves on anyway, and its least excess over that.
-_FASTER, _LEAST_EXCESS = 3.0, 0.1
-#: Standard deviation over the median of absolute deviations of Gaussian noise.
-_NORMAL = 1.4826
+#: Falls of stress, in smallest drops, from which it is suspect that no drop is found.
+_SUSPECT = 10.0
 
 
 def catalogue(found: Sequence[Found], about: Mapping[str, Mapping[Any, Any]]) -> xr.Dataset:
@@ -110,27 +101,30 @@ def _units(scale: str, about: Mapping[str, Mapping[Any, Any]]) -> dict[str, str]
 
 @error_boundary
 def events(
-    record: xr.Dataset | str | Path | None = None,
+    record: xr.Dataset | Record | str | Path | None = None,
     *,
     time: Any = None,
     displacement: Any = None,
     shear_stress: Any = None,
     stiffness: Any = None,
+    sign: int | None = None,
 ) -> xr.Dataset:
-    """The events of a record: drops of shear stress that its noise does not explain.
+    """Find the events of a record: drops of shear stress that noise does not explain.
 
-    An event is where the mean stress of a number of samples falls below the mean of as many samples
-    before by more than a threshold, and by more than it usually changes. Windows of 4, 8, 16 and
-    more samples, up to a hundredth of the record, are looked at, at every sample. The threshold is
-    a multiple of the standard deviation of that difference, which is taken from the record by the
-    median of absolute deviations: noise may be correlated over times short against the longest
-    window, and events may take up to a fifth of the record. The multiple is such that all looks
-    together find something in one record of Gaussian noise of 10,000.
+    The mean stress of a window of samples is compared with that of the window behind it, for
+    windows of 4, 8, 16 and more sampling intervals, up to a hundredth of the record, at every
+    sample. The noise of the difference is the spread of its most frequent values, those of
+    loading. It may be correlated over times that are short compared with the longest window, and
+    drops may take up to 40 % of the record. If sampling intervals differ by more than a factor of
+    three, as in triggered bursts, samples are first averaged over even intervals of time. The
+    threshold is such that all comparisons together find something in one of 10,000 records of
+    Gaussian noise. Three lines are then fitted to all samples around a drop: their corners are the
+    beginning and the end of the event, the highest and the lowest stress.
 
-    A drop of ``smallest_drop`` that stands for as long as the longest window, before it and after
-    it, is found but once in 1,000. Where noise is white, that is below three standard deviations of
-    the noise from 3,200 samples on; correlated noise asks for more. Glitches of single samples are
-    no Gaussian noise. Stress that relaxes by as much within a window, as in a hold, is a drop too.
+    A drop of ``smallest_drop`` that is separated from others by the longest window is missed once
+    in 1,000. With white noise it is less than three standard deviations of the noise from 3,200
+    samples on; it is larger with correlated noise. Glitches of single samples are no Gaussian
+    noise. Stress that relaxes by as much within a window, as in a hold, is a drop too.
 
     Slip is that of the fault: displacement less shear stress over `stiffness`, that of what lies
     between the fault and where displacement is measured. Without it displacement is taken for that
@@ -140,9 +134,11 @@ def events(
 
     Parameters
     ----------
-    record : xarray.Dataset, str or Path, optional
-        ``time``, ``shear_stress`` and, where it was measured, ``displacement``, with units; or a
-        CSV file of these, whose first line names columns and units (`read_table`).
+    record : xarray.Dataset, Record, str or Path, optional
+        ``time``, ``shear_stress`` and, if it was measured, ``displacement``, with units; or a CSV
+        file of these, whose first line names columns and units (`read_table`). The shear stress of
+        a Record (`read_record`) is friction times normal stress, or friction if it has no normal
+        stress.
     time, displacement, shear_stress : array_like
         The same as arrays; one with the attribute ``units`` keeps them, and numbers that are read
         of others have no attribute ``units``.
@@ -150,16 +146,20 @@ def events(
         Shear stress over displacement, "0.05 MPa/um", or a number in units of the record: that of
         the rig where displacement is that of the load point; ``inf`` where it is surely that of the
         fault.
+    sign : {1, -1}, optional
+        Sign of shear stress in the direction of slip. Stress is multiplied by it, so that events
+        are falls. By default -1 if all samples are negative, otherwise 1.
 
     Returns
     -------
     xarray.Dataset
-        Along ``event``, in the units of the record: ``time``, ``duration`` (at least one sample),
-        ``interval``, ``stress_before`` and ``stress_after`` (means of windows),
-        ``static_stress_drop``; with displacement ``slip``, ``peak_slip_rate`` between neighbouring
-        samples and ``dynamic_stress_drop``. What is not above the noise is NaN. Beside each number
-        that has one, its standard error by noise. ``noise``, its standard deviation, and
-        ``smallest_drop``.
+        Along ``event``, in the units of the record: ``time`` (of the beginning), ``duration``,
+        ``interval``, ``stress_before`` and ``stress_after``, ``static_stress_drop``, ``cut`` (1 if
+        the record begins within the event, 2 if it ends within it); with displacement ``slip``,
+        ``peak_slip_rate`` between neighbouring samples and ``dynamic_stress_drop``. What is not
+        above the noise is NaN. Each number has an ``_error``, the half width of a 95 % interval.
+        ``noise`` is the standard deviation of the noise, ``smallest_drop`` the smallest drop that
+        can be detected, and the attribute ``sign_of_shear_stress`` the sign that was used.
 
     Raises
     ------
@@ -172,12 +172,19 @@ def events(
     NoAnswer
         Where displacement does not move faster during the drops; ``slip``, ``peak_slip_rate`` and
         ``dynamic_stress_drop`` are NaN, and the attribute ``comment`` of slip says why.
+        If no drop is found although stress falls by more than ten times ``smallest_drop``; the
+        attribute ``comment`` of the dataset gives both numbers.
     """
     given = {"time": time, "displacement": displacement, "shear_stress": shear_stress}
     if isinstance(record, str | Path):
         table = {n: of for n, of in read_table(record).items() if n in given}
         record = xr.Dataset({n: (n, of.values, {"units": of.units}) for n, of in table.items()})
+    if isinstance(record, Record):
+        record = _stress_of(record)
     if record is not None:
+        if not hasattr(record, "data_vars"):
+            remedy = "Pass a Dataset, a Record, the path of a CSV file, or arrays by name."
+            raise InvalidValue("record", record, "is no record of stress", remedy=remedy)
         given = {name: record.get(name) for name in given}
     times, stress = (_samples(name, given[name]) for name in ("time", "shear_stress"))
     moved = given["displacement"]
@@ -189,17 +196,21 @@ def events(
     if not (np.diff(times) > 0.0).all():
         late = int(np.argmax(np.diff(times) <= 0.0)) + 1
         raise InvalidValue("time", times[late], f"must increase, and does not at sample {late}")
+    direction = _sign(stress, sign)
+    stress = direction * stress
     about = {name: dict(getattr(values, "attrs", {})) for name, values in given.items()}
     if stiffness is not None:
         if moves is None:
             raise InvalidValue("stiffness", stiffness, "needs the displacement of the load point")
         moves = moves - stress / _stiffness(stiffness, about)
-    found, noise, smallest = _drops(stress)
-    ends = [0, *(drop[1] for drop in found[:-1])]
-    begins = [*(drop[0] for drop in found[1:]), len(stress)]
-    rooms = [*zip(ends, begins, strict=True)] if found else []
-    rows = [_row(times, stress, moves, *of) for of in zip(found, rooms, strict=True)]
-    runs_on = moves is not None and stiffness is None and not _slips(times, moves, found)
+    found, detection = find_drops(times, stress)
+    ends = [-math.inf, *(of.drop.ends for of in found)]
+    begins = [*(of.drop.begins for of in found[1:]), math.inf]
+    rooms = [*zip(ends, begins, strict=False)][: len(found)]
+    places = [place_of(times, *of) for of in zip(found, rooms, strict=True)]
+    each = zip(found, places, rooms, strict=True)
+    rows = [numbers_of(times, stress, moves, *of) for of in each]
+    runs_on = moves is not None and stiffness is None and not moves_with_drops(times, moves, places)
     for row in rows if runs_on else ():
         row[0].update(dict.fromkeys(_OF_SLIP, (math.nan, math.nan)))
     dataset = catalogue(rows, about | {"slip": about["displacement"]})
@@ -211,9 +222,16 @@ def events(
             f"slip has no number: {why}. {remedy}", NoAnswer, stacklevel=user_stacklevel()
         )
     units = {key: value for key, value in about["shear_stress"].items() if key == "units"}
-    dataset["noise"] = ((), noise, {"long_name": "standard deviation of the noise", **units})
-    words = "drop of shear stress that is found but once in 1,000"
-    dataset["smallest_drop"] = ((), smallest, {"long_name": words, **units})
+    dataset["noise"] = (
+        (),
+        detection.noise,
+        {"long_name": "standard deviation of the noise", **units},
+    )
+    words = "smallest drop of shear stress that is missed once in 1,000 records"
+    dataset["smallest_drop"] = ((), detection.smallest, {"long_name": words, **units})
+    dataset.attrs["sign_of_shear_stress"] = int(direction)
+    if not rows and (text := _warn_of_nothing(detection)):
+        dataset.attrs["comment"] = text
     return dataset
 
 
@@ -237,7 +255,7 @@ def _samples(name: str, values: Any) -> np.ndarray:
         samples = np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise InvalidValue(name, values, "must be numbers") from error
-    least = _SHORTEST * _SAMPLES
+    least = SHORTEST * SAMPLES
     if samples.ndim != 1 or len(samples) < least:
         rule = f"must be a list of {least} samples at least, which tell the noise"
         raise InvalidValue(name, samples.shape, rule)
@@ -247,117 +265,39 @@ def _samples(name: str, values: Any) -> np.ndarray:
     return samples
 
 
-def _spread(values: np.ndarray) -> float:
-    """Standard deviation, by the median of absolute deviations."""
-    return _NORMAL * float(np.median(np.abs(values - np.median(values))))
-
-
-def _quantum(values: np.ndarray) -> float:
-    """The smallest difference of neighbours."""
-    steps = np.abs(np.diff(values))
-    return float(steps[steps > 0.0].min(initial=math.inf))
-
-
-def _falls(values: np.ndarray, window: int) -> np.ndarray:
-    """Mean of the samples before each place less that of as many behind it."""
-    sums = np.concatenate([[0.0], np.cumsum(values - values.mean())])
-    return (
-        np.asarray(2.0 * sums[window:-window] - sums[: -2 * window] - sums[2 * window :]) / window
-    )
-
-
-def _drops(stress: np.ndarray) -> tuple[list[tuple[int, int, int, float]], float, float]:
-    """The first place of each drop, the place behind it, the window that found it and the standard
-    error; the noise; and the smallest drop that is found.
-    """
-    windows = [_SHORTEST]
-    while 2 * windows[-1] * _SAMPLES <= len(stress):
-        windows.append(2 * windows[-1])
-    quantum = _quantum(stress)
-    looks = float(norm.isf(_CHANCE / (len(stress) * len(windows))))
-    taken: list[tuple[int, int, int, float]] = []
-    smallest = math.inf
-    for window in windows:
-        falls = _falls(stress, window)
-        usual, spread = float(np.median(falls)), _spread(falls)
-        # the spread itself is known from so many windows only
-        surely = 1.0 + 2.33 / math.sqrt(len(stress) / (2.0 * window))
-        threshold = max(looks * surely * spread, 2.0 * quantum)
-        smallest = min(smallest, threshold + _FOUND * spread)
-        net = falls - max(0.0, usual)
-        for (part,) in find_objects(label(net > min(_FOLLOWED * spread, threshold))[0]):
-            place = part.start + int(np.argmax(net[part]))
-            near = any(part.start < e + window and b - window < part.stop for b, e, *_ in taken)
-            if net[place] <= threshold or near:
-                continue
-            # a step is seen from all windows that it is in
-            begin, end = min(part.start + window - 1, place), max(part.stop - window, place)
-            taken.append((begin + window, end + window, window, spread + abs(usual)))
-    apart = stress[windows[-1] :] - stress[: -windows[-1]]
-    return sorted(taken), _spread(apart) / math.sqrt(2.0), smallest
-
-
-def _slips(
-    times: np.ndarray, moves: np.ndarray, found: Sequence[tuple[int, int, int, float]]
-) -> bool:
-    """True where displacement moves faster during the drops than for as long before and after."""
-    excess = usual = variance = 0.0
-    quantum = _quantum(moves)
-    noises = {n: max(_spread(_falls(moves, n)), quantum) for n in {drop[2] for drop in found}}
-    for begin, end, window, _error in found:
-        far = end + window - begin
-        places = (begin - window - far, begin - window, end, end + far)
-        starts = np.clip(places, 0, len(moves) - window)
-        lasts, slips = (
-            np.diff([of[at : at + window].mean() for at in starts]) for of in (times, moves)
-        )
-        # nothing is before the very begin of the record, nor after its end
-        ratios = (lasts[1] / np.where(lasts > 0.0, lasts, math.inf))[::2]
-        moved, ratio = float((ratios * slips[::2]).max()), float(ratios.max())
-        excess, usual = excess + float(slips[1]) - moved, usual + abs(moved)
-        variance += 0.5 * noises[window] ** 2 * (1.0 + (1.0 + ratio) ** 2 + ratio**2)
-    return bool(excess > max(_FASTER * math.sqrt(variance), _LEAST_EXCESS * usual))
-
-
-def _row(
-    times: np.ndarray,
-    stress: np.ndarray,
-    moves: np.ndarray | None,
-    drop: tuple[int, int, int, float],
-    room: tuple[int, int],
-) -> Found:
-    """The numbers of one event of a record, each with its standard error by noise; between the end
-    of the event before and the beginning of the next.
-    """
-    begin, end, window, error = drop
-    before, after = stress[begin - window : begin].mean(), stress[end : end + window].mean()
-    apart = times[end] - times[begin - 1]
-    row = {
-        "time": (times[begin - 1], apart),
-        "duration": (apart, apart),
-        "stress_before": (before, error),
-        "stress_after": (after, error),
-        "static_stress_drop": (before - after, error),
+def _stress_of(record: Record) -> xr.Dataset:
+    """Return the shear stress of a record in MPa; its friction, if it has no normal stress."""
+    columns = record.columns
+    if "normal_stress" in columns:
+        stress, units = 1e-6 * columns["friction"] * columns["normal_stress"], "MPa"
+    else:
+        stress, units = columns["friction"], "1"
+    data = {
+        "time": ("sample", record.time, {"units": "s"}),
+        "displacement": ("sample", columns["displacement"], {"units": "um"}),
+        "shear_stress": ("sample", stress, {"units": units}),
     }
-    if moves is None:
-        return row, 0
-    # moved by m samples, the mean of stress falls less by m drop/window, with noise of a deviation
-    # of sqrt(3 m/window) of the error: so far may noise have moved the place, but once in 1,000
-    off = math.ceil(3.0 * window * (_FOUND * error / (before - after)) ** 2)
-    off = max(0, min(off, window, begin - window - room[0], room[1] - end - window))
-    begin, end = begin - off, end + off
-    slips = -_falls(moves, window)
-    rates = np.diff(moves) / np.diff(times)
-    fastest = begin - 1 + int(np.argmax(rates[begin - 1 : end]))
-    noise = _spread(rates)
-    slip = moves[end : end + window].mean() - moves[begin - window : begin].mean()
-    crept = abs(float(np.median(slips))) * (1.0 + 2.0 * off / window)
-    row["slip"] = slip, _spread(slips) + crept
-    row["peak_slip_rate"] = row["dynamic_stress_drop"] = math.nan, math.nan
-    if rates[fastest] > noise * norm.isf(_CHANCE / len(rates)):
-        row["peak_slip_rate"] = rates[fastest], noise
-        # stress then lies between that of the two samples
-        ends = stress[fastest : fastest + 2]
-        reading = 0.5 * float(np.ptp(ends)) + _spread(np.diff(stress))
-        row["dynamic_stress_drop"] = before - ends.mean(), error + reading
-    return row, 0
+    return xr.Dataset(data)
+
+
+def _sign(stress: np.ndarray, stated: int | None) -> float:
+    """Return the sign of shear stress in the direction of slip."""
+    if stated is None:
+        return -1.0 if stress.max() < 0.0 else 1.0
+    if stated not in (-1, 1):
+        raise InvalidValue("sign", stated, "is unknown", choices=("1", "-1"))
+    return float(stated)
+
+
+def _warn_of_nothing(detection: Detection) -> str:
+    """Warn if stress falls by much more than the smallest drop although no drop is found."""
+    if not detection.variation > _SUSPECT * detection.smallest:
+        return ""
+    text = (
+        f"no drop was found, although stress falls by {detection.variation:.4g} in all, "
+        f"{detection.variation / detection.smallest:.0f} times the smallest drop that can be "
+        f"detected ({detection.smallest:.4g}): it falls for most of the record or too slowly"
+    )
+    remedy = "Select a part of the record, or pass sign=-1 if shear stress is negative"
+    warnings.warn(f"{text}. {remedy}.", NoAnswer, stacklevel=user_stacklevel())
+    return text

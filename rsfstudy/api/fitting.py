@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from rsfstudy.analysis.fitting import filters
 from rsfstudy.analysis.fitting.model import check_free, of_law
 from rsfstudy.analysis.fitting.record import Record
-from rsfstudy.analysis.fitting.steps import Step
+from rsfstudy.analysis.fitting.steps import Step, noise_variance
 from rsfstudy.analysis.fitting.window import Window
 from rsfstudy.api import runs
 from rsfstudy.axes.axis import Axis
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FIT_BUDGET as BUDGET
 from rsfstudy.error_boundary import error_boundary
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import InvalidValue, brief
 from rsfstudy.measures.fit import Fit
 from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
@@ -38,6 +41,9 @@ _STATES = "One state has b; two states have b1, b2, slip_distance and slip_dista
 _GUESS = 0.05
 #: Largest number of windows.
 _MOST_WINDOWS = 1000
+#: Jumps of displacement back, relative to its noise and to its changes nearby, and to its extent,
+#: that are a new zero; and rows from which noise is known.
+_JUMPS, _LEAST_JUMP, _FEW_ROWS = 10.0, 0.01, 20
 #: Shortest of several windows, as a part of what follows a step.
 _SHORTEST = 0.5
 #: First guesses of a scene: those of a record take their place.
@@ -60,10 +66,12 @@ def fit(
     windows: int = 1,
     noise: str = "ar",
     loading: str = "steps",
+    averaging: Any = None,
+    low_pass: str = "",
     posterior: int = 0,
     stiffness: Any = None,
     slip_distance: Any = None,
-    engine: Any = None,
+    engine: str | type | None = None,
     rtol: float = DEFAULT_RTOL,
     budget: int = BUDGET,
     workers: int = 0,
@@ -105,6 +113,12 @@ def fit(
     loading : {"steps", "recorded"}
         The load point as its steps say, or as it was recorded, and normal stress with it where that
         is no constant of the scene (``normal_stress="imposed"``).
+    averaging : quantity, optional
+        Time over which the data logger averaged friction about each row ("1 s", a plain number is
+        in s); "trailing 1 s" if the average ends at the row. The model is averaged in the same way.
+    low_pass : str, optional
+        Low-pass filter that friction passed, with its corner frequency: "first_order 2 Hz",
+        "butterworth_2 2 Hz" or "butterworth_4 2 Hz". The model passes through the same filter.
     posterior : int
         Draws from the posterior (``posterior``, along ``draw``), by emcee, with flat priors between
         the bounds of the search and the noise as the fit found it. A chain of some 1,000 to 10,000
@@ -160,6 +174,9 @@ def fit(
     if "law" in scene:
         remedy = f"Write laws={np.atleast_1d(scene['law']).tolist()}."
         raise InvalidValue("law", scene["law"], "is given as laws, each fitted", remedy=remedy)
+    if isinstance(record, str | Path):
+        remedy = f"Read the file first: record = rsfstudy.read_record({brief(record)!r})."
+        raise InvalidValue("record", record, "is no record", remedy=remedy)
     records: tuple[Any, ...] = (record,) if isinstance(record, Record) else tuple(record)
     for one in records:
         if not isinstance(one, Record):
@@ -191,6 +208,7 @@ def fit(
         after=_micrometres("after", after),
         noise=noise,
         loading=loading,
+        filter=_describe_filter(averaging, low_pass),
         posterior=posterior,
         machine_stiffness=machine,
     )
@@ -206,7 +224,9 @@ def fit(
     if windows > 1:
         axes.append(Axis("part", np.linspace(1.0, _SHORTEST, windows).tolist()))
         reductions = [Range(f"{n}_windows", n, over="part") for n in measure.parameters]
-    engine = engine or (COMPILED if is_installed(COMPILED) else SCIPY)
+    chosen: Any = engine
+    if engine is None:
+        chosen = COMPILED if is_installed(COMPILED) else SCIPY
     study = Study(
         name="fit",
         title="Friction parameters of a record",
@@ -215,7 +235,7 @@ def fit(
         measure=measure,
         reductions=reductions,
         plot="fits",
-        accuracy=Accuracy(rtol, budget, engine=engine),
+        accuracy=Accuracy(rtol, budget, engine=chosen),
     )
     return runs.run(
         study, workers=workers, output=None, progress=False, keep_going=True, command=command
@@ -227,6 +247,8 @@ def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]
 
     Steps that lie outside of their record are refused, and a load point that does not move forward.
     """
+    for record in records:
+        _check_displacement(record)
     count = max(len(one.found) for one in records)
     if not count:
         remedy = "State them: record.with_steps([(begins, ends, before, after)])."
@@ -241,6 +263,22 @@ def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]
             for step in record.found[number - 1 : number]:
                 _check_step(record, number, step)
     return numbers
+
+
+def _check_displacement(record: Record) -> None:
+    """Refuse a load point that jumps back between two rows, as one that is set to zero again."""
+    time, moved = record.time, record.columns["displacement"]
+    jumps = np.diff(moved)
+    row = int(np.argmin(jumps))
+    noise = math.sqrt(noise_variance(time, moved)) if len(time) > _FEW_ROWS else 0.0
+    beside = np.abs(np.delete(jumps[max(row - 5, 0) : row + 6], min(row, 5))).max(initial=0.0)
+    back = -float(jumps[row]) > max(_JUMPS * beside, _JUMPS * noise, _LEAST_JUMP * np.ptp(moved))
+    if record.stated is None and back:
+        rule = f"falls back between two rows at {time[row + 1]:g} s in {record.name}, as a load "
+        rule += "point does that is set to zero again"
+        remedy = f"Fit its parts, as in record.window({time[0]:g}, {time[row]:g}), or add the "
+        remedy += "offset to the later rows."
+        raise InvalidValue("displacement", f"{jumps[row]:.4g} um", rule, remedy=remedy)
 
 
 def _check_step(record: Record, number: int, step: Step) -> None:
@@ -361,6 +399,28 @@ def _of_laws(stated: Sequence[str], laws: Sequence[str], scene: Scene) -> tuple[
             rule = f"names no {'evolution effect' if names else 'parameter'} of law={law!r}"
             raise InvalidValue("free", free, rule, remedy=_STATES)
     return shared
+
+
+def _describe_filter(averaging: Any, low_pass: str) -> str:
+    """Return the filter as the measure takes it, with its size in s or Hz."""
+    if averaging is not None and low_pass:
+        remedy = "Pass `averaging=` or `low_pass=`."
+        raise InvalidValue("low_pass", low_pass, "cannot follow an averaging", remedy=remedy)
+    if averaging is not None:
+        kind, size = filters.MEAN, averaging
+        if isinstance(size, str) and size.startswith("trailing "):
+            kind, size = filters.TRAILING_MEAN, size.removeprefix("trailing ")
+        seconds = float(size) if isinstance(size, Real) else in_si("averaging", size, "s")
+    elif low_pass:
+        kind, _, size = str(low_pass).partition(" ")
+        if kind not in filters.LOW_PASS:
+            remedy = "Write it as in 'butterworth_2 2 Hz'."
+            choices = [*filters.LOW_PASS]
+            raise InvalidValue("low_pass", low_pass, "is unknown", choices=choices, remedy=remedy)
+        seconds = in_si("low_pass", size, "1/s")
+    else:
+        return ""
+    return f"{kind} {seconds!r}"
 
 
 def _micrometres(name: str, value: Any) -> float:

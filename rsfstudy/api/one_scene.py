@@ -13,7 +13,7 @@ import xarray as xr
 from rsfstudy.api.trajectory import attributes_of
 from rsfstudy.compute import provenance
 from rsfstudy.error_boundary import error_boundary
-from rsfstudy.errors import NoAnswer
+from rsfstudy.errors import NoAnswer, RsfStudyWarning
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -177,7 +177,7 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         text = f"{measure.name} has no number: {outcome.status.label} ({why})"
         warnings.warn(text, NoAnswer, stacklevel=4)
     elif outcome.message:
-        warnings.warn(outcome.message, UserWarning, stacklevel=4)
+        warnings.warn(outcome.message, RsfStudyWarning, stacklevel=4)
     own, inner = {about.name: about for about in measure.quantities}, measure.inner_coordinates
     variables: dict[str, Any] = {}
     for name, dims in measure.variables.items():

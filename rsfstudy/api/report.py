@@ -8,7 +8,6 @@ import re
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from html import escape
 from importlib import resources
 from pathlib import Path
 from string import Template
@@ -22,9 +21,9 @@ from rsfstudy.api.tables import Table
 from rsfstudy.compute import provenance, runner
 from rsfstudy.defaults import FIGURES, OUTPUT
 from rsfstudy.error_boundary import check_file, error_boundary, in_words
-from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief, spelt
+from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, brief
 from rsfstudy.files import contents, places, store
-from rsfstudy.quantity import Markup, table
+from rsfstudy.quantity import Markup, as_html, table
 from rsfstudy.status import Status
 from rsfstudy.wording import counted, settings
 
@@ -193,7 +192,7 @@ def html(dataset: xr.Dataset) -> str:
 
 def _text(text: object) -> str:
     """A text as HTML; control characters, which no browser shows, are spelt out."""
-    return escape(spelt(str(text)))
+    return as_html(text)
 
 
 def _said(text: str, colour: str = "") -> str:

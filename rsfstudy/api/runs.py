@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +23,7 @@ from rsfstudy.declare.claims import verdicts
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import OUTPUT, TIME_LIMIT
 from rsfstudy.error_boundary import error_boundary, user_stacklevel
-from rsfstudy.errors import Incomplete, InvalidValue
+from rsfstudy.errors import Incomplete, InvalidValue, RsfStudyWarning
 from rsfstudy.files import contents, places, restore, store
 from rsfstudy.files.comparison import Comparison, cell_number, compared, side_by_side
 from rsfstudy.files.journal import differences
@@ -54,8 +55,8 @@ def studies() -> dict[str, Study]:
     return Studies({name: catalogue.load(name) for name in names.names()})
 
 
-@completed()
 @error_boundary
+@completed()
 def run(
     study: str | Path | Study,
     *,
@@ -151,7 +152,7 @@ def run(
     if told:
         warnings.warn("; ".join(told), Incomplete, stacklevel=user_stacklevel())
     if slow := tables.slow_norm(results):
-        warnings.warn(slow, UserWarning, stacklevel=user_stacklevel())
+        warnings.warn(slow, RsfStudyWarning, stacklevel=user_stacklevel())
     return results
 
 
@@ -217,7 +218,7 @@ def _opened(dataset: xr.Dataset | str | Path) -> xr.Dataset:
     return dataset
 
 
-@error_boundary
+@partial(error_boundary, is_inner=True)
 def plot(
     dataset: xr.Dataset | str | Path,
     variable: str | None = None,
@@ -361,6 +362,7 @@ def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> 
     return side_by_side(_opened(first), _opened(second))
 
 
+@partial(error_boundary, passed=(Exception,))
 def cell(
     file: str | Path, place: Mapping[str, Any], *, study: str | Path | None = None
 ) -> tuple[Scene, Outcome]:
@@ -391,12 +393,13 @@ def cell(
     """
     declared, number, differs = _found(file, place, study)
     for name, (theirs, ours) in differs.items():
-        warnings.warn(f"{name}: {theirs} then, {ours} now", stacklevel=2)
+        text = f"{name}: {theirs} then, {ours} now"
+        warnings.warn(text, RsfStudyWarning, stacklevel=user_stacklevel())
     scene, changes = declared.cell(number)
     return scene, declared.measure.with_(**changes)(scene, declared.accuracy)
 
 
-@error_boundary
+@partial(error_boundary, is_inner=True)
 def _found(
     file: str | Path, place: Mapping[str, Any], study: str | Path | None
 ) -> tuple[Study, int, Mapping[str, tuple[Any, Any]]]:

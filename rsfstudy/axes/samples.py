@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
+from rsfstudy.argument_checks import MOST_ITEMS
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import headed
 
@@ -60,6 +61,8 @@ def _check(distribution: Mapping[str, Any], n: int, seed: int, method: str) -> N
     for name, value, least in (("n", n, 1), ("seed", seed, 0)):
         if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
             raise InvalidValue(name, value, f"must be a whole number, {least} or more")
+    if n > MOST_ITEMS:
+        raise InvalidValue("n", n, f"must be at most {MOST_ITEMS:,}")
     if method in _OF_SOBOL and n & (n - 1):
         below = 1 << (int(n).bit_length() - 1)
         rule = "is no power of two, without which Sobol points are not balanced"

@@ -92,12 +92,22 @@ def main() -> None:
     except Exception as error:
         if os.environ.get("RSFSTUDY_TRACEBACK"):
             raise
-        words = brief(shlex.join(sys.argv[1:]))
-        _say(
-            f"error: rsfstudy {words}: {in_words(error)}. Look at what it names: a file may be "
-            "damaged, or no place to write to. RSFSTUDY_TRACEBACK=1 shows where it arose."
-        )
+        _say(f"error: rsfstudy {brief(shlex.join(sys.argv[1:]))}: {_explain(error)}")
         sys.exit(FAILED)
+
+
+def _explain(error: Exception) -> str:
+    """Explain an error that no command expects."""
+    if isinstance(error, OSError) and error.strerror:
+        place = f" ({brief(error.filename)})" if error.filename else ""
+        remedy = "Check that the place exists, may be written to, and is not full."
+        return f"{error.strerror}{place}. {remedy}"
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for it. Ask for fewer or smaller values."
+    return (
+        f"{in_words(error)}. Look at what it names: a file may be damaged, or no place to write "
+        "to. RSFSTUDY_TRACEBACK=1 shows where it arose."
+    )
 
 
 def _end(number: int, _frame: object) -> None:

@@ -119,6 +119,18 @@ def _quantity(name: str, words: str, default: str | None = None) -> Callable[[F]
     default="steps",
     help="The load point by its steps, or as it was recorded.",
 )
+@_quantity(
+    "--averaging",
+    "Time over which the data logger averaged friction, as in '1 s', or 'trailing 1 s' if the "
+    "average ends at the row.  [default: none]",
+)
+@click.option(
+    "--low-pass",
+    default="",
+    show_default=False,
+    help="Low-pass filter that friction passed: first_order, butterworth_2 or butterworth_4 with "
+    "its corner frequency, as in 'butterworth_2 2 Hz'.  [default: none]",
+)
 @click.option(
     "--posterior",
     type=click.IntRange(0),

@@ -34,7 +34,7 @@ _NO_PHYSICS = 3
 _MOST_STEPS = 24
 #: Options that `rsfstudy.fit` takes as they are.
 _TAKEN = ("stiffness", "slip_distance", "laws", "free", "together", "before", "after", "windows",
-    "noise", "loading", "posterior", "budget", "engine")  # fmt: skip
+    "noise", "loading", "averaging", "low_pass", "posterior", "budget", "engine")  # fmt: skip
 
 
 def simulate(given: Given) -> int:

@@ -4,19 +4,31 @@ from __future__ import annotations
 
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, ConsoleDimensions
 from rich.text import Text
 
 from rsfstudy.errors import RunError, brief, spelt
 
 #: Most characters of a text that is printed: what a file says may be without end.
 _LONGEST = 5000
+#: Bounds of the width: the environment may state any.
+_NARROWEST, _WIDEST = 20, 1000
 
 
 class Plain(Console):
     """A console that prints any text literally, brackets included; only control characters, which
     would steer the terminal, are spelt out.
     """
+
+    @property
+    def size(self) -> ConsoleDimensions:
+        """Size of the terminal within the bounds, or of the environment variable COLUMNS."""
+        found = super().size
+        return ConsoleDimensions(min(max(found.width, _NARROWEST), _WIDEST), found.height)
+
+    @size.setter
+    def size(self, size: tuple[int, int]) -> None:
+        self._width, self._height = size
 
     def render_str(self, text: str, **options: Any) -> Text:
         """Text with control characters spelt out, and without its middle where it is endless."""

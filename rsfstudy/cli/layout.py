@@ -27,7 +27,8 @@ def show(piece: Piece) -> None:
     elif isinstance(piece, Table):
         _table(piece)
     elif piece:
-        _list({head: clean(text) for head, text in piece.items()}, set(piece), "")
+        row = _cleaned(piece)
+        _list(row, set(row), "")
 
 
 def _table(table: Table) -> None:
@@ -36,14 +37,14 @@ def _table(table: Table) -> None:
         return
     if table.caption:
         console.print(table.caption)
-    rows = [{head: clean(text) for head, text in row.items()} for row in table.rows]
+    rows, prose = [_cleaned(row) for row in table.rows], set(map(clean, table.prose))
     heads, columns = list(rows[0]), list(zip(*(row.values() for row in rows), strict=True))
-    least = [_least(h, c, h in table.prose) for h, c in zip(heads, columns, strict=True)]
+    least = [_least(h, c, h in prose) for h, c in zip(heads, columns, strict=True)]
     most = [max(map(cell_len, (h, *c))) for h, c in zip(heads, columns, strict=True)]
     room = console.width - _BETWEEN * (len(heads) - 1)
     if sum(least) > room:
         for row, style in zip(rows, table.colours or [""] * len(rows), strict=True):
-            _list(row, table.prose, style)
+            _list(row, prose, style)
         return
     printed = rich_table.Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
     printed.pad_edge = False
@@ -56,6 +57,11 @@ def _table(table: Table) -> None:
         printed.add_row(*map(Text, texts), Text(last, style=style))
     console.print(printed)
     console.print()
+
+
+def _cleaned(row: Mapping[str, str]) -> dict[str, str]:
+    """Return a row with control characters spelt out, in headings and in values."""
+    return {clean(head): clean(text) for head, text in row.items()}
 
 
 def _list(row: Mapping[str, str], prose: Collection[str], style: str) -> None:

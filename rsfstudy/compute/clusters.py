@@ -86,7 +86,7 @@ def _interrupts_held() -> Iterator[None]:
             handlers[held[0]](held[0], None)
 
 
-def _unregister_safely(unregister: Callable[[str, str], None]) -> Callable[[str, str], None]:
+def _unregister_safely(unregister: Callable[..., None]) -> Any:
     """Wrap `resource_tracker.unregister` for names that the tracker does not know.
 
     If the tracker process is killed, Python starts another, which knows none of the semaphores

@@ -21,7 +21,7 @@ from rsfstudy.declare.cell import Cell, Changes
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
 from rsfstudy.declare.shown import study_html
-from rsfstudy.error_boundary import CheckedKeywords
+from rsfstudy.error_boundary import error_boundary, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.motion.accuracy import Accuracy
@@ -46,14 +46,17 @@ from rsfstudy.slider.registry import (
 from rsfstudy.slider.scene import Scene
 from rsfstudy.wording import is_list
 
+#: Most bytes of the name of a study: a file name has at most 255, and endings follow.
+_LONGEST_NAME = 200
 #: Fields that decide what fills a slot.
 _CHOOSING = frozenset({*SLOT_NAMES, *CALLERS})
 #: Most bytes of the name of a study, which leaves room for the suffixes of its files.
 _LONGEST_NAME = 200
 
 
+@guard_methods
 @dataclass(frozen=True, kw_only=True)
-class Study(CheckedKeywords):
+class Study:
     """A parameter study, declared.
 
     Parameters
@@ -138,6 +141,7 @@ class Study(CheckedKeywords):
                 raise InvalidValue(name, value, f"must be plain data ({error})") from error
 
     @staticmethod
+    @error_boundary
     def caption(docstring: str | None) -> str:
         """The second paragraph of a module's docstring: a summary at the top of the file."""
         paragraphs = (docstring or "").split("\n\n", 2)

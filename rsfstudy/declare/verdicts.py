@@ -7,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+from rsfstudy.errors import spelt
 from rsfstudy.quantity import table
 
 _SIGNS = {"equals": "", "below": "< ", "above": "> "}
@@ -55,7 +56,7 @@ class Verdicts(pd.DataFrame):
     def __repr__(self) -> str:
         if self.empty or not set(_PRINTED) <= set(self):
             return super().__repr__()
-        return _aligned([_headed(row) for row in self.to_dict("records")])
+        return spelt(_aligned([_headed(row) for row in self.to_dict("records")]))
 
     def _repr_html_(self) -> str:
         rows = [told(row) for row in self.to_dict("records")]

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files.contents import provenance
 from rsfstudy.files.journal import differences
@@ -104,6 +105,7 @@ def _agreement(
 # ---- side by side -------------------------------------------------------------------------------
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Comparison:
     """Differences between two results datasets.

@@ -335,7 +335,7 @@ def fit(value: Any, kind: Any, path: str) -> Any:
     """
     try:
         return msgspec.convert(value, kind)
-    except (msgspec.ValidationError, RecursionError) as error:
+    except (msgspec.ValidationError, OverflowError, RecursionError) as error:
         why, _, within = str(error).rpartition(" - at `$")
         place, why = (f"{path}{within.rstrip('`')}", why) if why else (path, str(error))
         if field := re.fullmatch("Object .* (required|unknown) field `(.*)`", why):

@@ -21,7 +21,8 @@ import dask
 import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import DataError, RsfStudyError, brief
+from rsfstudy.error_boundary import user_stacklevel
+from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, brief
 from rsfstudy.files import content_digest, contents
 from rsfstudy.files.attributes import check_attributes
 from rsfstudy.files.contents import LAYOUT
@@ -205,7 +206,7 @@ def read_any(path: Path) -> xr.Dataset:
         raise DataError(f"{where}: {error}") from error
     if not sealed and not (path.is_dir() and "layout" not in dataset.attrs):
         said = f"{where} has no digest: another program saved it, and may have changed it"
-        warnings.warn(said, stacklevel=5)
+        warnings.warn(said, RsfStudyWarning, stacklevel=user_stacklevel())
     return dataset
 
 

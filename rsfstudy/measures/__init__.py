@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import CheckedKeywords
+from rsfstudy.error_boundary import CheckedKeywords, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import _checks
 from rsfstudy.measures._checks import Plain
@@ -31,6 +31,7 @@ from rsfstudy.status import Status
 from rsfstudy.vocabulary import DERIVED
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Outcome:
     """Findings of a measure in one scene.
@@ -47,7 +48,7 @@ class Outcome:
     """
 
     status: Status
-    values: Mapping[str, Value] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""
     rhs_evaluations: int = 0
 
@@ -56,6 +57,7 @@ class Outcome:
 TAKEN = frozenset({"status", "message", "rhs_evaluations", "wall_time", *FIELDS, *DERIVED})
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Measure(CheckedKeywords):
     """Base of all measures: runs `find` under a work budget and turns a `Halt` into a status.
@@ -69,9 +71,11 @@ class Measure(CheckedKeywords):
         find(self, scene, accuracy, meter) -> Outcome
 
     `find` returns ``Outcome(status, values)``. `values` has a number for each name of `outputs`,
-    and one called ``<name>_error`` for each with ``error=True``. `accuracy` holds what is asked
-    for (``accuracy.rtol``), and motions charge `meter`, which stops one that takes too much work.
-    Optional is what makes a cell ``unverified`` where its estimates are far too large::
+    and one called ``<name>_error`` for each with ``error=True``. `accuracy` holds the requested
+    accuracy (``accuracy.rtol``), and `meter` counts right-hand sides and stops a motion that takes
+    too many. To follow a motion, pass both on: ``rsfstudy.simulate(scene, accuracy=accuracy,
+    meter=meter)``. To use another measure, call its `charged`. Override `scales` to report a cell
+    as ``unverified`` if its error estimates are far too large::
 
         scales(self, scene, values) -> Mapping[str, float]
     """

@@ -13,6 +13,8 @@ _NUMBERS = (
     Output("a_minus_b", "$a-b$", "1", "rate dependence of steady friction"),
     Output("a_minus_b_stderr", "", "1", "standard error of a - b"),
     Output("noise_size", "", "1", "standard deviation of the noise"),
+    Output("outliers", "", "1", "number of rows that were left out as outliers"),
+    Output("friction_quantum", "", "1", "quantum to which friction is rounded, 0 if it is not"),
     Output("noise_order", "", "1", "order of the autoregressive process of the noise"),
     Output("effective_samples", "", "1", "number of independent samples that tell as much"),
     Output("degrees_of_freedom", "", "1", "degrees of freedom of the intervals"),

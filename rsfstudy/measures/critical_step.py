@@ -23,6 +23,7 @@ from rsfstudy.analysis import after_step
 from rsfstudy.analysis.by_path import Boundary, from_critical_path, from_touching_cycle
 from rsfstudy.analysis.kinds_of_steps import DisplacementSteps, NormalStressSteps, RateSteps
 from rsfstudy.analysis.search_of_steps import Steps
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_single_step, near_loading, reached_by_loading
@@ -63,6 +64,7 @@ def _outputs(of: str) -> tuple[Output, ...]:
     return Output(critical, error=True), *map(Output, beside)
 
 
+@guard_methods
 @dataclass(frozen=True)
 class CriticalStep(Measure):
     """Critical step of the load point, or of normal stress: the smallest after which slip rate

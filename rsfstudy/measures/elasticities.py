@@ -11,6 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
 from rsfstudy.motion.accuracy import Accuracy
@@ -50,26 +51,32 @@ class _Level(NamedTuple):
     error: float
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Elasticities(Measure):
-    """The headline y of a measure with its elasticities, d ln|y|/d ln p by each number p of the
-    scene, all others held: 2 where y doubles twice as p doubles once.
+    """Primary output y of a measure and its elasticities, d ln|y|/d ln p, by scene parameters p.
 
-    They are central differences of the fourth order over ln p = -2h, -h, h and 2h. The step h =
-    (e/2)^(1/3) follows from e, the error estimate of y. The error estimate is 1.5 e/h for the
-    errors of y, plus a quarter of the difference between the formulas of the fourth and of the
-    second order, plus a bound by the fourth difference. There are four measurements for each
-    number and one more. If a number is missing on one side, steps of an eighth, and so on three
-    times, find both sides of a number that is near the end of answers. At the end itself, as at the
-    critical stiffness, the difference is one-sided. `elasticity` and `elasticity_error` are pure
-    numbers of the shape (parameters,).
+    Each elasticity is a partial derivative: the other parameters stay fixed. For example, it is 2
+    if y is proportional to the square of p. The elasticity and its error are dimensionless and
+    have the shape (parameters,).
+
+    The derivatives are central differences of the fourth order, from points at ln p = -2h, -h, h
+    and 2h. The step h = (e/2)^(1/3) follows from e, the error estimate of y. The error estimate
+    of an elasticity is 1.5 e/h for the errors of y, plus a quarter of the difference between the
+    formulas of the fourth and of the second order, plus a bound by the fourth difference. The
+    measure is thus evaluated four times per parameter, and once at the scene itself.
+
+    If y has no value on one side, for example near a stability boundary, up to three shorter steps
+    are tried, each an eighth of the one before. At the boundary itself, for example at the critical
+    stiffness, the difference is one-sided.
 
     Parameters
     ----------
     measure : Measure
     parameters : sequence of str
-        Numbers of the scene, along the dimension ``parameter``; by default all that the measure
-        does not solve for. NaN stands for one that a scene does not have, or that is zero there.
+        Scene parameters, along the dimension ``parameter``. By default, all parameters that the
+        measure does not solve for. The elasticity is NaN for a parameter that a scene does not
+        have, or that is zero.
     """
 
     measure: Measure

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rsfstudy.analysis.fitting import posterior
+from rsfstudy.analysis.fitting.filters import Filter
 from rsfstudy.analysis.fitting.intervals import interval
 from rsfstudy.analysis.fitting.joint import Joint, is_own, numbered, plain
 from rsfstudy.analysis.fitting.model import (
@@ -25,8 +26,10 @@ from rsfstudy.analysis.fitting.noise import WHITE, check_noise, whiteness
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
 from rsfstudy.analysis.fitting.steps import Step
-from rsfstudy.analysis.fitting.validity import find_reasons
+from rsfstudy.analysis.fitting.unstated_filter import find_averaging
+from rsfstudy.analysis.fitting.validity import find_reasons, is_rounded, name_outliers
 from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess, stiffness_factors
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
 from rsfstudy.measures._fit_outputs import outputs_of
@@ -52,6 +55,7 @@ _SOUGHT = (
 _LEAST = 1.001
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Fit(Measure):
     """Friction parameters by least squares, under the noise that the residuals tell.
@@ -104,6 +108,9 @@ class Fit(Measure):
     machine_stiffness : float
         Stiffness of the machine in Pa/um. It is divided by the normal stress before the step of
         each window. Zero: stiffness over normal stress is that of the scene in all windows.
+    filter : str
+        Filter that friction passed before it was recorded, such as "mean 1.0" (see
+        `analysis.fitting.filters.Filter`). Empty if there is no filter.
     posterior : int
         Draws from the posterior (see `analysis.fitting.posterior`); none, unless asked for.
 
@@ -126,6 +133,7 @@ class Fit(Measure):
     part: float = 1.0
     noise: str = "ar"
     loading: str = "steps"
+    filter: str = ""
     posterior: int = 0
     machine_stiffness: float = 0.0
     name: ClassVar[str] = "fit"
@@ -141,6 +149,7 @@ class Fit(Measure):
         Quantity("part", "", "1", "part of what follows the step that is fitted"),
         Quantity("noise", "", "", "model of the noise"),
         Quantity("loading", "", "", "where the loading is taken from"),
+        Quantity("filter", "", "", "filter that friction passed before it was recorded"),
     )
 
     def __post_init__(self) -> None:
@@ -167,6 +176,7 @@ class Fit(Measure):
             rule = "is that of a loading by steps"
             raise InvalidValue("free", "step_time", rule, remedy="Leave it out.")
         check_noise(self.noise)
+        Filter.parse(self.filter)
         posterior.check(self.posterior)
 
     @property
@@ -266,6 +276,7 @@ class Fit(Measure):
         scenes = [w.scene(scene, per_um) for w in windows]
         of_each = zip(windows, scenes, strict=True)
         parts = [w.model(one, self.free, self.loading, smooth, meter) for w, one in of_each]
+        parts = [replace(part, filter=Filter.parse(self.filter)) for part in parts]
         if self.noise == WHITE:  # the usual formula
             parts = [replace(part, moves=()) for part in parts]
         distances = self.slip_distance_guess, self.slip_distance_2_guess
@@ -301,10 +312,13 @@ class Fit(Measure):
                 text += "; friction does not change at the step as velocity does: "
                 text += "see whether columns (time and displacement, say) are exchanged"
             return Outcome(Status.NOT_IDENTIFIED, values, text)
-        remark = self._remark(found, place["load_point_noise"])
+        remarks = (name_outliers(found.outliers), self._remark(found, place["load_point_noise"]))
         reasons = find_reasons(found, model.friction)
+        if not self.filter and self.noise != WHITE and not is_rounded(found):
+            reasons = (*find_averaging(found, model.time, self.noise), *reasons)
         status = Status.ERRORS_NOT_VALID if reasons else Status.OK
-        return Outcome(status, values, "; ".join(filter(None, (*reasons, remark))))
+        cuts = [cut for window in windows for cut in window.cuts]
+        return Outcome(status, values, "; ".join(filter(None, (*reasons, *cuts, *remarks))))
 
     def _widened(self, outcome: Outcome) -> Outcome:
         """An outcome of fewer parameters, with NaN in matrices where those of other laws stand."""
@@ -374,6 +388,8 @@ class Fit(Measure):
             "a_minus_b": found.values["a"] - b,
             "a_minus_b_stderr": math.sqrt(max(variance_of_rate, 0.0)),
             "noise_size": found.noise_sd,
+            "outliers": len(found.outliers),
+            "friction_quantum": found.quantum,
             "noise_order": found.noise.order,
             "effective_samples": found.noise.effective_samples,
             "degrees_of_freedom": found.degrees_of_freedom,
@@ -389,7 +405,7 @@ class Fit(Measure):
             "fitted_friction_stderr": found.band,
             "detrended_friction": found.curve,
             "residual": found.residuals,
-            "innovation": found.innovations,
+            "innovation": found.all_innovations,
         }
         for name in (about.name for about in COLUMNS[:3]):
             whole = [record.columns[name] for record in self._first_rows]

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rsfstudy.analysis.settling import is_attracted
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures._records import Record, Recorded, errors_of, followed, recorded, since
@@ -48,6 +49,7 @@ _OUTPUTS = (
 )
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Healing(Recorded):
     """Relaxation and healing by the first hold of a loading, by the definitions of the laboratory.

@@ -24,6 +24,7 @@ import numpy as np
 from rsfstudy.analysis.approach import Approach, Course, course
 from rsfstudy.analysis.cycles import LN10, Cycle, more_events, path_of
 from rsfstudy.analysis.return_map import Orbit, ReturnMap
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures._records import Recorded, recorded
@@ -92,6 +93,7 @@ _OUTPUTS = (
 )
 
 
+@guard_methods
 @dataclass(frozen=True)
 class LimitCycle(Recorded):
     """Limit cycle of stick-slip under a steady load point velocity.

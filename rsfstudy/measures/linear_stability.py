@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import brentq
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
@@ -45,6 +46,7 @@ _OUTPUTS = (
 )
 
 
+@guard_methods
 @dataclass(frozen=True)
 class LinearStability(Measure):
     """Critical stiffness of steady sliding at the load point velocity of the scene, over

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._records import error_of
@@ -60,6 +61,7 @@ _OUTPUTS = (
 )
 
 
+@guard_methods
 @dataclass(frozen=True)
 class RigidResponse(Measure):
     """Stress against slip of a rigid slider whose slip rate steps from V_* to V, the

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rsfstudy.analysis.settling import is_attracted
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures._records import BY_CHANCE, Recorded, recorded
@@ -40,6 +41,7 @@ _OUTPUTS = (
 )
 
 
+@guard_methods
 @dataclass(frozen=True)
 class StepResponse(Recorded):
     """Oscillations of slip rate that the step of a scene sets off: peaks of log10(V/V_*), and the

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy.analysis.after_step import neutral, reaches_norm
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures._single_step import check_single_step, near_loading, reached_by_loading
 from rsfstudy.motion.accuracy import Accuracy
@@ -15,6 +16,7 @@ from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Triggered(Measure):
     """1 where the motion after the step reaches the instability norm of the scene, a slip rate over

@@ -9,6 +9,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from rsfstudy.analysis.settling import settled_flag
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
 from rsfstudy.measures._records import Record, Recorded, errors_of, followed, recorded, since
@@ -75,6 +77,7 @@ class _Step(NamedTuple):
         return math.log(self.after / self.before)
 
 
+@guard_methods
 @dataclass(frozen=True)
 class VelocityStep(Recorded):
     """Response to one step of load point velocity, by the definitions of the laboratory.
@@ -87,7 +90,8 @@ class VelocityStep(Recorded):
     D_c is the displacement from the extremum until mu_1 + (mu_p - mu_1)/e, of the load point as
     recorded, and of slip, which is that less the shortening of the spring. Nothing is corrected for
     the stiffness of the rig: what a soft spring does to the numbers is what is measured. Friction
-    has settled if it stays within a hundredth of mu_p - mu_0 over the last tenth of the record.
+    has settled if it stays within a hundredth of mu_p - mu_0 over the last tenth of the record, and
+    small changes of steady sliding do not grow (NaN if that is undecided).
     Where there is no extremum, or no more evolution than its own error, the measure is
     `not_applicable`, with the numbers that there are. Distances are in D_c. The record, from the
     step on, has the shape (phases,).
@@ -224,9 +228,7 @@ class VelocityStep(Recorded):
         return next((event for event in events if event.watch == watch), None)
 
     def _shown(self, scene: Scene, step: _Step, record: Record) -> dict[str, float | np.ndarray]:
-        """True if friction has settled, how far it departs from that of a stiff slider, and the
-        record itself.
-        """
+        """Return the record, if it has settled, and its departure from that of a stiff slider."""
         rows, friction = record.rows, friction_coefficient_of(record.rows)
         late = record.end.time - _LAST * step.duration
         # there may be few samples, in long steps
@@ -234,8 +236,10 @@ class VelocityStep(Recorded):
         turned = record.peak or record.end
         direct = turned.point.reading - record.before[0]
         path = since(record.begin, along_path(rows, self.phases, READ))
+        stepped = scene.acting(self.step_number - 1)
+        is_flat = bool(np.ptp(last) < _STAYS * abs(direct))
         return {
-            "settled": float(np.ptp(last) < _STAYS * abs(direct)),
+            "settled": settled_flag(stepped, is_flat=is_flat),
             "closed_form_departure": _departure(scene, step, record),
             "load_point_displacement": step.after * path.pop("time"),
             **path,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from numbers import Real
 
-from rsfstudy.error_boundary import CheckedKeywords
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import SCIPY, named
 
@@ -27,8 +27,9 @@ MUCH_WORSE = 100.0
 ROUNDING = 1e-13
 
 
+@guard_methods
 @dataclass(frozen=True)
-class Accuracy(CheckedKeywords):
+class Accuracy:
     """The accuracy a result must meet, and the work it may cost.
 
     Parameters
@@ -73,6 +74,7 @@ class Accuracy(CheckedKeywords):
         if not 1 <= self.budget <= LARGEST_BUDGET or self.budget % 1:
             rule = f"must be a whole number from 1 to {LARGEST_BUDGET:,}"
             raise InvalidValue("budget", self.budget, rule)
+        object.__setattr__(self, "budget", int(self.budget))
         object.__setattr__(self, "engine", named(self.engine))
         if self.methods and self.engine != SCIPY:
             rule = f"are SciPy's, and the engine is {self.engine}"

@@ -97,6 +97,10 @@ def figure(
         Where the declaration names no module of `rsfstudy.plots`; nothing else is ever imported.
         Where there is no such variable or style.
     """
+    draws = own is None or isinstance(own, str | Declared) or callable(getattr(own, "draw", own))
+    if not draws:
+        rule = "must be a Figure, or a function or module of yours that draws"
+        raise InvalidValue("own", own, rule, remedy="Write def name(dataset, axes): ...")
     dataset = in_units_of_rig(dataset)
     with styled(style):
         drawing, dataset = _fitting(dataset, own, variable)
@@ -155,7 +159,7 @@ def _fitting(
     study = catalogue.load(name) if name in names.names() else None
     if name == _FITS and own is variable is None:
         return Declared(importlib.import_module(f"{__name__}.{_FITS}").panels(dataset)), dataset
-    if own is None and study is None and name not in _ANY:
+    if own is None and study is None and name not in (*_ANY, _FITS):
         raise InvalidValue("plot", name, "is unknown", choices=NAMES)
     known = {str(dimension) for dimension in sizes}
     if study is not None and own in (None, study.plot):
@@ -191,7 +195,7 @@ def _expanded(drawing: Declared, dataset: xr.Dataset, further: Sequence[str]) ->
     named = [panel.y for panel in drawing.panels if isinstance(panel.y, str) and panel.y]
     if not found and named and not any(name in dataset for name in named):
         rule = "does not fit these results (they have none of its variables)"
-        raise InvalidValue("plot", declaration(dataset).plot, rule, choices=NAMES)
+        raise InvalidValue("plot", declaration(dataset).plot, rule)
     return found
 
 

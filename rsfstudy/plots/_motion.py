@@ -4,8 +4,8 @@ phase plane.
 
 from __future__ import annotations
 
-import json
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.files import contents
 from rsfstudy.plots import Drawing
 from rsfstudy.plots._axes import log_scale
 from rsfstudy.plots._style import hold_ticks, legend, letter, look, make_room, settle, size, styled
@@ -34,7 +35,7 @@ _ROUNDING = 1e-6
 _FRICTION = r"Friction coefficient, $\mu$"
 
 
-@error_boundary
+@partial(error_boundary, is_inner=True)
 def picture(
     motion: xr.Dataset, laboratory: Laboratory | None = None, *, against: str | None = None
 ) -> Figure:
@@ -66,10 +67,7 @@ def picture(
     """
     if against not in (None, *AGAINST):
         raise InvalidValue("against", against, "is unknown", choices=AGAINST)
-    for name in (against or "time", "slip", "frictional_stress", "log10_slip_rate"):
-        if name not in motion:
-            text = "is missing: it is no motion as simulate gives it, and no limit cycle"
-            raise DataError(f"{name} {text}")
+    _check_motion(motion, against)
     if not motion["slip"].notnull().any():
         text = f"{motion.attrs.get('status', '')}: {motion.attrs.get('message', '')}"
         raise DataError(f"there is no motion, and nothing to draw. {text}")
@@ -101,6 +99,25 @@ def picture(
     return figure
 
 
+def _check_motion(motion: xr.Dataset, against: str | None) -> None:
+    """Check that a dataset has the variables of a motion or a limit cycle."""
+    stress = () if "friction_coefficient" in motion else ("shear_stress",)
+    needed = ("slip", against or "time", "frictional_stress", "log10_slip_rate", *stress)
+    known = [name for name in AGAINST if name in motion]
+    for name in (*needed, _normal_stress(motion), *known):
+        if name not in motion:
+            text = "is missing: it is no motion as simulate gives it, and no limit cycle"
+            raise DataError(f"{name} {text}")
+        if motion[name].dims != motion["slip"].dims or motion[name].dtype.kind not in "fiu":
+            text = f"must be numbers along {', '.join(map(str, motion['slip'].dims))}, as slip is"
+            raise DataError(f"{name} {text}: the dataset is no motion as simulate returns it")
+
+
+def _normal_stress(motion: xr.Dataset) -> str:
+    """Return the name of the variable that holds the normal stress."""
+    return "normal_stress_ratio" if "normal_stress_ratio" in motion else "effective_normal_stress"
+
+
 def _abscissa(motion: xr.Dataset) -> str:
     """Load point displacement, or slip where that does not change but for rounding; time where it
     is not known.
@@ -127,7 +144,7 @@ def _rate(shown: xr.Dataset, axes: Axes, against: str) -> None:
         if np.ptp(ends := axes.dataLim.intervaly) < _ROUNDING * ends[1]:  # it slides steadily
             axes.set_ylim(0.5 * ends[0], 2.0 * ends[1])
         log_scale(axes, "y")
-        axes.set_ylabel(f"Slip rate ({_written(shown['slip_rate'].attrs['units'])})")
+        axes.set_ylabel(f"Slip rate ({_written(str(shown['slip_rate'].attrs.get('units', '1')))})")
     else:
         axes.plot(shown[against], shown["log10_slip_rate"])
         axes.set_ylabel(r"Slip rate, $\log_{10}(V/V_*)$")
@@ -139,16 +156,15 @@ def _plane(motion: xr.Dataset, shown: xr.Dataset, axes: Axes) -> None:
     rates = shown.get("slip_rate", (10.0**logs).assign_attrs(units="$V_*$"))
     scale = float(rates[0]) / 10.0 ** float(logs[0])
     # in ruptures the spring carries what accelerates the mass, too
-    normal = "normal_stress_ratio" if "normal_stress_ratio" in motion else "effective_normal_stress"
-    friction = motion["frictional_stress"] / motion[normal]
+    friction = motion["frictional_stress"] / motion[_normal_stress(motion)]
     axes.plot(scale * 10.0**logs, friction, **look(0), label="motion")
     axes.plot(scale * 10.0 ** logs[0], friction[0], "o", color=look(0)["color"], label="its start")
     beyond = np.linspace(float(logs.min()) - 0.3, float(logs.max()) + 0.3, 201)
-    steady = _steady(json.loads(motion.attrs["scene"]), beyond)
+    steady = _steady(contents.scene_of(motion), beyond)
     if steady is not None:
         axes.plot(scale * 10.0**beyond, steady, "--", color="0.4", label="steady sliding")
     log_scale(axes, "x")
-    axes.set_xlabel(f"Slip rate ({_written(rates.attrs['units'])})")
+    axes.set_xlabel(f"Slip rate ({_written(str(rates.attrs.get('units', '1')))})")
     axes.set_ylabel(r"Friction coefficient of the fault, $\mu$")
     legend(axes, 3)
 
@@ -169,10 +185,10 @@ def _steady(values: dict[str, Any], log10_rates: np.ndarray) -> np.ndarray | Non
 
 
 def _labelled(values: xr.DataArray) -> str:
-    name = str(values.attrs["long_name"])
+    name = str(values.attrs.get("long_name", values.name))
     name = name.removesuffix(" since the step") if "phase" in values.dims else name
-    name = f"{name[0].upper()}{name[1:]}"
-    units = values.attrs.get("scale", values.attrs["units"])
+    name = f"{name[:1].upper()}{name[1:]}"
+    units = str(values.attrs.get("scale", values.attrs.get("units", "1")))
     scales = {"D_c": "$D_c$", "D_c/V_*": "$D_c/V_*$", "sigma_*": r"$\sigma_*$"}
     return f"{name} ({scales.get(units, _written(units))})"
 

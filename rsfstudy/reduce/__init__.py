@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import xarray as xr
 
+from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.reduce.base import (
     Reduction,
@@ -53,6 +54,7 @@ __all__ = [
 _BESIDE = ("error", "stderr", "misfit", "points", "status")
 
 
+@error_boundary
 def reduced(
     dataset: xr.Dataset, reductions: tuple[Reduction, ...], *, despite_failures: bool = False
 ) -> xr.Dataset:
@@ -75,7 +77,7 @@ def reduced(
         if not reduction.of_failures:
             own = drawn.get(reduction.of, own)
         support = known(support, reduction.of, own)
-        found = reduction(support)
+        found: object = reduction(support)  # user-defined reductions may return anything
         if not isinstance(found, xr.Dataset):
             rule = "must return an xarray.Dataset of the new variables"
             remedy = "Write return self.results('how it was found', {'': values})."

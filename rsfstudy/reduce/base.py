@@ -10,7 +10,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.error_boundary import CheckedKeywords
+from rsfstudy.error_boundary import CheckedKeywords, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.status import Status
@@ -32,6 +32,7 @@ _STATISTICAL = ("_stderr", "_low", "_high", "covariance", "correlation")
 ROUNDING = 1e-9
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Reduction(CheckedKeywords):
     """Base of all reductions: ``reduction(dataset)`` gives a dataset of the new variables.

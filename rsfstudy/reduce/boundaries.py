@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce._crossing import FEWEST, Verdict, find_crossing
 from rsfstudy.reduce.base import Derivatives, Fields, Reduction, dimension_of, refused
@@ -18,6 +19,7 @@ from rsfstudy.reduce.base import Derivatives, Fields, Reduction, dimension_of, r
 _STEP = 1e-6
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Boundary(Reduction):
     """Boundary between the points of a coordinate whose cells say no and those that say yes.
@@ -102,6 +104,7 @@ class Boundary(Reduction):
         return *ends, float(changes.size)
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Inverse(Reduction):
     """Place along a coordinate where a monotone variable reaches a level, by logarithms.

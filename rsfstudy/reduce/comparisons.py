@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.reduce.base import Derivatives, Fields, Reduction, dimension_of, refused, within
 from rsfstudy.slider.closed_forms import FORMS
@@ -15,6 +16,7 @@ from rsfstudy.slider.closed_forms import FORMS
 Pair = tuple[xr.DataArray, xr.DataArray]
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Difference(Reduction):
     """Difference of a variable above its value at a reference point: ``of - of_reference``.
@@ -70,6 +72,7 @@ class Difference(Reduction):
         return [(own.where(apart, 0.0), {}), (others.where(apart, 0.0), place)]
 
 
+@guard_methods
 @dataclass(frozen=True)
 class RelativeDifference(Difference):
     """Difference of a variable below its value at a reference point: ``1 - of/of_reference``."""
@@ -87,6 +90,7 @@ class RelativeDifference(Difference):
         return -xr.ones_like(values) / reference, values / reference**2
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Range(Reduction):
     """Largest less least value along a dimension, of two at least.
@@ -141,6 +145,7 @@ class Range(Reduction):
         return dimension, within(dataset, self.over, self.within)
 
 
+@guard_methods
 @dataclass(frozen=True)
 class OverClosedForm(Reduction):
     """A variable over a published closed form.

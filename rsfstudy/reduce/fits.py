@@ -8,9 +8,11 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.reduce.base import Derivatives, Fields, Reduction, dimension_of, refused, within
 
 
+@guard_methods
 @dataclass(frozen=True)
 class LinearFit(Reduction):
     """Unweighted least squares of ``of = constant + name * on`` along one coordinate.
@@ -107,6 +109,7 @@ class LinearFit(Reduction):
         return on
 
 
+@guard_methods
 @dataclass(frozen=True)
 class ProportionalFit(LinearFit):
     """Least squares of ``of - minus = name * on``, without intercept; `minus` is the value of `of`
@@ -127,6 +130,7 @@ class ProportionalFit(LinearFit):
         return values - self.minus
 
 
+@guard_methods
 @dataclass(frozen=True)
 class DecadeFit(LinearFit):
     """Least squares of ``of = constant + name * log10(on)``: the slope per decade. Points where
@@ -144,6 +148,7 @@ class DecadeFit(LinearFit):
         return logarithms
 
 
+@guard_methods
 @dataclass(frozen=True)
 class PowerLaw(DecadeFit):
     """Least squares of ``log10(of) = constant + name * log10(on)``: the exponent of a power law,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import sys
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -17,6 +18,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Derivatives, Fields, Reduction, refused
@@ -81,6 +83,14 @@ class _Statistic(Reduction):
         return self.results(f"{self.text} of {self.of} over {self.over}", found)
 
 
+def standard_deviation(of: xr.DataArray, over: str) -> xr.DataArray:
+    """Compute the standard deviation of samples; NaN for fewer than two of them."""
+    with warnings.catch_warnings():  # older versions of xarray let it through
+        warnings.filterwarnings("ignore", "Degrees of freedom", RuntimeWarning)
+        return of.std(over, ddof=1)
+
+
+@guard_methods
 @dataclass(frozen=True)
 class Mean(_Statistic):
     """Mean over samples."""
@@ -91,7 +101,7 @@ class Mean(_Statistic):
     def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
         """The mean, and sd/sqrt(n)."""
         count = of.notnull().sum(self.over)
-        return of.mean(self.over), of.std(self.over, ddof=1) / count**0.5
+        return of.mean(self.over), standard_deviation(of, self.over) / count**0.5
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """1/n."""
@@ -99,6 +109,7 @@ class Mean(_Statistic):
         return [(has / has.sum(self.over), {})]
 
 
+@guard_methods
 @dataclass(frozen=True)
 class StandardDeviation(_Statistic):
     """Standard deviation over samples, of three at least.
@@ -120,16 +131,17 @@ class StandardDeviation(_Statistic):
         rest = (apart**2).sum(self.over) - apart**2 * count / (count - 1.0)
         without = (rest.clip(min=0.0) / (count - 2.0).where(count > 2)) ** 0.5
         scatter = without.std(self.over) * (count - 1.0) ** 0.5
-        return of.std(self.over, ddof=1), scatter
+        return standard_deviation(of, self.over), scatter
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """(y - mean)/((n - 1) sd)."""
         of = _of(self, dataset)
         freedom = of.notnull().sum(self.over) - 1
-        by = (of - of.mean(self.over)) / (freedom * of.std(self.over, ddof=1))
+        by = (of - of.mean(self.over)) / (freedom * standard_deviation(of, self.over))
         return [(by.fillna(0.0), {})]
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Quantile(_Statistic):
     """Quantile over samples, between neighbours by their distance; its standard error is half the
@@ -192,6 +204,7 @@ def _between(of: xr.DataArray, over: str, level: xr.DataArray) -> xr.DataArray:
     return (weights * of.where(weights > 0.0, 0.0)).sum(over)
 
 
+@guard_methods
 @dataclass(frozen=True)
 class StatusShares(Reduction):
     """Share of the samples that ended by each status, failures among them; its standard error is
@@ -239,6 +252,7 @@ class StatusShares(Reduction):
         return xr.Dataset({name: values.where(known) for name, values in found.items()})
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Logarithm(Reduction):
     """Natural logarithm of a variable, in each cell where that is positive. Slopes of it over

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 import xarray as xr
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction, refused
@@ -21,6 +22,7 @@ _INTERVAL = (0.025, 0.975)
 _RESULTS = ("first_order", "total")
 
 
+@guard_methods
 @dataclass(frozen=True)
 class SobolIndices(Reduction):
     """Sobol indices of first order and total, with 95 % confidence intervals, by

@@ -103,7 +103,7 @@ def _measured(problem: Problem, accuracy: Accuracy, measure: Measure) -> Mapping
     found = measure(problem.scene, accuracy)
     if found.status is not Status.OK:
         raise RsfStudyError(f"{measure.name}: {found.status.label} ({found.message})")
-    return found.values  # type: ignore[return-value]  # of those that are asked for
+    return found.values
 
 
 def _linear(problem: Problem, accuracy: Accuracy) -> tuple[float, ...]:

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rsfstudy.errors import InvalidValue
+from rsfstudy.error_boundary import user_stacklevel
+from rsfstudy.errors import InvalidValue, RsfStudyWarning
 from rsfstudy.rig.units import in_si
 from rsfstudy.slider.numbers import SPRING
 from rsfstudy.slider.registry import QUANTITIES
@@ -81,7 +82,7 @@ def stated(name: str, value: Any, stress: float | None = None) -> float:
         raise InvalidValue(name, value, "must be positive", remedy=f"Give it in {units}.")
     if not least <= found <= most:
         text = f"{name} is {found:g} {units}: unusual for a rig. Is the unit right?"
-        warnings.warn(text, UserWarning, stacklevel=5)
+        warnings.warn(text, RsfStudyWarning, stacklevel=user_stacklevel())
     return found
 
 

@@ -234,8 +234,12 @@ def _selected(key: str, told: Any, headings: Sequence[str]) -> Selected:
 
 
 def _is_binary(path: Path) -> bool:
-    with path.open("rb") as file:
-        return b"\0" in file.read(_BEGIN)
+    """Return True if a file begins with bytes that text does not contain."""
+    try:
+        with path.open("rb") as file:
+            return b"\0" in file.read(_BEGIN)
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
 
 
 def _of_xlook(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:

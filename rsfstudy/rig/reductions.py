@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import xarray as xr
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Derivatives, Reduction
@@ -15,6 +16,7 @@ from rsfstudy.rig.scales import scale_of, scales_of
 from rsfstudy.rig.units import factor
 
 
+@guard_methods
 @dataclass(frozen=True)
 class InUnits(Reduction):
     """A variable in units of the rig, in each cell by its own scales: what a mean over samples

@@ -7,7 +7,7 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,6 +39,10 @@ class Selected(NamedTuple):
     units: str = ""
     scale: float = 1.0
     offset: float = 0.0
+
+
+#: A function of the headings and of their place, which chooses columns.
+Choose = Callable[[list[str], str], dict[str, Selected]]
 
 
 def check_heading(heading: str) -> None:
@@ -153,13 +157,18 @@ def _floats(key: str, values: Any) -> tuple[np.ndarray, str]:
     if kind == "c":
         raise InvalidValue(key, values.dtype.name, "must be real numbers")
     if kind not in ("m", "M"):
-        return np.ma.asarray(values, dtype=float).filled(math.nan), ""
+        try:
+            return np.ma.asarray(values, dtype=float).filled(math.nan), ""
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InvalidValue(key, values, "must be a list of numbers") from error
     times = np.asarray(values, dtype=f"{'datetime' if kind == 'M' else 'timedelta'}64[ns]")
     return (times - times[:1] if kind == "M" else times) / np.timedelta64(1, "s"), "s"
 
 
 @error_boundary
-def read_table(path: str | Path, columns: Any = None) -> dict[str, Column]:
+def read_table(
+    path: str | Path, columns: Mapping[str, Any] | Choose | None = None
+) -> dict[str, Column]:
     """Columns of a CSV file, or of a text with tabs, by their names: numbers, units, and where each
     stands.
 
@@ -206,10 +215,14 @@ def read_table(path: str | Path, columns: Any = None) -> dict[str, Column]:
                 remedy = "Numbers have a decimal point." if len(row) > len(header) else ""
                 wrong = InvalidValue("line", between.join(row), rule, remedy=remedy)
                 raise wrong.at(f"{path}, line {n}")
+    wanted: Any
     if isinstance(columns, Mapping):
         wanted = {name: selected(told, headings) for name, told in columns.items()}
     else:
         wanted = (columns or _as_headed)(headings, f"{path}, line {line}")
+    if not isinstance(wanted, Mapping):
+        rule = "must be a mapping, or a function that returns one"
+        raise InvalidValue("columns", columns, rule)
     found = {}
     places, counts = {h: n for n, h in enumerate(headings)}, Counter(headings)
     for name, (heading, units, scale, offset) in wanted.items():

@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple, Self
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity, ShownAsTable
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
@@ -220,6 +221,7 @@ _INNER = frozenset(
 )
 
 
+@guard_methods
 class Assembled(ShownAsTable):
     """Base of a scene: what is made of parts, whose fields it has as its own.
 

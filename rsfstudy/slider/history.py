@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity, is_name
 from rsfstudy.slider.loading import Segment, ramp
@@ -42,6 +43,7 @@ class Segments(Sequence[Segment]):
         return Segment(velocity, duration=ends - begins)
 
 
+@guard_methods
 @dataclass(frozen=True, kw_only=True)
 class History(Stated):
     """A loading history by its samples.

@@ -17,12 +17,13 @@ from __future__ import annotations
 import importlib
 import math
 import pkgutil
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 
@@ -48,6 +49,7 @@ Function = Callable[..., Any]
 Numbers = tuple[float, ...]
 
 
+@guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Part:
     """Base of all parts.
@@ -68,6 +70,10 @@ class Part:
     #: their steady values are huge at the slip rate of a rupture. Motions may settle, and limit
     #: cycles are recognised, whatever these unknowns do.
     excluded_from_distance: ClassVar[tuple[str, ...]] = ()
+    #: Quantities that the rates of a part need, and those that the functions of its slot receive
+    #: (names of `requirements.QUANTITIES`). A scene refuses a part if it cannot provide a quantity.
+    needs: ClassVar[Collection[str]] = frozenset()
+    receives: ClassVar[frozenset[str]] = frozenset()
     auxiliary_rates: ClassVar[Function | None] = None
     auxiliary_steady_states: ClassVar[Function | None] = None
     #: Where values of other parts of the slot have no meaning, and what would give them one.
@@ -178,11 +184,7 @@ def _appended(part: type[Part]) -> tuple[str, ...]:
     """Return the names of number fields that were declared below the last override of `numbers`."""
     overriding = next(kind for kind in part.__mro__ if "numbers" in vars(kind))
     known = vars(overriding).get("__dataclass_fields__", {})
-    return tuple(
-        name
-        for name in names_of(part)  # type: ignore[arg-type]
-        if name not in known and not is_flag(part, name)
-    )
+    return tuple(name for name in names_of(part) if name not in known and not is_flag(part, name))
 
 
 def numbers_of(part: Part, scene: Scene) -> Numbers:

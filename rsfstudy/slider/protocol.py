@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from rsfstudy.error_boundary import error_boundary, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.slider.loading import Loading, Segment
@@ -25,6 +26,7 @@ from rsfstudy.slider.places import VELOCITY
 KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
 
 
+@guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Stated(Loading, ABC):
     """Base of loading histories of a user's own, which are data.
@@ -57,6 +59,7 @@ class Stated(Loading, ABC):
         """Duration in D_c/V_* of all that was stated."""
 
 
+@guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Protocol(Stated):
     """A loading history as it was stated, segment by segment.
@@ -84,6 +87,7 @@ class Protocol(Stated):
         return math.fsum(s.duration for s in self.history if s.duration < math.inf)
 
 
+@error_boundary
 def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "protocol") -> Protocol:
     """A loading history of your own: ``Scene(loading=protocol([...]))``.
 

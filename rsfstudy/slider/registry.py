@@ -21,6 +21,7 @@ from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
 from rsfstudy.slider.numbers import Slider
 from rsfstudy.slider.parts import Part, is_flag, names_of, quantities_of
 from rsfstudy.slider.protocol import Stated
+from rsfstudy.slider.requirements import check_declaration
 from rsfstudy.slider.synonyms import law_name
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -188,6 +189,7 @@ def _check(slot: Slot, part: Any) -> None:
     _check_name(slot, part)
     _check_fields(slot, part)
     _check_excluded(slot, part)
+    check_declaration(slot.name, part)
     for name in part.functions():
         function = getattr_static(part, name, None)
         if not isinstance(getattr(function, "__func__", None), FunctionType):

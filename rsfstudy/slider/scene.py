@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import (
     dynamics,
@@ -31,6 +32,7 @@ from rsfstudy.slider.fluid._recharged import Recharged
 from rsfstudy.slider.loading.step import Step
 from rsfstudy.slider.numbers import Slider
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.requirements import check_needs
 from rsfstudy.slider.states import check_steady_states
 
 #: Critical stiffnesses that are kept: studies come back to those along their other axes.
@@ -39,6 +41,7 @@ _KEPT = 4096
 FOR_EVER = np.array([[0.0, math.inf, *[math.nan] * 4]])
 
 
+@guard_methods
 @dataclass(frozen=True, init=False, repr=False)
 class Scene(Assembled):
     """A spring-slider with rate- and state-dependent friction, sliding steadily at V_* until a step
@@ -165,6 +168,7 @@ class Scene(Assembled):
     )
 
     def _check(self) -> None:
+        check_needs(self)
         # the law last: it may ask what all of friction makes of steady sliding
         for part in (*self.parts[:1], *reversed(self.parts[2:]), self.parts.law):
             part.check(self)
@@ -349,8 +353,7 @@ class Scene(Assembled):
     @property
     def begins_elsewhere(self) -> bool:
         """True if it begins with other stress or state than those of steady sliding at V_*."""
-        slider = self.parts.slider
-        return bool(slider.initial_stress or slider.initial_state)
+        return bool(self.parts.slider.initial_stress or self.parts.slider.initial_state)
 
     @derived
     def inertial_time(self) -> float:

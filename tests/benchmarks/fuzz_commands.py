@@ -471,7 +471,7 @@ class Server:
     """
 
     def __init__(self, terminal: bool, home: Path, limit: float) -> None:
-        self.limit = limit
+        self.limit, self._pending = limit, b""
         self._read, write = pty.openpty() if terminal else os.pipe()
         if terminal:
             fcntl.ioctl(write, termios.TIOCSWINSZ, struct.pack("HHHH", 24, WIDTH, 0, 0))
@@ -490,15 +490,18 @@ class Server:
     def _receive(self, seconds: float) -> tuple[dict[str, Any] | None, bytes]:
         """The next message, None if there was none in time, and the output meanwhile."""
         end, output = time.monotonic() + seconds, b""
-        while (left := end - time.monotonic()) > 0.0:
+        while b"\n" not in self._pending:
+            if (left := end - time.monotonic()) <= 0.0:
+                return None, output
             ready, _, _ = select.select([self._read, self._link], [], [], left)
             if self._read in ready:
                 output += self._drain()
             if self._link in ready:
-                message = self._link.recv(2**16)
-                assert message, "the process that runs commands has ended"
-                return json.loads(message), output + self._drain()
-        return None, output
+                received = self._link.recv(2**16)
+                assert received, "the process that runs commands has ended"
+                self._pending += received
+        message, _, self._pending = self._pending.partition(b"\n")
+        return json.loads(message), output + self._drain()
 
     def _drain(self) -> bytes:
         output = b""
@@ -557,19 +560,19 @@ def _serve(link: socket.socket, output: int, home: Path, limit: float) -> None:
     sys.stdout.flush()
     gc.collect()
     gc.freeze()  # so that forks share memory
-    link.sendall(b"{}")
+    link.sendall(b"{}\n")
     for line in link.makefile():
         words, place = json.loads(line)
         began, process = os.times(), os.fork()
         if not process:
             _run(words, place, limit)
-        link.sendall(json.dumps({"process": process}).encode())
+        link.sendall(json.dumps({"process": process}).encode() + b"\n")
         _process, status = os.waitpid(process, 0)
         now = os.times()
         spent = now.children_user + now.children_system
         spent -= began.children_user + began.children_system
         status = os.waitstatus_to_exitcode(status)
-        link.sendall(json.dumps({"status": status, "seconds": spent}).encode())
+        link.sendall(json.dumps({"status": status, "seconds": spent}).encode() + b"\n")
 
 
 def _run(words: Sequence[str], place: str, limit: float) -> None:

@@ -44,6 +44,8 @@ class Fitted:
         Free parameters that the record does not tell.
     white_size : float
         Root mean square of the residuals of the ordinary least-squares fit.
+    quantum : float
+        To which friction is rounded; 0 if it is not.
     """
 
     values: dict[str, float]
@@ -61,6 +63,18 @@ class Fitted:
     criterion: float
     unidentified: tuple[str, ...]
     white_size: float
+    quantum: float
+
+    @property
+    def outliers(self) -> np.ndarray:
+        """Rows that were left out."""
+        kept = self.noise.kept
+        return np.zeros(0, dtype=int) if kept is None else np.flatnonzero(~kept)
+
+    @property
+    def all_innovations(self) -> np.ndarray:
+        """Whitened residuals of all rows; NaN for outliers."""
+        return np.insert(self.innovations, self.outliers - np.arange(len(self.outliers)), np.nan)
 
     @property
     def slopes(self) -> np.ndarray:

@@ -12,6 +12,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.linalg import block_diag
 
+from rsfstudy.analysis.fitting.filters import LOW_PASS
 from rsfstudy.analysis.fitting.model import FINE, Differences, Model, Values
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.meter import Halt
@@ -77,6 +78,17 @@ class Joint:
     def friction(self) -> np.ndarray:
         """Friction of all rows."""
         return np.concatenate([part.friction for part in self.parts])
+
+    @property
+    def averaging(self) -> float:
+        """Averaging time of friction in s; 0 if it was not averaged."""
+        passed = self.parts[0].filter
+        return passed.size if passed is not None and passed.kind not in LOW_PASS else 0.0
+
+    @property
+    def frictions(self) -> list[np.ndarray]:
+        """Friction of the rows of each window."""
+        return [part.friction for part in self.parts]
 
     @cached_property
     def displacement(self) -> np.ndarray:

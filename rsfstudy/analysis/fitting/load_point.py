@@ -14,6 +14,7 @@ from scipy.linalg import solve_triangular
 
 from rsfstudy.analysis.fitting import noise
 from rsfstudy.analysis.fitting.model import MOVED
+from rsfstudy.analysis.fitting.outliers import find_quantum
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.analysis.fitting.steps import Step
 
@@ -22,6 +23,9 @@ from rsfstudy.analysis.fitting.steps import Step
 _MEANS = 1000
 #: Part of the displacement of a record that noise exceeds.
 _CLEAN = 1e-7
+#: Standard deviation of residuals of displacement, over its quantum, below which there is no noise
+#: that would make rounding errors random; and draws of their phases.
+_DITHERED, _DRAWS = 0.4, 200
 
 
 def moved_steps(record: Record, steps: Sequence[Step]) -> list[list[Step]]:
@@ -104,19 +108,51 @@ def _errors(
     columns[:, -1] -= columns[:, :-1] @ best
     if not np.std(columns[:, -1]) > _CLEAN * np.ptp(x) or len(t) < 4 * columns.shape[1]:
         return []
-    every = -(-len(t) // _MEANS)
-    table = np.column_stack([t, columns])[: len(t) // every * every]
-    t, *rest = table.reshape(-1, every, table.shape[1]).mean(axis=1).T
-    jacobian, left = np.array(rest[:-1]).T, rest[-1]
-    told = noise.fitted(noise.AUTOREGRESSIVE, t, left, jacobian)
-    white = told.whitened(np.eye(len(t)))
-    size = np.linalg.norm(white @ left) / np.sqrt(len(t) - len(best))
-    # lines are those of least squares, with J^+ R J^+' for covariance, J^+ = (J'J)^-1 J'
-    acting = solve_triangular(white, np.linalg.pinv(jacobian).T, trans="T", lower=True)
-    root = size * np.linalg.qr(acting)[1].T[:-1, :-1]
+    quantum = find_quantum(record.columns["displacement"])
+    if np.std(columns[:, -1]) < _DITHERED * quantum:
+        exact = columns[:, :-1] @ best + x[0]
+        root = _rounding_root(columns[:, :-1], exact, np.searchsorted(at, t), quantum)
+    else:
+        root = _noise_root(t, columns)
     # steps are found where displacement parts best, which need not be where all of it would have it
     missed = best[:-1] - np.concatenate([np.zeros(len(at)), speeds[moves]])
     root = np.column_stack([root, missed])
     faster = np.zeros((len(speeds), root.shape[1]))
     faster[moves] = root[len(at) :]
     return [*zip(root[: len(at)].T, faster.T, strict=True)]
+
+
+def _noise_root(t: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Compute a root of the covariance of times and velocities under the noise of displacement.
+
+    Parameters
+    ----------
+    t : ndarray, shape (rows,)
+    columns : ndarray, shape (rows, parameters + 1)
+        Derivatives of displacement, of which the last one is by its origin; and residuals.
+    """
+    every = -(-len(t) // _MEANS)
+    table = np.column_stack([t, columns])[: len(t) // every * every]
+    t, *rest = table.reshape(-1, every, table.shape[1]).mean(axis=1).T
+    jacobian, left = np.array(rest[:-1]).T, rest[-1]
+    told = noise.fitted(noise.AUTOREGRESSIVE, t, left, jacobian)
+    white = told.whitened(np.eye(len(t)))
+    size = np.linalg.norm(white @ left) / np.sqrt(len(t) - jacobian.shape[1])
+    # lines are those of least squares, with J^+ R J^+' for covariance, J^+ = (J'J)^-1 J'
+    acting = solve_triangular(white, np.linalg.pinv(jacobian).T, trans="T", lower=True)
+    return np.asarray(size * np.linalg.qr(acting)[1].T[:-1, :-1])
+
+
+def _rounding_root(
+    jacobian: np.ndarray, exact: np.ndarray, pieces: np.ndarray, quantum: float
+) -> np.ndarray:
+    """Compute a root of the covariance of times and velocities if displacement is only rounded.
+
+    Rounding errors are not random within a record: at a steady velocity they repeat. But their
+    phase is arbitrary in each straight piece, so lines are fitted to errors with random phases.
+    """
+    rng = np.random.default_rng(0)
+    phases = quantum * rng.random((_DRAWS, pieces.max() + 1))[:, pieces]
+    errors = quantum * np.rint((exact + phases) / quantum) - exact - phases
+    moved = errors @ np.linalg.pinv(jacobian).T
+    return np.asarray(np.linalg.qr(moved / np.sqrt(_DRAWS))[1].T[:-1])

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from rsfstudy.analysis.fitting.filters import Filter
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.course import follow
@@ -123,6 +124,8 @@ class Model:
     meter : Meter
     moves : sequence of ndarray
         Pieces of loading by steps that are moved (see `moved_steps`).
+    filter : Filter, optional
+        That friction passed before it was recorded.
     """
 
     scene: Scene
@@ -133,6 +136,7 @@ class Model:
     accuracy: Accuracy
     meter: Meter
     moves: Sequence[np.ndarray] = ()
+    filter: Filter | None = None
 
     @property
     def reference(self) -> float:
@@ -201,7 +205,8 @@ class Model:
                 return nothing
             late = values.get("step_time", 0.0)
             scale = self.reference / values["slip_distance"]
-            at = np.maximum(self.time - late - self.loading[0, 0], 0.0) * scale
+            times = self.filter.sample_times(self.time) if self.filter else self.time
+            at = np.maximum(times - late - self.loading[0, 0], 0.0) * scale
             accuracy = self.accuracy.refined() if refined else self.accuracy
             recording, end = Recording(at=at), float(at[-1]) * (1.0 + 1e-12)
             self.meter.budget = min(budget, self.meter.spent + most)
@@ -216,7 +221,9 @@ class Model:
         finally:
             self.meter.budget = budget
         found = friction_coefficient_of(recording.seen(scene))
-        return found if len(found) == len(self.time) else nothing
+        if len(found) != len(times):
+            return nothing
+        return self.filter.apply(self.time, found) if self.filter else found
 
     def trend(self, values: Values) -> np.ndarray:
         """The trend along the rows, shape (rows,): ``c_1 x + c_2 x^2 + ...``, x being displacement

@@ -23,18 +23,25 @@ Biometrika 65, 297-303.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
+from rsfstudy.analysis.fitting.averaging import Overlap
+from rsfstudy.analysis.fitting.noise_runs import (
+    Run,
+    count_processes,
+    find_level_changes,
+    find_runs,
+    index_rows,
+    split_runs,
+)
 from rsfstudy.errors import InvalidValue
 
 WHITE, AUTOREGRESSIVE = "white", "ar"
@@ -42,9 +49,10 @@ WHITE, AUTOREGRESSIVE = "white", "ar"
 HIGHEST, _SAMPLES = 12, 10
 #: Largest partial correlation, and slope of what REML minimises at which the search ends.
 _LARGEST, _ENOUGH = 0.999, 0.02
-#: Sampling intervals that differ by less than this factor are one; fewer samples than so many at
-#: another, or in runs shorter than so many, do not tell a process of their own: clocks are uneven.
-_ALIKE, _RARE, _SHORT = 2.0, 300, 30
+#: Passes in which the noise levels and the autoregressive process are estimated in turn.
+_LEVEL_PASSES = 2
+#: Smallest standard deviation of a level, relative to that of all residuals.
+_QUIETEST = 1e-3
 #: Lags at which residuals freed of correlation are tested for what is left of it.
 LAGS = 20
 
@@ -56,41 +64,28 @@ def check_noise(name: str) -> None:
         raise InvalidValue("noise", name, "is unknown", choices=choices)
 
 
-class Run(NamedTuple):
-    """Samples taken at one interval.
-
-    Attributes
-    ----------
-    first, last : int
-        First row, and row behind the last.
-    number : int
-        That of the process.
-    before : int
-        Rows before it since the clock began.
-    """
-
-    first: int
-    last: int
-    number: int
-    before: int
-
-
 @dataclass(frozen=True)
 class Noise:
-    """The noise of samples, which come in runs of one sampling interval.
+    """Noise with an autoregressive process per sampling interval, and levels that may change.
 
     Attributes
     ----------
     runs : tuple of Run
     partial : ndarray, shape (processes, order)
         Partial autocorrelations of each process.
-    sizes : ndarray, shape (processes,)
-        Standard deviations, over that of the first one.
+    sizes : ndarray, shape (levels,)
+        Standard deviations of the levels, relative to the first one.
+    kept : ndarray of bool, shape (rows,), optional
+        False for outliers, which are left out. All rows are kept by default.
+    overlap : Overlap, optional
+        Correlation by averaging, which is removed before that of the process.
     """
 
     runs: tuple[Run, ...]
     partial: np.ndarray
     sizes: np.ndarray
+    kept: np.ndarray | None = None
+    overlap: Overlap | None = None
 
     @property
     def order(self) -> int:
@@ -98,16 +93,29 @@ class Noise:
         return int(self.partial.shape[1])
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
-        """Columns freed of correlation, shape (samples, columns), as those given: each sample less
-        what those before tell of it, over the standard deviation of what is left.
+        """Whiten columns: subtract the prediction by earlier rows, and divide by its error.
+
+        Parameters
+        ----------
+        columns : ndarray, shape (rows, columns)
+
+        Returns
+        -------
+        ndarray, shape (kept rows, columns)
         """
-        scaled = columns / self.sizes[_numbers(self.runs)][:, None]
+        columns = self.kept_rows(columns)
+        columns = columns if self.overlap is None else self.overlap.whitened(columns)
+        scaled = columns / self.sizes[index_rows(self.runs, "level")][:, None]
         found = np.empty_like(columns)
         for run in self.runs:
             known = min(run.before, self.order)
             part = scaled[run.first - known : run.last]
             found[run.first : run.last] = _innovations(part, *self.predictors[run.number])[known:]
         return found
+
+    def kept_rows(self, columns: np.ndarray) -> np.ndarray:
+        """Return columns without the rows of outliers."""
+        return columns if self.kept is None else columns[self.kept]
 
     @cached_property
     def predictors(self) -> list[tuple[list[list[float]], list[float]]]:
@@ -117,13 +125,13 @@ class Noise:
     @property
     def log_determinant(self) -> float:
         """``ln|R|``."""
-        total = 0.0
-        for first, last, number, before in self.runs:
+        total = 0.0 if self.overlap is None else self.overlap.log_determinant
+        for first, last, number, before, level in self.runs:
             variances = self.predictors[number][1]
             early = variances[min(before, self.order) : min(before + last - first, self.order)]
             total += math.fsum(map(math.log, early))
             total += (last - first - len(early)) * math.log(variances[-1])
-            total += 2.0 * (last - first) * math.log(self.sizes[number])
+            total += 2.0 * (last - first) * math.log(self.sizes[level])
         return total
 
     @property
@@ -134,7 +142,8 @@ class Noise:
         """
         power = self._power_at_zero
         lasts = ((run.last - run.first, run.number) for run in self.runs)
-        return sum(max(1.0, rows / max(power[n], 1.0)) for rows, n in lasts)
+        each = 1.0 if self.overlap is None else self.overlap.rows
+        return sum(max(1.0, rows / max(power[n], 1.0) / each) for rows, n in lasts)
 
     @property
     def _power_at_zero(self) -> list[float]:
@@ -148,7 +157,7 @@ class Noise:
         2 over the variance of its logarithm, in which coefficients that are found count.
         """
         total = 0.0
-        rows = np.bincount(_numbers(self.runs)).tolist()
+        rows = np.bincount(index_rows(self.runs, "number")).tolist()
         for count, told, power in zip(rows, self.predictors, self._power_at_zero, strict=True):
             # coefficients have the covariance (variance left) R^-1/rows
             ones = _innovations(np.ones((self.order, 1)), *told)
@@ -157,52 +166,112 @@ class Noise:
 
 
 def white(time: np.ndarray) -> Noise:
-    """White noise of one size at samples taken at these times."""
-    runs = _runs(time)
-    return Noise(runs, np.zeros((_count(runs), 0)), np.ones(_count(runs)))
+    """Return white noise of one level per sampling interval."""
+    runs = find_runs(time)
+    return Noise(runs, np.zeros((count_processes(runs), 0)), np.ones(count_processes(runs)))
 
 
-def fitted(name: str, time: np.ndarray, residuals: np.ndarray, jacobian: np.ndarray) -> Noise:
-    """The noise that residuals of a fit tell, by REML.
+def fitted(
+    name: str,
+    time: np.ndarray,
+    residuals: np.ndarray,
+    jacobian: np.ndarray,
+    kept: np.ndarray | None = None,
+    least: float = 0.0,
+    averaging: float = 0.0,
+) -> Noise:
+    """Estimate the noise from the residuals of a fit by restricted maximum likelihood.
 
     Parameters
     ----------
     name : str
-        "white", "ar", whose order a criterion chooses (AIC), or "ar3" and so on.
-    time : ndarray, shape (samples,)
-    residuals : ndarray, shape (samples,)
-    jacobian : ndarray, shape (samples, parameters)
+        "white"; "ar", whose order minimises the AIC; or "ar3" and so on.
+    time : ndarray, shape (rows,)
+    residuals : ndarray, shape (rows,)
+    jacobian : ndarray, shape (rows, parameters)
         Derivatives of the model.
+    kept : ndarray of bool, shape (rows,), optional
+        False for outliers. All rows are kept by default.
+    least : float
+        Smallest standard deviation of a level, for example that of rounding.
+    averaging : float
+        Averaging time of friction in s; 0 if it was not averaged.
 
     Returns
     -------
     Noise
-        With a process for each sampling interval.
+        With a process for each sampling interval, and a level for each segment.
     """
-    runs = _runs(time)
-    count = _count(runs)
-    parts = [[residuals[r.first : r.last] for r in runs if r.number == n] for n in range(count)]
-    stated = name.removeprefix(AUTOREGRESSIVE)
-    order = 0 if name == WHITE else int(stated) if stated else _order(parts)
-    sizes = np.array([max(float(np.std(np.concatenate(part))), 1e-300) for part in parts])
-    begin = np.array([_partial(part, order) for part in parts])
-    if not order and count == 1:
-        return Noise(runs, begin, np.ones(1))
+    begin, least = guess_noise(name, time, residuals, kept, least, averaging)
+    shape, order = begin.partial.shape, begin.order
+    if not order and len(begin.sizes) == 1:
+        return begin
 
     def noise(x: np.ndarray) -> Noise:
-        partial = _LARGEST * np.tanh(x[: count * order]).reshape(count, order)
-        return Noise(runs, partial, np.exp(np.append(0.0, x[count * order :])))
+        partial = _LARGEST * np.tanh(x[: begin.partial.size]).reshape(shape)
+        sizes = np.exp(np.append(0.0, x[begin.partial.size :]))
+        return Noise(begin.runs, partial, np.maximum(sizes, least), kept, begin.overlap)
 
-    products = _Products(runs, np.column_stack([jacobian, residuals]), order)
+    columns = begin.kept_rows(np.column_stack([jacobian, residuals]))
+    columns = columns if begin.overlap is None else begin.overlap.whitened(columns)
+    products = _Products(begin.runs, columns, order)
 
     def misfit(x: np.ndarray) -> float:
         return products.misfit(noise(x))
 
-    x = np.append(np.arctanh(begin.ravel() / _LARGEST), np.log(sizes[1:] / sizes[0]))
-    if not math.isfinite(misfit(x)):  # nothing is left
+    x = np.append(np.arctanh(begin.partial.ravel() / _LARGEST), np.log(begin.sizes[1:]))
+    if not math.isfinite(misfit(x)):  # the residuals vanish
         return noise(x)
     found = minimize(misfit, x, method="BFGS", options={"gtol": _ENOUGH})
     return noise(found.x if found.fun <= misfit(x) else x)
+
+
+def guess_noise(
+    name: str,
+    time: np.ndarray,
+    residuals: np.ndarray,
+    kept: np.ndarray | None = None,
+    least: float = 0.0,
+    averaging: float = 0.0,
+) -> tuple[Noise, float]:
+    """Estimate the noise by moments, and the least size of a level relative to the first one.
+
+    The parameters are those of `fitted`.
+    """
+    if kept is not None:
+        time, residuals = time[kept], residuals[kept]
+    overlap = Overlap(time, averaging) if averaging else None
+    if overlap is not None:
+        residuals = overlap.whitened(residuals)
+    least = max(least, _QUIETEST * math.sqrt(float(np.mean(np.square(residuals)))), 1e-300)
+    found, first = _first_guess(name, find_runs(time), residuals, least)
+    return replace(found, kept=kept, overlap=overlap), least / first
+
+
+def _first_guess(
+    name: str, whole: tuple[Run, ...], residuals: np.ndarray, least: float
+) -> tuple[Noise, float]:
+    """Estimate the noise by moments, where the search begins, and the size of its first level."""
+    stated, count = name.removeprefix(AUTOREGRESSIVE), count_processes(whole)
+    runs, knots, innovations = whole, list[int](), residuals
+    scale = np.ones(len(residuals))
+    for _ in range(1 + _LEVEL_PASSES):
+        levels = index_rows(runs, "level")
+        squares = np.bincount(levels, np.square(innovations)) / np.bincount(levels)
+        scale = np.maximum(scale * np.sqrt(squares)[levels], least)
+        scaled = residuals / scale
+        parts = [[scaled[r.first : r.last] for r in whole if r.number == n] for n in range(count)]
+        order = 0 if name == WHITE else int(stated) if stated else _order(parts)
+        partial = np.array([_partial(part, order) for part in parts]).reshape(count, order)
+        sizes = scale[np.unique(levels, return_index=True)[1]]
+        found = Noise(runs, partial, sizes)
+        innovations = found.whitened(residuals[:, None])[:, 0]
+        before, knots = knots, find_level_changes(innovations * scale, least)
+        if knots == before:
+            break
+        runs = split_runs(whole, knots)
+    first = float(found.sizes[0])
+    return Noise(found.runs, found.partial, found.sizes / first), first
 
 
 def whiteness(innovations: np.ndarray, order: int) -> float:
@@ -221,6 +290,18 @@ def whiteness(innovations: np.ndarray, order: int) -> float:
     correlations = np.array([seen[lag:] @ seen[:-lag] for lag in lags]) / (seen @ seen)
     size = count * (count + 2.0) * float(np.sum(correlations**2 / (count - lags)))
     return float(chi2.sf(size, max(len(lags) - order, 1)))
+
+
+def compute_criterion(innovations: np.ndarray, noise: Noise, parameters: int, count: int) -> float:
+    """Compute Akaike's criterion, corrected for few samples (Hurvich and Tsai, 1989).
+
+    It is ``n [ln(2 pi S/n) + 1] + ln|R| + 2 k n/(n - k - 1)`` for n rows, a sum of squares S of the
+    innovations and k parameters, including those of the noise and one for each outlier.
+    """
+    parameters, size = parameters + count - len(innovations), float(innovations @ innovations)
+    every = parameters + noise.partial.size + len(noise.sizes)
+    likelihood = count * (math.log(2.0 * math.pi * size / count) + 1.0) + noise.log_determinant
+    return likelihood + 2.0 * every * count / max(count - every - 1.0, 1.0)
 
 
 class _Products:
@@ -242,35 +323,38 @@ class _Products:
         left = left - base @ (base.T @ left)
         columns = np.column_stack([base, left / (np.linalg.norm(left) or 1.0)])
         width = columns.shape[1]
-        self.sums = np.zeros((_count(runs), order + 1, order + 1, width, width))
-        #: The first rows of each run with those before that tell of them: how many these are, and
-        #: the processes of all.
-        self.early: list[tuple[np.ndarray, int, np.ndarray]] = []
-        numbers = _numbers(runs)
+        self.levels = sorted({(run.number, run.level) for run in runs})
+        self.sums = np.zeros((len(self.levels), order + 1, order + 1, width, width))
+        #: The first rows of each run with the rows before that predict them, the number of the
+        #: latter, the process of the run, and the levels of all these rows.
+        self.early: list[tuple[np.ndarray, int, int, np.ndarray]] = []
+        levels = index_rows(runs, "level")
         for run in runs:
             known = min(run.before, order)
             rows = slice(run.first - known, min(run.first + order, run.last))
             if order:
-                self.early.append((columns[rows], known, numbers[rows]))
+                self.early.append((columns[rows], known, run.number, levels[rows]))
             part = columns[run.first : run.last]
             later = [part[order - lag : len(part) - lag] for lag in range(order + 1)]
+            sums = self.sums[self.levels.index((run.number, run.level))]
             for i in range(order + 1 if len(part) > order else 0):
                 for j in range(i + 1):
                     found = later[i].T @ later[j]
-                    self.sums[run.number, i, j] += found
+                    sums[i, j] += found
                     if i > j:
-                        self.sums[run.number, j, i] += found.T
+                        sums[j, i] += found.T
 
     def misfit(self, noise: Noise) -> float:
         """Number that REML minimises, up to a constant; infinite where nothing is left."""
         total = np.zeros(self.sums.shape[-2:])
-        for number, (coefficients, variances) in enumerate(noise.predictors):
+        for (number, level), sums in zip(self.levels, self.sums, strict=True):
+            coefficients, variances = noise.predictors[number]
             full = np.append(1.0, -np.array(coefficients[-1]))
-            scale = variances[-1] * noise.sizes[number] ** 2
-            total += np.einsum("i,j,ijab->ab", full, full, self.sums[number]) / scale
-        for early, known, numbers in self.early:
-            scaled = early / noise.sizes[numbers][:, None]
-            begun = _innovations(scaled, *noise.predictors[numbers[-1]])[known:]
+            scale = variances[-1] * noise.sizes[level] ** 2
+            total += np.einsum("i,j,ijab->ab", full, full, sums) / scale
+        for early, known, number, levels in self.early:
+            scaled = early / noise.sizes[levels][:, None]
+            begun = _innovations(scaled, *noise.predictors[number])[known:]
             total += begun.T @ begun
         try:
             triangle = np.diag(np.linalg.cholesky(total))
@@ -335,40 +419,3 @@ def _innovations(
         found[row] /= math.sqrt(variances[row])
     found[len(coefficients) - 1 :] /= math.sqrt(variances[-1])
     return found
-
-
-def _kinds(time: np.ndarray) -> np.ndarray:
-    """The kind of sampling interval that each sample is taken at: 0, 1 and so on."""
-    gaps = np.diff(time)
-    gaps[gaps <= 0.0] = np.median(gaps)
-    kinds = np.rint(np.log(gaps / np.median(gaps)) / math.log(_ALIKE))
-    kinds = np.append(kinds[:1], kinds)
-    lasts = np.diff([0, *(np.flatnonzero(np.diff(kinds)) + 1), len(kinds)])
-    steady = np.repeat(lasts, lasts) >= _SHORT
-    names, counts = np.unique(kinds[steady], return_counts=True)
-    rows = np.flatnonzero(steady & np.isin(kinds, names[counts >= _RARE]))
-    if not len(rows):
-        return np.zeros(len(time), dtype=int)
-    nearest = np.minimum(np.searchsorted(rows, np.arange(len(time))), len(rows) - 1)
-    return np.asarray(np.unique(kinds[rows[nearest]], return_inverse=True)[1])
-
-
-def _count(runs: Sequence[Run]) -> int:
-    """Number of processes."""
-    return 1 + max(run.number for run in runs)
-
-
-def _runs(time: np.ndarray) -> tuple[Run, ...]:
-    """The runs of samples of one kind; where the clock begins again there is another run."""
-    kinds, begins = _kinds(time), np.diff(time) <= 0.0
-    bounds = (np.flatnonzero((np.diff(kinds) != 0) | begins) + 1).tolist()
-    found, begun = [], 0
-    for first, last in itertools.pairwise([0, *bounds, len(time)]):
-        begun = first if first and begins[first - 1] else begun
-        found.append(Run(first, last, int(kinds[first]), first - begun))
-    return tuple(found)
-
-
-def _numbers(runs: Sequence[Run]) -> np.ndarray:
-    """The process of each row."""
-    return np.repeat([run.number for run in runs], [run.last - run.first for run in runs])

@@ -36,6 +36,7 @@ from rsfstudy.analysis.fitting.model import (
     value_of,
 )
 from rsfstudy.analysis.fitting.noise import Noise
+from rsfstudy.analysis.fitting.outliers import find_kept_rows, find_quantum
 from rsfstudy.motion.meter import Halt
 from rsfstudy.status import Status
 
@@ -85,7 +86,9 @@ class Search:
 
     def __init__(self, model: Joint, values: Values, free: Sequence[str], noise: str) -> None:
         self.model, self.free, self.noise_model = model, tuple(free), noise
-        self.first, self.has_converged, self.white_size = dict(values), True, math.nan
+        self.first, self.has_converged = dict(values), True
+        self.white_residuals = np.zeros(0)
+        self.quantum = max(find_quantum(part) for part in model.frictions)
         self.low, self.high = np.array([self._bounds(name) for name in free]).T
 
     def _bounds(self, name: str) -> tuple[float, float]:
@@ -140,12 +143,16 @@ class Search:
             x, jacobian = self.least_squares(x, noise)
             left = self.residuals(self.values(x))
             if not number:
-                self.white_size = math.sqrt(float(np.square(left).mean()))
+                self.white_residuals = left
             if number and _has_converged(
                 x - before, noise.whitened(np.column_stack([jacobian, left]))
             ):
                 break
-            noise = noises.fitted(self.noise_model, self.model.time, left, jacobian)
+            kept = find_kept_rows(left, self.model.friction - left, self.quantum)
+            least = self.quantum / math.sqrt(12.0)
+            noise = noises.fitted(
+                self.noise_model, self.model.time, left, jacobian, kept, least, self.model.averaging
+            )
         found = self._result(x, noise)
         if not (self.has_converged or found.unidentified):
             text = f"the search did not end within {_CURVES} curves"
@@ -226,20 +233,21 @@ class Search:
         curve = self.model.curve(values)
         left = self.model.friction - curve - self.model.trend(values)
         innovations = noise.whitened(left[:, None])[:, 0]
-        free_of = len(left) - len(x)
+        count = len(innovations)
+        free_of = count - len(x)
         size = math.sqrt(float(innovations @ innovations) / free_of)
         inverse = _inverse(whitened[:, :-1])
         by_noise = covariance = size**2 * inverse
         if (moved_by := self.model.by_loading(values)).size and np.isfinite(inverse).all():
             shifts = inverse @ whitened[:, :-1].T @ noise.whitened(moved_by)
             covariance = by_noise + shifts @ shifts.T
-        degrees = max(noise.degrees * free_of / len(left), _FEWEST)
+        degrees = max(noise.degrees * free_of / count, _FEWEST)
         finer = self.model.curve(values, refined=True) - curve
         with np.errstate(invalid="ignore"):  # of what is not told
             off = np.abs(inverse @ whitened[:, :-1].T @ noise.whitened(finer[:, None])[:, 0])
         slopes = [slope(name, values[name]) for name in self.free]
         errors = (3.0 * off + np.abs(moved)) * slopes
-        criterion = _criterion(innovations, noise, len(x))
+        criterion = noises.compute_criterion(innovations, noise, len(x), len(left))
         steps = self._criterion_without_steps(jacobian, noise) - criterion > _DECIDES
         return Fitted(
             values=values,
@@ -256,7 +264,8 @@ class Search:
             jacobian=jacobian,
             criterion=criterion,
             unidentified=self._unidentified(x, values, covariance, steps),
-            white_size=self.white_size,
+            white_size=float(np.sqrt(np.mean(np.square(noise.kept_rows(self.white_residuals))))),
+            quantum=self.quantum,
         )
 
     def _criterion_without_steps(self, jacobian: np.ndarray, noise: Noise) -> float:
@@ -269,7 +278,7 @@ class Search:
             columns = np.insert(columns, 0, 1.0, axis=1)
         whitened = noise.whitened(columns)
         innovations = whitened[:, -1] - whitened[:, :-1] @ _linear_solution(whitened)
-        return _criterion(innovations, noise, columns.shape[1] - 1)
+        return noises.compute_criterion(innovations, noise, columns.shape[1] - 1, len(columns))
 
     def _unidentified(
         self, x: np.ndarray, values: Values, covariance: np.ndarray, steps: bool
@@ -299,17 +308,6 @@ class Search:
         ends = self.low[place], self.high[place]
         low, high = (value_of(name, v) if math.isfinite(v) else math.nan for v in ends)
         return low, high
-
-
-def _criterion(innovations: np.ndarray, noise: Noise, parameters: int) -> float:
-    """Akaike's criterion, corrected for few samples: ``n [ln(2 pi S/n) + 1] + ln|R| + 2 k n/(n - k
-    - 1)`` of n rows with a sum of squares S of innovations, and k parameters, those of the noise
-    too (Hurvich and Tsai, 1989).
-    """
-    count, size = len(innovations), float(innovations @ innovations)
-    every = parameters + noise.order * len(noise.sizes) + len(noise.sizes)
-    likelihood = count * (math.log(2.0 * math.pi * size / count) + 1.0) + noise.log_determinant
-    return likelihood + 2.0 * every * count / max(count - every - 1.0, 1.0)
 
 
 def _linear_solution(columns: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 
 from rsfstudy.analysis.fitting.fitted import Fitted
 from rsfstudy.analysis.fitting.noise import whiteness
+from rsfstudy.wording import counted
 
 #: p-value below which whitened residuals are called autocorrelated.
 SIGNIFICANT = 0.01
@@ -19,6 +20,11 @@ SIGNIFICANT = 0.01
 _NEGLIGIBLE = 1e-7
 #: Largest ratio of the residual standard deviation to that of an ordinary least-squares fit.
 _LARGEST_RATIO = 2.0
+#: Standard deviation of the noise, over the quantum of friction, below which rounding errors depend
+#: on friction; and the largest fraction of rows that may be outliers.
+_LEAST_NOISE, _MOST_OUTLIERS = 0.4, 0.05
+#: Largest number of outliers that a message names.
+_NAMED = 10
 
 
 def find_reasons(found: Fitted, friction: np.ndarray) -> tuple[str, ...]:
@@ -37,12 +43,28 @@ def find_reasons(found: Fitted, friction: np.ndarray) -> tuple[str, ...]:
     """
     if found.noise_sd < _NEGLIGIBLE:
         return ()
-    return (*_misfit(found, friction), *_autocorrelation(found))
+    return (
+        *_misfit(found, friction),
+        *_rounding(found),
+        *_outliers(found),
+        *_autocorrelation(found),
+    )
+
+
+def name_outliers(outliers: np.ndarray) -> str:
+    """Return a remark that names outliers by their rows in the window, from 1; empty if none."""
+    if not len(outliers):
+        return ""
+    names = ", ".join(str(row + 1) for row in outliers[:_NAMED].tolist())
+    more = " and more" * (len(outliers) > _NAMED)
+    count = counted(len(outliers), "outlier")
+    verb = "was" if len(outliers) == 1 else "were"
+    return f"{count} {verb} left out: rows {names}{more} of the window"
 
 
 def _misfit(found: Fitted, friction: np.ndarray) -> Iterator[str]:
     """Yield the reasons that the size of the residuals gives."""
-    size = float(np.sqrt(np.mean(found.residuals**2)))
+    size = float(np.sqrt(np.mean(found.noise.kept_rows(found.residuals) ** 2)))
     if not size < np.std(friction):
         yield (
             "the fit explains the record no better than its mean does (R2 is not positive): "
@@ -54,6 +76,28 @@ def _misfit(found: Fitted, friction: np.ndarray) -> Iterator[str]:
             "of an ordinary least-squares fit, so part of the response is taken for noise: "
             "check the time of the step, the trend and the law"
         )
+
+
+def _rounding(found: Fitted) -> Iterator[str]:
+    """Yield a reason if friction is rounded to a quantum that the noise does not cover."""
+    if is_rounded(found):
+        yield (
+            f"friction is rounded to {found.quantum:.2g}, more than 2.5 times the noise, so "
+            "rounding errors are not random: export the record with more digits"
+        )
+
+
+def is_rounded(found: Fitted) -> bool:
+    """Return True if friction is rounded to a quantum that the noise does not cover."""
+    variance = (found.noise_sd * float(found.noise.sizes.min())) ** 2 - found.quantum**2 / 12.0
+    return variance < (_LEAST_NOISE * found.quantum) ** 2
+
+
+def _outliers(found: Fitted) -> Iterator[str]:
+    """Yield a reason if many rows are outliers."""
+    count, rows = len(found.outliers), len(found.residuals)
+    if count > _MOST_OUTLIERS * rows:
+        yield f"{count} of {rows} rows are outliers: remove them from the record, or check the law"
 
 
 def _autocorrelation(found: Fitted) -> Iterator[str]:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy.slider.parts import Function, Part, Scene, found_in
+from rsfstudy.slider.requirements import QUANTITIES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +26,7 @@ class Dynamics(Part):
 
     #: Name of the form between ruptures, as it appears in results.
     regime: ClassVar[str]
+    receives = frozenset(QUANTITIES)
     slip_rate: ClassVar[Function]
     rupture_rate: ClassVar[Function | None] = None
     #: Whether slip may reverse, in the regularised form of friction.

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.parts import Numbers, Part, found_in
+from rsfstudy.slider.requirements import PORE_PRESSURE, SLIP_RATE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +30,7 @@ class Fluid(Part):
 
     conclusions = ("highest_pressure",)
     equations = frozenset({"auxiliary_rates", "numbers"})
+    receives = frozenset({SLIP_RATE, PORE_PRESSURE})
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
         """Bound of pore pressure from now on, while ln(V/V_*) is at most `log_slip_rate`; infinite

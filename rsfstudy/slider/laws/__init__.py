@@ -25,6 +25,7 @@ from rsfstudy.slider.parts import (
     found_in,
     number,
 )
+from rsfstudy.slider.requirements import LAW_RECEIVES
 
 #: Exponents of evolution laws beyond this occur in trial steps only, which the integrator rejects:
 #: the equations of motion stop at slip rates of 10^-290 V_*.
@@ -50,7 +51,14 @@ def cutoff_velocity() -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class LawOfStates(Part):
-    """Base of all laws; one with a single b is derived from `Law`.
+    """Base class of all laws. Laws with a single b are derived from `Law`.
+
+    The functions of a law receive ln(V/V_*), the states and the numbers of the law. The friction
+    coefficient ``tau/sigma = mu_* + a ln(V/V_*) + sum of Theta_i`` of forward slip follows from
+    these. The functions do not receive shear stress, normal stress or pore pressure. A law whose
+    state evolves with one of these lists it in `needs`, for example ``needs = {"shear_stress"}``.
+    It is then accepted only in scenes with constant effective normal stress, where shear stress
+    over sigma_* is the friction coefficient.
 
     A law states ``evolution(log_slip_rate, state, p)``: the change of its state variable per unit
     of slip in D_c, at constant normal stress. It comes to rest at Theta = -b ln(V/V_*), unless it
@@ -64,10 +72,8 @@ class LawOfStates(Part):
     shift each state has; the parts add up to all of it. What the states together have for b it says
     as `b_over_a`, a field or a property; `two_slip_states` is an example.
 
-    Any unknown that friction depends on may be such a state, temperature for one, written as what
-    it adds to friction. Its change may read slip rate, the states and the numbers of the law, and
-    with them friction of slip forward, ``mu_* + a ln(V/V_*)`` and the sum of the states. It cannot
-    read normal stress or pore pressure, which evolutions are not given.
+    Any unknown that friction depends on may be a state, for example temperature, if it is written
+    as the friction coefficient that it adds.
     """
 
     stress_dependence: float = number(
@@ -82,6 +88,7 @@ class LawOfStates(Part):
 
     conclusions = ("orbits_close", "scale_free", "relaxation")
     equations = frozenset({"evolution", "evolutions"})
+    receives = LAW_RECEIVES
     #: How many states the law has.
     states: ClassVar[int] = 1
     #: Whether every orbit closes at critical stiffness, where friction alone acts and stress has no

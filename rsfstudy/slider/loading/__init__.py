@@ -9,14 +9,17 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.parts import NOT_NEGATIVE, Numbers, Part, Scene, found_in, number
+from rsfstudy.slider.requirements import SLIP_RATE
 
 #: Duration of a segment in D_c/V_* below which no step of an integrator is taken; from a time of 1
 #: on rounding is longer.
 SHORTEST = 1e-16
 
 
+@guard_methods
 class Segment(NamedTuple):
     """A part of a loading history.
 
@@ -51,6 +54,7 @@ class Segment(NamedTuple):
         return stated
 
 
+@guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Loading(Part):
     """Base of the loading histories.
@@ -73,6 +77,7 @@ class Loading(Part):
     #: Whether the last of them is, instead, shear stress by a load point that is ahead of its mean
     #: motion, less what stands as third of its numbers.
     displaces: ClassVar[bool] = False
+    receives = frozenset({SLIP_RATE})
     #: Whether the fall of normal stress is pore pressure: beside a fluid that has unknowns, that of
     #: its surroundings.
     of_pressure: ClassVar[bool] = True
@@ -165,10 +170,11 @@ class Loading(Part):
 
     @classmethod
     def refuse(cls, name: str, value: Any) -> InvalidValue:
-        owners = (p for p in PARTS.values() if name in p.__dataclass_fields__)
+        owners = (p for p in PARTS.values() if str(name) in p.__dataclass_fields__)
         wanted = " or ".join(p.called_by for p in owners if p.called_by not in ("", name))
         remedy = f"Leave it out, or state {wanted} too." if wanted else "Leave it out."
-        return InvalidValue(name, value, f"has no meaning for {cls.name}", remedy=remedy)
+        of = getattr(cls, "name", cls.__name__)  # each protocol has a name of its own
+        return InvalidValue(name, value, f"has no meaning for {of}", remedy=remedy)
 
 
 def velocity_ratio() -> Any:

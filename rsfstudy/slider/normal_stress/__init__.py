@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy.slider.parts import Function, Part, Scene, found_in
+from rsfstudy.slider.requirements import SHEAR_STRESS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +21,7 @@ class NormalStress(Part):
 
     conclusions = ("follows_friction", "coupling", "weakest")
     equations = frozenset({"normal_stress", "state_effect", "numbers"})
+    receives = frozenset({SHEAR_STRESS})
     normal_stress: ClassVar[Function | None] = None
 
     @property

@@ -1,0 +1,244 @@
+"""Detection of drops of shear stress in a record with noise.
+
+The mean of stress in a window of time is compared with the mean in the window behind it, for
+windows of 4, 8, 16 and more sampling intervals. Falls between them are scaled by their noise, which
+is the spread of the most frequent falls: those of loading, also if drops take up to a third of the
+record. Peaks of the scaled fall above a threshold are drops [1]_.
+
+References
+----------
+.. [1] `scipy.signal.find_peaks`, by height and prominence.
+.. [2] Rousseeuw and Leroy (1988), Statistica Neerlandica 42, 103-116, for the shortest half.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import find_peaks
+from scipy.stats import norm
+
+#: Chance that any drop is found in a record of Gaussian noise.
+CHANCE = 1e-4
+#: Shortest windows in samples, and samples of a record for each sample of the longest window.
+SHORTEST, SAMPLES = 4, 100
+#: Standard deviations by which a drop must exceed the threshold to be missed once in 1,000.
+FOUND = 3.1
+#: Standard deviations down to which a fall is followed from its peak.
+_FOLLOWED = 2.0
+#: Share of values in the shortest interval, from which noise is taken.
+_SHARE = 0.4
+#: Standard deviation over the median of absolute deviations of Gaussian noise.
+_NORMAL = 1.4826
+#: Sampling intervals that differ by more than this factor are brought to one by means.
+_UNEVEN = 3.0
+#: A window that is 2 or 4 times as long shows a drop better if its scaled fall, over the square
+#: root of its length, is larger by this factor: then the shorter window sees a part of the drop.
+_PARTIAL = 1.4
+#: Number of the shortest window, from 0, that shows how noise is correlated: 16 samples.
+_LEAST_SCALE = 2
+#: Peaks are separate if the scaled fall between them is less by this share of the lower one.
+_SEPARATE = 0.5
+
+
+class Candidate(NamedTuple):
+    """A fall of stress that noise does not explain.
+
+    Attributes
+    ----------
+    begins, ends : float
+        Times between which stress falls, as seen by the window.
+    window : float
+        Length of the window in time.
+    error : float
+        Standard error of the difference of two means over windows, by noise.
+    correlation : float
+        Factor by which correlation of the noise increases standard errors of means.
+    """
+
+    begins: float
+    ends: float
+    window: float
+    error: float
+    correlation: float
+
+
+class Detection(NamedTuple):
+    """Drops found in a record.
+
+    Attributes
+    ----------
+    candidates : list of Candidate
+        In the order of time.
+    noise : float
+        Standard deviation of the noise.
+    smallest : float
+        Smallest drop that is missed once in 1,000 records.
+    variation : float
+        Largest fall of the mean over a window.
+    """
+
+    candidates: list[Candidate]
+    noise: float
+    smallest: float
+    variation: float
+
+
+def spread(values: np.ndarray) -> float:
+    """Estimate a standard deviation by the median of absolute deviations."""
+    return _NORMAL * float(np.median(np.abs(values - np.median(values))))
+
+
+def quantum_of(values: np.ndarray) -> float:
+    """Return the smallest difference between neighbouring samples; infinity if all are equal."""
+    steps = np.abs(np.diff(values))
+    return float(steps[steps > 0.0].min(initial=math.inf))
+
+
+def most_frequent(values: np.ndarray) -> tuple[float, float]:
+    """Estimate mean and standard deviation of the most frequent values of a mixture.
+
+    Both are those of a Gaussian whose central 40 % lie in the shortest interval with 40 % of the
+    values.
+    """
+    ordered = np.sort(values)
+    count = max(int(_SHARE * len(ordered)), 1)
+    widths = ordered[count:] - ordered[:-count]
+    first = int(np.argmin(widths))
+    middle = 0.5 * float(ordered[first] + ordered[first + count])
+    return middle, float(widths[first]) / (2.0 * float(norm.ppf(0.5 + 0.5 * _SHARE)))
+
+
+def falls(values: np.ndarray, window: int) -> np.ndarray:
+    """Compute means of the samples before each place less means of as many samples behind it."""
+    sums = np.concatenate([[0.0], np.cumsum(values - values.mean())])
+    fallen = 2.0 * sums[window:-window] - sums[: -2 * window] - sums[2 * window :]
+    return np.asarray(fallen / window)
+
+
+def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
+    """Detect drops of stress.
+
+    Parameters
+    ----------
+    time, stress : ndarray, shape (samples,)
+
+    Returns
+    -------
+    Detection
+    """
+    t, s = _even(time, stress)
+    apart = float(t[-1] - t[0]) / (len(t) - 1)
+    windows = [SHORTEST]
+    while 2 * windows[-1] * SAMPLES <= len(s):
+        windows.append(2 * windows[-1])
+    quantum = min(quantum_of(stress), float(np.ptp(stress)))
+    looks = float(norm.isf(CHANCE / (len(s) * len(windows))))
+    scales = [_Scale(s, window, looks, quantum) for window in windows]
+    found: list[Candidate] = []
+    for number, scale in enumerate(scales):
+        for first, last in scale.peaks(scales[number + 1 : number + 3]):
+            begins, ends = float(t[max(first - 1, 0)]), float(t[min(last, len(t) - 1)])
+            length = scale.window * apart
+            reach = length if found else 0.0
+            if any(begins < one.ends + reach and one.begins - reach < ends for one in found):
+                continue
+            wider = min(max(number + 1, _LEAST_SCALE), len(scales) - 1)
+            correlation = scales[wider].correlation
+            found.append(Candidate(begins, ends, length, scale.spread, correlation))
+    best = min(scales, key=lambda scale: scale.smallest)
+    means = np.convolve(s, np.full(best.window, 1.0 / best.window), "valid")
+    variation = float((np.maximum.accumulate(means) - means).max())
+    return Detection(sorted(found), scales[-1].noise, best.smallest, variation)
+
+
+def _even(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Bring samples to even intervals of time, if their intervals differ much.
+
+    The interval is that at which half of the record was sampled or at shorter ones. Samples within
+    an interval are averaged; intervals without samples are interpolated.
+    """
+    gaps = np.diff(time)
+    if gaps.max() < _UNEVEN * gaps.min():
+        return time, stress
+    ordered = np.sort(gaps)
+    sums = np.cumsum(ordered)
+    apart = float(ordered[np.searchsorted(sums, 0.5 * sums[-1])])
+    bins = np.floor((time - time[0]) / apart + 1e-9).astype(int)
+    count = int(bins[-1]) + 1
+    if not SHORTEST * SAMPLES <= count <= 4 * len(time):
+        return time, stress
+    samples = np.bincount(bins, minlength=count)
+    has = samples > 0
+    sums_of = (np.bincount(bins, weights=of, minlength=count)[has] for of in (time, stress))
+    t, s = (of / samples[has] for of in sums_of)
+    even = time[0] + apart * (np.arange(count) + 0.5)
+    even[has] = t
+    return even, np.interp(even, t, s)
+
+
+class _Scale:
+    """Falls between windows of one length.
+
+    Parameters
+    ----------
+    stress : ndarray, shape (samples,)
+    window : int
+        Length in samples.
+    looks : float
+        Threshold in standard deviations, for all windows and places together.
+    quantum : float
+        Resolution of stress.
+    """
+
+    def __init__(self, stress: np.ndarray, window: int, looks: float, quantum: float) -> None:
+        change = falls(stress, window)
+        self.window, self.samples = window, len(stress)
+        self.usual, spread = most_frequent(change)
+        # a record without noise has that of its resolution
+        self.spread = max(spread, quantum / math.sqrt(6.0 * window))
+        # the spread itself is known from so many windows only
+        surely = 1.0 + 2.33 / math.sqrt(len(stress) / (2.0 * window))
+        self.threshold = max(looks * surely * self.spread, 2.0 * quantum)
+        self.smallest = self.threshold + FOUND * self.spread
+        self.net = change - max(0.0, self.usual)
+        lag = most_frequent(stress[window:] - stress[:-window])[1]
+        self.noise = max(lag / math.sqrt(2.0), quantum / math.sqrt(12.0))
+        # from that of white noise to that of noise which does not change within a window
+        ratio = self.spread / (self.noise or 1.0) / math.sqrt(2.0 / window)
+        self.correlation = min(max(ratio, 1.0), math.sqrt(window))
+
+    def score(self, places: np.ndarray) -> np.ndarray:
+        """Compute the scaled fall at places, over the square root of the window."""
+        at = places - self.window
+        inside = (at >= 0) & (at < len(self.net))
+        net = np.where(inside, self.net[np.clip(at, 0, len(self.net) - 1)], 0.0)
+        return np.asarray(net / (self.spread or 1.0) / math.sqrt(self.window))
+
+    def peaks(self, longer: list[_Scale]) -> list[tuple[int, int]]:
+        """Find drops, as the first sample behind their beginning and that behind their end.
+
+        Parameters
+        ----------
+        longer : list of _Scale
+            Scales of longer windows. A drop that they show better is left to them.
+        """
+        padded = np.concatenate([[0.0], self.net, [0.0]])  # so that peaks may be at the ends
+        peaks, about = find_peaks(padded, height=self.threshold, prominence=0.0)
+        peaks = peaks[about["prominences"] > _SEPARATE * padded[peaks]]
+        places = peaks - 1 + self.window
+        better = [scale.score(places) > _PARTIAL * self.score(places) for scale in longer]
+        complete = ~np.any(better, axis=0) if better else np.ones(len(peaks), dtype=bool)
+        least = min(_FOLLOWED * self.spread, self.threshold)
+        below = np.flatnonzero(padded <= least)
+        found = []
+        for peak in peaks[complete].tolist():
+            place = int(np.searchsorted(below, peak))
+            start, stop = int(below[place - 1]), int(below[place])  # in terms of `padded`
+            # a step is seen from all windows that it is in
+            begin = min(start + self.window - 1, peak - 1)
+            end = max(stop - 1 - self.window, peak - 1)
+            found.append((begin + self.window, end + self.window))
+        return found

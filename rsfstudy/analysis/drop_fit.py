@@ -1,0 +1,220 @@
+"""Sizes and times of drops of shear stress, with errors.
+
+Stress around a drop is taken for a line before it, a line during it and a line after it, which meet
+where the drop begins and ends. For each pair of these times the lines follow by least squares. The
+best pair gives the drop, highest less lowest stress. Pairs whose sum of squares is larger by less
+than a number of variances of the noise bound the times [1]_.
+
+References
+----------
+.. [1] Yao (1987), The Annals of Statistics 15, 1321-1328, for the time of a change in noise.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rsfstudy.analysis.drop_detection import Candidate
+
+#: Windows and durations on either side that are fitted, and the fewest and most samples of a side.
+_SPAN, _DURATIONS, _LEAST, _MOST = 3.0, 1.0, 16, 400
+#: Most samples of a fit; of more, means are fitted.
+_THIN = 300
+#: Windows beyond the candidate in which the drop may begin or end.
+_REACH = 2.0
+#: Times that are tried at once for beginning and end, and how often the grid is refined.
+_GRID, _REFINED = 16, 3
+#: Share of the slope of the drop that lines before and behind it must not reach.
+_STEEP = 0.3
+#: Share of the drop by which the line on one side must not fall more than that on the other side.
+_FALLS = 0.5
+#: Excess of the sum of squares, in variances of the noise, at the ends of 95 % intervals: of the
+#: time of a sudden change (twice -ln 0.0253), and of a parameter.
+_OF_TIME, _OF_SIZE = 7.4, 3.84
+#: Standard errors in half of a 95 % interval.
+HALF = 1.96
+#: Share of a sampling interval by which a time between samples is unknown.
+_BETWEEN = 0.55
+#: Samples beside a drop at an end of the record that show stress before it or after it.
+_SHOWS_END = 3
+
+
+class Drop(NamedTuple):
+    """A drop of stress, with half widths of 95 % intervals.
+
+    Attributes
+    ----------
+    begins, ends : float
+        Times at which stress is highest and lowest.
+    before, after : float
+        Highest and lowest stress.
+    begins_error, ends_error, before_error, after_error, drop_error : float
+    residual : float
+        Standard deviation of the samples about the lines.
+    starts_inside, stops_inside : bool
+        True if the record holds no stress before the drop, or none after it.
+    """
+
+    begins: float
+    ends: float
+    before: float
+    after: float
+    begins_error: float
+    ends_error: float
+    before_error: float
+    after_error: float
+    drop_error: float
+    residual: float
+    starts_inside: bool
+    stops_inside: bool
+
+
+class _Lines(NamedTuple):
+    """Least squares for pairs of times: coefficients, inverse matrices and sums of squares."""
+
+    pairs: np.ndarray
+    values: np.ndarray
+    inverse: np.ndarray
+    squares: np.ndarray
+
+    @property
+    def best(self) -> int:
+        """The first pair with the least sum of squares, but for rounding errors."""
+        return int(np.argmax(self.squares <= self.squares.min() * (1.0 + 1e-9)))
+
+
+def fit_drop(
+    time: np.ndarray,
+    stress: np.ndarray,
+    candidate: Candidate,
+    room: tuple[float, float],
+    noise: float,
+) -> Drop:
+    """Fit the lines around a drop.
+
+    Parameters
+    ----------
+    time, stress : ndarray, shape (samples,)
+    candidate : Candidate
+    room : (float, float)
+        Times of the end of the drop before and of the beginning of the next drop.
+    noise : float
+        Standard deviation of the noise.
+    """
+    rows = _rows_around(time, candidate, room)
+    every = -(-len(rows) // _THIN)
+    whole = rows[: len(rows) // every * every]
+    t, y = (of[whole].reshape(-1, every).mean(axis=1) for of in (time, stress))
+    origin, scale = float(t[0]), float(t[-1] - t[0])
+    t = (t - origin) / scale
+    begins, ends = ((at - origin) / scale for at in candidate[:2])
+    lines = _search(t, y, begins, ends, candidate.window / scale)
+    best = lines.best
+    left = float(lines.squares[best]) / max(len(t) - 6, 1)
+    variance = max(left, 0.25 * noise**2 / every) * candidate.correlation**2
+    excess = lines.squares - lines.squares[best]
+    late = np.abs(lines.pairs[excess <= _OF_TIME * variance] - lines.pairs[best]).max(axis=0)
+    sizes = lines.values[:, 0] - lines.values[:, 1]
+    spread = float(np.abs(sizes[excess <= _OF_SIZE * variance] - sizes[best]).max())
+    inverse = lines.inverse[best]
+    variances = np.array([inverse[0, 0], inverse[1, 1], inverse[:2, :2].trace()])
+    variances[2] -= 2.0 * inverse[0, 1]
+    of_before, of_after, of_drop = HALF * np.sqrt(np.maximum(variance * variances, 0.0))
+    begins, t1 = t0, _ = lines.pairs[best].tolist()
+    (early, later), gaps = np.searchsorted(t, (t0, t1), "right"), np.diff(t)
+    last = len(gaps) - 1
+    gap0, gap1 = (float(gaps[min(max(at - 1, 0), last)]) for at in (early, later))
+    if not ((t > t0) & (t < t1)).any():  # the drop is between two samples
+        begins = float(t[max(early - 1, 0)]) + 0.5 * gap0
+    return Drop(
+        begins=origin + scale * begins,
+        ends=origin + scale * t1,
+        before=float(lines.values[best, 0]),
+        after=float(lines.values[best, 1]),
+        begins_error=scale * (float(late[0]) + _BETWEEN * gap0),
+        ends_error=scale * (float(late[1]) + gap1),
+        before_error=float(of_before + spread),
+        after_error=float(of_after + spread),
+        drop_error=float(of_drop + spread),
+        residual=float(np.sqrt(left * every)),
+        starts_inside=bool(rows[0] == 0 and (t <= t0).sum() < _SHOWS_END),
+        stops_inside=bool(rows[-1] == len(time) - 1 and (t >= t1).sum() <= _SHOWS_END),
+    )
+
+
+def _rows_around(time: np.ndarray, candidate: Candidate, room: tuple[float, float]) -> np.ndarray:
+    """Select the rows around a drop, without those of its neighbours."""
+    begins, ends, window = candidate[:3]
+    reach = max(_SPAN * window, _DURATIONS * (ends - begins))
+    first = int(np.searchsorted(time, begins, "left"))
+    last = int(np.searchsorted(time, ends, "right"))
+    start = min(int(np.searchsorted(time, begins - reach)), first - _LEAST)
+    stop = max(int(np.searchsorted(time, ends + reach)), last + _LEAST)
+    start = max(start, first - _MOST, int(np.searchsorted(time, room[0])), 0)
+    stop = min(stop, last + _MOST, int(np.searchsorted(time, room[1], "right")), len(time))
+    start, stop = min(start, max(first - 2, 0)), max(stop, min(last + 2, len(time)))
+    return np.arange(start, stop)
+
+
+def _search(t: np.ndarray, y: np.ndarray, begins: float, ends: float, window: float) -> _Lines:
+    """Try pairs of times at which the drop begins and ends, finer and finer around the best."""
+    reach = max(_REACH * window, ends - begins)
+    halves = np.sort(np.concatenate([t, 0.5 * (t[1:] + t[:-1])]))
+    starts = halves[(halves >= begins - reach) & (halves < ends)]
+    stops = halves[(halves > begins) & (halves <= ends + reach)]
+    parts: list[_Lines] = []
+    for level in range(_REFINED + 1):
+        pairs = np.array([(u, v) for u in _thinned(starts) for v in _thinned(stops) if u < v])
+        if len(pairs):
+            parts.append(_lines(t, y, pairs))
+        found = parts[int(np.argmin([part.squares.min() for part in parts]))]
+        best = found.pairs[found.best]
+        near = [_near(halves, at, ends - begins + 2.0 * reach, level) for at in best]
+        starts, stops = near
+    return _Lines(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _thinned(times: np.ndarray) -> list[float]:
+    """Select some of many times, evenly."""
+    places = np.unique(np.linspace(0, len(times) - 1, _GRID).round().astype(int))
+    return [float(times[place]) for place in places] if len(times) else []
+
+
+def _near(times: np.ndarray, at: float, extent: float, level: int) -> np.ndarray:
+    """Select times near the best one, and at the finest level its neighbours."""
+    reach = extent / _GRID * (4.0 / _GRID) ** level
+    place = int(np.searchsorted(times, at))
+    around = times[max(place - _GRID // 3, 0) : place + _GRID // 3 + 1]
+    within = times[np.abs(times - at) <= 2.0 * reach]
+    return within if level < _REFINED - 1 and len(within) > len(around) else around
+
+
+def _lines(t: np.ndarray, y: np.ndarray, pairs: np.ndarray) -> _Lines:
+    """Fit three lines that meet at each pair of times.
+
+    Coefficients are the stress at both times, and slopes before and behind. Lines that fall outside
+    of the drop almost as steeply as in it, or by half as much more than on the other side, are
+    ruled out: the drop would go on.
+    """
+    t0, t1 = pairs[:, :1], pairs[:, 1:]
+    share = np.clip((t - t0) / (t1 - t0), 0.0, 1.0)
+    columns = np.stack([1.0 - share, share, np.minimum(t - t0, 0.0), np.maximum(t - t1, 0.0)], -1)
+    turned = columns.transpose(0, 2, 1)
+    normal = turned @ columns
+    # a tiny ridge: without samples on one side there is no slope to fit
+    normal += 1e-9 * np.eye(4) * len(t)
+    inverse = np.linalg.inv(normal)
+    centre = y.mean()
+    values = (inverse @ (turned @ (y - centre))[:, :, None])[:, :, 0]
+    left = y - centre - (columns @ values[:, :, None])[:, :, 0]
+    squares = np.square(left).sum(axis=1)
+    drop, lasts = values[:, 0] - values[:, 1], (t1 - t0)[:, 0]
+    goes_on = (values[:, 2:].min(axis=1) < -_STEEP * drop / lasts) | (drop <= 0.0)
+    for own, other, beside in ((2, 3, pairs[:, 0] - t[0]), (3, 2, t[-1] - pairs[:, 1])):
+        fall = np.minimum(values[:, other], 0.0) - values[:, own]
+        goes_on |= fall * np.maximum(beside, 0.0) > _FALLS * drop
+    values[:, :2] += centre
+    squares[goes_on] += 1e3 * (float(np.square(y - centre).sum()) + 1e-300)
+    return _Lines(pairs, values, inverse, squares)

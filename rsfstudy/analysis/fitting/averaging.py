@@ -1,0 +1,64 @@
+"""Noise that a data logger has averaged: its correlation, and its signature in residuals."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import cholesky_banded, solve_banded
+
+#: Variance of noise that is not averaged, relative to averaged noise: without it, notches of the
+#: spectrum would have infinite weight. And the largest number of rows within an averaging time.
+_FLOOR, _WIDEST = 0.002, 200
+
+
+class Overlap:
+    """Correlation of rows whose averaging times overlap.
+
+    Averages of white noise over a time T have the correlation ``1 - |t_i - t_j|/T``, 0 at least.
+
+    Parameters
+    ----------
+    time : ndarray, shape (rows,)
+        Times in s; a clock that begins again belongs to another window.
+    averaging : float
+        Averaging time in s.
+    """
+
+    def __init__(self, time: np.ndarray, averaging: float) -> None:
+        clock = np.concatenate([[0], np.cumsum(np.diff(time) <= 0.0)])
+        band = [np.full(len(time), 1.0 + _FLOOR)]
+        for lag in range(1, min(_WIDEST, len(time) - 1)):
+            apart = np.abs(time[lag:] - time[:-lag]) / averaging
+            overlap = np.where(clock[lag:] == clock[:-lag], np.maximum(1.0 - apart, 0.0), 0.0)
+            if not overlap.any():
+                break
+            band.append(np.append(overlap, np.zeros(lag)))
+        self.factor = cholesky_banded(np.array(band), lower=True)
+        #: Rows that one independent row stands for.
+        self.rows = float(1.0 + 2.0 * np.sum(band[1:]) / len(time))
+
+    def whitened(self, columns: np.ndarray) -> np.ndarray:
+        """Remove the correlation from columns, shape (rows, columns)."""
+        if not columns.size:
+            return columns
+        return np.asarray(solve_banded((len(self.factor) - 1, 0), self.factor, columns))
+
+    @property
+    def log_determinant(self) -> float:
+        """Logarithm of the determinant of the correlation matrix."""
+        return float(2.0 * np.sum(np.log(self.factor[0])))
+
+
+def average(time: np.ndarray, columns: np.ndarray, averaging: float) -> np.ndarray:
+    """Average columns of one clock, shape (rows, columns), over a time about each row.
+
+    Columns are linear between rows, and constant before the first and after the last row.
+    """
+    at = np.concatenate([[time[0] - averaging], time, [time[-1] + averaging]])
+    padded = np.concatenate([columns[:1], columns, columns[-1:]])
+    pieces = 0.5 * np.diff(at)[:, None] * (padded[1:] + padded[:-1])
+    sums = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(pieces, axis=0)])
+    ends = [
+        np.column_stack([np.interp(time + side, at, column) for column in sums.T])
+        for side in (0.5 * averaging, -0.5 * averaging)
+    ]
+    return np.asarray((ends[0] - ends[1]) / averaging)

@@ -1,0 +1,103 @@
+"""Filters that friction passed before it was recorded, and that the model must pass too.
+
+A filter smooths the peak of a velocity step, so a model without it gives a direct effect that is
+too small and a slip distance that is too long.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, sosfilt, sosfilt_zi
+
+from rsfstudy.errors import InvalidValue
+
+MEAN, TRAILING_MEAN = "mean", "trailing_mean"
+#: Low-pass filters, with their orders: all are Butterworth filters.
+LOW_PASS = {"first_order": 1, "butterworth_2": 2, "butterworth_4": 4}
+KINDS = (MEAN, TRAILING_MEAN, *LOW_PASS)
+#: Fewest points of a running mean, points per period of the corner frequency, periods after which a
+#: low-pass filter has settled, and largest number of points on its grid.
+_FEWEST, _POINTS, _SETTLED, _MOST = 8, 60, 3.0, 400_000
+
+
+@dataclass(frozen=True)
+class Filter:
+    """A filter of friction.
+
+    Parameters
+    ----------
+    kind : {"mean", "trailing_mean", "first_order", "butterworth_2", "butterworth_4"}
+        A running mean about each row or up to each row, or a low-pass filter.
+    size : float
+        Averaging time in s, or corner frequency in Hz.
+    """
+
+    kind: str
+    size: float
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise InvalidValue("filter", self.kind, "is unknown", choices=KINDS)
+        if not 0.0 < self.size < math.inf:
+            rule = "must be positive: an averaging time in s, or a corner frequency in Hz"
+            raise InvalidValue("filter", self.size, rule)
+
+    @classmethod
+    def parse(cls, text: str) -> Filter | None:
+        """Return the filter that a text such as "mean 1.0" describes; None for an empty text."""
+        if not text:
+            return None
+        kind, _, size = text.partition(" ")
+        try:
+            number = float(size)
+        except ValueError:
+            rule = "must be a kind of filter and its size, such as 'mean 1.0' (in s or Hz)"
+            raise InvalidValue("filter", text, rule, choices=KINDS) from None
+        return cls(kind, number)
+
+    def sample_times(self, time: np.ndarray) -> np.ndarray:
+        """Return the times, in s, at which unfiltered friction is needed for these rows."""
+        if self.kind in LOW_PASS:
+            return self._grid(time)
+        return np.unique(time[:, None] + self._offsets(time))
+
+    def apply(self, time: np.ndarray, samples: np.ndarray) -> np.ndarray:
+        """Filter friction.
+
+        Parameters
+        ----------
+        time : ndarray, shape (rows,)
+            Times of the rows in s.
+        samples : ndarray
+            Unfiltered friction at `sample_times(time)`.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+        """
+        at = self.sample_times(time)
+        if self.kind not in LOW_PASS:
+            places = np.searchsorted(at, time[:, None] + self._offsets(time))
+            return np.asarray(samples[places].mean(axis=1))
+        rate = 1.0 / float(at[1] - at[0])
+        sections = butter(LOW_PASS[self.kind], self.size, fs=rate, output="sos")
+        begin = sosfilt_zi(sections) * samples[0]  # steady before the first row
+        return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
+
+    def _offsets(self, time: np.ndarray) -> np.ndarray:
+        """Return the offsets, in s, of the points of a running mean.
+
+        If rows are closer than the averaging time, the points are as far apart as the rows.
+        """
+        count = max(round(self.size / float(np.median(np.diff(time)))), 1)
+        count *= max(math.ceil(_FEWEST / count), 1) if count < _FEWEST // 2 else 1
+        middle = 0.5 if self.kind == MEAN else 1.0
+        return np.asarray(self.size * ((np.arange(count) + 0.5) / count - middle))
+
+    def _grid(self, time: np.ndarray) -> np.ndarray:
+        first = float(time[0]) - _SETTLED / self.size
+        finest = max(1.0 / (_POINTS * self.size), (time[-1] - first) / _MOST)
+        return np.arange(first, float(time[-1]) + 2.0 * finest, finest)

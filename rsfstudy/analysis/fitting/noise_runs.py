@@ -1,0 +1,156 @@
+"""Runs of rows that share a sampling interval and a noise level.
+
+Sampling intervals are classified by their running mean, so that a clock with jitter belongs to
+one class. Changes of the noise level are found by binary segmentation of the whitened residuals.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+#: Sampling intervals whose ratio is smaller than this factor belong to one class.
+_ALIKE = 2.0
+#: Rows of the running mean of sampling intervals, fewest rows of a class with a noise process of
+#: its own, and fewest rows of a run.
+_MEAN, _RARE, _SHORT = 15, 100, 30
+#: Fewest rows with a noise level of their own, and as a fraction of the record; the least squared
+#: change of the mean logarithm at a change of the level, in its variances and over ln n; and the
+#: largest number of changes.
+_FEWEST, _FRACTION, _GAIN, _MOST = 30, 0.08, 3.0, 7
+#: Variance of the logarithm of the absolute value of Gaussian noise, and the least difference of
+#: rows relative to the root mean square.
+_LOG_VARIANCE, _LEAST = math.pi**2 / 8.0, 0.01
+
+
+class Run(NamedTuple):
+    """Consecutive rows with one sampling interval and one noise level.
+
+    Attributes
+    ----------
+    first, last : int
+        First row, and the row after the last.
+    number : int
+        Index of the noise process.
+    before : int
+        Number of earlier rows on the same clock.
+    level : int
+        Index of the noise level.
+    """
+
+    first: int
+    last: int
+    number: int
+    before: int
+    level: int
+
+
+def find_runs(time: np.ndarray) -> tuple[Run, ...]:
+    """Find the runs of rows with one sampling interval.
+
+    Another run begins if the clock starts again, as it does in joint fits. The noise level of a run
+    has the index of its process.
+    """
+    kinds, begins = _classify_intervals(time), np.diff(time) <= 0.0
+    bounds = (np.flatnonzero((np.diff(kinds) != 0) | begins) + 1).tolist()
+    found, begun = [], 0
+    for first, last in itertools.pairwise([0, *bounds, len(time)]):
+        begun = first if first and begins[first - 1] else begun
+        found.append(Run(first, last, int(kinds[first]), first - begun, int(kinds[first])))
+    return tuple(found)
+
+
+def split_runs(runs: Sequence[Run], knots: Sequence[int]) -> tuple[Run, ...]:
+    """Split runs at the rows where the noise level changes; each segment has levels of its own."""
+    found: list[Run] = []
+    levels: dict[tuple[int, int], int] = {}
+    for run in runs:
+        inside = [k for k in knots if run.first + _SHORT <= k <= run.last - _SHORT]
+        for first, last in itertools.pairwise([run.first, *inside, run.last]):
+            segment = sum(k <= first for k in knots)
+            level = levels.setdefault((segment, run.number), len(levels))
+            found.append(Run(first, last, run.number, run.before + first - run.first, level))
+    return tuple(found)
+
+
+def count_processes(runs: Sequence[Run]) -> int:
+    """Return the number of noise processes."""
+    return 1 + max(run.number for run in runs)
+
+
+def index_rows(runs: Sequence[Run], field: str) -> np.ndarray:
+    """Return the process (`"number"`) or the noise level (`"level"`) of each row."""
+    return np.repeat([getattr(run, field) for run in runs], [run.last - run.first for run in runs])
+
+
+def find_level_changes(innovations: np.ndarray, smallest: float = 0.0) -> list[int]:
+    """Find the rows where the standard deviation of white noise changes.
+
+    The logarithms of absolute differences of successive rows are segmented. A misfit of the model
+    near a step is smooth or short, so it changes few of them; a change of the noise level changes
+    all.
+
+    Parameters
+    ----------
+    innovations : ndarray, shape (rows,)
+        Whitened residuals.
+    smallest : float
+        Differences that are smaller count as this difference.
+
+    Returns
+    -------
+    list of int
+        First rows of the second and later segments.
+    """
+    count, size = len(innovations), np.abs(np.diff(innovations, prepend=0.0))
+    shortest = max(_FEWEST, math.ceil(_FRACTION * count))
+    least = _LEAST * float(np.sqrt(np.mean(np.square(size)))) or 1.0
+    logs = np.log(np.maximum(size, max(least, smallest)))
+    sums = np.concatenate([[0.0], np.cumsum(logs - logs.mean())])
+    segments, found = [(0, count)], []
+    while segments:
+        first, last = segments.pop()
+        at = np.arange(first + shortest, last - shortest + 1)
+        if not len(at):
+            continue
+        apart = (sums[at] - sums[first]) / (at - first) - (sums[last] - sums[at]) / (last - at)
+        gains = (at - first) * (last - at) / (last - first) * np.square(apart) / _LOG_VARIANCE
+        best = int(np.argmax(gains))
+        if gains[best] > _GAIN * math.log(count):
+            found.append((float(gains[best]), int(at[best])))
+            segments += [(first, int(at[best])), (int(at[best]), last)]
+    return sorted(row for _gain, row in sorted(found, reverse=True)[:_MOST])
+
+
+def _classify_intervals(time: np.ndarray) -> np.ndarray:
+    """Classify the sampling interval of each row: 0, 1 and so on."""
+    gaps = np.diff(time)
+    gaps[gaps <= 0.0] = np.median(gaps)
+    smooth = np.log(uniform_filter1d(gaps, min(_MEAN, len(gaps)), mode="nearest"))
+    kinds = np.rint((smooth - np.median(smooth)) / math.log(_ALIKE))
+    kinds = np.append(kinds[:1], kinds)
+    lasts = np.diff([0, *(np.flatnonzero(np.diff(kinds)) + 1), len(kinds)])
+    steady = np.repeat(lasts, lasts) >= _SHORT
+    names, counts = np.unique(kinds[steady], return_counts=True)
+    rows = np.flatnonzero(steady & np.isin(kinds, names[counts >= _RARE]))
+    if not len(rows):
+        return np.zeros(len(time), dtype=int)
+    nearest = np.minimum(np.searchsorted(rows, np.arange(len(time))), len(rows) - 1)
+    found = np.unique(kinds[rows[nearest]], return_inverse=True)[1]
+    for row in (np.flatnonzero(np.diff(found)) + 1).tolist():
+        at = _refine_boundary(np.log(gaps), row)
+        found[min(row, at) : max(row, at)] = found[row - 1 if at > row else row]
+    return np.asarray(found)
+
+
+def _refine_boundary(logs: np.ndarray, row: int) -> int:
+    """Find the row near another one where sampling intervals change, by least squares."""
+    first, last = max(row - 1 - 2 * _MEAN, 0), min(row - 1 + 2 * _MEAN, len(logs))
+    part = logs[first:last]
+    costs = [np.var(part[:k]) * k + np.var(part[k:]) * (len(part) - k) for k in range(1, len(part))]
+    return first + 2 + int(np.argmin(costs))

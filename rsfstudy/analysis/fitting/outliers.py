@@ -1,0 +1,75 @@
+"""Outliers of a record, and the quantum to which its values are rounded."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import maximum_filter, rank_filter
+
+#: Neighbours on each side whose median is compared with a row, and rows of a block with a scale of
+#: its own.
+_REACH, _BLOCK = 3, 100
+#: Standard deviations beyond which a row is an outlier, and the same in deviations of the model
+#: from its own median of neighbours: a misfit at a peak of the model is no outlier.
+_FAR, _PEAKED = 6.0, 2.0
+#: Standard deviation of Gaussian noise over its median absolute deviation.
+_NORMAL = 1.4826
+#: Largest misfit of a grid of values, relative to its quantum.
+_GRID = 0.02
+
+
+def find_quantum(values: np.ndarray) -> float:
+    """Find the quantum of which values are multiples, apart from an offset.
+
+    Returns
+    -------
+    float
+        0 if the values do not lie on a grid.
+    """
+    distinct = np.unique(values)
+    gaps = np.diff(distinct)
+    gaps = gaps[gaps > 1e-12 * max(abs(distinct[0]), abs(distinct[-1]))]
+    if not len(gaps):
+        return 0.0
+    multiples = (distinct - distinct[0]) / gaps.min()
+    quantum = float(gaps.min() * multiples[-1] / max(np.rint(multiples[-1]), 1.0))
+    multiples = (distinct - distinct[0]) / quantum
+    return quantum if np.abs(multiples - np.rint(multiples)).max() < _GRID else 0.0
+
+
+def find_kept_rows(residuals: np.ndarray, curve: np.ndarray, quantum: float) -> np.ndarray | None:
+    """Find the rows that are no outliers.
+
+    An outlier is a row whose residual differs from the median of the neighbouring residuals by more
+    than six local standard deviations, and by more than twice what the model differs from its own.
+
+    Parameters
+    ----------
+    residuals, curve : ndarray, shape (rows,)
+        Of a fit, and its friction.
+    quantum : float
+        To which friction is rounded.
+
+    Returns
+    -------
+    ndarray of bool, shape (rows,), or None
+        None if there are no outliers.
+    """
+    off = residuals - _median_of_neighbours(residuals)
+    blocks = np.array_split(np.abs(off), max(len(off) // _BLOCK, 1))
+    least = max(0.5 * quantum, 0.1 * _NORMAL * float(np.median(np.abs(off))))
+    scales = [max(_NORMAL * float(np.median(block)), least) for block in blocks]
+    # the noise level may change within a block, and then one of the neighbours has that level
+    scale = np.repeat(maximum_filter(scales, 3), [len(block) for block in blocks])
+    peaked = maximum_filter(np.abs(curve - _median_of_neighbours(curve)), 2 * _REACH + 1)
+    found = np.abs(off) > np.maximum(_FAR * scale, _PEAKED * peaked)
+    return ~found if found.any() and scale.min() > 0.0 else None
+
+
+def _median_of_neighbours(values: np.ndarray) -> np.ndarray:
+    """Compute the median of the neighbours of each row, without the row itself."""
+    around = np.ones(2 * _REACH + 1, dtype=bool)
+    around[_REACH] = False
+    lower, upper = (
+        rank_filter(values, rank, footprint=around, mode="mirror") for rank in (_REACH - 1, _REACH)
+    )
+    return np.asarray(0.5 * (lower + upper))

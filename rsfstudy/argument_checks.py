@@ -1,0 +1,323 @@
+"""Checks of arguments against the annotations of a signature.
+
+A public function that fails with an error of Python uses them to name the argument that is
+responsible: the functions themselves accept whatever behaves like the annotated type.
+"""
+
+from __future__ import annotations
+
+import inspect
+import itertools
+import math
+import os
+import sys
+import types
+import typing
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any, ForwardRef, Literal, TypeVar, Union
+
+from rsfstudy.errors import InvalidValue, brief
+
+#: Largest number of items of a list that is passed as an argument. A `range` and an array that
+#: repeats one value can be longer than anything that fits in memory.
+MOST_ITEMS = 2**20
+#: Number of items of an argument, and of levels of nesting, that the checks look at.
+_ITEMS, _LEVELS = 1000, 4
+#: Modules that annotations name by an alias.
+_ALIASES = {"xr": "xarray", "pd": "pandas", "np": "numpy"}
+#: Names of plain types in messages.
+_WORDS: Mapping[Any, str] = {
+    str: "a text",
+    bool: "True or False",
+    int: "a whole number",
+    float: "a number",
+    Path: "a path",
+    type(None): "None",
+    type: "a class",
+    object: "an object",
+}
+
+
+def check_lengths(arguments: Mapping[str, Any]) -> None:
+    """Reject a `range`, or an array that repeats one value, with more than `MOST_ITEMS` items.
+
+    The other checks would never end.
+
+    Raises
+    ------
+    InvalidValue
+        Naming the argument.
+    """
+    for name, value in arguments.items():
+        for part in _parts(value, _LEVELS):
+            if _is_endless(part):
+                rule = f"has more than {MOST_ITEMS:,} items"
+                raise InvalidValue(name, part, rule, remedy="Pass a shorter list.")
+
+
+def find_text_for_list(
+    function: Callable[..., Any], arguments: Mapping[str, Any], error: Exception
+) -> InvalidValue | None:
+    """Return the error for the first text in the place of a list of texts, if any.
+
+    The function takes its characters for the items, and complains about one of them.
+    """
+    for name, value, annotation in _annotated(function, arguments):
+        blamed = getattr(error, "value", None)
+        if not isinstance(value, str) or (isinstance(blamed, str) and blamed == value):
+            continue
+        if _is_list_of_texts(annotation) and not is_match(value, annotation):
+            rule, remedy = f"must be {describe_type(annotation)}", f"Write [{brief(value)!r}]."
+            return InvalidValue(name, value, rule, remedy=remedy)
+    return None
+
+
+def find_mismatch(
+    function: Callable[..., Any], arguments: Mapping[str, Any], remedy: str
+) -> InvalidValue | None:
+    """Return the error for the first argument that does not match its annotation, if any.
+
+    Parameters
+    ----------
+    function : callable
+        The function that failed.
+    arguments : mapping of str to value
+        Its arguments, as `inspect.BoundArguments` holds them.
+    remedy : str
+        Last sentence of the message.
+    """
+    for name, value, annotation in _annotated(function, arguments):
+        if not is_match(value, annotation):
+            rule = f"must be {describe_type(annotation)}"
+            return InvalidValue(name, value, rule, remedy=remedy)
+    return None
+
+
+def find_unusable(
+    arguments: Mapping[str, Any], error: Exception, remedy: str
+) -> InvalidValue | None:
+    """Return the error for the first argument that explains an exception by its value, if any.
+
+    Such a value is a number that is not finite or too large, a text that no file can hold, an
+    index out of range, or a function that fails.
+    """
+    for name, value in arguments.items():
+        for part in _parts(value, _LEVELS):
+            if isinstance(part, float) and not math.isfinite(part):
+                return InvalidValue(name, value, "must be finite", remedy=remedy)
+            if isinstance(part, int) and abs(part) >= 2**63:
+                return InvalidValue(name, value, "is too large a number", remedy=remedy)
+            if isinstance(part, str) and not _is_encodable(part):
+                return InvalidValue(name, value, "must be a text that UTF-8 can hold")
+        if isinstance(error, OSError) and _is_part(value, error.filename):
+            rule = f"cannot be the name of a file: {error.strerror}"
+            return InvalidValue(name, value, rule, remedy=remedy)
+        if isinstance(error, IndexError) and isinstance(value, Integral):
+            return InvalidValue(name, value, "is out of range", remedy=remedy)
+        if isinstance(value, str) and value == _missing(error):
+            return InvalidValue(name, value, "is unknown", remedy=remedy)
+        if name != "self" and callable(value) and _has_failed(value, error):
+            rule = f"fails when it is called ({type(error).__name__}: {brief(error)})"
+            return InvalidValue(name, value, rule, remedy=remedy)
+    return None
+
+
+def _is_part(value: object, path: object) -> bool:
+    """Return True if a text or a path is part of a longer path."""
+    is_path = isinstance(value, str | os.PathLike) and isinstance(path, str | os.PathLike)
+    return is_path and str(value) in str(path)
+
+
+def _missing(error: Exception) -> object:
+    """Return the name that a KeyError or an AttributeError did not find, or None."""
+    if isinstance(error, KeyError) and error.args:
+        return error.args[0]
+    return getattr(error, "name", None)
+
+
+def _has_failed(function: Callable[..., Any], error: Exception) -> bool:
+    """Return True if an exception was raised in a function, or by a call that does not fit it."""
+    code, trace = getattr(function, "__code__", None), error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code is code:
+            return True
+        trace = trace.tb_next
+    return isinstance(error, TypeError)
+
+
+def is_match(value: object, annotation: Any, levels: int = _LEVELS) -> bool:
+    """Return True if a value has an annotated type, or behaves like one.
+
+    Lists, tuples and arrays are interchangeable, as are the numbers of Python and NumPy. A flag is
+    not a number.
+    """
+    origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
+    if annotation is Any or isinstance(annotation, TypeVar | ForwardRef | str) or not levels:
+        return True
+    if origin in (Union, types.UnionType):
+        return any(is_match(value, each, levels) for each in arguments)
+    if origin is Literal:
+        return any(type(value) is type(each) and value == each for each in arguments)
+    if origin is not None:
+        return _is_container(value, origin, arguments, levels - 1)
+    if annotation in (bool, int, float):
+        return _is_number(value, annotation)
+    if annotation is Path:
+        return isinstance(value, str | os.PathLike)
+    if annotation is None:
+        return value is None
+    return isinstance(value, annotation) if isinstance(annotation, type) else True
+
+
+def describe_type(annotation: Any) -> str:
+    """Return an annotated type as a phrase: "a text", "a list of numbers" and so on."""
+    origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin in (Union, types.UnionType):
+        words = list(dict.fromkeys(describe_type(each) for each in arguments))
+        return " or ".join(filter(None, (", ".join(words[:-1]), words[-1])))
+    if origin is Literal:
+        return f"one of {', '.join(map(repr, arguments))}"
+    if origin is type:
+        return "a class"
+    kind = origin or annotation
+    if kind in _WORDS:
+        return _WORDS[kind]
+    if kind is Callable or not isinstance(kind, type):
+        return "a function"
+    is_plain = kind.__module__ in ("builtins", "collections", "collections.abc")
+    if is_plain and issubclass(kind, Mapping):
+        return "a mapping"
+    if kind is tuple and arguments and Ellipsis not in arguments:
+        return f"a tuple of ({', '.join(map(describe_type, arguments))})"
+    if is_plain and issubclass(kind, Iterable):
+        items = [describe_type(each) for each in arguments[:1] if each is not Any]
+        return "a list" + "".join(f" in which each item is {item}" for item in items)
+    package = kind.__module__.partition(".")[0]
+    name = f"{package}.{kind.__name__}"
+    return f"an {name}" if name[0] in "aeioux" else f"a {name}"
+
+
+def _is_number(value: object, kind: type) -> bool:
+    name = type(value).__name__
+    is_flag = name in ("bool", "bool_")  # of Python or NumPy
+    if kind is bool or is_flag:
+        return kind is bool and is_flag
+    if not isinstance(value, Real) or name == "timedelta64":  # an integer according to NumPy
+        return False
+    return kind is float or isinstance(value, Integral)
+
+
+def _is_container(value: object, origin: Any, arguments: tuple[Any, ...], levels: int) -> bool:
+    """Return True if a value is a container of the kind `origin`, with items of these types."""
+    if not isinstance(origin, type) or issubclass(origin, type):
+        return isinstance(value, type)
+    if origin in (Callable, typing.get_origin(Callable[..., Any])):
+        return callable(value)
+    if issubclass(origin, Mapping):
+        if not isinstance(value, Mapping):
+            return False
+        pairs = itertools.islice(value.items(), _ITEMS)
+        return not arguments or all(
+            is_match(key, arguments[0], levels) and is_match(item, arguments[1], levels)
+            for key, item in pairs
+        )
+    if not issubclass(origin, Iterable):
+        return isinstance(value, origin)
+    if not _is_listed(value, origin):
+        return False
+    items = list(itertools.islice(typing.cast(Iterable[Any], value), _ITEMS))
+    if origin is tuple and arguments and Ellipsis not in arguments:
+        return len(items) == len(arguments) and all(
+            is_match(item, each, levels) for item, each in zip(items, arguments, strict=True)
+        )
+    return all(is_match(item, arguments[0], levels) for item in items if arguments)
+
+
+def _is_listed(value: object, origin: type) -> bool:
+    if isinstance(value, str | bytes):
+        return False
+    if hasattr(value, "ndim"):  # an array, or a series of pandas
+        return bool(value.ndim)
+    if issubclass(origin, Sequence | tuple):
+        return isinstance(value, Sequence)
+    return isinstance(value, Collection if issubclass(origin, Collection) else Iterable)
+
+
+def _is_list_of_texts(annotation: Any) -> bool:
+    """Return True if one of the types of an annotation is a list whose items may be texts."""
+    origin, items = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin in (Union, types.UnionType):
+        return any(map(_is_list_of_texts, items))
+    return origin in (Sequence, Collection, Iterable, list, tuple) and is_match("", items[0])
+
+
+def _annotated(
+    function: Callable[..., Any], arguments: Mapping[str, Any]
+) -> Iterator[tuple[str, Any, Any]]:
+    """Yield the name, the value and the annotation of each argument."""
+    for name, parameter in inspect.signature(function).parameters.items():
+        if name not in arguments or parameter.annotation is parameter.empty or name == "self":
+            continue
+        value, annotation = arguments[name], _resolve(function, parameter.annotation)
+        if parameter.kind is parameter.VAR_KEYWORD:
+            yield from ((key, each, annotation) for key, each in value.items())
+        elif parameter.kind is parameter.VAR_POSITIONAL:
+            yield from ((name, each, annotation) for each in value)
+        elif value is not parameter.default:
+            yield name, value, annotation
+
+
+class _Names(dict[str, Any]):
+    """Names that an annotation may use: those of its module, and classes that are loaded later."""
+
+    def __missing__(self, name: str) -> Any:
+        module = sys.modules.get(_ALIASES.get(name, ""))
+        if module is not None:
+            return module
+        for home, module in list(sys.modules.items()):
+            found = vars(module).get(name) if home.startswith("rsfstudy.") else None
+            if isinstance(found, type) and found.__name__ == name:
+                return found
+        raise KeyError(name)
+
+
+def _resolve(function: Callable[..., Any], annotation: Any) -> Any:
+    """Return an annotation as types; Any if it names types that are not loaded."""
+    annotation = getattr(annotation, "__forward_arg__", annotation)
+    if not isinstance(annotation, str):
+        return annotation
+    known = getattr(inspect.unwrap(function), "__globals__", {})
+    names = {name: kind for name, kind in known.items() if kind is not Any or name == "Any"}
+    try:
+        return eval(annotation, {}, _Names(names))
+    except (NameError, AttributeError, TypeError):
+        return Any
+
+
+def _parts(value: object, levels: int) -> Iterator[Any]:
+    """Yield a value and, if it is a list or a mapping, its first items, level by level."""
+    yield value
+    if not levels or isinstance(value, range):
+        return
+    if isinstance(value, Mapping):
+        value = list(itertools.islice(value.values(), _ITEMS))
+    if isinstance(value, list | tuple | set | frozenset):
+        for item in itertools.islice(value, _ITEMS):
+            yield from _parts(item, levels - 1)
+
+
+def _is_endless(value: Any) -> bool:
+    """Return True if a value takes no memory for its items and has more than `MOST_ITEMS`."""
+    if isinstance(value, range):
+        return bool(value) and (value[-1] - value[0]) // value.step >= MOST_ITEMS
+    is_array = type(value).__module__ == "numpy" and hasattr(value, "strides")
+    return is_array and 0 in value.strides and value.size > MOST_ITEMS
+
+
+def _is_encodable(text: str) -> bool:
+    try:
+        return "\0" not in text.encode().decode()
+    except UnicodeError:
+        return False

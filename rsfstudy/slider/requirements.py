@@ -1,0 +1,118 @@
+"""Check that a scene provides the quantities that the rates of its parts need.
+
+The functions of a part receive the quantities that its slot lists as `receives`. Other quantities
+follow from those if effective normal stress never changes: shear stress is then the friction
+coefficient times the constant normal stress. A part that lists further quantities as `needs` is
+refused in any other scene, because its rates would use wrong values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rsfstudy.errors import InvalidValue
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.parts import Part, Scene
+
+SLIP_RATE, STATE, FRICTION_COEFFICIENT = "slip_rate", "state", "friction_coefficient"
+SHEAR_STRESS, NORMAL_STRESS = "shear_stress", "normal_stress"
+PORE_PRESSURE, EFFECTIVE_NORMAL_STRESS = "pore_pressure", "effective_normal_stress"
+
+#: The quantities that a part may need.
+QUANTITIES: Mapping[str, str] = {
+    SLIP_RATE: "ln(V/V_*)",
+    STATE: "the states of the law",
+    FRICTION_COEFFICIENT: "tau/sigma = mu_* + a ln(V/V_*) + the sum of the states",
+    SHEAR_STRESS: "frictional shear stress tau over sigma_*",
+    NORMAL_STRESS: "normal stress over sigma_*",
+    PORE_PRESSURE: "pore pressure above that of the surroundings, over sigma_*",
+    EFFECTIVE_NORMAL_STRESS: "normal stress less pore pressure, over sigma_*",
+}
+#: Quantities that the functions of a law receive; the friction coefficient is a sum of the others.
+LAW_RECEIVES = frozenset({SLIP_RATE, STATE, FRICTION_COEFFICIENT})
+#: Quantities that follow from others.
+_FOLLOWS: Mapping[str, frozenset[str]] = {
+    EFFECTIVE_NORMAL_STRESS: frozenset({NORMAL_STRESS, PORE_PRESSURE}),
+    SHEAR_STRESS: frozenset({FRICTION_COEFFICIENT, NORMAL_STRESS, PORE_PRESSURE}),
+}
+
+
+def check_declaration(slot: str, part: type[Part]) -> None:
+    """Raise InvalidValue if `needs` of a user-defined part is not a collection of known names."""
+    needs: Any = part.needs
+    if isinstance(needs, str):
+        raise InvalidValue("needs", needs, "must be a set of names", remedy=f"Write {{{needs!r}}}.")
+    for name in needs:
+        if name not in QUANTITIES:
+            rule = f"is not a quantity that rates of the {slot} {part.name} can need"
+            raise InvalidValue("needs", name, rule, choices=QUANTITIES)
+
+
+def check_needs(scene: Scene) -> None:
+    """Raise InvalidValue if a part needs a quantity that the scene does not provide to it."""
+    for slot, part in zip(scene.parts._fields, scene.parts, strict=True):
+        missing = sorted(set(part.needs) - provided(scene, part)) if part.needs else []
+        if missing:
+            raise _refusal(scene, slot, part, missing)
+
+
+def provided(scene: Scene, part: Part) -> frozenset[str]:
+    """Return the quantities that the functions of a part receive, or that follow from these.
+
+    Parameters
+    ----------
+    scene : Scene
+    part : Part
+        One of its parts.
+    """
+    constant = {NORMAL_STRESS, PORE_PRESSURE} - {change.quantity for change in _changes(scene)}
+    found = constant | part.receives
+    if part is scene.parts.law and scene.parts.law.regularised:
+        found -= {FRICTION_COEFFICIENT}  # that of forward slip does not hold where slip reverses
+    return frozenset(found | {name for name, terms in _FOLLOWS.items() if found >= terms})
+
+
+class _Change(NamedTuple):
+    """A field of a scene because of which a quantity is not known to rates, and its remedy."""
+
+    quantity: str
+    cause: str
+    remedy: str
+
+
+def _changes(scene: Scene) -> list[_Change]:
+    """Return the fields of a scene by which normal stress or friction is not that of a constant."""
+    parts, found = scene.parts, []
+    if parts.normal_stress.normal_stress is not None:
+        cause = f"normal_stress={parts.normal_stress.name!r}"
+        found.append(_Change(NORMAL_STRESS, cause, "set normal_stress='constant'"))
+    if parts.loading.imposes:
+        cause = f"the loading {parts.loading.name!r}"
+        remedy = "leave normal stress and pore pressure out of the loading"
+        found += [_Change(name, cause, remedy) for name in (NORMAL_STRESS, PORE_PRESSURE)]
+    if parts.fluid.unknowns:
+        cause = f"fluid={parts.fluid.name!r}"
+        found.append(_Change(PORE_PRESSURE, cause, "set fluid='drained'"))
+    if parts.law.regularised:
+        cause = "regularised=True"
+        found.append(_Change(FRICTION_COEFFICIENT, cause, "set regularised=False"))
+    return found
+
+
+def _refusal(scene: Scene, slot: str, part: Part, missing: list[str]) -> InvalidValue:
+    """Return the error for a part whose rates need quantities that they do not receive."""
+    known = provided(scene, part)
+    # terms that are missing, of which a change of the scene may be the cause
+    wanted = set[str]().union(*(_FOLLOWS.get(name, {name}) for name in missing)) - known
+    changes = [change for change in _changes(scene) if change.quantity in wanted]
+    causes = "with " + " and ".join(dict.fromkeys(change.cause for change in changes))
+    remedies = ", ".join(dict.fromkeys(change.remedy for change in changes))
+    if wanted > {change.quantity for change in changes}:
+        causes, remedies = "in any scene", "write the unknown as a state of a law"
+    named = " and ".join(missing)
+    rule = f"needs {named}, which its rates do not receive {causes}: they receive "
+    rule += ", ".join(sorted(known)) or "no quantity"
+    remedy = f"{remedies[:1].upper()}{remedies[1:]}, or use a part that does not need {named}."
+    return InvalidValue(slot, part.name, rule, remedy=remedy)
