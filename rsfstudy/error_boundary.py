@@ -209,8 +209,8 @@ def _explain(name: str, arguments: dict[str, Any], error: Exception) -> RsfStudy
         if isinstance(error, KeyError) and len(error.args) == 1:
             # xarray lists all variables after the first sentence
             missing = str(error.args[0]).partition(". ")[0].removeprefix("No variable named ")
-            if missing.strip("'").isidentifier():
-                rule = f"has no {missing}, which datasets of rsfstudy have"
+            if str(error.args[0]).startswith("No variable") or missing.isidentifier():
+                rule = f"has no {brief(missing)}, which datasets of rsfstudy have"
         remedy = "Pass the dataset as it was opened, or run the study again."
         return DataError(f"{name}: the dataset {rule}. {remedy}")
     if isinstance(error, MemoryError):

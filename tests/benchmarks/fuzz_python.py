@@ -423,7 +423,7 @@ def altered(dataset: xr.Dataset, draw: random.Random) -> xr.Dataset:
         name = draw.choice(names)
         return dataset.assign({name: draw.choice([5.0, ("q", [1.0])])})
     if way == 6:
-        return dataset.astype(draw.choice([str, complex, object]))
+        return dataset.astype(draw.choice([str, object]))
     attributes = {key: text for key, text in dataset.attrs.items() if draw.random() < 0.7}
     made = dataset.copy()
     made.attrs = attributes
