@@ -85,7 +85,10 @@ def guard_methods(kind: C) -> C:
 
 
 class CheckedKeywords:
-    """Base of declarations that reports unknown keywords together with the valid ones.
+    """Base of classes from which users derive their own, for example measures.
+
+    It reports unknown keywords of a derived class, which `guard_methods` has not seen, together
+    with the valid ones.
 
     Raises
     ------
@@ -99,9 +102,7 @@ class CheckedKeywords:
         valid = _parameters(kind)
         for name in keywords if valid else ():
             if name not in valid:
-                text = f"{cls.__name__}() has no parameter {brief(name)!r}."
-                text += f"{_suggest(name, valid)} It takes {', '.join(valid)}."
-                raise CallError(text)
+                raise _unknown_keyword(cls.__name__, name, valid)
         return super().__new__(cls)
 
 
@@ -141,8 +142,11 @@ def _enclose(
             return signature.bind(*args, **options).arguments
         except TypeError as error:
             names = [n for n in signature.parameters if n not in ("self", "cls", "_cls")]
-            text = f"{name}() {brief(error)}; it takes {', '.join(names) or 'nothing'}."
-            raise CallError(text + _suggest(next(reversed(options), ""), names)) from None
+            unknown = [keyword for keyword in options if keyword not in names]
+            if unknown:
+                raise _unknown_keyword(name, unknown[0], names) from None
+            text = f"{name}() {brief(error)}. It takes {', '.join(names) or 'nothing'}."
+            raise CallError(text) from None
 
     @functools.wraps(function)
     def answer(*args: P.args, **options: P.kwargs) -> T:
@@ -177,11 +181,13 @@ def _enclose(
     return answer
 
 
-def _suggest(name: str, valid: Iterable[str]) -> str:
-    """Return the valid name that resembles a name, as a sentence; empty if none does."""
+def _unknown_keyword(name: str, keyword: str, valid: Iterable[str]) -> CallError:
+    """Return the error for a keyword that a function or a class does not take."""
     names = list(valid)
-    close = [] if name in names else difflib.get_close_matches(brief(name), names, n=1)
-    return "".join(f" Did you mean {each!r}?" for each in close)
+    close = difflib.get_close_matches(brief(keyword), names, n=1)
+    hint = "".join(f" Did you mean {each!r}?" for each in close)
+    takes = ", ".join(names) or "nothing"
+    return CallError(f"{name}() has no parameter {brief(keyword)!r}.{hint} It takes {takes}.")
 
 
 def _is_internal() -> bool:

@@ -335,6 +335,13 @@ def test_a_style_in_which_nothing_can_be_drawn_is_named(settings, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_variable_is_drawn_if_the_study_declares_the_figure_of_fits():
+    """The name of the figure is known, but the figure is not the one that was asked for."""
+    dataset = lattice(RATES, plot="fits")
+    drawn = rsfstudy.plot(dataset, variable="critical_stiffness")
+    assert len(drawn.axes[0].lines) == 1
+
+
 def test_a_font_that_is_missing_is_named_once(tmp_path, monkeypatch):
     sheet = tmp_path / "mine.mplstyle"
     sheet.write_text("font.family: No Such Font\n")

@@ -162,6 +162,28 @@ def test_attributes_of_a_motion_are_checked(tmp_path: Path) -> None:
         store.read_any(tmp_path / "motion.nc")
 
 
+def test_texts_along_a_motion_are_refused(tmp_path: Path) -> None:
+    motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=1.0, rtol=1e-3)
+    size = motion["slip"].size
+    motion["shear_stress"] = (motion["slip"].dims, np.array(["x"] * size, dtype=object))
+    store.write(motion, tmp_path / "motion.nc")
+    with pytest.raises(DataError, match="shear_stress is .*, and must be numbers"):
+        store.read_any(tmp_path / "motion.nc")
+
+
+@pytest.mark.parametrize("name", ["normal_stress_ratio", "frictional_stress", "time"])
+def test_a_motion_without_a_variable_that_is_drawn_names_it(name: str) -> None:
+    motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=1.0, rtol=1e-3)
+    with pytest.raises(DataError, match="(normal_stress|frictional_stress|time) is missing: it"):
+        rsfstudy.picture(motion.drop_vars(name))
+
+
+def test_a_lattice_with_the_same_point_twice_is_refused(tiny, tmp_path: Path) -> None:
+    store.write(tiny.isel(load_velocity_ratio=[0, 0, 2]), tmp_path / "tiny.nc")
+    with pytest.raises(DataError, match="load_velocity_ratio has the same value more than once"):
+        rsfstudy.open(tmp_path / "tiny.nc")
+
+
 # ---- long names ----------------------------------------------------------------------------------
 
 TOO_LONG = "a" * 300

@@ -138,6 +138,10 @@ MADE = {
 }
 
 
+#: Forms whose files hold the same as those of another form: "run" and "open a store".
+ALIKE = ("run into a file", "run into a store", "open", "Backend.open_dataset")
+
+
 @functools.cache
 def load_checkers() -> None:
     with warnings.catch_warnings():
@@ -171,7 +175,8 @@ def test_any_dataset_is_written_as_it_is_and_follows_cf(name, tmp_path, monkeypa
     dataset.to_netcdf(path)
     with xr.open_dataset(path) as written:
         xr.testing.assert_identical(dataset.load(), written.load())
-    assert cf_errors(path, monkeypatch) - {ELAPSED} == set()
+    if name not in ALIKE:  # the checker is what takes time
+        assert cf_errors(path, monkeypatch) - {ELAPSED} == set()
 
 
 def test_every_public_function_that_returns_a_dataset_is_tried():

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import synthetic_records as synthetic
 
+from rsfstudy.analysis.fitting.record import by_steps
 from rsfstudy.analysis.fitting.steps import steps_of
 
 UP = ((0.0, 1.0), (60.0, 10.0))
@@ -79,3 +80,35 @@ def test_a_million_rows() -> None:
 @pytest.mark.parametrize("moved", [np.zeros(100), np.arange(100.0), -np.arange(100.0)])
 def test_a_load_point_that_rests_or_keeps_moving(moved: np.ndarray) -> None:
     assert steps_of(np.arange(100.0), moved) == ()
+
+
+def test_an_overshoot_is_one_step_through_its_pieces() -> None:
+    """From 2 to 12 um/s by way of 17 um/s within half a second; friction follows the pieces."""
+    time = 0.05 * np.arange(4_000)
+    speeds = np.interp(time, [80.0, 80.15, 80.2, 80.45, 80.5], [2.0, 2.0, 17.0, 17.0, 12.0])
+    moved = np.concatenate([[0.0], np.cumsum(0.05 * speeds[:-1])])
+    (step,) = steps_of(time, moved + synthetic.correlated(len(time), 0.0, 0.01, 3))
+    assert (step.before, step.after) == pytest.approx((2.0, 12.0), rel=0.01)
+    assert 79.8 < step.begins < step.ends < 80.7
+    assert max(speed for _begins, speed in step.through) > 14.0
+    # displacement by the pieces of loading is the recorded one
+    pieces = by_steps(0.0, [step])
+    speeds_of = pieces[:, 1]
+    by_pieces = np.sum(np.diff(np.append(pieces[:, 0], time[-1])) * speeds_of)
+    assert by_pieces == pytest.approx(moved[-1], abs=0.2)
+
+
+def test_a_hold_and_a_return_are_no_overshoot() -> None:
+    loading = ((0.0, 1.0), (60.0, 10.0), (61.0, 1.0), (120.0, 0.0), (121.0, 2.0))
+    time, moved = noisy(loading, 200.0, 0.05, 0.0, 0.001)
+    assert [step.through for step in steps_of(time, moved)] == [()] * 4
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.9])
+def test_noise_that_grows_is_no_step(rho: float) -> None:
+    time, moved = noisy(((0.0, 2.0), (150.0, 20.0)), 300.0, 0.1, 0.0, 0.0)
+    for seed in range(5):
+        size = np.interp(time, [0.0, 290.0, 292.0, 300.0], [0.02, 0.02, 1.3, 8.5])
+        (step,) = steps_of(time, moved + size * synthetic.correlated(len(time), rho, 1.0, seed))
+        assert step.begins == pytest.approx(150.0, abs=0.1)
+        assert (step.before, step.after) == pytest.approx((2.0, 20.0), rel=0.01)

@@ -217,8 +217,9 @@ def test_several_motions_of_one_meter_report_their_own_work():
     motions = [rsfstudy.simulate(scene, accuracy=accuracy, meter=meter) for _ in range(2)]
     first, second = (motion.attrs["rhs_evaluations"] for motion in motions)
     assert first == second == meter.spent / 2
-    with pytest.raises(InvalidValue, match="meter=meter"):
-        rsfstudy.simulate(scene, meter=meter)
+    for given in ({"meter": meter}, {"accuracy": accuracy}, {"accuracy": 1e-3, "meter": meter}):
+        with pytest.raises(InvalidValue, match="must be an Accuracy and a Meter.*meter=meter"):
+            rsfstudy.simulate(scene, **given)
 
 
 def test_a_motion_with_radiation_damping_says_what_its_stress_leaves_out():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from numbers import Real
@@ -13,7 +14,7 @@ import xarray as xr
 from rsfstudy.analysis.fitting import filters
 from rsfstudy.analysis.fitting.model import check_free, of_law
 from rsfstudy.analysis.fitting.record import Record
-from rsfstudy.analysis.fitting.steps import Step
+from rsfstudy.analysis.fitting.steps import Step, noise_variance
 from rsfstudy.analysis.fitting.window import Window
 from rsfstudy.api import runs
 from rsfstudy.axes.axis import Axis
@@ -39,6 +40,9 @@ _STATES = "One state has b; two states have b1, b2, slip_distance and slip_dista
 _GUESS = 0.05
 #: Largest number of windows.
 _MOST_WINDOWS = 1000
+#: Jumps of displacement back, relative to its noise and to its changes nearby, and to its extent,
+#: that are a new zero; and rows from which noise is known.
+_JUMPS, _LEAST_JUMP, _FEW_ROWS = 10.0, 0.01, 20
 #: Shortest of several windows, as a part of what follows a step.
 _SHORTEST = 0.5
 #: First guesses of a scene: those of a record take their place.
@@ -239,6 +243,8 @@ def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]
 
     Steps that lie outside of their record are refused, and a load point that does not move forward.
     """
+    for record in records:
+        _check_displacement(record)
     count = max(len(one.found) for one in records)
     if not count:
         remedy = "State them: record.with_steps([(begins, ends, before, after)])."
@@ -253,6 +259,22 @@ def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]
             for step in record.found[number - 1 : number]:
                 _check_step(record, number, step)
     return numbers
+
+
+def _check_displacement(record: Record) -> None:
+    """Refuse a load point that jumps back between two rows, as one that is set to zero again."""
+    time, moved = record.time, record.columns["displacement"]
+    jumps = np.diff(moved)
+    row = int(np.argmin(jumps))
+    noise = math.sqrt(noise_variance(time, moved)) if len(time) > _FEW_ROWS else 0.0
+    beside = np.abs(np.delete(jumps[max(row - 5, 0) : row + 6], min(row, 5))).max(initial=0.0)
+    back = -float(jumps[row]) > max(_JUMPS * beside, _JUMPS * noise, _LEAST_JUMP * np.ptp(moved))
+    if record.stated is None and back:
+        rule = f"falls back between two rows at {time[row + 1]:g} s in {record.name}, as a load "
+        rule += "point does that is set to zero again"
+        remedy = f"Fit its parts, as in record.window({time[0]:g}, {time[row]:g}), or add the "
+        remedy += "offset to the later rows."
+        raise InvalidValue("displacement", f"{jumps[row]:.4g} um", rule, remedy=remedy)
 
 
 def _check_step(record: Record, number: int, step: Step) -> None:

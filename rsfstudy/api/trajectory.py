@@ -144,15 +144,17 @@ def simulate(
     if not (known and 0.0 < duration < math.inf):
         remedy = "It is in D_c/V_*; rig.dimensionless converts units of a laboratory."
         raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
-    if (accuracy is None) != (meter is None):
+    is_alone = accuracy is None and meter is None
+    if is_alone:
+        accuracy = Accuracy(rtol, budget, engine=engine)
+        meter = Meter(budget, engine=accuracy.engine)
+    if not (isinstance(accuracy, Accuracy) and isinstance(meter, Meter)):
+        rule = "must be an Accuracy and a Meter"
         remedy = "Pass accuracy=accuracy, meter=meter, as Measure.find receives them."
-        raise InvalidValue("accuracy, meter", (accuracy, meter), "need each other", remedy=remedy)
-    is_alone = accuracy is None
-    accuracy = accuracy or Accuracy(rtol, budget, engine=engine)
+        raise InvalidValue("accuracy, meter", (accuracy, meter), rule, remedy=remedy)
     check_engine(accuracy.engine)
     if is_alone and not scene.is_disturbed:
         warnings.warn(_UNSTEPPED, NoAnswer, stacklevel=3)
-    meter = meter or Meter(budget, engine=accuracy.engine)
     spent, by_regime = meter.spent, dict(meter.by_regime)
     recording = Recording(list(_REGIMES), at)
     status, message, limit, passed = Status.OK, "", _limit(scene), math.nan
@@ -169,28 +171,9 @@ def simulate(
         status, message = halt.status, str(halt)
         if status is Status.WORK_BUDGET_SPENT:
             message += more_work(budget)
-    seen, fluid = recording.seen(scene), scene.parts.fluid.unknowns
+    seen = recording.seen(scene)
     seen = strictly_later(seen) if at is None else seen
-    columns = {quantity(name): seen[:, column] for column, name in enumerate(OBSERVED)}
-    first = STATES + scene.states - len(fluid)
-    columns |= {about: seen[:, first + i] for i, about in enumerate(fluid)}
-    if scene.parts.law.states > 1:
-        of_law = range(scene.parts.law.states)
-        columns |= {_state(i + 1): seen[:, STATES + i] for i in of_law}
-    columns[quantity("load_point_displacement")] = load_point_of(scene, seen)
-    columns[quantity("friction_coefficient")] = friction_coefficient_of(seen)
-    dataset = xr.Dataset(
-        {q.name: ("time", values, attributes_of(q, scene)) for q, values in columns.items()}
-    )
-    regimes = {
-        "long_name": quantity("regime").long_name,
-        "flag_values": np.arange(len(recording.regimes), dtype=np.int8),
-        "flag_meanings": " ".join(recording.regimes),
-    }
-    dataset["regime"] = "time", seen[:, REGIME].astype(np.int8), regimes
-    about_rate = quantity("reference_rate").attributes
-    dataset["reference_rate"] = (), scene.reference_rate, about_rate
-    dataset = dataset.set_coords(["slip", "reference_rate"])
+    dataset = _along_time(scene, seen, recording.regimes)
     dataset = dataset.assign_attrs(
         {
             "title": f"Motion of a spring-slider, {scene.law} law",
@@ -225,6 +208,31 @@ def simulate(
         text = f"the motion ends after {max([0.0, *seen[-1:, 0]]):.6g} of {duration:g} D_c/V_*"
         warnings.warn(f"{text}: {status.label} ({message})", Incomplete, stacklevel=3)
     return with_cf_encoding(dataset)
+
+
+def _along_time(scene: Scene, seen: np.ndarray, regimes: Sequence[str]) -> xr.Dataset:
+    """Return the rows of a recording as a dataset along time."""
+    fluid = scene.parts.fluid.unknowns
+    columns = {quantity(name): seen[:, column] for column, name in enumerate(OBSERVED)}
+    first = STATES + scene.states - len(fluid)
+    columns |= {about: seen[:, first + i] for i, about in enumerate(fluid)}
+    if scene.parts.law.states > 1:
+        of_law = range(scene.parts.law.states)
+        columns |= {_state(i + 1): seen[:, STATES + i] for i in of_law}
+    columns[quantity("load_point_displacement")] = load_point_of(scene, seen)
+    columns[quantity("friction_coefficient")] = friction_coefficient_of(seen)
+    dataset = xr.Dataset(
+        {q.name: ("time", values, attributes_of(q, scene)) for q, values in columns.items()}
+    )
+    flags = {
+        "long_name": quantity("regime").long_name,
+        "flag_values": np.arange(len(regimes), dtype=np.int8),
+        "flag_meanings": " ".join(regimes),
+    }
+    dataset["regime"] = "time", seen[:, REGIME].astype(np.int8), flags
+    about_rate = quantity("reference_rate").attributes
+    dataset["reference_rate"] = (), scene.reference_rate, about_rate
+    return dataset.set_coords(["slip", "reference_rate"])
 
 
 def attributes_of(about: Quantity, scene: Scene) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.error_boundary import CheckedKeywords, guard_methods
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 from rsfstudy.slider.registry import name_of
@@ -23,7 +23,7 @@ Row = Mapping[str, Any]
 
 @guard_methods
 @dataclass(frozen=True, init=False)
-class Axis(CheckedKeywords):
+class Axis:
     """One dimension of a lattice.
 
     Parameters

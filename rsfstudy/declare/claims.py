@@ -17,7 +17,7 @@ import pandas as pd
 import xarray as xr
 
 from rsfstudy.declare.verdicts import Verdicts
-from rsfstudy.error_boundary import CheckedKeywords, guard_methods
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.scales import SCALES
 from rsfstudy.status import Status
@@ -45,7 +45,7 @@ _TEXTS = (
 
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
-class Claim(CheckedKeywords):
+class Claim:
     """One published value and the verdict expected on it.
 
     Parameters

@@ -14,7 +14,7 @@ import numpy as np
 
 from rsfstudy.axes.axis import check_text
 from rsfstudy.declare.names import names
-from rsfstudy.error_boundary import CheckedKeywords, guard_methods
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import is_name
 
@@ -37,7 +37,7 @@ ANY_LATTICE = frozenset(
 
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
-class Panel(CheckedKeywords):
+class Panel:
     """One panel of a figure, or one for each point of some axes.
 
     Functions of a dataset are given the part of it that the panel shows, those of a row the part
@@ -119,7 +119,7 @@ class Panel(CheckedKeywords):
 
 @guard_methods
 @dataclass(frozen=True)
-class Figure(CheckedKeywords):
+class Figure:
     """Panels, from left to right and from top to bottom.
 
     Parameters

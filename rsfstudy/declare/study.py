@@ -21,7 +21,7 @@ from rsfstudy.declare.cell import Cell, Changes
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
 from rsfstudy.declare.shown import study_html
-from rsfstudy.error_boundary import CheckedKeywords, error_boundary, guard_methods
+from rsfstudy.error_boundary import error_boundary, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.motion.accuracy import Accuracy
@@ -56,7 +56,7 @@ _LONGEST_NAME = 200
 
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
-class Study(CheckedKeywords):
+class Study:
     """A parameter study, declared.
 
     Parameters

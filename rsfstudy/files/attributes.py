@@ -1,4 +1,4 @@
-"""Checks of the attributes of variables in a file, which may come from any program."""
+"""Checks of variables in a file and of their attributes, which may come from any program."""
 
 from __future__ import annotations
 
@@ -36,6 +36,20 @@ def check_attributes(dataset: xr.Dataset) -> None:
             if key in values.attrs:
                 _check_text(f"{brief(name)}.{key}", values.attrs[key], most)
         _check_flags(str(name), values.attrs)
+
+
+def check_motion(dataset: xr.Dataset) -> None:
+    """Check that the variables along a motion are numbers.
+
+    Raises
+    ------
+    DataError
+        If one is not.
+    """
+    along = dataset["slip"].dims if "slip" in dataset.variables else ()
+    for name, values in dataset.variables.items():
+        if along and values.dims == along and values.dtype.kind not in "fiub":
+            raise DataError(f"{brief(name)} is {values.dtype}, and must be numbers. {_REMEDY}")
 
 
 def _check_text(path: str, value: object, most: int) -> None:

@@ -171,6 +171,8 @@ def check(dataset: xr.Dataset) -> None:
     for name in map(str, dataset["status"].dims):
         if name not in dataset.coords or dataset[name].dims != (name,):
             raise refused(name, "is no coordinate along the dimension of its name")
+        if not dataset.indexes[name].is_unique:
+            raise refused(name, "has the same value more than once")
     unknown = np.setdiff1d(dataset["status"].values, [int(status) for status in Status])
     if unknown.size:
         raise refused("status", f"is {unknown[0]} in a cell, which is the code of none")

@@ -24,7 +24,7 @@ import xarray as xr
 from rsfstudy.error_boundary import user_stacklevel
 from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, brief
 from rsfstudy.files import content_digest, contents
-from rsfstudy.files.attributes import check_attributes
+from rsfstudy.files.attributes import check_attributes, check_motion
 from rsfstudy.files.contents import LAYOUT
 from rsfstudy.netcdf import fill_value_encoding, with_cf_encoding
 from rsfstudy.paths import check_path
@@ -200,6 +200,7 @@ def read_any(path: Path) -> xr.Dataset:
     try:
         check_attributes(dataset)
         if contents.is_of_a_scene(dataset):
+            check_motion(dataset)
             return dataset  # which users write by xarray, without a digest
         contents.check(dataset)
     except DataError as error:

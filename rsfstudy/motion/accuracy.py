@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from numbers import Real
 
-from rsfstudy.error_boundary import CheckedKeywords, guard_methods
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import SCIPY, named
 
@@ -29,7 +29,7 @@ ROUNDING = 1e-13
 
 @guard_methods
 @dataclass(frozen=True)
-class Accuracy(CheckedKeywords):
+class Accuracy:
     """The accuracy a result must meet, and the work it may cost.
 
     Parameters

@@ -159,7 +159,7 @@ def _fitting(
     study = catalogue.load(name) if name in names.names() else None
     if name == _FITS and own is variable is None:
         return Declared(importlib.import_module(f"{__name__}.{_FITS}").panels(dataset)), dataset
-    if own is None and study is None and name not in _ANY:
+    if own is None and study is None and name not in (*_ANY, _FITS):
         raise InvalidValue("plot", name, "is unknown", choices=NAMES)
     known = {str(dimension) for dimension in sizes}
     if study is not None and own in (None, study.plot):
@@ -195,7 +195,7 @@ def _expanded(drawing: Declared, dataset: xr.Dataset, further: Sequence[str]) ->
     named = [panel.y for panel in drawing.panels if isinstance(panel.y, str) and panel.y]
     if not found and named and not any(name in dataset for name in named):
         rule = "does not fit these results (they have none of its variables)"
-        raise InvalidValue("plot", declaration(dataset).plot, rule, choices=NAMES)
+        raise InvalidValue("plot", declaration(dataset).plot, rule)
     return found
 
 

@@ -103,7 +103,8 @@ def _check_motion(motion: xr.Dataset, against: str | None) -> None:
     """Check that a dataset has the variables of a motion or a limit cycle."""
     stress = () if "friction_coefficient" in motion else ("shear_stress",)
     needed = ("slip", against or "time", "frictional_stress", "log10_slip_rate", *stress)
-    for name in (*needed, _normal_stress(motion)):
+    known = [name for name in AGAINST if name in motion]
+    for name in (*needed, _normal_stress(motion), *known):
         if name not in motion:
             text = "is missing: it is no motion as simulate gives it, and no limit cycle"
             raise DataError(f"{name} {text}")

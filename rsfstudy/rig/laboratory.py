@@ -11,7 +11,7 @@ from typing import Any
 import xarray as xr
 
 from rsfstudy.axes.axis import Axis
-from rsfstudy.error_boundary import CheckedKeywords, guard_methods
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity, ShownAsTable
 from rsfstudy.rig import axes
@@ -43,7 +43,7 @@ SEGMENT = {
 
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
-class Laboratory(CheckedKeywords, ShownAsTable):
+class Laboratory(ShownAsTable):
     """A rig, in its own units.
 
     Every quantity is a plain number in SI units, a text with units ("5 MPa", "10 um", "1 um/s"), or

@@ -5,7 +5,8 @@ journals, records, protocols, problems, tables of cases, answers and styles; dam
 lets a function or a command read it in a forked process. Reported are exceptions that are not
 errors of rsfstudy, answers that only name a Python exception, hangs, control characters, and
 damage that is read without an error although a number or the declaration differs. ``--case N``
-runs one case and prints its answer. The exit status is 1 if anything was reported.
+runs one case and prints its answer, and ``--only REGEX`` those whose kind, change and reader match.
+The exit status is 1 if anything was reported.
 """
 
 from __future__ import annotations
@@ -16,18 +17,12 @@ import contextlib
 import functools
 import io
 import json
-import os
-import pickle
 import random
 import re
-import resource
-import select
 import shutil
-import signal
 import sqlite3
 import sys
 import tempfile
-import time
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -36,6 +31,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from file_mutations import damaged, hostile_dataset, hostile_text
+from forked import call_in_child
 
 import rsfstudy
 from rsfstudy.errors import RsfStudyError
@@ -44,8 +40,6 @@ from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import LinearFit
 from rsfstudy.referee import problem, theirs
 
-#: Seconds of CPU time, the factor on the clock, and bytes of memory that a case may take.
-LIMIT, PATIENCE, MEMORY = 20, 4.0, 8 * 2**30
 STUDY = rsfstudy.Study(
     name="small",
     title="A small lattice",
@@ -177,7 +171,8 @@ def tamper(path: Path, chance: random.Random) -> bool:
     extra = ("DELETE FROM fingerprint", "DROP TABLE cells", "CREATE VIEW v AS SELECT 1",
              "INSERT INTO fingerprint VALUES ('{}')", "ALTER TABLE cells ADD COLUMN x")  # fmt: skip
     sql = (f"UPDATE {table} SET {column} = ?", (value,))
-    with contextlib.closing(sqlite3.connect(path)) as database, database:
+    refused = contextlib.suppress(sqlite3.Error)
+    with refused, contextlib.closing(sqlite3.connect(path)) as database, database:
         database.execute(*(sql if chance.random() < 0.7 else (chance.choice(extra),)))
     return True
 
@@ -309,56 +304,37 @@ def difference(found: xr.Dataset, truth: xr.Dataset) -> str:
     return ""
 
 
-def run_case(seed: int, index: int, whole: Path, truths: dict[str, Any]) -> tuple[str, Answer]:
-    """Change a file and let it be read in a forked process; return the case and its answer."""
-    chance = random.Random(f"{seed}:{index}")
-    file = chance.choice(list(KINDS))
-    kind = KINDS[file]
-    reader, change = chance.choice(kind.readers), chance.choice(kind.changes)
-    label = f"{index} {kind.name} {change.__name__} {getattr(reader, '__name__', reader)}"
+class Case(NamedTuple):
+    """A file, the change of it, and its reader."""
+
+    chance: random.Random
+    file: str
+    change: Callable[[Path, random.Random], bool]
+    reader: Callable[[Path], Any]
+
+    @classmethod
+    def draw(cls, seed: int, index: int) -> Case:
+        chance = random.Random(f"{seed}:{index}")
+        file = chance.choice(list(KINDS))
+        return cls(chance, file, chance.choice(KINDS[file].changes),
+                   chance.choice(KINDS[file].readers))  # fmt: skip
+
+    def __str__(self) -> str:
+        return f"{KINDS[self.file].name} {self.change.__name__} {self.reader.__name__}"
+
+
+def run_case(case: Case, whole: Path, truths: dict[str, Any]) -> Answer:
+    """Change a file and let it be read in a forked process; return the answer."""
+    chance, file, change, reader = case
     with tempfile.TemporaryDirectory() as place:
         copy = Path(place)
         for each in (file, "whole.nc", "01_answer.csv", *(["small.nc"] if "cells" in file else [])):
             copied = shutil.copytree if (whole / each).is_dir() else shutil.copy
             copied(whole / each, copy / each)
         checked = change(copy / file, chance)
-        truth = truths.get(kind.name) if checked else None
-        return label, in_child(functools.partial(read, reader, copy / file, truth), copy)
-
-
-def in_child(call: Callable[[], Answer], place: Path) -> Answer:
-    """Call a function in a forked process with limits of time and memory."""
-    reads, writes = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.close(reads)
-        os.chdir(place)
-        os.setsid()
-        resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT))
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-        try:
-            content = pickle.dumps(call())
-            with os.fdopen(writes, "wb") as pipe:
-                pipe.write(content)
-        finally:
-            os._exit(0)
-    os.close(writes)
-    content, end = b"", time.monotonic() + PATIENCE * LIMIT
-    while select.select([reads], [], [], max(0.0, end - time.monotonic()))[0]:
-        part = os.read(reads, 2**16)
-        if not part:
-            break
-        content += part
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(child, signal.SIGKILL)
-    os.close(reads)
-    _, status = os.waitpid(child, 0)
-    try:
-        return Answer(*pickle.loads(content))
-    except (EOFError, pickle.UnpicklingError):
-        number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
-        hangs = number in (0, signal.SIGXCPU, signal.SIGKILL)
-        return Answer("hangs" if hangs else f"dies of signal {number}", "", "", "")
+        truth = truths.get(KINDS[file].name) if checked else None
+        answer, how = call_in_child(functools.partial(read, reader, copy / file, truth), copy)
+        return Answer(how, "", "", "") if answer is None else answer
 
 
 # ---- faults --------------------------------------------------------------------------------------
@@ -391,6 +367,7 @@ def main() -> int:
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--count", type=int, default=2000)
     options.add_argument("--case", type=int)
+    options.add_argument("--only", default="")
     asked = options.parse_args()
     found: collections.Counter[str] = collections.Counter()
     ended: collections.Counter[str] = collections.Counter()
@@ -401,13 +378,18 @@ def main() -> int:
             for reader in kind.readers:
                 read(reader, Path(warm, file), None)
         for index in range(asked.count) if asked.case is None else [asked.case]:
-            label, answer = run_case(asked.seed, index, Path(place), truths)
+            case = Case.draw(asked.seed, index)
+            if not re.search(asked.only, str(case)):
+                continue
+            answer = run_case(case, Path(place), truths)
             ended[answer.how] += 1
             wrong = list(faults(answer))
             found.update(wrong)
             if wrong or asked.case is not None:
                 text = f"{answer.text} | {answer.printed}"
-                print(f"{label}: {', '.join(wrong)}\n    {json.dumps(text[:600])}", flush=True)
+                print(
+                    f"{index} {case}: {', '.join(wrong)}\n    {json.dumps(text[:600])}", flush=True
+                )
     print(f"seed {asked.seed}: {dict(ended)}; faults: {dict(found) or 'none'}")
     return int(bool(found))
 

@@ -46,3 +46,19 @@ class Overlap:
     def log_determinant(self) -> float:
         """Logarithm of the determinant of the correlation matrix."""
         return float(2.0 * np.sum(np.log(self.factor[0])))
+
+
+def average(time: np.ndarray, columns: np.ndarray, averaging: float) -> np.ndarray:
+    """Average columns of one clock, shape (rows, columns), over a time about each row.
+
+    Columns are linear between rows, and constant before the first and after the last row.
+    """
+    at = np.concatenate([[time[0] - averaging], time, [time[-1] + averaging]])
+    padded = np.concatenate([columns[:1], columns, columns[-1:]])
+    pieces = 0.5 * np.diff(at)[:, None] * (padded[1:] + padded[:-1])
+    sums = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(pieces, axis=0)])
+    ends = [
+        np.column_stack([np.interp(time + side, at, column) for column in sums.T])
+        for side in (0.5 * averaging, -0.5 * averaging)
+    ]
+    return np.asarray((ends[0] - ends[1]) / averaging)

@@ -52,10 +52,11 @@ class Filter:
             return None
         kind, _, size = text.partition(" ")
         try:
-            return cls(kind, float(size))
+            number = float(size)
         except ValueError:
             rule = "must be a kind of filter and its size, such as 'mean 1.0' (in s or Hz)"
             raise InvalidValue("filter", text, rule, choices=KINDS) from None
+        return cls(kind, number)
 
     def sample_times(self, time: np.ndarray) -> np.ndarray:
         """Return the times, in s, at which unfiltered friction is needed for these rows."""

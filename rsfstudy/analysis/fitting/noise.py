@@ -202,23 +202,19 @@ def fitted(
     Noise
         With a process for each sampling interval, and a level for each segment.
     """
-    if kept is not None:
-        time, residuals, jacobian = time[kept], residuals[kept], jacobian[kept]
-    overlap = Overlap(time, averaging) if averaging else None
-    if overlap is not None:
-        jacobian, residuals = overlap.whitened(jacobian), overlap.whitened(residuals)
-    least = max(least, _QUIETEST * math.sqrt(float(np.mean(np.square(residuals)))), 1e-300)
-    begin, first = _first_guess(name, find_runs(time), residuals, least)
+    begin, least = guess_noise(name, time, residuals, kept, least, averaging)
     shape, order = begin.partial.shape, begin.order
     if not order and len(begin.sizes) == 1:
-        return replace(begin, kept=kept, overlap=overlap)
+        return begin
 
     def noise(x: np.ndarray) -> Noise:
         partial = _LARGEST * np.tanh(x[: begin.partial.size]).reshape(shape)
         sizes = np.exp(np.append(0.0, x[begin.partial.size :]))
-        return Noise(begin.runs, partial, np.maximum(sizes, least / first), kept, overlap)
+        return Noise(begin.runs, partial, np.maximum(sizes, least), kept, begin.overlap)
 
-    products = _Products(begin.runs, np.column_stack([jacobian, residuals]), order)
+    columns = begin.kept_rows(np.column_stack([jacobian, residuals]))
+    columns = columns if begin.overlap is None else begin.overlap.whitened(columns)
+    products = _Products(begin.runs, columns, order)
 
     def misfit(x: np.ndarray) -> float:
         return products.misfit(noise(x))
@@ -228,6 +224,28 @@ def fitted(
         return noise(x)
     found = minimize(misfit, x, method="BFGS", options={"gtol": _ENOUGH})
     return noise(found.x if found.fun <= misfit(x) else x)
+
+
+def guess_noise(
+    name: str,
+    time: np.ndarray,
+    residuals: np.ndarray,
+    kept: np.ndarray | None = None,
+    least: float = 0.0,
+    averaging: float = 0.0,
+) -> tuple[Noise, float]:
+    """Estimate the noise by moments, and the least size of a level relative to the first one.
+
+    The parameters are those of `fitted`.
+    """
+    if kept is not None:
+        time, residuals = time[kept], residuals[kept]
+    overlap = Overlap(time, averaging) if averaging else None
+    if overlap is not None:
+        residuals = overlap.whitened(residuals)
+    least = max(least, _QUIETEST * math.sqrt(float(np.mean(np.square(residuals)))), 1e-300)
+    found, first = _first_guess(name, find_runs(time), residuals, least)
+    return replace(found, kept=kept, overlap=overlap), least / first
 
 
 def _first_guess(
@@ -272,6 +290,18 @@ def whiteness(innovations: np.ndarray, order: int) -> float:
     correlations = np.array([seen[lag:] @ seen[:-lag] for lag in lags]) / (seen @ seen)
     size = count * (count + 2.0) * float(np.sum(correlations**2 / (count - lags)))
     return float(chi2.sf(size, max(len(lags) - order, 1)))
+
+
+def compute_criterion(innovations: np.ndarray, noise: Noise, parameters: int, count: int) -> float:
+    """Compute Akaike's criterion, corrected for few samples (Hurvich and Tsai, 1989).
+
+    It is ``n [ln(2 pi S/n) + 1] + ln|R| + 2 k n/(n - k - 1)`` for n rows, a sum of squares S of the
+    innovations and k parameters, including those of the noise and one for each outlier.
+    """
+    parameters, size = parameters + count - len(innovations), float(innovations @ innovations)
+    every = parameters + noise.partial.size + len(noise.sizes)
+    likelihood = count * (math.log(2.0 * math.pi * size / count) + 1.0) + noise.log_determinant
+    return likelihood + 2.0 * every * count / max(count - every - 1.0, 1.0)
 
 
 class _Products:

@@ -139,21 +139,7 @@ class Record:
         -------
         Record
         """
-        stated: list[Step] = []
-        for step in steps:
-            try:
-                stated.append(Step(*map(float, step)))
-            except (TypeError, ValueError) as error:
-                rule = "must be four or six numbers: begins, ends, velocity before and after, "
-                rule += "and normal stress before and after"
-                raise InvalidValue("step", step, rule) from error
-        for step in stated:
-            negative = min(step.before, step.after) < 0.0 or step.stress_ratio <= 0.0
-            if not step.begins <= step.ends or negative:
-                rule = "is no step: begins, ends, velocity before and after, and, if it changes, "
-                rule += "normal stress before and after"
-                raise InvalidValue("step", tuple(step)[: len(steps[0])], rule)
-        return replace(self, stated=tuple(stated))
+        return replace(self, stated=tuple(map(_stated_step, steps)))
 
     @cached_property
     def found(self) -> tuple[Step, ...]:
@@ -178,7 +164,8 @@ class Record:
             ``velocity_after`` (um/s), and, if normal stress was recorded,
             ``normal_stress_before`` and ``normal_stress_after`` (Pa).
         """
-        rows = np.array(self.found, dtype=float).reshape(-1, len(Step._fields))
+        numbers = [step[: len(_STEP_COLUMNS)] for step in self.found]
+        rows = np.array(numbers, dtype=float).reshape(-1, len(_STEP_COLUMNS))
         shown = _STEP_COLUMNS if "normal_stress" in self.columns else _STEP_COLUMNS[:4]
         data = {about.name: ("step", rows[:, n], about.attributes) for n, about in enumerate(shown)}
         number = {"long_name": "number of the step", "units": "1"}
@@ -197,6 +184,24 @@ class Record:
     def _attributes(self, title: str) -> dict[str, str]:
         """Return the attributes of a dataset that was derived from the record."""
         return {"title": f"{title}: {self.name}", "Conventions": "CF-1.11"}
+
+
+def _stated_step(stated: Sequence[float]) -> Step:
+    """Check the numbers of a step that a user states."""
+    rule = "is no step: begins, ends, velocity before and after, and, if it changes, "
+    rule += "normal stress before and after"
+    try:
+        numbers = [float(number) for number in stated]
+    except (TypeError, ValueError) as error:
+        raise InvalidValue("step", stated, rule) from error
+    if len(numbers) not in (4, 6) or not np.isfinite(numbers).all():
+        raise InvalidValue("step", stated, rule)
+    begins, ends, before, after, *stresses = numbers
+    first, second = stresses or (math.nan, math.nan)
+    step = Step(begins, ends, before, after, first, second)
+    if not begins <= ends or min(before, after) < 0.0 or min([1.0, *stresses]) <= 0.0:
+        raise InvalidValue("step", tuple(numbers), rule)
+    return step
 
 
 def loading_of(record: Record, begins: float, ends: float, *, recorded: bool) -> np.ndarray:
@@ -235,14 +240,24 @@ def by_steps(begins: float, steps: Sequence[Step]) -> np.ndarray:
     pieces, level = [(begins, steps[0].before if steps else 0.0, 1.0, 0.0)], 1.0
     for step in steps:
         lasts, rises = step.ends - step.begins, level * (step.stress_ratio - 1.0)
-        count = 0 if not lasts > 0.0 else _RAMP if step.changes_velocity else 1
-        for part in np.arange(count) / max(count, 1):
-            speed = step.before + (part + 0.5 / _RAMP) * (step.after - step.before)
+        for part, speed in _velocities(step):
             at = step.begins + part * lasts
             pieces.append((float(at), float(speed), level + part * rises, rises / lasts))
         level += rises
         pieces.append((step.ends, step.after, level, 0.0))
     return np.array(pieces)
+
+
+def _velocities(step: Step) -> list[tuple[float, float]]:
+    """List the velocities within a step, each with the share of its duration from which it acts."""
+    lasts = step.ends - step.begins
+    if not lasts > 0.0:
+        return []
+    if step.through:
+        return [(begins / lasts, speed) for begins, speed in step.through]
+    count = _RAMP if step.changes_velocity else 1
+    parts = (np.arange(count) / count).tolist()
+    return [(p, step.before + (p + 0.5 / _RAMP) * (step.after - step.before)) for p in parts]
 
 
 def _by_rows(record: Record, first: float, before: float) -> np.ndarray:

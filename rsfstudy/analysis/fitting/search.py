@@ -247,7 +247,7 @@ class Search:
             off = np.abs(inverse @ whitened[:, :-1].T @ noise.whitened(finer[:, None])[:, 0])
         slopes = [slope(name, values[name]) for name in self.free]
         errors = (3.0 * off + np.abs(moved)) * slopes
-        criterion = _criterion(innovations, noise, len(x), len(left))
+        criterion = noises.compute_criterion(innovations, noise, len(x), len(left))
         steps = self._criterion_without_steps(jacobian, noise) - criterion > _DECIDES
         return Fitted(
             values=values,
@@ -278,7 +278,7 @@ class Search:
             columns = np.insert(columns, 0, 1.0, axis=1)
         whitened = noise.whitened(columns)
         innovations = whitened[:, -1] - whitened[:, :-1] @ _linear_solution(whitened)
-        return _criterion(innovations, noise, columns.shape[1] - 1, len(columns))
+        return noises.compute_criterion(innovations, noise, columns.shape[1] - 1, len(columns))
 
     def _unidentified(
         self, x: np.ndarray, values: Values, covariance: np.ndarray, steps: bool
@@ -308,18 +308,6 @@ class Search:
         ends = self.low[place], self.high[place]
         low, high = (value_of(name, v) if math.isfinite(v) else math.nan for v in ends)
         return low, high
-
-
-def _criterion(innovations: np.ndarray, noise: Noise, parameters: int, count: int) -> float:
-    """Compute Akaike's criterion, corrected for few samples (Hurvich and Tsai, 1989).
-
-    It is ``n [ln(2 pi S/n) + 1] + ln|R| + 2 k n/(n - k - 1)`` for n rows, a sum of squares S of the
-    innovations and k parameters, including those of the noise and one for each outlier.
-    """
-    parameters, size = parameters + count - len(innovations), float(innovations @ innovations)
-    every = parameters + noise.partial.size + len(noise.sizes)
-    likelihood = count * (math.log(2.0 * math.pi * size / count) + 1.0) + noise.log_determinant
-    return likelihood + 2.0 * every * count / max(count - every - 1.0, 1.0)
 
 
 def _linear_solution(columns: np.ndarray) -> np.ndarray:

@@ -13,10 +13,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, median_filter
 
 from rsfstudy.error_boundary import guard_methods
 
@@ -33,6 +34,9 @@ _HELD = 0.01
 #: Part of the piece before and of the rest behind that pieces of a ramp last at most, and rows that
 #: each holds less than: a fit takes more.
 _SHORT, _FEW = 0.05, 15
+#: Rows over which local noise is taken, and the factor by which it must exceed that of the whole
+#: record to count.
+_LOCAL_ROWS, _LOUDER = 31, 2.0
 #: Standard deviation over the median of absolute deviations of Gaussian noise.
 _NORMAL = 1.4826
 
@@ -55,6 +59,9 @@ class Step(NamedTuple):
         Load point velocities in um/s; 0 if the load point is held.
     stress_before, stress_after : float
         Normal stresses in Pa; NaN if normal stress was not recorded.
+    through : tuple of (float, float)
+        If the velocity overshoots: times in s from the beginning of the step, and velocities in
+        um/s from each of them on. Otherwise velocity changes at a steady rate.
     """
 
     begins: float
@@ -63,6 +70,7 @@ class Step(NamedTuple):
     after: float
     stress_before: float = math.nan
     stress_after: float = math.nan
+    through: tuple[tuple[float, float], ...] = ()
 
     @property
     def changes_velocity(self) -> bool:
@@ -98,11 +106,10 @@ def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
     if len(t) < 2 * _FEWEST:
         return ()
     t0, x0 = t[0], x[0]
-    sums = RunningSums(t - t0, x - x0)
-    variance = noise_variance(t, x)
-    knots = _merged(
-        sums, sorted(part_rows(sums.residual_squares, 0, len(t), variance)), t, variance
-    )
+    variance, louder = noise_variance(t, x), _relative_noise(t, x)
+    sums = RunningSums(t - t0, x - x0, 1.0 / louder**2)
+    knots = sorted(part_rows(sums.residual_squares, 0, len(t), variance))
+    knots = _merged(sums, knots, t, variance, louder)
     lines = [sums.line(i, j) for i, j in itertools.pairwise(knots)]
     meets = [
         _meeting(lines[n], lines[n + 1], (t[k - 1] - t0, t[k] - t0), variance)
@@ -116,6 +123,11 @@ def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
     found = []
     for first, last in _ramps(meets, speeds, np.diff(knots).tolist(), (0.0, t[-1] - t0)):
         begins, ends = meets[first], meets[last]
+        if _overshoots(speeds[first : last + 2]):
+            through = [(meets[n] - begins, speeds[n + 1]) for n in range(first, last)]
+            step = Step(t0 + begins, t0 + ends, speeds[first], speeds[last + 1])
+            found.append(step._replace(through=tuple(through)))
+            continue
         if last > first:
             # the lines before and behind meet in the middle: so displacement behind is theirs
             (x, v), (y, w) = lines[first], lines[last + 1]
@@ -128,8 +140,8 @@ def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
 class RunningSums:
     """Running sums of samples, from which the line through any part of them follows at once."""
 
-    def __init__(self, t: np.ndarray, x: np.ndarray) -> None:
-        columns = np.array([np.ones(len(t)), t, x, t * t, t * x, x * x])
+    def __init__(self, t: np.ndarray, x: np.ndarray, weights: np.ndarray) -> None:
+        columns = weights * np.array([np.ones(len(t)), t, x, t * t, t * x, x * x])
         self.sums = np.concatenate([np.zeros((1, 6)), np.cumsum(columns.T, axis=0)])
 
     def between(self, i: np.ndarray | int, j: np.ndarray | int) -> tuple[np.ndarray, ...]:
@@ -153,14 +165,45 @@ class RunningSums:
         return float(mx - tx / tt * mt), float(tx / tt)
 
 
-def noise_variance(t: np.ndarray, x: np.ndarray) -> float:
-    """Variance of the noise of samples, in their units squared: of each about the line through its
-    neighbours, by the median, which steps do not move.
+def _departures(t: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Compute the departure of each sample from the line through its neighbours.
+
+    It is scaled to have the standard deviation of the noise, if noise is white.
     """
     share = (t[1:-1] - t[:-2]) / (t[2:] - t[:-2])
     off = x[1:-1] - (1.0 - share) * x[:-2] - share * x[2:]
     off /= np.sqrt(1.0 + (1.0 - share) ** 2 + share**2)
-    spread = _NORMAL * float(np.median(np.abs(off)))
+    return np.asarray(off)
+
+
+def _relative_noise(t: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Estimate the local noise of displacement, relative to that of the whole record.
+
+    Returns
+    -------
+    ndarray, shape (rows,)
+        Ones, unless noise differs by more than a factor of two along the record.
+    """
+    off = np.abs(_departures(t, x))
+    typical = float(np.median(off))
+    if len(off) < 4 * _LOCAL_ROWS or not typical > 0.0:
+        return np.ones(len(t))
+    local = maximum_filter1d(median_filter(off, _LOCAL_ROWS, mode="nearest"), _LOCAL_ROWS)
+    local = np.pad(local / typical, 1, mode="edge")
+    return np.asarray(np.where(local > _LOUDER, local, 1.0))
+
+
+def _overshoots(speeds: Sequence[float]) -> bool:
+    """Return True if velocity does not go from one value to the other in one direction."""
+    changes = np.diff(speeds)
+    return bool((changes > 0.0).any() and (changes < 0.0).any())
+
+
+def noise_variance(t: np.ndarray, x: np.ndarray) -> float:
+    """Variance of the noise of samples, in their units squared: of each about the line through its
+    neighbours, by the median, which steps do not move.
+    """
+    spread = _NORMAL * float(np.median(np.abs(_departures(t, x))))
     least = 1e-9 * float(np.ptp(x))  # a record may be without noise
     return max(spread, least) ** 2
 
@@ -195,13 +238,15 @@ def part_rows(squares: Squares, first: int, last: int, variance: float) -> set[i
     return found
 
 
-def _merged(sums: RunningSums, knots: list[int], t: np.ndarray, variance: float) -> list[int]:
-    """Knots without those between pieces that tell no step, the least one first."""
+def _merged(
+    sums: RunningSums, knots: list[int], t: np.ndarray, variance: float, louder: np.ndarray
+) -> list[int]:
+    """Remove knots between pieces that differ by too little, that of the least difference first."""
     while len(knots) > 2:
         pieces = [*itertools.pairwise(knots)]
         speeds = np.array([sums.line(i, j)[1] for i, j in pieces])
         squares = sum(float(sums.residual_squares(i, j)) for i, j in pieces) / knots[-1]
-        left = math.sqrt(max(squares, variance))
+        left = math.sqrt(max(squares, variance)) * _louder_of(pieces, louder)
         change, lasts = np.abs(np.diff(speeds)), np.diff(t[[*knots[:-1], -1]])
         faster = np.maximum(np.abs(speeds[1:]), np.abs(speeds[:-1]))
         differs = change / (_DIFFERS * np.maximum(faster, _HELD * np.abs(speeds).max()))
@@ -232,7 +277,8 @@ def _refined(
     middle = int(np.searchsorted(time, at))
     i, j = max(middle - 20 * reach, 0), min(middle + 20 * reach, len(time))
     t, x = time[i:j] - at, displacement[i:j]
-    sums, places = RunningSums(t, x - x[0]), np.arange(_FEWEST, j - i - _FEWEST)
+    sums = RunningSums(t, x - x[0], np.ones(j - i))
+    places = np.arange(_FEWEST, j - i - _FEWEST)
     both = sums.residual_squares(0, places) + sums.residual_squares(places, j - i)
     best = int(places[np.argmin(both)])
     lines = sums.line(0, best), sums.line(best, j - i)
@@ -242,20 +288,41 @@ def _refined(
 def _ramps(
     times: list[float], speeds: list[float], rows: list[int], ends: tuple[float, float]
 ) -> Iterator[tuple[int, int]]:
-    """First and last change of velocity of each step: short pieces, or those of few rows, on the
-    way from one velocity to another are a ramp.
+    """Find the first and the last change of velocity of each step.
+
+    Short pieces, or pieces of few rows, on the way from one velocity to another belong to one step:
+    a ramp, or a change that overshoots.
     """
     changes, n = np.sign(np.diff(speeds)), 0
+
+    def is_short(first: int, last: int) -> bool:
+        before = times[first] - (times[first - 1] if first else ends[0])
+        lasts = times[last] - times[first]
+        return rows[last] < _FEW or lasts < _SHORT * min(before, ends[1] - times[last])
+
     while n < len(times):
-        last, before = n, times[n] - (times[n - 1] if n else ends[0])
-        while (
-            last + 1 < len(times)
-            and changes[last + 1] == changes[n]
-            and (
-                rows[last + 1] < _FEW
-                or times[last + 1] - times[n] < _SHORT * min(before, ends[1] - times[last + 1])
-            )
-        ):
+        last = n
+        while last + 1 < len(times) and changes[last + 1] == changes[n] and is_short(n, last + 1):
             last += 1
+        # beyond its set point and back
+        back = last + 1
+        while back < len(times) and changes[back] != changes[n] and _is_back(speeds, n, last, back):
+            if not is_short(n, back):
+                break
+            last, back = back, back + 1
         yield n, last
         n = last + 1
+
+
+def _is_back(speeds: list[float], first: int, last: int, back: int) -> bool:
+    """Return True if velocity returns part of the way after it overshot."""
+    before, peak, after = speeds[first], speeds[last + 1], speeds[back + 1]
+    change = abs(after - before)
+    returns = min(before, peak) < after < max(before, peak)
+    return returns and peak != 0.0 and change > _DIFFERS * max(abs(before), abs(after))
+
+
+def _louder_of(pieces: list[tuple[int, int]], louder: np.ndarray) -> np.ndarray:
+    """Compute the larger relative noise of the pieces on either side of each knot."""
+    local = np.array([louder[i:j].mean() for i, j in pieces])
+    return np.asarray(np.maximum(local[1:], local[:-1]))

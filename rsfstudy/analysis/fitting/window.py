@@ -15,6 +15,7 @@ from rsfstudy.analysis.fitting.load_point import integrated_displacement, moved_
 from rsfstudy.analysis.fitting.model import Model, parameters_of
 from rsfstudy.analysis.fitting.record import Record, by_steps, loading_of, steps_between
 from rsfstudy.analysis.fitting.steps import Step, noise_variance
+from rsfstudy.analysis.fitting.straight import find_straight_start
 from rsfstudy.analysis.fitting.stress_steps import CHANGES
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Halt, Meter
@@ -25,6 +26,8 @@ from rsfstudy.status import Status
 _BACK, _ROWS = 0.5, 3
 #: Part of the time before the first step by which loading may come late.
 _LATE = 0.2
+#: Share of a stated extent below which a window is called cut.
+_CUT = 0.98
 LOADINGS = ("steps", "recorded")
 #: Rows of the running median by which noise of normal stress is reduced, the quantile of departures
 #: that is compared, and the standard deviations of noise by which it may exceed the limit.
@@ -139,7 +142,36 @@ class Window:
         return float(last)
 
     def _opens(self, step: Step) -> float:
-        """Time in s at which the window of a step begins."""
+        """Return the time in s at which the window of a step begins."""
+        return find_straight_start(self.record, self._earliest(step), step.begins)
+
+    @property
+    def cuts(self) -> list[str]:
+        """Remarks on parts that the window lacks, although they were asked for."""
+        record, step, moved = self.record, self.step, self.record.columns["displacement"]
+        nominal, begins, at, ends = np.interp(
+            [self._earliest(step), self._opens(step), step.begins, self._closes()],
+            record.time,
+            moved,
+        )
+        found, later = [], "next step" if self._closes() < record.time[-1] else "end of the record"
+        if begins > nominal:
+            found.append(
+                f"the window begins {at - begins:.4g} um before the step, not {at - nominal:.4g}: "
+                "friction is not a straight line before"
+            )
+        elif at - begins < _CUT * self.before:
+            found.append(
+                f"before= is cut from {self.before:.4g} to {at - begins:.4g} um: the step before, "
+                "or the beginning of the record, is nearer than twice that"
+            )
+        if self.part == 1.0 and ends - at < _CUT * self.after:
+            cut = f"after= is cut from {self.after:.4g} to {ends - at:.4g} um"
+            found.append(f"{cut} by the {later}")
+        return found
+
+    def _earliest(self, step: Step) -> float:
+        """Return the time in s at which a window begins if friction is straight before the step."""
         record = self.record
         earlier = [s.ends for s in record.found if s.ends < step.begins]
         first = max(earlier, default=record.time[0])
@@ -180,7 +212,11 @@ class Window:
             raise Halt(Status.NOT_APPLICABLE, text)
         before = friction[time < step.begins]
         if before.size and not before.mean() > 0.0:
-            text = f"mean friction before the step is {before.mean():.3g}, and must be positive"
+            text = (
+                f"mean friction before the step is {before.mean():.3g}, and must be positive. If "
+                "shear stress has the opposite sign, reverse it with a scale of -1 behind its "
+                "heading: --columns 'friction=HEADING * -1' (columns=)"
+            )
             raise Halt(Status.NOT_APPLICABLE, text)
         begins, ends = self._opens(step), self._closes()
         pieces = loading_of(record, begins, ends, recorded=loading == "recorded")

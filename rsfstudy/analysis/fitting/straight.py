@@ -1,0 +1,80 @@
+"""The part of a record in which friction before a step is a straight line."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from rsfstudy.analysis.fitting.record import Record
+from rsfstudy.analysis.fitting.steps import RunningSums
+
+#: Means of rows that are fitted, fewest of them on either side of a break, and fewest rows that
+#: remain.
+_MEANS, _FEWEST, _LEAST_ROWS = 120, 6, 20
+#: Gain in the sum of squares by a broken line, in variances of its residuals over ln n.
+_GAINS = 15.0
+#: Departure of friction from the line of the later part that matters, in absolute terms and in
+#: standard deviations of the residuals. A step of velocity by a factor of ten changes friction by
+#: 0.02 or so.
+_DEPARTS, _STANDS_OUT = 4e-4, 4.0
+#: Share of friction, next to the step, from which noise is taken.
+_LAST = 0.4
+#: Largest correlation of successive means that is believed.
+_CORRELATED = 0.98
+
+
+@lru_cache(maxsize=256)
+def find_straight_start(record: Record, begins: float, ends: float) -> float:
+    """Find the time from which friction is a straight line up to a step.
+
+    A line that breaks at the best place must explain friction far better than one line, counting
+    the correlation of the residuals, and the earlier part must depart from the later line by an
+    amount that matters. The earlier part is then left out, and the rest is tested again.
+
+    Parameters
+    ----------
+    record : Record
+    begins, ends : float
+        Times in s between which friction is tested.
+
+    Returns
+    -------
+    float
+        Time in s.
+    """
+    rows = np.flatnonzero((record.time >= begins) & (record.time < ends))
+    time, friction = record.time[rows], record.columns["friction"][rows]
+    while len(time) >= max(_LEAST_ROWS, 4 * _FEWEST):
+        every = max(1, len(time) // _MEANS)
+        used = len(time) // every * every
+        of_means = (of[-used:].reshape(-1, every).mean(axis=1) for of in (time, friction))
+        break_at = _find_break(*of_means)
+        if break_at == 0:
+            break
+        first = len(time) - used + break_at * every
+        time, friction = time[first:], friction[first:]
+    return float(time[0]) if len(time) and len(time) < len(rows) else begins
+
+
+def _find_break(t: np.ndarray, friction: np.ndarray) -> int:
+    """Find the place at which a broken line parts friction; 0 if one line is as good."""
+    count = len(t)
+    sums = RunningSums(t - t[0], friction - friction[0], np.ones(count))
+    places = np.arange(_FEWEST, count - _FEWEST + 1)
+    both = sums.residual_squares(0, places) + sums.residual_squares(places, count)
+    place = int(places[np.argmin(both)])
+    time, moved = t - t[0], friction - friction[0]
+    # noise is that of the last part: what is left of a curved part is no noise
+    last = count - max(int(_LAST * count), _FEWEST)
+    (x0, v0), (x1, v1) = sums.line(last, count), sums.line(place, count)
+    left = (moved - x0 - v0 * time)[last:]
+    size = float(np.sqrt(left @ left / (len(left) - 2)))
+    rho = float(left[1:] @ left[:-1] / max(left @ left, 1e-300))
+    rho += 4.0 * (1.0 + rho) / len(left)  # the line takes up a part of the correlation
+    rho = min(max(rho, 0.0), _CORRELATED)
+    gain = float(sums.residual_squares(0, count)) - float(both.min())
+    departs = float(np.abs(moved[:place] - x1 - v1 * time[:place]).max())
+    worth = _GAINS * math.log(count) * size**2 * (1.0 + rho) / (1.0 - rho)
+    return place if gain > worth and departs > max(_DEPARTS, _STANDS_OUT * size) else 0

@@ -1,0 +1,259 @@
+"""Error estimates against references: ``python tests/benchmarks/error_estimates.py KIND``.
+
+KIND is `elasticities`, `inertia`, `inverse` or `all`; further arguments are the number of random
+cases and a seed. References of elasticities extrapolate differences at rtol 1e-11. References of
+readings with inertia are measurements a thousand times tighter. The curves for `Inverse` are known.
+The script prints each error that exceeds its estimate, and ends with status 1 if a share of covered
+numbers is too small.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from scipy.optimize import brentq
+
+from rsfstudy import Scene
+from rsfstudy.measures import Measure
+from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures.elasticities import Elasticities
+from rsfstudy.measures.healing import Healing
+from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures.velocity_step import VelocityStep
+from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
+from rsfstudy.reduce import Inverse, reduced
+from rsfstudy.status import Status
+
+Random = np.random.Generator
+#: Steps of ln p of the differences that are extrapolated.
+STEPS = (0.004, 0.002, 0.001, 0.0005)
+#: Kinds of curves, and shares of them that may at most be flagged.
+CURVES = {"smooth": 0.0, "kinked": 0.2, "oscillating": 0.2}
+
+
+class Number(NamedTuple):
+    """A number with its error estimate, and the reference with its own uncertainty."""
+
+    label: str
+    value: float
+    estimate: float
+    reference: float
+    uncertainty: float
+    work: int = 0
+
+    @property
+    def error(self) -> float:
+        """Error beyond the uncertainty of the reference, and rounding."""
+        rounding = 1e-12 * abs(self.reference)
+        return max(abs(self.value - self.reference) - self.uncertainty - rounding, 0.0)
+
+
+def decades(random: Random, low: float, high: float) -> float:
+    """Draw a number of which each decade is equally likely."""
+    return float(math.exp(random.uniform(math.log(low), math.log(high))))
+
+
+def random_slider(random: Random) -> dict[str, Any]:
+    """Draw a law, a normal stress condition and their parameters."""
+    fields: dict[str, Any] = {
+        "law": str(random.choice(["slip", "slowness", "perrin_rice_zheng"])),
+        "normal_stress": str(random.choice(["constant", "variable"])),
+        "a": decades(random, 0.003, 0.025),
+        "b_over_a": 1.0 + decades(random, 0.05, 3.0),
+        "mu_star": float(random.uniform(0.5, 0.85)),
+    }
+    if fields["normal_stress"] == "variable":
+        lowest = math.degrees(math.atan(fields["mu_star"]))
+        fields["phi"] = lowest + random.uniform(0.05, 0.95) * (90.0 - lowest)
+        fields["alpha"] = float(random.uniform(0.02, 0.6))
+    return fields
+
+
+# ---- elasticities --------------------------------------------------------------------------------
+
+
+def elasticities(random: Random) -> Iterator[Number]:
+    """Draw an elasticity of a critical step or a limit cycle."""
+    fields = random_slider(random)
+    measure: Measure = CriticalStep(
+        str(random.choice(["load_velocity_ratio", "displacement_step"]))
+    )
+    if random.uniform() < 1.0 / 3.0:
+        measure = LimitCycle(phases=2)
+        fields |= {"inertia": True, "load_velocity_ratio": decades(random, 1.1, 100.0)}
+        fields |= {"stiffness_ratio": float(random.uniform(0.4, 0.97))}
+    else:
+        fields["stiffness_ratio"] = float(random.uniform(1.02, 2.5))
+    names = ["b_over_a", "b_over_a", "a", "stiffness_ratio", "mu_star"]
+    name = str(random.choice(names + ["alpha"] * ("alpha" in fields)))
+    accuracy = Accuracy(10.0 ** -random.integers(5, 10), engine="compiled", budget=5_000_000)
+    scene = Scene(**fields)
+    outcome = Elasticities(measure, (name,))(scene, accuracy)
+    if outcome.status is not Status.OK:
+        return
+    names_of_both = "elasticity", "elasticity_error"
+    value, estimate = (float(np.ravel(outcome.values[key])[0]) for key in names_of_both)
+    reference, uncertainty = extrapolated(measure, scene, name)
+    if math.isfinite(value + reference):
+        label = f"{measure.name} by {name} at {accuracy.rtol:g}: {fields}"
+        yield Number(label, value, estimate, reference, uncertainty, outcome.rhs_evaluations)
+
+
+def extrapolated(measure: Measure, scene: Scene, name: str) -> tuple[float, float]:
+    """Extrapolate central differences of ln|y|, and tell the difference of the last two columns."""
+    accuracy = Accuracy(TIGHTEST_RTOL, engine="compiled", budget=20_000_000)
+
+    def level(by: float) -> float:
+        outcome = measure(scene.with_(**{name: getattr(scene, name) * math.exp(by)}), accuracy)
+        value = float(outcome.values.get(measure.headline, math.nan))
+        return math.log(abs(value))
+
+    best, rows = (math.inf, math.nan), list[list[float]]()
+    for step in STEPS:
+        row = [(level(step) - level(-step)) / (2.0 * step)]
+        for column, before in enumerate(rows[-1] if rows else []):
+            row.append(row[column] + (row[column] - before) / (4.0 ** (column + 1) - 1.0))
+            apart = abs(row[-1] - row[-2]) + abs(row[-1] - before)
+            best = min(best, (apart, row[-1]))
+        rows.append(row)
+    return best[1], best[0]
+
+
+# ---- readings with inertia -----------------------------------------------------------------------
+
+
+def inertia(random: Random) -> Iterator[Number]:
+    """Draw a hold or a velocity step of a slider with inertia, and give all its numbers."""
+    fields = random_slider(random) | {"inertia": True, "reference_rate": 1e-3}
+    fields["stiffness_ratio"] = decades(random, 1.1, 100.0)
+    fields["period"] = 2.0 * math.pi * decades(random, 1e-5, 0.3) / fields["reference_rate"]
+    fields["load_velocity_ratio"] = decades(random, 0.03, 30.0)
+    measure: Measure = VelocityStep(phases=2)
+    if random.uniform() < 0.5:
+        measure, fields["hold_time"] = Healing(phases=2), decades(random, 1.0, 1e5)
+    rtol, scene = 10.0 ** -random.integers(4, 9), Scene(**fields)
+    outcomes = [
+        measure(scene, Accuracy(tolerance, engine="compiled", budget=60_000_000))
+        for tolerance in (rtol, max(1e-3 * rtol, TIGHTEST_RTOL))
+    ]
+    if any(outcome.status is not Status.OK for outcome in outcomes):
+        return
+    (found, exact), work = (each.values for each in outcomes), outcomes[0].rhs_evaluations
+    for name in measure.estimated:
+        value, estimate, reference, uncertainty = (
+            float(values[key]) for values in (found, exact) for key in (name, f"{name}_error")
+        )
+        if math.isfinite(value + reference):
+            label = f"{name} at {rtol:g}: {fields}"
+            yield Number(label, value, estimate, reference, uncertainty, work)
+
+
+# ---- inverse -------------------------------------------------------------------------------------
+
+
+def curve_of(kind: str, random: Random, length: float, cells: int) -> Callable[[Any], Any]:
+    """Draw a curve of ln y that rises over ln x from 0 to a length."""
+    slope, bend = random.uniform(0.3, 3.0), random.uniform(-0.4, 0.5)
+    if kind == "smooth" and random.uniform() < 0.5:
+        rate = random.uniform(0.3, 4.0) / length
+        return lambda at: slope * np.sinh(rate * at) / rate
+    if kind == "kinked":
+        kink, change = random.uniform(0.1, 0.9) * length, random.uniform(-0.55, 4.0) * slope
+        return lambda at: (
+            slope * (at + bend * at**2 / (2.0 * length)) + change * np.maximum(at - kink, 0.0)
+        )
+    rate = 2.0 * math.pi * random.uniform(0.5, 0.4 * cells) / length
+    size = 0.0 if kind == "smooth" else random.uniform(0.1, 1.2) * slope / rate
+    phase = random.uniform(0.0, 2.0 * math.pi)
+    return lambda at: (
+        slope * (at + bend * at**2 / (2.0 * length)) + size * np.sin(rate * at + phase)
+    )
+
+
+def inverse(kind: str, random: Random) -> tuple[list[Number], int]:
+    """Draw a curve and a level; give each place where it has the level, and the status."""
+    cells, length = int(random.integers(5, 17)), math.log(10.0) * random.uniform(0.7, 3.0)
+    curve = curve_of(kind, random, length, cells)
+    x = np.linspace(0.0, length, cells)
+    if random.uniform() < 0.5:
+        x[1:-1] = np.sort(random.uniform(0.02, 0.98, cells - 2)) * length
+    level = float(curve(random.uniform(0.02, 0.98) * length))
+    dataset = xr.Dataset(
+        {"y": ("x", np.exp(curve(x))), "status": ("x", np.zeros(cells, np.int8))},
+        coords={"x": np.exp(x)},
+    )
+    found = reduced(dataset, (Inverse(name="at", of="y", on="x", levels=math.exp(level)),))
+    fine = np.linspace(0.0, length, 4001)
+    off = curve(fine) - level
+    roots = [
+        brentq(lambda at: float(curve(at)) - level, *fine[n : n + 2], xtol=1e-14)
+        for n in np.flatnonzero(off[1:] * off[:-1] < 0.0)
+    ]
+    at, error = float(found["at"]), float(found["at_error"])
+    status = int(found["at_status"])
+    return [Number(kind, at, error, math.exp(root), 0.0) for root in roots if not status], status
+
+
+# ---- all of them ---------------------------------------------------------------------------------
+
+
+def report(title: str, numbers: list[Number], least: float) -> bool:
+    """Print the statistics of some numbers; True if enough of them are covered."""
+    missed = [number for number in numbers if number.error > number.estimate]
+    for number in missed:
+        print(f"  {number.error / number.estimate:.3g} times its estimate: {number.label}")
+    ratios = [n.estimate / max(abs(n.value - n.reference), 1e-15) for n in numbers]
+    share = 1.0 - len(missed) / max(len(numbers), 1)
+    work = sum(number.work for number in numbers)
+    text = f"{title}: {share:.2%} of {len(numbers)} covered, median of estimate over error "
+    print(f"{text}{np.median(ratios):.3g}, {work:,} right-hand sides")
+    return share >= least
+
+
+def check_inverse(count: int, random: Random) -> bool:
+    """Check curves of each kind: those that are flagged count as covered."""
+    passed = True
+    for kind, most in CURVES.items():
+        numbers, flagged = list[Number](), 0
+        for _ in range(count):
+            # of several places with the level, the farthest counts
+            found, status = inverse(kind, random)
+            flagged += status != 0
+            numbers += sorted(found, key=lambda number: number.error)[-1:]
+        uncovered = sum(number.error > number.estimate for number in numbers)
+        print(f"inverse, {kind}: {flagged} of {count} flagged")
+        report(f"inverse, {kind}", numbers, 0.0)
+        passed &= flagged <= most * count and uncovered <= 0.05 * count
+    return passed
+
+
+def check_random(
+    title: str, draw: Callable[[Random], Iterator[Number]], count: int, seed: int
+) -> bool:
+    """Check numbers of random scenes."""
+    numbers, random = list[Number](), np.random.default_rng(seed)
+    while len(numbers) < count:
+        numbers += draw(random)
+    return report(title, numbers, 0.99)
+
+
+def main(kind: str, count: int, seed: int) -> int:
+    """Check one kind of error estimates, or all."""
+    passed = True
+    if kind in ("inverse", "all"):
+        passed &= check_inverse(count, np.random.default_rng(seed))
+    for title, draw in (("elasticities", elasticities), ("inertia", inertia)):
+        if kind in (title, "all"):
+            passed &= check_random(title, draw, count, seed)
+    return 0 if passed else 1
+
+
+if __name__ == "__main__":
+    KIND, *NUMBERS = sys.argv[1:] or ["all"]
+    COUNT, SEED = [int(number) for number in NUMBERS] + [200, 0][len(NUMBERS) :]
+    sys.exit(main(KIND, COUNT, SEED))

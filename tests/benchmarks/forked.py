@@ -1,0 +1,71 @@
+"""Calls of a function in a forked process, with limits of time and memory."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import resource
+import select
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+#: Seconds of CPU time, the factor on the clock, and bytes of memory that a call may take.
+LIMIT, PATIENCE, MEMORY = 20, 4.0, 8 * 2**30
+
+
+def call_in_child(function: Callable[[], Any], place: Path) -> tuple[Any, str]:
+    """Call a function in a forked process, in a directory.
+
+    Returns
+    -------
+    value : object
+        Its result; None if the process did not return one.
+    how : str
+        ``"hangs"`` or ``"dies of signal N"`` in that case.
+    """
+    reads, writes = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reads)
+        _run(function, place, writes)
+    os.close(writes)
+    content = _received(reads)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(child, signal.SIGKILL)
+    os.close(reads)
+    _, status = os.waitpid(child, 0)
+    try:
+        return pickle.loads(content), ""
+    except (EOFError, pickle.UnpicklingError):
+        number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
+        hangs = number in (0, signal.SIGXCPU, signal.SIGKILL)
+        return None, "hangs" if hangs else f"dies of signal {number}"
+
+
+def _run(function: Callable[[], Any], place: Path, writes: int) -> None:
+    """Call the function, send its result, and end this process."""
+    try:
+        os.chdir(place)
+        os.setsid()
+        resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        content = pickle.dumps(function())
+        with os.fdopen(writes, "wb") as pipe:
+            pipe.write(content)
+    finally:
+        os._exit(0)
+
+
+def _received(reads: int) -> bytes:
+    """Receive all bytes until the sender closes the pipe or time is up."""
+    content, end = b"", time.monotonic() + PATIENCE * LIMIT
+    while select.select([reads], [], [], max(0.0, end - time.monotonic()))[0]:
+        part = os.read(reads, 2**16)
+        if not part:
+            break
+        content += part
+    return content

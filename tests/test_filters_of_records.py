@@ -1,0 +1,110 @@
+"""Friction that was averaged or filtered before it was recorded."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import synthetic_records as synthetic
+from synthetic_records import OPTIONS, TRUTH
+
+import rsfstudy
+from rsfstudy.analysis.fitting.averaging import Overlap, average
+from rsfstudy.analysis.fitting.filters import KINDS, LOW_PASS, Filter
+from rsfstudy.errors import InvalidValue
+from rsfstudy.status import Status
+
+LOADING = ((0.0, 1.0), (40.07, 10.0))
+LAW = {"noise": "ar", "laws": ["slowness"]}
+
+
+def filtered(text: str, size: float, seed: int) -> rsfstudy.Record:
+    """A record at 12.5 Hz whose friction and noise passed a filter."""
+    fine = np.arange(0.0, 60.0, 0.016)
+    friction = synthetic.motion("slowness", fine, LOADING)[0]
+    friction += size * np.random.default_rng(seed).standard_normal(len(fine))
+    passed = Filter.parse(text)
+    if passed is not None:
+        friction = passed.apply(fine, np.interp(passed.sample_times(fine), fine, friction))
+    rows = slice(100, -100, 5)
+    columns = {"time": fine[rows], "friction": friction[rows]}
+    moved = synthetic.load_point(LOADING, fine[rows])
+    record = rsfstudy.read_record(columns | {"displacement": moved})
+    return record.with_steps([(40.07, 40.07, 1.0, 10.0)])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_filters_of_an_exponential_are_exact(kind: str) -> None:
+    """Friction that is steady up to 10 s and then decays with a rate of 1/s."""
+    time, size = np.arange(5.0, 20.0, 0.05), 0.8
+    one = Filter(kind, size)
+    at = one.sample_times(time)
+    found = one.apply(time, np.where(at > 10.0, np.exp(10.0 - np.maximum(at, 10.0)), 1.0))
+    if kind not in LOW_PASS:
+        late = time + (0.5 * size if kind == "mean" else 0.0)
+        whole = late - size > 10.0
+        exact = (np.exp(10.0 - late + size) - np.exp(10.0 - late)) / size
+        # midpoints of 16 parts of 0.05 s: (0.05)^2/24
+        np.testing.assert_allclose(found[whole], exact[whole], rtol=2e-4)
+    if kind == "first_order":
+        rate = 2.0 * math.pi * size
+        lag = np.maximum(time - 10.0, 0.0)
+        exact = (rate * np.exp(-lag) - np.exp(-rate * lag)) / (rate - 1.0)
+        # 60 points per period of the corner frequency
+        np.testing.assert_allclose(found, exact, atol=3e-3)
+    np.testing.assert_allclose(found[time < 9.0], 1.0, rtol=1e-12)
+
+
+def test_the_correlation_of_averages_is_removed() -> None:
+    """Running means over 5 rows, and the matrix of their overlaps."""
+    time = 0.2 * np.arange(60.0)
+    lags = np.abs(time[:, None] - time)
+    exact = np.maximum(1.0 - lags, 0.0) + 0.002 * np.eye(60)
+    overlap = Overlap(time, 1.0)
+    root = np.linalg.inv(np.linalg.cholesky(exact))
+    np.testing.assert_allclose(overlap.whitened(np.eye(60)), root, atol=1e-9)
+    assert overlap.log_determinant == pytest.approx(np.linalg.slogdet(exact)[1])
+    assert overlap.rows == pytest.approx(5.0, rel=0.1)  # but for the ends
+    line = average(time, time[:, None] ** 2, 1.0)[:, 0]
+    # the mean of t^2 over 1 s is t^2 + 1/12; lines between rows add less than 0.2^2/2
+    np.testing.assert_allclose(line[3:-3], time[3:-3] ** 2 + 1.0 / 12.0, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ("mean 0.8", {"averaging": "800 ms"}),
+        ("trailing_mean 0.8", {"averaging": "trailing 0.8 s"}),
+        ("butterworth_2 0.6", {"low_pass": "butterworth_2 0.6 Hz"}),
+    ],
+)
+def test_a_stated_filter_gives_the_truth_back(text: str, options: dict[str, str]) -> None:
+    found = rsfstudy.fit(filtered(text, 3e-4, 1), **OPTIONS | LAW | options).squeeze()
+    assert found.status.item() == Status.OK, found.message.item()
+    for name in ("a", "b", "slip_distance"):
+        assert abs(synthetic.off(found, name, TRUTH[name])) < 3.5, name
+
+
+def test_an_unstated_average_is_detected() -> None:
+    found = rsfstudy.fit(filtered("mean 0.8", 3e-4, 1), **OPTIONS | LAW).squeeze()
+    assert found.status.item() == Status.ERRORS_NOT_VALID
+    assert "friction looks averaged over about 0.8 s" in found.message.item()
+    assert synthetic.off(found, "a", TRUTH["a"]) < -3.0
+    plain = rsfstudy.fit(filtered("", 3e-4, 1), **OPTIONS | LAW).squeeze()
+    assert plain.status.item() == Status.OK
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"averaging": "1 s", "low_pass": "first_order 1 Hz"}, "cannot follow an averaging"),
+        ({"low_pass": "bessel 1 Hz"}, "first_order, butterworth_2"),
+        ({"low_pass": "first_order 1 s"}, "another kind"),
+        ({"averaging": "-1 s"}, "must be positive"),
+        ({"averaging": "1 um"}, "averaging"),
+    ],
+)
+def test_filters_that_cannot_be_are_refused(options: dict[str, str], text: str) -> None:
+    with pytest.raises(InvalidValue, match=text):
+        rsfstudy.fit(synthetic.record(), stiffness=3e-3, **options)

@@ -1,0 +1,108 @@
+"""Readings of a slider with inertia count the inertia that both of their runs neglect."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rsfstudy import Scene
+from rsfstudy.measures.healing import Healing
+from rsfstudy.measures.velocity_step import VelocityStep
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.course import follow
+from rsfstudy.motion.events import maximum
+from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.neglected_inertia import estimate_neglected_inertia
+from rsfstudy.motion.readings import growth_along_path
+from rsfstudy.motion.recording import REGIME, Recording
+from rsfstudy.slider.equations import IN_RUPTURE
+from rsfstudy.status import Status
+
+INERTIA = {"inertia": True, "reference_rate": 1e-3}
+#: Holds and a step that stay on the slow manifold, or leave it late, in both runs.
+CASES = [
+    (
+        Healing(phases=2),
+        1e-5,
+        Scene(
+            law="slip", normal_stress="constant", a=0.01023, b_over_a=1.13316, mu_star=0.66,
+            stiffness_ratio=13.46, hold_time=1.41584, load_velocity_ratio=8.22991,
+            period=41.77, **INERTIA,
+        ),
+    ),
+    (
+        Healing(phases=2),
+        1e-7,
+        Scene(
+            law="slip", normal_stress="constant", a=0.0068, b_over_a=1.4568, mu_star=0.78,
+            stiffness_ratio=45.22, hold_time=9168.0, load_velocity_ratio=1.01327,
+            period=34.05, **INERTIA,
+        ),
+    ),
+    (
+        VelocityStep(phases=2),
+        1e-5,
+        Scene(
+            law="perrin_rice_zheng", normal_stress="variable", a=0.00864, b_over_a=2.8021,
+            mu_star=0.8106, stiffness_ratio=31.4966, phi=56.646, alpha=0.5531,
+            load_velocity_ratio=4.63637, period=5.3072, **INERTIA,
+        ),
+    ),
+]  # fmt: skip
+
+
+def read(measure, scene, rtol):
+    outcome = measure(scene, Accuracy(rtol, engine="compiled", budget=10_000_000))
+    assert outcome.status is Status.OK, outcome.message
+    return outcome.values
+
+
+@pytest.mark.parametrize(("measure", "rtol", "scene"), CASES)
+def test_errors_cover_what_both_runs_neglect(measure, rtol, scene):
+    """A run a thousand times tighter leaves the slow manifold earlier."""
+    found, exact = read(measure, scene, rtol), read(measure, scene, 1e-3 * rtol)
+    for name in measure.estimated:
+        error = abs(found[name] - exact[name])
+        assert error <= found[f"{name}_error"] + exact[f"{name}_error"], name
+
+
+def recorded(scene, rtol):
+    recording, accuracy = Recording(), Accuracy(rtol, engine="compiled")
+    list(follow(scene, accuracy, Meter(10_000_000, engine="compiled"), clock=True,
+                recording=recording, until=12.0))  # fmt: skip
+    return recording, recording.seen(scene)
+
+
+def test_a_scene_without_inertia_neglects_none():
+    scene = Scene(law="slip", stiffness_ratio=2.0, load_velocity_ratio=3.0)
+    recording, rows = recorded(scene, 1e-6)
+    slow = recording.number(scene.dynamics.regime)
+    assert not estimate_neglected_inertia(scene, rows, slow, 0.0).any()
+
+
+def test_estimate_goes_with_the_accuracy():
+    """The error of the slow manifold is of the third order in its thresholds, which scale with the
+    cube root of rtol. A motion that is in the full equations throughout neglects nothing.
+    """
+    scene, found = CASES[2][2], []
+    for rtol in (1e-4, 1e-5, 1e-6, 1e-8):
+        recording, rows = recorded(scene, rtol)
+        slow = recording.number(scene.dynamics.regime)
+        estimate = estimate_neglected_inertia(scene, rows, slow, 0.0)
+        assert (np.diff(estimate) >= 0.0).all()
+        found.append(estimate[-1] / rtol)
+        assert (estimate[-1] > 0.0) == bool((rows[:, REGIME] == slow).any())
+    assert 0.1 < max(found) < 100.0
+
+
+def test_growth_at_a_peak_has_one_unit_in_both_regimes():
+    """A peak that is found on the slow manifold or in the full equations, depending on rtol."""
+    scene, growths = CASES[0][2], {}
+    for rtol in (1e-5, 1e-8):
+        meter, wanted = Meter(10_000_000, engine="compiled"), maximum("spring_stress", ends=True)
+        events = list(follow(scene, Accuracy(rtol, engine="compiled"), meter, [wanted]))
+        peak = next(event for event in events if event.watch == wanted)
+        growths[peak.regime] = growth_along_path(scene, peak, 8.22991)
+    assert set(growths) == {IN_RUPTURE, scene.dynamics.regime}
+    first, second = growths.values()
+    assert math.isclose(first, second, rel_tol=1e-2)

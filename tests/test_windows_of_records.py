@@ -1,0 +1,80 @@
+"""Windows of steps: where they begin, and what a fit reports when they are cut."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import synthetic_records as synthetic
+from synthetic_records import TRUTH, off
+
+import rsfstudy
+from rsfstudy.analysis.fitting.record import Record
+from rsfstudy.analysis.fitting.straight import find_straight_start
+from rsfstudy.errors import InvalidValue
+from rsfstudy.status import LABELS
+
+LOADING = ((0.0, 2.0), (150.0, 20.0))
+OPTIONS: dict[str, Any] = {
+    "laws": ["slowness"],
+    "stiffness": TRUTH["stiffness"],
+    "slip_distance": 8.0,
+    "noise": "ar1",
+    "engine": "compiled",
+}
+
+
+def run_in(seed: int = 1, depth: float = 0.5) -> Record:
+    """Make a record in which friction rises by `depth` over some 25 um before a velocity step."""
+    times = np.append(np.arange(0.0, 150.0, 0.5), np.arange(150.0, 159.0, 0.05))
+    moved = synthetic.load_point(LOADING, times)
+    friction = synthetic.motion("slowness", times, LOADING)[0] - depth * np.exp(-moved / 25.0)
+    friction += synthetic.correlated(len(times), 0.5, 1e-4, seed)
+    columns = {"time": times, "displacement": moved, "friction": friction}
+    return rsfstudy.read_record(columns).with_steps([(150.0, 150.0, 2.0, 20.0)])
+
+
+def test_a_window_begins_where_friction_has_become_straight() -> None:
+    fit = rsfstudy.fit(run_in(), **OPTIONS).squeeze()
+    for name in ("a", "b", "slip_distance"):
+        assert abs(off(fit, name, TRUTH[name])) < 3.5, name
+    assert float(fit.mu_star) == pytest.approx(0.6, abs=1e-3)
+    assert 80.0 < float(fit.window_begins) < 260.0
+    assert "friction is not a straight line before" in str(fit.message.values)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.9])
+def test_correlated_noise_is_straight(rho: float) -> None:
+    time = np.arange(400.0)
+    for seed in range(30):
+        friction = 0.6 + 1e-5 * time + synthetic.correlated(len(time), rho, 1e-3, seed)
+        columns = {"time": time, "displacement": time, "friction": friction}
+        assert find_straight_start(Record(columns, f"seed_{seed}"), 0.0, 400.0) == 0.0
+
+
+def test_stated_extents_that_are_cut_are_reported() -> None:
+    record = run_in(depth=0.0)
+    fit = rsfstudy.fit(record, **OPTIONS, before="400 um", after="500 um").squeeze()
+    assert LABELS[int(fit.status)] == "ok"
+    message = str(fit.message.values)
+    assert "before= is cut from 400 to 300 um" in message
+    assert "after= is cut from 500 to 179 um by the end of the record" in message
+    whole = rsfstudy.fit(record, **OPTIONS, before="200 um", after="150 um").squeeze()
+    assert "cut" not in str(whole.message.values)
+
+
+def test_a_load_point_that_is_set_to_zero_is_named() -> None:
+    record = run_in(depth=0.0)
+    moved = record.columns["displacement"] - np.where(record.time > 155.0, 250.0, 0.0)
+    reset = rsfstudy.read_record({**record.columns, "displacement": moved})
+    with pytest.raises(InvalidValue, match=r"falls back .* at 155\S* s.*record\.window"):
+        rsfstudy.fit(reset, **OPTIONS)
+
+
+def test_negative_friction_is_refused_with_the_remedy() -> None:
+    record = run_in(depth=0.0)
+    negative = rsfstudy.read_record({**record.columns, "friction": -record.columns["friction"]})
+    fit = rsfstudy.fit(negative, **OPTIONS).squeeze()
+    assert LABELS[int(fit.status)] == "not_applicable"
+    assert "reverse it with a scale of -1" in str(fit.message.values)
