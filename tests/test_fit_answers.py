@@ -121,7 +121,7 @@ def test_errors_of_steps_are_those_of_two_straight_lines() -> None:
     exact = [of_time, *(12 * 0.01 / (counts * lasts**2))]
     # 400 rows tell s^2 to 7 per cent, and an order above 0 that chance may take to some more
     assert variances == pytest.approx(exact, rel=0.25)
-    assert moved_steps(one.with_steps([step]), [step]) == []
+    assert moved_steps(one.with_steps([step[:4]]), [step]) == []
     assert moved_steps(record(), [step]) == []
 
 
