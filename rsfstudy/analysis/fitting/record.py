@@ -188,6 +188,8 @@ class Record:
 
 def _stated_step(stated: Sequence[float]) -> Step:
     """Check the numbers of a step that a user states."""
+    if isinstance(stated, Step):  # from another record
+        return stated
     rule = "is no step: begins, ends, velocity before and after, and, if it changes, "
     rule += "normal stress before and after"
     try:
