@@ -60,7 +60,7 @@ _GRID = (0.1, 0.3, 1.0, 3.0, 10.0)
 #: Passes in which noise and parameters are found in turn, until those move by this part of their
 #: standard errors; most curves of a pass, and where it ends; and the fewest and most steps of
 #: Newton at the end, of which the last one moves by less than a part of standard errors.
-_PASSES, _STILL, _CURVES, _FOUND, _POLISHED = 4, 0.05, 200, 1e-8, (2, 8)
+_PASSES, _STILL, _CURVES, _FOUND, _POLISHED = 4, 0.05, 200, 1e-8, (2, 24)
 _TRUST_REGION = {"x_scale": "jac", "xtol": _FOUND, "gtol": 1e-12, "max_nfev": _CURVES}
 _DONE = 1e-3
 #: Fewest degrees of freedom of intervals.
