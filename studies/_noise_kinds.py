@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.signal import lfilter
 
-from rsfstudy.analysis.fitting.record import Record
+if TYPE_CHECKING:
+    from rsfstudy.analysis.fitting.record import Record
 
 
 class Truth(NamedTuple):
@@ -105,6 +106,8 @@ class NoiseKind:
 
     def draw(self, truth: Truth, rng: np.random.Generator) -> Record:
         """Draw a record."""
+        from rsfstudy.analysis.fitting.record import Record  # imports xarray, which is slow
+
         margin = self.mean_of // 2
         time = self._times(truth, rng, margin)
         moved, size = truth.displacement(time), self.noise_factor * truth.noise_size

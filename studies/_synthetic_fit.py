@@ -29,7 +29,6 @@ from rsfstudy.analysis.fitting.validity import find_reasons
 from rsfstudy.axes.axis import Axis
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
-from rsfstudy.measures.fit import Fit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output, Quantity
@@ -191,6 +190,8 @@ class SyntheticFit(Measure):
 
     def _find_in_record(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Draw a laboratory record, and fit it as `rsfstudy.fit` does."""
+        from rsfstudy.measures.fit import Fit  # imports xarray, which is slow
+
         kind, true = KINDS[self.process], self._true(scene)
         if "trend1" in true:
             true["trend1"] = kind.trend

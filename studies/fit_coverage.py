@@ -5,9 +5,9 @@ A velocity step from 1 to 10 um/s with noise that is white, autoregressive with 
 the noise (full markers) cover the truth as often as they promise; those of the usual formula, which
 takes residuals for white noise (open markers), cover it far less often where noise is correlated.
 Further kinds of noise imitate laboratory records: a noise level that changes, outliers, rounded
-friction, an uneven clock, displacement with jitter or from an encoder, and averaged friction.
-Errors that cannot be valid, because friction is rounded too coarsely or was averaged without a
-stated filter, are flagged.
+friction, an uneven clock, displacement with jitter or from an encoder, and averaged friction. The
+fit reports that errors are not valid if friction is rounded too coarsely, or if it was averaged and
+the average was not stated.
 """
 
 from collections.abc import Mapping
@@ -98,7 +98,9 @@ def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
     for number, process in enumerate(dataset["process"].values):
         for prefix, fill in (("", "full"), ("naive_", "none")):
             share = 100.0 * dataset[f"{prefix}share_one"].isel(process=number)
-            beside = 0.15 * (number - 0.5 * (dataset.sizes["process"] - 1))
+            beside = min(0.15, 0.8 / dataset.sizes["process"]) * (
+                number - 0.5 * (dataset.sizes["process"] - 1)
+            )
             style = {"color": look(number)["color"], "linestyle": "", "fillstyle": fill}
             text = f"{process}{', naive' * bool(prefix)}"
             axes.plot(places + beside, share, marker=marker(number), label=text, **style)

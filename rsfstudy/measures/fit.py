@@ -25,6 +25,7 @@ from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
 from rsfstudy.analysis.fitting.unstated_filter import find_averaging
 from rsfstudy.analysis.fitting.validity import (
+    NEGLIGIBLE,
     describe_load_point,
     describe_unidentified,
     find_reasons,
@@ -330,7 +331,10 @@ class Fit(Measure):
     def find_reasons(self, search: Search, found: Fitted) -> tuple[str, ...]:
         """Find the reasons why the standard errors of a fit are not valid."""
         reasons = find_reasons(found, search.model.friction)
-        if self.filter or self.noise == WHITE or is_rounded(found):
+        # a recorded load point has noise that any average would reduce
+        is_recorded = self.loading == "recorded"
+        is_exact = found.noise_sd < NEGLIGIBLE
+        if self.filter or is_recorded or is_exact or self.noise == WHITE or is_rounded(found):
             return reasons
         return (*find_averaging(found, search.model.time, self.noise), *reasons)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,3 +99,15 @@ class Fitted:
     def stderr(self, name: str) -> float:
         """Standard error of a parameter."""
         return float((self.spread * self.slopes)[self.free.index(name)])
+
+
+def compute_criterion(innovations: np.ndarray, noise: Noise, parameters: int, count: int) -> float:
+    """Compute Akaike's criterion, corrected for few samples (Hurvich and Tsai, 1989).
+
+    It is ``n [ln(2 pi S/n) + 1] + ln|R| + 2 k n/(n - k - 1)`` for n rows, a sum of squares S of the
+    innovations and k parameters, including those of the noise and one for each outlier.
+    """
+    parameters, size = parameters + count - len(innovations), float(innovations @ innovations)
+    every = parameters + noise.partial.size + len(noise.sizes)
+    likelihood = count * (math.log(2.0 * math.pi * size / count) + 1.0) + noise.log_determinant
+    return likelihood + 2.0 * every * count / max(count - every - 1.0, 1.0)

@@ -31,7 +31,6 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import minimize
 from scipy.signal import lfilter
-from scipy.stats import chi2
 
 from rsfstudy.analysis.fitting.averaging import Overlap
 from rsfstudy.analysis.fitting.noise_runs import (
@@ -42,6 +41,8 @@ from rsfstudy.analysis.fitting.noise_runs import (
     index_rows,
     split_runs,
 )
+from rsfstudy.analysis.fitting.whiteness import LAGS as LAGS
+from rsfstudy.analysis.fitting.whiteness import whiteness as whiteness
 from rsfstudy.errors import InvalidValue
 
 WHITE, AUTOREGRESSIVE = "white", "ar"
@@ -53,8 +54,8 @@ _LARGEST, _ENOUGH = 0.999, 0.02
 _LEVEL_PASSES = 2
 #: Smallest standard deviation of a level, relative to that of all residuals.
 _QUIETEST = 1e-3
-#: Lags at which residuals freed of correlation are tested for what is left of it.
-LAGS = 20
+#: Largest logarithm of a level relative to the first one.
+_WIDEST = 30.0
 
 
 def check_noise(name: str) -> None:
@@ -209,7 +210,8 @@ def fitted(
 
     def noise(x: np.ndarray) -> Noise:
         partial = _LARGEST * np.tanh(x[: begin.partial.size]).reshape(shape)
-        sizes = np.exp(np.append(0.0, x[begin.partial.size :]))
+        logs = np.clip(x[begin.partial.size :], -_WIDEST, _WIDEST)
+        sizes = np.exp(np.append(0.0, logs))
         return Noise(begin.runs, partial, np.maximum(sizes, least), kept, begin.overlap)
 
     columns = begin.kept_rows(np.column_stack([jacobian, residuals]))
@@ -222,7 +224,8 @@ def fitted(
     x = np.append(np.arctanh(begin.partial.ravel() / _LARGEST), np.log(begin.sizes[1:]))
     if not math.isfinite(misfit(x)):  # the residuals vanish
         return noise(x)
-    found = minimize(misfit, x, method="BFGS", options={"gtol": _ENOUGH})
+    with np.errstate(invalid="ignore", over="ignore"):  # the misfit may be infinite near by
+        found = minimize(misfit, x, method="BFGS", options={"gtol": _ENOUGH})
     return noise(found.x if found.fun <= misfit(x) else x)
 
 
@@ -272,36 +275,6 @@ def _first_guess(
         runs = split_runs(whole, knots)
     first = float(found.sizes[0])
     return Noise(found.runs, found.partial, found.sizes / first), first
-
-
-def whiteness(innovations: np.ndarray, order: int) -> float:
-    """Chance that white noise looks as correlated as residuals freed of correlation: of chi^2
-    as large as ``n (n + 2) sum r_k^2/(n - k)``, r_k being their autocorrelation at lag k (Ljung and
-    Box, 1978).
-
-    Parameters
-    ----------
-    innovations : ndarray, shape (samples,)
-    order : int
-        Coefficients that were found; by so many there are fewer degrees of freedom.
-    """
-    count, seen = len(innovations), innovations - innovations.mean()
-    lags = np.arange(1, min(LAGS + order, count // 4) + 1)
-    correlations = np.array([seen[lag:] @ seen[:-lag] for lag in lags]) / (seen @ seen)
-    size = count * (count + 2.0) * float(np.sum(correlations**2 / (count - lags)))
-    return float(chi2.sf(size, max(len(lags) - order, 1)))
-
-
-def compute_criterion(innovations: np.ndarray, noise: Noise, parameters: int, count: int) -> float:
-    """Compute Akaike's criterion, corrected for few samples (Hurvich and Tsai, 1989).
-
-    It is ``n [ln(2 pi S/n) + 1] + ln|R| + 2 k n/(n - k - 1)`` for n rows, a sum of squares S of the
-    innovations and k parameters, including those of the noise and one for each outlier.
-    """
-    parameters, size = parameters + count - len(innovations), float(innovations @ innovations)
-    every = parameters + noise.partial.size + len(noise.sizes)
-    likelihood = count * (math.log(2.0 * math.pi * size / count) + 1.0) + noise.log_determinant
-    return likelihood + 2.0 * every * count / max(count - every - 1.0, 1.0)
 
 
 class _Products:

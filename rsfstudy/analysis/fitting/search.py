@@ -24,6 +24,7 @@ from scipy.optimize import least_squares
 
 from rsfstudy.analysis.fitting import noise as noises
 from rsfstudy.analysis.fitting.fitted import Fitted as Fitted
+from rsfstudy.analysis.fitting.fitted import compute_criterion
 from rsfstudy.analysis.fitting.joint import Joint
 from rsfstudy.analysis.fitting.model import (
     FINE,
@@ -247,7 +248,7 @@ class Search:
             off = np.abs(inverse @ whitened[:, :-1].T @ noise.whitened(finer[:, None])[:, 0])
         slopes = [slope(name, values[name]) for name in self.free]
         errors = (3.0 * off + np.abs(moved)) * slopes
-        criterion = noises.compute_criterion(innovations, noise, len(x), len(left))
+        criterion = compute_criterion(innovations, noise, len(x), len(left))
         steps = self._criterion_without_steps(jacobian, noise) - criterion > _DECIDES
         return Fitted(
             values=values,
@@ -278,7 +279,7 @@ class Search:
             columns = np.insert(columns, 0, 1.0, axis=1)
         whitened = noise.whitened(columns)
         innovations = whitened[:, -1] - whitened[:, :-1] @ _linear_solution(whitened)
-        return noises.compute_criterion(innovations, noise, columns.shape[1] - 1, len(columns))
+        return compute_criterion(innovations, noise, columns.shape[1] - 1, len(columns))
 
     def _unidentified(
         self, x: np.ndarray, values: Values, covariance: np.ndarray, steps: bool

@@ -13,7 +13,7 @@ import numpy as np
 
 from rsfstudy.analysis.fitting import noise as noises
 from rsfstudy.analysis.fitting.averaging import average
-from rsfstudy.analysis.fitting.fitted import Fitted
+from rsfstudy.analysis.fitting.fitted import Fitted, compute_criterion
 
 #: Rows of the averages that are tried, improvement of the criterion that decides, and change of a
 #: parameter, in standard errors, that matters.
@@ -58,7 +58,7 @@ def find_averaging(found: Fitted, time: np.ndarray, noise: str) -> tuple[str, ..
             whitened = there.whitened(np.column_stack([jacobian, left]))
             moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
         innovations = whitened[:, -1] - whitened[:, :-1] @ moved
-        criterion = noises.compute_criterion(innovations, there, len(moved), len(time))
+        criterion = compute_criterion(innovations, there, len(moved), len(time))
         return criterion, float(np.max(np.abs(moved) / found.spread))
 
     if len(time) > _MOST or not np.isfinite(columns).all():

@@ -21,7 +21,7 @@ DISTANCES = ("slip_distance", "slip_distance_2")
 #: p-value below which whitened residuals are called autocorrelated.
 SIGNIFICANT = 0.01
 #: Standard deviation of friction below which residuals are numerical, not statistical.
-_NEGLIGIBLE = 1e-7
+NEGLIGIBLE = 1e-7
 #: Largest ratio of the residual standard deviation to that of an ordinary least-squares fit.
 _LARGEST_RATIO = 2.0
 #: Standard deviation of the noise, over the quantum of friction, below which rounding errors depend
@@ -47,7 +47,7 @@ def find_reasons(found: Fitted, friction: np.ndarray) -> tuple[str, ...]:
     tuple of str
         Empty if the standard errors are valid.
     """
-    if found.noise_sd < _NEGLIGIBLE:
+    if found.noise_sd < NEGLIGIBLE:
         return ()
     return (
         *_misfit(found, friction),
