@@ -114,7 +114,8 @@ def find_unusable(
         if isinstance(error, OSError) and _is_part(value, error.filename):
             rule = f"cannot be the name of a file: {error.strerror}"
             return InvalidValue(name, value, rule, remedy=remedy)
-        if isinstance(error, IndexError) and isinstance(value, Integral):
+        is_outside = isinstance(error, IndexError) or "out of bounds" in str(error)
+        if is_outside and isinstance(value, Integral):
             return InvalidValue(name, value, "is out of range", remedy=remedy)
         if isinstance(value, str) and value == _missing(error):
             return InvalidValue(name, value, "is unknown", remedy=remedy)

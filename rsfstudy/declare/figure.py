@@ -116,6 +116,10 @@ class Panel:
     legend_title: str | None = None
     as_marked: bool = False
 
+    def __post_init__(self) -> None:
+        if isinstance(self.log, str) and not set(self.log) <= {"x", "y"}:
+            raise InvalidValue("log", self.log, "must name axes", choices=("x", "y", "xy"))
+
 
 @guard_methods
 @dataclass(frozen=True)

@@ -162,7 +162,8 @@ def _floats(key: str, values: Any) -> tuple[np.ndarray, str]:
         except (TypeError, ValueError, OverflowError) as error:
             raise InvalidValue(key, values, "must be a list of numbers") from error
     times = np.asarray(values, dtype=f"{'datetime' if kind == 'M' else 'timedelta'}64[ns]")
-    return (times - times[:1] if kind == "M" else times) / np.timedelta64(1, "s"), "s"
+    first = times[:1] if times.ndim else times
+    return (times - first if kind == "M" else times) / np.timedelta64(1, "s"), "s"
 
 
 @error_boundary
