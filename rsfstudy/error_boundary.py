@@ -202,15 +202,13 @@ def _is_internal() -> bool:
 def _explain(name: str, arguments: dict[str, Any], error: Exception) -> RsfStudyError:
     """Return the error for a call that failed although its arguments have the right types."""
     reason = in_words(error)
-    if any(
-        hasattr(value, "data_vars") or hasattr(value, "_dataset") for value in arguments.values()
-    ):
-        rule = f"is not as rsfstudy made it ({brief(error)})"
+    if any(map(_is_dataset, arguments.values())):
+        rule = f"is not as rsfstudy made it ({reason.partition(': ')[2] or reason})"
         if isinstance(error, KeyError) and len(error.args) == 1:
             # xarray lists all variables after the first sentence
             missing = str(error.args[0]).partition(". ")[0].removeprefix("No variable named ")
-            if missing.strip("'").isidentifier():
-                rule = f"has no {missing}, which datasets of rsfstudy have"
+            if str(error.args[0]).startswith("No variable") or missing.isidentifier():
+                rule = f"has no {brief(missing)}, which datasets of rsfstudy have"
         remedy = "Pass the dataset as it was opened, or run the study again."
         return DataError(f"{name}: the dataset {rule}. {remedy}")
     if isinstance(error, MemoryError):
@@ -218,6 +216,11 @@ def _explain(name: str, arguments: dict[str, Any], error: Exception) -> RsfStudy
     given = {key: value for key, value in arguments.items() if value is not None}
     remedy = f"See the documentation of {name}."
     return InvalidValue(name, given, f"cannot be answered ({reason})", remedy=remedy)
+
+
+def _is_dataset(value: object) -> bool:
+    """Return True for a dataset, and for the accessor of one."""
+    return hasattr(type(value), "data_vars") or "_dataset" in getattr(value, "__dict__", {})
 
 
 def in_words(error: BaseException) -> str:

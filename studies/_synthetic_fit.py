@@ -12,6 +12,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from scipy.linalg import solve_toeplitz, toeplitz
 
+from rsfstudy.analysis.fitting.fitted import Fitted
 from rsfstudy.analysis.fitting.intervals import Profile, half_width
 from rsfstudy.analysis.fitting.joint import Joint, numbered, plain
 from rsfstudy.analysis.fitting.model import (
@@ -24,18 +25,22 @@ from rsfstudy.analysis.fitting.model import (
 )
 from rsfstudy.analysis.fitting.noise import check_noise
 from rsfstudy.analysis.fitting.search import Search
+from rsfstudy.analysis.fitting.validity import find_reasons
 from rsfstudy.axes.axis import Axis
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Value
+from rsfstudy.measures.fit import Fit
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import Meter
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
+from ._noise_kinds import KINDS, Truth
+
 #: Correlation of an autoregressive process of order one, and coefficients of moving averages.
 _AR1, _MOVING_AVERAGES = 0.9, {"white": (1.0,), "ma3": (1.0, 0.8, 0.5, 0.2)}
-_PROCESSES = ("ar1", *_MOVING_AVERAGES)
+_PROCESSES = ("ar1", *_MOVING_AVERAGES, *KINDS)
 #: Shares of records whose parameters lie within one and two standard deviations of Gaussian errors.
 ONE, TWO = 0.6827, 0.9545
 #: The fault and machine of the studies that fit synthetic records, the work that one of those may
@@ -60,6 +65,7 @@ _OF_PARAMETER = (
     ("naive_inside_two", "the same, residuals taken for white noise"),
     ("told", "whether the record tells the parameter"),
 )
+_FLAGGED = Output("flagged", "", "1", "1 if standard errors are reported as not valid, otherwise 0")
 
 
 def designs(protocols: Mapping[str, str]) -> Axis:
@@ -95,9 +101,10 @@ class SyntheticFit(Measure):
         Rows of each window.
     noise_size : float
         Standard deviation of the noise.
-    process : {"white", "ar1", "ma3"}
-        The noise that is drawn: white, autoregressive with a correlation of 0.9, or a moving
-        average of the last four.
+    process : str
+        The noise that is drawn: "white"; "ar1", autoregressive with a correlation of 0.9; "ma3", a
+        moving average of four rows; or a kind of laboratory record (`_noise_kinds.KINDS`), which
+        chooses the times of the rows itself.
     noise : str
         The noise that the fit looks for, as `Fit` takes it.
     fitted_law : str
@@ -151,7 +158,7 @@ class SyntheticFit(Measure):
         ]
         text = "Akaike's criterion, in which the noise counts"
         order = Output("noise_order", "", "1", "order of the autoregressive process of the noise")
-        return (*by, Output("criterion", "", "1", text), order)
+        return (*by, Output("criterion", "", "1", text), order, _FLAGGED)
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
@@ -164,6 +171,8 @@ class SyntheticFit(Measure):
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
         """Draw a record, and fit it."""
+        if self.process in KINDS:
+            return self._find_in_record(scene, accuracy, meter)
         true = self._true(scene)
         truth = self._joint(scene, accuracy, meter)
         clean = truth.curve(true)
@@ -175,9 +184,54 @@ class SyntheticFit(Measure):
         fitted = scene.with_(law=self.fitted_law) if self.fitted_law else scene
         model = self._joint(fitted, accuracy, meter, clean + size * noise)
         search = Search(model, self._first(fitted, true), self._free, self.noise)
-        found = naive = search.run()
+        found = search.run()
+        promised = self._promised(truth, true)
+        reasons = find_reasons(found, model.friction)
+        return Outcome(Status.OK, self._compared(search, found, true, promised, reasons))
+
+    def _find_in_record(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+        """Draw a laboratory record, and fit it as `rsfstudy.fit` does."""
+        kind, true = KINDS[self.process], self._true(scene)
+        if "trend1" in true:
+            true["trend1"] = kind.trend
+        windows = self._windows()
+        if len(windows) > 1 or len(windows[0]) != 2:
+            rule = "is drawn for a protocol with one step"
+            raise InvalidValue("process", self.process, rule, choices=_PROCESSES)
+        before, after = windows[0]
+        smooth = replace(accuracy, rtol=min(accuracy.rtol, 1e-9))
+
+        def friction(time: np.ndarray) -> np.ndarray:
+            begins = min(float(time[0]), 0.0)
+            pieces = [(begins, before.velocity, 1.0, 0.0), (before.lasts, after.velocity, 1.0, 0.0)]
+            zeros = np.zeros(len(time))
+            return Model(scene, time, zeros, zeros, np.array(pieces), smooth, meter).curve(true)
+
+        ends = before.lasts + after.lasts
+        step = before.lasts, ends, before.velocity, after.velocity
+        rng = np.random.default_rng(self.seed)
+        record = kind.draw(Truth(*step, friction, self.noise_size), rng)
+        guess, stated = _OFF * self.slip_distance, kind.filter
+        fit = Fit((record,), self.free, guess, noise=self.noise, filter=stated)
+        fitted = scene.with_(law=self.fitted_law) if self.fitted_law else scene
+        fitted = fitted.with_(stiffness=fitted.stiffness * guess / self.slip_distance)
+        search, found = fit.solve(fitted, accuracy, meter)
+        unknown = np.full(len(self.free), math.nan)
+        reasons = fit.find_reasons(search, found)
+        return Outcome(Status.OK, self._compared(search, found, true, unknown, reasons))
+
+    def _compared(
+        self,
+        search: Search,
+        found: Fitted,
+        true: Values,
+        promised: np.ndarray,
+        reasons: Sequence[str],
+    ) -> dict[str, Value]:
+        """Compare the result of a search with the truth."""
+        naive = found
         if self.noise != "white":
-            naive = Search(model, found.values, self._free, "white").run()
+            naive = Search(search.model, found.values, self._free, "white").run()
         exact = search.coordinates(true)
         profiles = [Profile(search, found, name) for name in self._free]
         squared = [one.squared_distance(x) for one, x in zip(profiles, exact.tolist(), strict=True)]
@@ -187,7 +241,7 @@ class SyntheticFit(Measure):
             "deviation": search.coordinates(found.values) - exact,
             "deviation_error": np.array([found.errors[n] for n in self._free]) / found.slopes,
             "spread": found.spread,
-            "promised_spread": self._promised(truth, true),
+            "promised_spread": promised,
             "told": np.array([float(n not in found.unidentified) for n in self._free]),
         }
         for words, share in (("one", ONE), ("two", TWO)):
@@ -198,7 +252,7 @@ class SyntheticFit(Measure):
         shown = [self._free.index(n if n in self._free else f"{n}_1") for n in self.free]
         values: dict[str, Value] = {name: each[shown] for name, each in by_parameter.items()}
         values |= {"criterion": found.criterion, "noise_order": found.noise.order}
-        return Outcome(Status.OK, values)
+        return values | {"flagged": float(bool(reasons))}
 
     def _windows(self) -> list[list[_Piece]]:
         """The pieces of each window."""

@@ -1,9 +1,13 @@
-"""Do the errors of a fit cover the truth? Synthetic velocity steps with noise of three kinds.
+"""Do the errors of a fit cover the truth? Synthetic velocity steps with noise of many kinds.
 
 A velocity step from 1 to 10 um/s with noise that is white, autoregressive with a correlation of
 0.9, or a moving average, is fitted by the law that made it. Errors that count the correlation of
 the noise (full markers) cover the truth as often as they promise; those of the usual formula, which
 takes residuals for white noise (open markers), cover it far less often where noise is correlated.
+Further kinds of noise imitate laboratory records: a noise level that changes, outliers, rounded
+friction, an uneven clock, displacement with jitter or from an encoder, and averaged friction. The
+fit reports that errors are not valid if friction is rounded too coarsely, or if it was averaged and
+the average was not stated.
 """
 
 from collections.abc import Mapping
@@ -18,10 +22,16 @@ from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
 from rsfstudy.declare.figure import Axes
 from rsfstudy.reduce.base import Reduction
 
+from ._noise_kinds import KINDS
 from ._synthetic_fit import ACCURACY, ONE, RIG, TWO, SyntheticFit
 
 RECORDS = 24
-PROCESSES, LAWS = ("white", "ar1", "ma3"), ("slip", "slowness")
+CLASSIC, LAWS = ("white", "ar1", "ma3"), ("slip", "slowness")
+#: Kinds that cannot be modelled, with the least share of records that must be flagged; the fit
+#: describes all other kinds but 1/f noise.
+FLAGGED, PINK = {"coarsely_rounded": 0.95, "unstated_average": 0.8}, "pink"
+MODELLED = [kind for kind in KINDS if kind not in (*FLAGGED, PINK)]
+PROCESSES = (*CLASSIC, *KINDS)
 #: Of which shares of records are told, with what Gaussian errors cover.
 INTERVALS = {"inside_one": ONE, "inside_two": TWO}
 #: Standard deviations of a binomial share by which ours may be off.
@@ -58,6 +68,28 @@ class ShareInside(Reduction):
         return xr.Dataset({self.name: share, f"{self.name}_least": least})
 
 
+@dataclass(frozen=True)
+class ShareFlagged(Reduction):
+    """Share of records whose standard errors are reported as not valid.
+
+    Parameters
+    ----------
+    name : str
+        Name of the share.
+    of : str
+        Variable that is 1 for a flagged record and 0 otherwise.
+    """
+
+    kind: ClassVar[str] = "share_flagged"
+    long_names: ClassVar[Mapping[str, str]] = {
+        "": "share of records with errors that are not valid"
+    }
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Compute the mean over records."""
+        return xr.Dataset({self.name: dataset[self.of].mean("seed")})
+
+
 def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
     """Shares by parameter, of the fit and of the naive formula."""
     from rsfstudy.plots import look, marker
@@ -66,7 +98,9 @@ def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
     for number, process in enumerate(dataset["process"].values):
         for prefix, fill in (("", "full"), ("naive_", "none")):
             share = 100.0 * dataset[f"{prefix}share_one"].isel(process=number)
-            beside = 0.15 * (number - 0.5 * (dataset.sizes["process"] - 1))
+            beside = min(0.15, 0.8 / dataset.sizes["process"]) * (
+                number - 0.5 * (dataset.sizes["process"] - 1)
+            )
             style = {"color": look(number)["color"], "linestyle": "", "fillstyle": fill}
             text = f"{process}{', naive' * bool(prefix)}"
             axes.plot(places + beside, share, marker=marker(number), label=text, **style)
@@ -102,6 +136,33 @@ def covers(series: str, words: str, **where: str) -> list[Claim]:
     ]
 
 
+def is_flagged(process: str, law: str, least: float) -> Claim:
+    """Return the claim that errors of a kind that cannot be modelled are flagged."""
+    return Claim.above(
+        id="F6",
+        statement=f"{process} record, {law} law: the fit reports that errors are not valid",
+        source="this project's promise for the errors of fits",
+        variable="flagged_share",
+        where={"process": process, "law": law},
+        published=least,
+        reason="the least share of such records",
+    )
+
+
+def is_seldom_flagged(process: str, law: str) -> Claim:
+    """Return the claim that errors of a kind that can be modelled are seldom flagged."""
+    return Claim.below(
+        id="F7",
+        statement=f"{process} record, {law} law: the fit seldom reports errors that are not valid",
+        source="this project's promise for the errors of fits",
+        variable="flagged_share",
+        where={"process": process, "law": law},
+        published=0.05,
+        tolerance=0.08,
+        reason="two of 24 records by chance",
+    )
+
+
 def naive_fails(process: str, law: str) -> Claim:
     """F3: residuals taken for white noise make errors too small."""
     return Claim.below(
@@ -120,6 +181,7 @@ REDUCTIONS = [
     for prefix in ("", "naive_")
     for name, share in INTERVALS.items()
 ]
+FLAGS = ShareFlagged("flagged_share", "flagged")
 
 study = Study(
     name="fit_coverage",
@@ -132,15 +194,17 @@ study = Study(
         Axis("seed", list(range(RECORDS))),
     ],
     measure=SyntheticFit(),
-    reductions=REDUCTIONS,
+    reductions=[*REDUCTIONS, FLAGS],
     claims=[
         *(
             claim
-            for process in PROCESSES
+            for process in (*CLASSIC, *MODELLED)
             for law in LAWS
             for claim in covers("F", f"{process} noise, {law} law", process=process, law=law)
         ),
-        *(naive_fails(p, law) for p in PROCESSES[1:] for law in LAWS),
+        *(naive_fails(p, law) for p in CLASSIC[1:] for law in LAWS),
+        *(is_flagged(p, law, least) for p, least in FLAGGED.items() for law in LAWS),
+        *(is_seldom_flagged(p, law) for p in (*CLASSIC, *MODELLED) for law in LAWS),
     ],
     plot=Figure([shares]),
     accuracy=ACCURACY,

@@ -137,3 +137,20 @@ def test_errors_include_the_rounding_of_displacement(seed: int) -> None:
     exact = record.with_steps([(begins, begins, 1.0, 10.0)])
     stated = rsfstudy.fit(exact, **options).squeeze()
     assert float(found.a_stderr) > 1.5 * float(stated.a_stderr)
+
+
+@pytest.mark.parametrize(("rows", "status"), [(2.4, Status.OK), (1.0, Status.NOT_IDENTIFIED)])
+def test_coarse_sampling_is_fitted_as_far_as_intervals_cover(rows: float, status: Status) -> None:
+    """The load point moves by 10 um/s after the step, and D_c is 10 um."""
+    time = np.concatenate([np.arange(0.5, 40.0, 1.0), np.arange(40.1, 80.0, 1.0 / rows)])
+    friction = synthetic.motion("slowness", time)[0]
+    friction += synthetic.correlated(len(time), 0.0, 3e-4, 2)
+    moved = synthetic.load_point(STEP, time)
+    record = rsfstudy.read_record({"time": time, "displacement": moved, "friction": friction})
+    options = OPTIONS | {"noise": "ar", "laws": ["slowness"]}
+    found = rsfstudy.fit(record.with_steps([(40.0, 40.0, 1.0, 10.0)]), **options).squeeze()
+    assert found.status.item() == status, found.message.item()
+    for name in ("a", "b", "slip_distance"):
+        assert abs(synthetic.off(found, name, TRUTH[name])) < 3.5, name
+    if status is Status.NOT_IDENTIFIED:
+        assert "1.5 are needed: sample faster" in found.message.item()

@@ -92,6 +92,15 @@ def test_smooth_curves_are_resolved_and_errors_fall_with_spacing(curve, cells):
         assert error <= at * np.expm1(3.0 * turn / slopes.min() * (x[1] - x[0]))
 
 
+def test_noise_far_below_the_slope_is_no_oscillation():
+    """Alternating changes of slope by a hundredth: the bound is far smaller than the interval."""
+    x = np.linspace(0.0, 4.0, 11)
+    y = x + 0.001 * np.where(np.arange(11) % 2, 1.0, -1.0)
+    at, error, status = inverted(x, y, 1.77)
+    assert status == OK
+    assert error < 0.02 * at * (x[1] - x[0])
+
+
 def test_status_is_described():
     found = reduced(
         xr.Dataset(

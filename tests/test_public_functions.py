@@ -167,7 +167,9 @@ def test_junk_in_what_is_made(kind):
 def test_a_call_that_does_not_fit_is_a_type_error_of_python():
     with pytest.raises(TypeError, match="missing a required argument: 'dataset'"):
         rsfstudy.check()
-    with pytest.raises(TypeError, match=r"simulate\(\) has no parameter 't_end'.* It takes scene, .*, duration"):
+    with pytest.raises(
+        TypeError, match=r"simulate\(\) has no parameter 't_end'.* It takes scene, .*, duration"
+    ):
         rsfstudy.simulate(Scene(), t_end=50.0)
 
 

@@ -194,3 +194,31 @@ def test_a_binary_file_that_is_cut(length: int, told: str, tmp_path: Path) -> No
     path.write_bytes(path.read_bytes()[:length])
     with pytest.raises(DataError, match=told):
         rsfstudy.read_record(path, {"time": (1, "s")})
+
+
+@pytest.mark.parametrize("stiffness", [2e-3, "2e-3 1/um", "0.04 MPa/um"])
+def test_slip_is_turned_into_displacement_of_the_load_point(
+    tmp_path: Path, stiffness: float | str
+) -> None:
+    friction = 0.6 + 0.01 * np.sin(TIME)
+    slip = MOVED - friction / 2e-3
+    arrays = {"time": TIME, "slip": slip, "friction": friction}
+    record = rsfstudy.read_record(arrays, normal_stress="20 MPa", stiffness=stiffness)
+    np.testing.assert_allclose(record.columns["displacement"], MOVED, atol=1e-9)
+    path = tmp_path / "slip.csv"
+    rows = np.column_stack([TIME, slip, friction]).tolist()
+    lines = ["Time (s),Fault slip (um),Friction", *(",".join(map(repr, row)) for row in rows)]
+    path.write_text("\n".join(lines))
+    read = rsfstudy.read_record(path, normal_stress="20 MPa", stiffness=stiffness)
+    np.testing.assert_allclose(read.columns["displacement"], MOVED, atol=1e-9)
+
+
+def test_slip_without_stiffness_is_refused() -> None:
+    arrays = {"time": TIME, "slip": MOVED, "friction": 0.6 + 0.0 * TIME}
+    with pytest.raises(InvalidValue, match=r"slip = .*needs a stiffness.*read_record"):
+        rsfstudy.read_record(arrays)
+    with pytest.raises(InvalidValue, match=r"stiffness = '0.04 MPa/um': needs a normal stress"):
+        rsfstudy.read_record(arrays, stiffness="0.04 MPa/um")
+    for wrong in (-1.0, 0.0, "0 1/um"):
+        with pytest.raises(InvalidValue, match=r"stiffness = .*must be positive"):
+            rsfstudy.read_record(arrays, stiffness=wrong)

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from numbers import Real
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from rsfstudy.axes.axis import Axis
 from rsfstudy.declare.study import Study
 from rsfstudy.defaults import FIT_BUDGET as BUDGET
 from rsfstudy.error_boundary import error_boundary
-from rsfstudy.errors import InvalidValue, brief
+from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.fit import Fit
 from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
@@ -174,10 +173,7 @@ def fit(
     if "law" in scene:
         remedy = f"Write laws={np.atleast_1d(scene['law']).tolist()}."
         raise InvalidValue("law", scene["law"], "is given as laws, each fitted", remedy=remedy)
-    if isinstance(record, str | Path):
-        remedy = f"Read the file first: record = rsfstudy.read_record({brief(record)!r})."
-        raise InvalidValue("record", record, "is no record", remedy=remedy)
-    records: tuple[Any, ...] = (record,) if isinstance(record, Record) else tuple(record)
+    records: tuple[Any, ...] = (record,) if isinstance(record, Record | str) else tuple(record)
     for one in records:
         if not isinstance(one, Record):
             remedy = "Make one by rsfstudy.read_record."

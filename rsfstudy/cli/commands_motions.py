@@ -99,7 +99,8 @@ def fit(given: Given) -> int:
     _check_replaceable(data, fit_results.is_fit, "fit")
     columns = assignments.columns(given.columns)
     stress = given.normal_stress
-    records = [read_record(path, columns, normal_stress=stress) for path in given.records]
+    about = {"normal_stress": stress, "stiffness": given.stiffness}
+    records = [read_record(path, columns, **about) for path in given.records]
     for record in records:
         _list_steps(record)
     dataset = fitting.fit(

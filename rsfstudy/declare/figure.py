@@ -21,9 +21,9 @@ from rsfstudy.quantity import is_name
 if TYPE_CHECKING:
     import xarray as xr
 
-    Along = str | Callable[[xr.Dataset], xr.DataArray]
-    Text = str | Callable[[xr.Dataset], str]
-
+#: A variable by its name, or a function that computes it; and a text in the same way.
+Along = str | Callable[["xr.Dataset"], "xr.DataArray"]
+Text = str | Callable[["xr.Dataset"], str]
 #: `matplotlib.axes.Axes`, for annotations: what workers load must not load matplotlib.
 Axes = Any
 #: A function of a dataset and of axes, which draws the one on the other.

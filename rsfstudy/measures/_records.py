@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.motion.accuracy import Accuracy, error_between
@@ -154,6 +155,7 @@ def since(begin: Event, path: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]
     return {"time": path["time"] - begin.time, "slip": path["slip"] - path["slip"][0], **found}
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Recorded(Measure):
     """Base of them: the record is kept along `phase`, at so many points as the field `phases`

@@ -15,9 +15,7 @@ from rsfstudy.analysis.fitting.filters import Filter
 from rsfstudy.analysis.fitting.intervals import interval
 from rsfstudy.analysis.fitting.joint import Joint, is_own, numbered, plain
 from rsfstudy.analysis.fitting.model import (
-    LOGARITHMIC,
     OF_SOME_LAWS,
-    Model,
     check_free,
     check_positive,
     of_law,
@@ -25,9 +23,16 @@ from rsfstudy.analysis.fitting.model import (
 from rsfstudy.analysis.fitting.noise import WHITE, check_noise, whiteness
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
-from rsfstudy.analysis.fitting.steps import Step
 from rsfstudy.analysis.fitting.unstated_filter import find_averaging
-from rsfstudy.analysis.fitting.validity import find_reasons, is_rounded, name_outliers
+from rsfstudy.analysis.fitting.validity import (
+    NEGLIGIBLE,
+    describe_load_point,
+    describe_unidentified,
+    find_reasons,
+    find_unidentified,
+    is_rounded,
+    name_outliers,
+)
 from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess, stiffness_factors
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
@@ -41,8 +46,6 @@ from rsfstudy.status import Status
 
 #: Accuracy of motions at which their differences tell derivatives.
 _SMOOTH = 1e-9
-#: Least slip distance over the distance of rows.
-_POINTS = 3.0
 #: Standard errors that numerical errors are held to as to the parameter itself: at the default
 #: accuracy, 1e-7, of which a hundredfold is let pass, a hundredth of one is too much.
 _SMALL = 1000.0
@@ -270,6 +273,40 @@ class Fit(Measure):
         own = of_law(scene, self.free)
         if own != self.free:
             return self._widened(replace(self, free=own).find(scene, accuracy, meter))
+        windows = self._windows
+        search, found = self.solve(scene, accuracy, meter)
+        model, place = search.model, windows[0].about
+        part = model.parts[0]
+        apart = float(np.median(np.diff(part.displacement[part.time >= windows[0].step.begins])))
+        unidentified = find_unidentified(found, apart)
+        rows = [window.rows + self._first_rows[window.record] for window in windows]
+        values = self._told(found, np.concatenate(rows), model)
+        values |= place
+        values["window_stiffness"] = found.values["stiffness"]
+        if len(windows) > 1:
+            stresses = enumerate(windows, start=1)
+            values |= {f"normal_stress_before_{n}": w.normal_stress for n, w in stresses}
+        for name in self.parameters:
+            told = name not in unidentified
+            ends = interval(search, found, name) if told else search.bounds(name)
+            values[f"{name}_low"], values[f"{name}_high"] = ends
+        if self.posterior:
+            values |= posterior.draw(search, found, self.posterior)
+        if unidentified:
+            is_least = "a" in found.free and found.values["a"] < _LEAST * search.bounds("a")[0]
+            text = describe_unidentified(found, unidentified, apart, is_least=is_least)
+            return Outcome(Status.NOT_IDENTIFIED, values, text)
+        remarks = (
+            name_outliers(found.outliers),
+            describe_load_point(found, self.loading, place["load_point_noise"]),
+        )
+        reasons = self.find_reasons(search, found)
+        status = Status.ERRORS_NOT_VALID if reasons else Status.OK
+        cuts = [cut for window in windows for cut in window.cuts]
+        return Outcome(status, values, "; ".join(filter(None, (*reasons, *cuts, *remarks))))
+
+    def solve(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> tuple[Search, Fitted]:
+        """Fit the windows by a law that has all free parameters."""
         smooth = accuracy.at(min(accuracy.rtol, _SMOOTH))
         windows = self._windows
         per_um = self.machine_stiffness * self.slip_distance_guess
@@ -289,36 +326,17 @@ class Fit(Measure):
         one_machine = self.machine_stiffness > 0.0 or "stiffness" in self.free
         model = Joint(tuple(parts), stiffness_factors(windows) if one_machine else ())
         search = Search(model, first, self.parameters, self.noise)
-        found = search.run()
-        unidentified = self._unidentified(found, parts[0], windows[0].step)
-        rows = [window.rows + self._first_rows[window.record] for window in windows]
-        values = self._told(found, np.concatenate(rows), model)
-        values |= (place := windows[0].about)
-        values["window_stiffness"] = found.values["stiffness"]
-        if len(windows) > 1:
-            stresses = enumerate(windows, start=1)
-            values |= {f"normal_stress_before_{n}": w.normal_stress for n, w in stresses}
-        for name in self.parameters:
-            told = name not in unidentified
-            ends = interval(search, found, name) if told else search.bounds(name)
-            values[f"{name}_low"], values[f"{name}_high"] = ends
-        if self.posterior:
-            values |= self._drawn(search, found)
-        if unidentified:
-            text = f"{', '.join(unidentified)}: the record does not tell"
-            if set(unidentified) - set(found.unidentified):
-                text += f"; fewer than {_POINTS:g} rows stand in a slip distance"
-            if "a" in unidentified and found.values["a"] < _LEAST * search.bounds("a")[0]:
-                text += "; friction does not change at the step as velocity does: "
-                text += "see whether columns (time and displacement, say) are exchanged"
-            return Outcome(Status.NOT_IDENTIFIED, values, text)
-        remarks = (name_outliers(found.outliers), self._remark(found, place["load_point_noise"]))
-        reasons = find_reasons(found, model.friction)
-        if not self.filter and self.noise != WHITE and not is_rounded(found):
-            reasons = (*find_averaging(found, model.time, self.noise), *reasons)
-        status = Status.ERRORS_NOT_VALID if reasons else Status.OK
-        cuts = [cut for window in windows for cut in window.cuts]
-        return Outcome(status, values, "; ".join(filter(None, (*reasons, *cuts, *remarks))))
+        return search, search.run()
+
+    def find_reasons(self, search: Search, found: Fitted) -> tuple[str, ...]:
+        """Find the reasons why the standard errors of a fit are not valid."""
+        reasons = find_reasons(found, search.model.friction)
+        # a recorded load point has noise that any average would reduce
+        is_recorded = self.loading == "recorded"
+        is_exact = found.noise_sd < NEGLIGIBLE
+        if self.filter or is_recorded or is_exact or self.noise == WHITE or is_rounded(found):
+            return reasons
+        return (*find_averaging(found, search.model.time, self.noise), *reasons)
 
     def _widened(self, outcome: Outcome) -> Outcome:
         """An outcome of fewer parameters, with NaN in matrices where those of other laws stand."""
@@ -329,45 +347,6 @@ class Fit(Measure):
             for axis in axes if name in values else ():
                 values[name] = np.insert(values[name], before, math.nan, axis=axis)
         return replace(outcome, values=values)
-
-    def _remark(self, found: Fitted, noise: float) -> str:
-        """Remark on what noise of the load point does to parameters, or none."""
-        if self.loading == "steps":
-            moved = np.diag(found.covariance) > 2.0 * np.diag(found.by_noise)
-            pairs = zip(found.free, moved.tolist(), strict=True)
-            names = ", ".join(n for n, most in pairs if most and plain(n) != "step_time")
-            remedy = "" if "step_time" in self.free else ": looked for, step_time lessens it"
-            text = f"noise of load point displacement makes most of the error of {names}{remedy}"
-            return text if names else ""
-        if "slip_distance" not in found.free:
-            return ""
-        # of second order: ln V of a stiff slider follows the load point by k x/a
-        shift = 0.5 * (found.values["stiffness"] * noise / found.values["a"]) ** 2
-        if shift < found.stderr("slip_distance") / found.values["slip_distance"]:
-            return ""
-        return (
-            f"noise of the recorded load point, {noise:.2g} um, moves slip_distance by some "
-            f"{100.0 * shift:.2g} %, more than its standard error: see loading='steps'"
-        )
-
-    def _drawn(self, search: Search, found: Fitted) -> dict[str, Value]:
-        """Draws from the posterior; NaN where errors are infinite."""
-        drawn, time = np.full((self.posterior, len(found.free)), math.nan), math.nan
-        if np.isfinite(found.covariance).all():
-            drawn, time = posterior.sample(search, found, self.posterior)
-        logs = [name in LOGARITHMIC for name in found.free]
-        drawn[:, logs] = np.exp(drawn[:, logs])
-        return {"posterior": drawn, "autocorrelation_time": time}
-
-    def _unidentified(self, found: Fitted, model: Model, step: Step) -> tuple[str, ...]:
-        """Parameters that the record does not tell; those of too few rows a slip distance too."""
-        apart = np.median(np.diff(model.displacement[model.time >= step.begins]))
-        sparse = [
-            name
-            for name in ("slip_distance", "slip_distance_2")
-            if name in found.free and found.values[name] < _POINTS * apart
-        ]
-        return tuple(n for n in found.free if n in (*found.unidentified, *sparse))
 
     def _told(self, found: Fitted, rows: np.ndarray, model: Joint) -> dict[str, Value]:
         """Numbers and rows of what was found."""

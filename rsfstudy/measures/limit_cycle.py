@@ -107,6 +107,9 @@ class LimitCycle(Recorded):
     the instability norm; slow slip below. A motion that settles does so by a damped oscillation
     where the eigenvalues of steady sliding that decay last are a complex pair, else steadily.
 
+    A motion is reported to settle (`no_limit_cycle`) only if small changes of steady sliding decay.
+    If their growth rate is zero within its error, the outcome is `unverified`.
+
     Parameters
     ----------
     phases : int

@@ -54,6 +54,10 @@ __all__ = [
 _BESIDE = ("error", "stderr", "misfit", "points", "status")
 
 
+def _names_of(dataset: xr.Dataset) -> list[str]:
+    return list(map(str, dataset.data_vars))
+
+
 @error_boundary
 def reduced(
     dataset: xr.Dataset, reductions: tuple[Reduction, ...], *, despite_failures: bool = False
@@ -71,6 +75,8 @@ def reduced(
     despite = {"despite": f"{lost} failed cells are left out"} if lost and despite_failures else {}
     drawn: dict[str, xr.DataArray] = {}
     for reduction in reductions:
+        if reduction.of not in dataset:
+            raise InvalidValue("of", reduction.of, "is not measured", choices=_names_of(dataset))
         leaves_out = despite and not reduction.of_failures
         support = without_failures(dataset) if leaves_out else dataset
         own = worst(support["status"], support[reduction.of].dims)

@@ -16,7 +16,8 @@ FEWEST = 4
 _NEAR = 3
 #: Changes of slope, relative to the largest slope, that count as rounding errors.
 _ROUNDING = 1e-9
-#: The same, relative to the largest change nearby, that count for an oscillation.
+#: The same, relative to the largest change and to the smallest slope nearby, that count for an
+#: oscillation.
 _NOTICEABLE = 0.1
 
 
@@ -111,9 +112,11 @@ def _turns(slopes: np.ndarray, near: range) -> tuple[dict[int, float], bool]:
     within = bends[near.start : near.stop - 1]
     if not _reversals(within, _ROUNDING * float(np.abs(slopes).max())):
         return turns, False
-    # the small changes on either side of a kink do not make an oscillation of it
-    alternates = _reversals(within, _NOTICEABLE * float(np.abs(within).max())) > 1
-    return dict.fromkeys(near, 2.0 * max(turns.values())), alternates
+    largest = 2.0 * max(turns.values())
+    # the small changes on either side of a kink, or noise, do not make an oscillation
+    noticeable = _NOTICEABLE * float(np.abs(within).max())
+    steady = largest < 2.0 * _NOTICEABLE * float(np.abs(slopes[near.start : near.stop]).min())
+    return dict.fromkeys(near, largest), not steady and _reversals(within, noticeable) > 1
 
 
 def _reversals(bends: np.ndarray, least: float) -> int:

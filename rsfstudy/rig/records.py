@@ -13,6 +13,7 @@ import pandas as pd
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.error_boundary import check_file, error_boundary
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.rig.quantities import is_friction
 from rsfstudy.rig.table import (
     HEADING,
     Column,
@@ -28,16 +29,18 @@ from rsfstudy.rig.units import factor, in_si
 _UNITS = {
     "time": ("s", 1.0),
     "displacement": ("m", 1e6),
+    "slip": ("m", 1e6),
     "friction": ("1", 1.0),
     "shear_stress": ("Pa", 1.0),
     "normal_stress": ("Pa", 1.0),
 }
 #: The usual units.
-_USUAL = {"time": "s", "displacement": "um"}
+_USUAL = {"time": "s", "displacement": "um", "slip": "um"}
 #: How headings of the usual files begin.
 _HEADINGS = {
     "time": r"t(ime)?\b|time",
     "displacement": r"(load.*)?disp|lp(\b|_?disp)|l\.?p\.? disp|load.?point",
+    "slip": r"(fault.*)?slip",
     "friction": r"fric|mu\b|coeff",
     "shear_stress": r"shear|tau",
     "normal_stress": r"(eff\w*[ _])?norm|sigma",
@@ -54,6 +57,7 @@ def read_record(
     columns: Mapping[str, Any] | None = None,
     *,
     normal_stress: Any = None,
+    stiffness: Any = None,
     name: str = "",
 ) -> Record:
     """A record of an experiment, for `rsfstudy.fit`.
@@ -73,6 +77,11 @@ def read_record(
         are raw, a scale and an offset follow: ``"LP (um) * 0.1 + 5"``, or ``("LP", "um", 0.1, 5)``.
     normal_stress : quantity, optional
         By which shear stress is divided where no normal stress was recorded ("20 MPa").
+    stiffness : quantity, optional
+        Stiffness of the machine ("0.05 MPa/um"), or over normal stress ("2e-3 1/um", a plain number
+        is in 1/um). It is needed if the record has ``slip``, from which elastic shortening of the
+        machine was subtracted, instead of ``displacement``. The displacement of the load point is
+        then slip plus shear stress over stiffness. Pass the same stiffness to `rsfstudy.fit`.
     name : str
         What it is called in results; by default as the file is, or "record".
 
@@ -113,7 +122,7 @@ def read_record(
         _check_known(key)
         column.check(key, ~np.isfinite(column.values), "must be a finite number")
         values[key] = column.values * _scale(key, column.units)
-    return _record(values, normal_stress, name or _name(source))
+    return _record(values, normal_stress, stiffness, name or _name(source))
 
 
 def _check_known(key: str) -> None:
@@ -138,7 +147,31 @@ def _scale(key: str, units: str) -> float:
     return float(factor(key, units, si)) * ours
 
 
-def _record(values: dict[str, np.ndarray], normal_stress: Any, name: str) -> Record:
+def _load_point(values: dict[str, np.ndarray], stiffness: Any) -> np.ndarray:
+    """Compute load point displacement in um: slip plus friction over k, k being over stress."""
+    if stiffness is None:
+        remedy = "Give the stiffness that the correction used: read_record(..., stiffness="
+        remedy += "'0.05 MPa/um'), or --stiffness."
+        rule = "needs a stiffness: the load point moves by slip plus shear stress over stiffness"
+        raise InvalidValue("slip", "given without displacement", rule, remedy=remedy)
+    friction, stress = values["friction"], values.get("normal_stress")
+    is_number = isinstance(stiffness, int | float)
+    over_stress = is_number or is_friction(stiffness)
+    if is_number:
+        per_um = float(stiffness)
+    else:
+        per_um = in_si("stiffness", stiffness, "1/m" if over_stress else "Pa/m") * 1e-6
+    if not per_um > 0.0:
+        raise InvalidValue("stiffness", stiffness, "must be positive")
+    if over_stress:
+        return np.asarray(values["slip"] + friction / per_um)
+    if stress is None:
+        remedy = "Give --normal-stress (normal_stress=), or stiffness in 1/um."
+        raise InvalidValue("stiffness", stiffness, "needs a normal stress", remedy=remedy)
+    return np.asarray(values["slip"] + friction * stress / per_um)
+
+
+def _record(values: dict[str, np.ndarray], normal_stress: Any, stiffness: Any, name: str) -> Record:
     if normal_stress is not None and "normal_stress" not in values:
         stated = in_si("normal_stress", normal_stress, "Pa")
         values["normal_stress"] = np.full(len(values["time"]), stated)
@@ -155,6 +188,8 @@ def _record(values: dict[str, np.ndarray], normal_stress: Any, name: str) -> Rec
             rule = f"must be positive, and is not in row {row + 1}"
             raise InvalidValue("normal_stress", float(stress[row]), rule)
         values["friction"] = values["shear_stress"] / stress
+    if "displacement" not in values and "slip" in values:
+        values["displacement"] = _load_point(values, stiffness)
     return Record({q.name: values[q.name] for q in COLUMNS if q.name in values}, name)
 
 
@@ -182,19 +217,21 @@ def _completed(columns: Mapping[str, Any], headings: list[str], place: str) -> d
     """Columns that are named, and those of the others that a record needs whose headings are of the
     usual ones.
     """
-    lacking = {"time", "displacement"} - set(columns)
+    lacking = {"time", "displacement", "slip"} - set(columns)
     if not {"friction", "shear_stress"} & set(columns):
         lacking |= {"friction", "shear_stress", "normal_stress"} - set(columns)
     wanted = dict(columns)
     for key in _HEADINGS:
         if key in lacking and not (key == "shear_stress" and "friction" in wanted):
             wanted |= _usual(key, headings, place)
-    if {"time", "displacement"} - set(wanted):
+    if "displacement" in wanted and "slip" not in columns:
+        wanted.pop("slip", None)
+    if "time" not in wanted or not {"displacement", "slip"} & set(wanted):
         remedy = (
             "Say which is which: --columns 'time=t (s),displacement=lp (um),friction=mu', or "
             "columns={'time': 't (s)', 'displacement': 'lp (um)', 'friction': 'mu'}."
         )
-        rule = "does not name time and displacement"
+        rule = "does not name time and displacement (or slip)"
         raise InvalidValue("header", ", ".join(headings)[:200], rule, remedy=remedy).at(place)
     return wanted
 

@@ -109,8 +109,8 @@ def _order_eight(
     Returns
     -------
     derivatives, sizes : list of float
-        The derivatives, and the largest quotient of a value and the step, to which the rounding
-        error is relative.
+        The derivatives, and the largest quotient of a value and its distance from zero, to which
+        the rounding error is relative.
     """
     slopes = [0.0] * len(function(0.0))
     sizes = slopes
@@ -118,8 +118,8 @@ def _order_eight(
         ahead, behind = function(number * step), function(-number * step)
         changes = zip(slopes, ahead, behind, strict=True)
         slopes = [slope + weight * (more - less) / step for slope, more, less in changes]
-        values = zip(sizes, ahead, behind, strict=True)
-        sizes = [max(size, abs(more) / step, abs(less) / step) for size, more, less in values]
+        values, away = zip(sizes, ahead, behind, strict=True), number * step
+        sizes = [max(size, abs(more) / away, abs(less) / away) for size, more, less in values]
     return slopes, sizes
 
 

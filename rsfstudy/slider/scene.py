@@ -371,9 +371,7 @@ class Scene(Assembled):
 
     @derived
     def critical_stiffness(self) -> float:
-        """k_cr(V_*) D_c/sigma_*, without mass or damping, and before anything changes normal stress
-        (see `stability.critical_stiffness`).
-        """
+        """Critical stiffness k_cr(V_*) D_c/sigma_* (see `stability.critical_stiffness`)."""
         slider, law, stress, pores, *_others = self.parts
         return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores)
 

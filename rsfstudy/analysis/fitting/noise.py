@@ -222,7 +222,8 @@ def fitted(
     x = np.append(np.arctanh(begin.partial.ravel() / _LARGEST), np.log(begin.sizes[1:]))
     if not math.isfinite(misfit(x)):  # the residuals vanish
         return noise(x)
-    found = minimize(misfit, x, method="BFGS", options={"gtol": _ENOUGH})
+    with np.errstate(invalid="ignore"):  # differences of an infinite misfit
+        found = minimize(misfit, x, method="BFGS", options={"gtol": _ENOUGH})
     return noise(found.x if found.fun <= misfit(x) else x)
 
 

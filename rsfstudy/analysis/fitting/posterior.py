@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import importlib.util
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import multivariate_t
 
+from rsfstudy.analysis.fitting.model import LOGARITHMIC
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.meter import Halt
 
@@ -99,3 +100,16 @@ def sample(search: Search, found: Fitted, draws: int, seed: int = 0) -> tuple[np
         if kept >= _LONG * time and kept * walkers >= draws * time:
             chain = sampler.get_chain(discard=sampler.iteration - kept, flat=True)
             return chain[np.linspace(0, len(chain) - 1, draws).round().astype(int)], time
+
+
+def draw(search: Search, found: Fitted, draws: int) -> dict[str, Any]:
+    """Return draws of the free parameters, and the autocorrelation time of the chain.
+
+    They are NaN if standard errors are infinite.
+    """
+    drawn, time = np.full((draws, len(found.free)), math.nan), math.nan
+    if np.isfinite(found.covariance).all():
+        drawn, time = sample(search, found, draws)
+    logs = [name in LOGARITHMIC for name in found.free]
+    drawn[:, logs] = np.exp(drawn[:, logs])
+    return {"posterior": drawn, "autocorrelation_time": time}

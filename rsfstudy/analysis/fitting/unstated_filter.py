@@ -17,7 +17,7 @@ from rsfstudy.analysis.fitting.fitted import Fitted
 
 #: Rows of the averages that are tried, improvement of the criterion that decides, and change of a
 #: parameter, in standard errors, that matters.
-_ROWS, _DECIDES, _MATTERS = range(2, 21), 10.0, 0.5
+_ROWS, _DECIDES, _MATTERS = range(2, 21), 20.0, 0.5
 #: Largest number of rows that are tested, and passes in which noise and parameters are found.
 _MOST, _PASSES = 20_000, 2
 

@@ -6,23 +6,29 @@ sentence without its full stop: the condition that is violated, and the remedy.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from rsfstudy.analysis.fitting.fitted import Fitted
+from rsfstudy.analysis.fitting.joint import plain
 from rsfstudy.analysis.fitting.noise import whiteness
 from rsfstudy.wording import counted
 
+#: Parameters that are slip distances.
+DISTANCES = ("slip_distance", "slip_distance_2")
 #: p-value below which whitened residuals are called autocorrelated.
 SIGNIFICANT = 0.01
 #: Standard deviation of friction below which residuals are numerical, not statistical.
-_NEGLIGIBLE = 1e-7
+NEGLIGIBLE = 1e-7
 #: Largest ratio of the residual standard deviation to that of an ordinary least-squares fit.
 _LARGEST_RATIO = 2.0
 #: Standard deviation of the noise, over the quantum of friction, below which rounding errors depend
 #: on friction; and the largest fraction of rows that may be outliers.
 _LEAST_NOISE, _MOST_OUTLIERS = 0.4, 0.05
+#: Fewest rows within a slip distance for which intervals were found to cover.
+_FEWEST_ROWS = 1.5
 #: Largest number of outliers that a message names.
 _NAMED = 10
 
@@ -41,7 +47,7 @@ def find_reasons(found: Fitted, friction: np.ndarray) -> tuple[str, ...]:
     tuple of str
         Empty if the standard errors are valid.
     """
-    if found.noise_sd < _NEGLIGIBLE:
+    if found.noise_sd < NEGLIGIBLE:
         return ()
     return (
         *_misfit(found, friction),
@@ -108,3 +114,62 @@ def _autocorrelation(found: Fitted) -> Iterator[str]:
             f"the whitened residuals are still autocorrelated (p = {p_value:.2g}): "
             "the law, the trend or the noise model does not describe the record"
         )
+
+
+def describe_load_point(found: Fitted, loading: str, noise: float) -> str:
+    """Return a remark if noise of the load point matters for the parameters; empty if not."""
+    if loading == "steps":
+        moved = np.diag(found.covariance) > 2.0 * np.diag(found.by_noise)
+        pairs = zip(found.free, moved.tolist(), strict=True)
+        names = ", ".join(n for n, most in pairs if most and plain(n) != "step_time")
+        remedy = "" if "step_time" in found.free else ": looked for, step_time lessens it"
+        text = f"noise of load point displacement makes most of the error of {names}{remedy}"
+        return text if names else ""
+    if "slip_distance" not in found.free:
+        return ""
+    # of second order: ln V of a stiff slider follows the load point by k x/a
+    shift = 0.5 * (found.values["stiffness"] * noise / found.values["a"]) ** 2
+    if shift < found.stderr("slip_distance") / found.values["slip_distance"]:
+        return ""
+    return (
+        f"noise of the recorded load point, {noise:.2g} um, moves slip_distance by some "
+        f"{100.0 * shift:.2g} %, more than its standard error: see loading='steps'"
+    )
+
+
+def find_unidentified(found: Fitted, rows_apart: float) -> tuple[str, ...]:
+    """Find the parameters that the record does not constrain, also for want of rows.
+
+    Parameters
+    ----------
+    found : Fitted
+    rows_apart : float
+        Load point displacement in um between rows after the step.
+    """
+    sparse = [n for n in DISTANCES if found.values.get(n, math.inf) < _FEWEST_ROWS * rows_apart]
+    return tuple(n for n in found.free if n in (*found.unidentified, *sparse))
+
+
+def describe_unidentified(
+    found: Fitted, names: tuple[str, ...], rows_apart: float, *, is_least: bool
+) -> str:
+    """Return the message for parameters that the record does not constrain.
+
+    Parameters
+    ----------
+    found : Fitted
+    names : tuple of str
+    rows_apart : float
+        Load point displacement in um between rows after the step.
+    is_least : bool
+        True if the direct effect is at its lower bound.
+    """
+    text = f"{', '.join(names)}: the record does not tell"
+    if sparse := set(names) - set(found.unidentified):
+        rows = min(found.values[name] for name in sparse) / rows_apart
+        text += f"; the record has {rows:.1f} rows per slip distance, and {_FEWEST_ROWS:g} are "
+        text += "needed: sample faster after the step"
+    if "a" in names and is_least:
+        text += "; friction does not change at the step as velocity does: "
+        text += "see whether columns (time and displacement, say) are exchanged"
+    return text

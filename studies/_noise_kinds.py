@@ -1,0 +1,173 @@
+"""Synthetic records with the imperfections of laboratory records.
+
+Each kind turns the friction of a velocity step into a record: it chooses the times of the rows,
+adds noise, and degrades friction or displacement as data acquisition does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import lfilter
+
+from rsfstudy.analysis.fitting.record import Record
+
+
+class Truth(NamedTuple):
+    """The true velocity step of a record.
+
+    Attributes
+    ----------
+    step, ends : float
+        Times in s of the step and of the end of the record.
+    before, after : float
+        Load point velocities in um/s.
+    friction : callable
+        From times in s to friction.
+    noise_size : float
+        Standard deviation of the noise of friction.
+    """
+
+    step: float
+    ends: float
+    before: float
+    after: float
+    friction: Callable[[np.ndarray], np.ndarray]
+    noise_size: float
+
+    def displacement(self, time: np.ndarray) -> np.ndarray:
+        """Return the load point displacement from the step, in um."""
+        late = time - self.step
+        return np.where(late < 0.0, self.before, self.after) * late
+
+
+@dataclass(frozen=True)
+class NoiseKind:
+    """A kind of imperfection.
+
+    Attributes
+    ----------
+    rate : tuple of float
+        Rows per second before and after the step.
+    jitter : float
+        Standard deviation of the sample times, as a fraction of the interval.
+    correlation : float
+        Correlation of the noise of successive rows.
+    correlation_time : float
+        Correlation time in s of the noise, instead.
+    louder : float
+        Factor by which the noise is larger after the step.
+    spikes : float
+        Fraction of rows with an outlier.
+    quantum : float
+        To which friction is rounded, relative to the noise.
+    mean_of : int
+        Rows of a running mean of friction.
+    displacement_noise, displacement_quantum : float
+        Of the recorded load point displacement, in um.
+    pink : bool
+        True for noise with a power of 1/f.
+    trend : float
+        Of friction, in 1/um.
+    noise_factor : float
+        Factor of the standard deviation of the noise.
+    states_filter : bool
+        True if the running mean is stated to the fit.
+    """
+
+    rate: tuple[float, float] = (2.0, 20.0)
+    jitter: float = 0.0
+    correlation: float = 0.0
+    correlation_time: float = 0.0
+    louder: float = 1.0
+    spikes: float = 0.0
+    quantum: float = 0.0
+    mean_of: int = 1
+    displacement_noise: float = 0.0
+    displacement_quantum: float = 0.0
+    pink: bool = False
+    trend: float = 0.0
+    noise_factor: float = 1.0
+    states_filter: bool = False
+
+    @property
+    def filter(self) -> str:
+        """The filter that is stated to the fit."""
+        return f"mean {self.mean_of / self.rate[1]!r}" if self.states_filter else ""
+
+    @property
+    def finds_steps(self) -> bool:
+        """True if the steps are found in the recorded displacement, and not stated."""
+        return self.displacement_noise > 0.0 or self.displacement_quantum > 0.0
+
+    def draw(self, truth: Truth, rng: np.random.Generator) -> Record:
+        """Draw a record."""
+        margin = self.mean_of // 2
+        time = self._times(truth, rng, margin)
+        moved, size = truth.displacement(time), self.noise_factor * truth.noise_size
+        noise = size * self._unit_noise(time, rng)
+        noise[time > truth.step] *= self.louder
+        friction = truth.friction(time) + self.trend * moved + noise
+        if self.mean_of > 1:
+            friction = np.convolve(friction, np.full(self.mean_of, 1.0 / self.mean_of), "valid")
+            time, moved = time[margin:-margin], moved[margin:-margin]
+        hit = rng.random(len(time)) < self.spikes
+        friction[hit] += 30.0 * size * rng.choice([-1.0, 1.0], int(hit.sum()))
+        if self.quantum:
+            step = self.quantum * size
+            friction = step * np.rint(friction / step)
+        moved = moved + self.displacement_noise * rng.standard_normal(len(time))
+        if self.displacement_quantum:
+            offset = rng.random()
+            moved = self.displacement_quantum * np.rint(moved / self.displacement_quantum + offset)
+        columns = {"time": time, "displacement": moved, "friction": friction}
+        record = Record(columns)
+        if self.finds_steps:
+            return record
+        return record.with_steps([(truth.step, truth.step, truth.before, truth.after)])
+
+    def _times(self, truth: Truth, rng: np.random.Generator, margin: int) -> np.ndarray:
+        slow, fast = (1.0 / rate for rate in self.rate)
+        first = np.arange(-margin * slow + 0.5 * slow, truth.step, slow)
+        second = np.arange(truth.step + 0.3 * fast, truth.ends + margin * fast, fast)
+        time = np.concatenate([first, second])
+        gaps = np.repeat([slow, fast], [len(first), len(second)])
+        shift = np.clip(rng.standard_normal(len(time)), -1.4, 1.4) * self.jitter * gaps
+        return np.asarray(np.sort(time + shift))
+
+    def _unit_noise(self, time: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        drawn = rng.standard_normal(len(time))
+        if self.pink:
+            power = 1.0 / np.fft.rfftfreq(8 * len(time))[1:]
+            phases = rng.standard_normal((2, len(power)))
+            spectrum = np.concatenate([[0.0], np.sqrt(power) * (phases[0] + 1j * phases[1])])
+            found = np.fft.irfft(spectrum)[: len(time)]
+            return np.asarray(found / np.sqrt(np.mean(np.square(found))))
+        if self.correlation:
+            rho = self.correlation
+            warm = np.concatenate([rng.standard_normal(500), drawn])
+            return np.asarray(lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], warm)[500:])
+        if self.correlation_time:
+            remembered = np.exp(-np.diff(time) / self.correlation_time)
+            for row, r in enumerate(remembered.tolist(), start=1):
+                drawn[row] = r * drawn[row - 1] + np.sqrt(1.0 - r * r) * drawn[row]
+        return drawn
+
+
+KINDS = {
+    "louder_after": NoiseKind(louder=10.0, noise_factor=0.2),
+    "spikes": NoiseKind(spikes=0.01),
+    "rounded": NoiseKind(quantum=2.0),
+    "uneven_clock": NoiseKind(rate=(5.0, 50.0), jitter=0.2, correlation_time=0.5),
+    "jittered_displacement": NoiseKind(
+        correlation=0.9, displacement_noise=0.4, trend=-5e-5, noise_factor=0.5
+    ),
+    "encoder": NoiseKind(rate=(10.0, 10.0), displacement_quantum=0.5, noise_factor=0.2),
+    "averaged": NoiseKind(rate=(10.0, 10.0), mean_of=5, noise_factor=0.4, states_filter=True),
+    "unstated_average": NoiseKind(rate=(10.0, 10.0), mean_of=5, noise_factor=0.4),
+    "coarsely_rounded": NoiseKind(quantum=3.5),
+    "pink": NoiseKind(rate=(4.0, 40.0), pink=True, noise_factor=0.5),
+}

@@ -1,0 +1,238 @@
+"""Calls of the Python interface with wrong arguments.
+
+The error names the argument, the rule and the remedy, whichever public function, constructor or
+method is called.
+"""
+
+import importlib
+import inspect
+import pickle
+import pkgutil
+
+import numpy as np
+import pytest
+import xarray as xr
+from running import study_of
+
+import rsfstudy
+from rsfstudy import Axis, Figure, Laboratory, Panel, Scene, Segment, measures, reduce
+from rsfstudy.argument_checks import MOST_ITEMS, describe_type, is_match
+from rsfstudy.error_boundary import error_boundary
+from rsfstudy.errors import CallError, DataError, Incomplete, InvalidValue, RsfStudyError
+from rsfstudy.measures import Measure
+from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.quantity import table
+from rsfstudy.reduce import LinearFit, OverClosedForm, Range
+
+RIG = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
+ENDLESS = range(10**12)
+
+
+@pytest.fixture(scope="module")
+def record():
+    """Ten rows at constant velocity."""
+    time = np.arange(10.0)
+    return rsfstudy.read_record({"time": time, "displacement": time, "friction": np.ones(10)})
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    """Results of two cells."""
+    study = study_of("pair", LinearStability(), Axis("b_over_a", [2.0, 3.0]))
+    return rsfstudy.run(study, output=None, workers=0, progress=False)
+
+
+def public_classes() -> list[type]:
+    """The classes that users make instances of, and those that functions return."""
+    found = {getattr(rsfstudy, name) for name in rsfstudy.__all__}
+    found |= {getattr(reduce, name) for name in reduce.__all__}
+    for module in pkgutil.iter_modules(measures.__path__):
+        if not module.name.startswith("_"):
+            members = vars(importlib.import_module(f"rsfstudy.measures.{module.name}")).values()
+            found |= {m for m in members if inspect.isclass(m) and issubclass(m, Measure)}
+    record = rsfstudy.read_record({"time": [0.0, 1.0], "displacement": [0, 1], "friction": [1, 1]})
+    loadings = [rsfstudy.protocol([{"velocity": 2.0}])]
+    loadings.append(rsfstudy.history({"time": [0.0, 1.0], "velocity": [1.0, 2.0]}))
+    found |= {type(thing) for thing in (record, *loadings)}
+    shipped = [c for c in found if inspect.isclass(c) and c.__module__.startswith("rsfstudy")]
+    return sorted(shipped, key=lambda kind: kind.__qualname__)
+
+
+# ---- what is within the boundary -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", public_classes(), ids=lambda kind: kind.__qualname__)
+def test_constructors_and_methods_are_within_the_boundary(kind):
+    for name, member in vars(kind).items():
+        method = getattr(member, "__func__", member)
+        if inspect.isfunction(method) and not name.startswith("_"):
+            assert isinstance(member, staticmethod) or hasattr(method, "__wrapped__"), name
+    with pytest.raises(RsfStudyError):
+        kind(**{"\x1b[31m": 1})
+
+
+def test_functions_are_within_the_boundary():
+    for name in rsfstudy.__all__:
+        if inspect.isfunction(function := getattr(rsfstudy, name)) and name != "simulate":
+            with pytest.raises(CallError, match=rf"{name}\(\) .*; it takes"):
+                function(*[None] * 40)
+
+
+def test_a_guarded_object_can_be_pickled(record):
+    for thing in (record, RIG, Segment(1.0), Range("z", of="x"), Axis("a", [0.1])):
+        assert pickle.loads(pickle.dumps(thing)) == thing
+
+
+def test_calls_from_inside_rsfstudy_keep_the_original_exception():
+    inner = error_boundary(lambda: {}["a"])
+    with pytest.raises(InvalidValue, match="cannot be answered"):
+        inner()
+    caller = {"__name__": "rsfstudy.somewhere", "inner": inner}
+    exec("def call(): return inner()", caller)
+    with pytest.raises(KeyError):
+        caller["call"]()
+
+
+# ---- errors of signatures ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda d: d.rsf.plot(varible="zeta"), "'varible'; it takes .*Did you mean 'variable'"),
+        (lambda d: d.rsf.to_si(x=1), r"to_si\(\) .*'x'; it takes dataset, normal_stress"),
+        (lambda d: LinearFit("z", of="x", onn="y"), "'onn'.* Did you mean 'on'"),
+        (lambda d: Segment(1.0, duratoin=2.0), "'duratoin'; it takes load_velocity"),
+        (lambda d: RIG.axis(units=5), r"axis\(\) .*'dimension'; it takes dimension"),
+        (lambda d: rsfstudy.cell("x", {}, studdy=1), "Did you mean 'study'"),
+        (lambda d: rsfstudy.check(d, **{"\x1b[31m": 1}), r"'\\x1b\[31m'"),
+    ],
+)
+def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
+    with pytest.raises(CallError, match=message) as error:
+        call(dataset)
+    assert isinstance(error.value, TypeError)
+    assert str(error.value).isprintable()
+
+
+# ---- arguments of another type -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda r: r.window("5 s", "9 s"), "begins = '5 s': must be a number"),
+        (lambda r: r.with_steps([(1, 2)]), r"step = \(1, 2\): must be four"),
+        (lambda r: r.with_steps(7), "steps = 7: must be a list"),
+        (lambda r: rsfstudy.fit("rec.csv"), "record = 'rec.csv': is no record. .*read_record"),
+        (lambda r: rsfstudy.fit(r, laws="slip", stiffness=1e-3), r"laws = 'slip': .*\['slip'\]"),
+        (lambda r: RIG.axis("slip_distance", ["1 um"], units=5), "units = 5: must be a mapping"),
+        (lambda r: RIG.in_units("x"), "dataset = 'x': must be an xarray.Dataset"),
+        (lambda r: Scene().under(None), "segment = None: must be a rsfstudy.Segment"),
+        (lambda r: rsfstudy.protocol([{"velocity": 2.0}]).stated_at(9), "number = 9: is out of"),
+        (lambda r: Figure(panels=int), "panels = <class 'int'>: must be a list"),
+        (lambda r: Panel(x=5), "x = 5: must be a text or a function"),
+        (lambda r: Panel(by="law"), "by = 'law': must be a list"),
+        (lambda r: Segment("a"), "load_velocity = 'a': must be a number"),
+        (lambda r: OverClosedForm("z", of="x", form=np.ones(3)), "form = array.*must be a text"),
+        (lambda r: LinearFit("z", of=None, on="x"), "of = None: must be a text"),
+        (lambda r: reduce.reduced(r, ()), "dataset = Record.*must be an xarray.Dataset"),
+        (lambda r: rsfstudy.run("a" * 300), "study = 'aaa.*at most 255 bytes"),
+        (lambda r: rsfstudy.history({"time": [0, 1], "velocity": "="}), "velocity = '=': must"),
+        (lambda r: rsfstudy.Accuracy().at(np.timedelta64(1)), "rtol = .*must be a number"),
+    ],
+)
+def test_the_argument_is_named(call, message, record):
+    with pytest.raises(InvalidValue, match=message) as error:
+        call(record)
+    assert "cannot be answered" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: rsfstudy.run("limit_cycles", dilatancy=ENDLESS),
+        lambda: Figure(panels=ENDLESS),
+        lambda: Axis("b_over_a", ENDLESS),
+        lambda: Axis("b_over_a", np.broadcast_to(2.0, 10**10)),
+        lambda: rsfstudy.protocol(ENDLESS),
+        lambda: Axis("x", {"a": {"b_over_a": 2.0}, "b": {"b_over_a": ENDLESS}}),
+        lambda: Axis.samples({"a": 0.01}, 2**40, covariance=[[1e-6]]),
+    ],
+)
+def test_a_list_without_end_is_refused(call):
+    with pytest.raises(InvalidValue, match=f"{MOST_ITEMS:,}"):
+        call()
+
+
+def test_a_function_of_the_user_that_fails_is_named(dataset):
+    def draw(dataset, axes):
+        raise ZeroDivisionError("no")
+
+    with pytest.raises(InvalidValue, match="own = <function .*fails when it is called .*: no"):
+        rsfstudy.plot(dataset, own=draw)
+
+
+def test_what_a_dataset_lacks_is_named(dataset):
+    with pytest.raises(DataError, match="has no 'status'") as error:
+        dataset.drop_vars("status").rsf.failures()
+    assert isinstance(error.value.__cause__, KeyError)
+
+
+def test_a_name_of_a_study_leaves_room_for_endings():
+    with pytest.raises(InvalidValue, match="at most 200 bytes"):
+        study_of("a" * 201, LinearStability(), Axis("b_over_a", [2.0]))
+
+
+# ---- annotations ---------------------------------------------------------------------------------
+
+
+def test_numbers_and_lists_of_numpy_match():
+    from collections.abc import Callable, Mapping, Sequence
+
+    assert is_match(np.float32(1), float)
+    assert is_match(np.int8(1), int)
+    assert is_match(np.ones(3), Sequence[float])
+    assert is_match([0, None], tuple[float | None, float | None])
+    assert is_match({"a": [1]}, Mapping[str, Sequence[int]])
+    assert is_match(len, Callable[[str], int])
+    for value, annotation in [
+        (True, float), (1.5, int), ("ab", Sequence[str]), (np.array(1.0), Sequence[float]),
+        ([1.0], tuple[float, float]), ({1: 2}, Mapping[str, int]), (None, str | int), (int, int),
+    ]:  # fmt: skip
+        assert not is_match(value, annotation), annotation
+
+
+def test_types_are_described_in_words():
+    from collections.abc import Sequence
+
+    assert describe_type(str | None) == "a text or None"
+    assert describe_type(Sequence[int]) == "a list in which each item is a whole number"
+    assert describe_type(xr.Dataset) == "an xarray.Dataset"
+
+
+# ---- control characters --------------------------------------------------------------------------
+
+ESCAPE = "\x1b]0;x\x07\x1b[31m"
+
+
+def test_headings_of_html_are_spelt_out():
+    shown = table([f"zeta ({ESCAPE})"], [[ESCAPE]], ESCAPE)
+    assert shown.isprintable()
+    assert shown.count("x1b[31m") == 3
+
+
+def test_warnings_are_spelt_out():
+    assert str(Incomplete(ESCAPE)).isprintable()
+
+
+def test_headings_of_the_terminal_are_spelt_out(dataset, tmp_path, capsys):
+    from rsfstudy.api.tables import Table
+    from rsfstudy.cli.layout import show
+
+    rows = [{f"zeta ({ESCAPE})": "1", "why": "x" * 60}]
+    show(Table(rows, caption=ESCAPE, prose={"why"}))
+    show({ESCAPE: "1"})
+    wide = {f"{n} {ESCAPE}": "y" * 30 for n in range(5)}
+    show(Table([wide]))  # does not fit, and is printed as a list
+    assert all(c.isprintable() or c == "\n" for c in capsys.readouterr().out)
