@@ -138,7 +138,7 @@ def way_to(at: str) -> tuple[str | int, ...]:
         ("id", replaced("../other"), "id is '../other', and the declared study 'tiny'"),
         ("declaration.claims.0.id", removed, r"declaration.claims\[0\].id is missing"),
         ("declaration.claims.0.tolerance", replaced(10**400),
-         "claims.*(Number out of range|must be a number)"),
+         "declaration.*(Number out of range|must be a number|int too large)"),
         ("declaration.base.phi", replaced(95.0), "declaration.base.phi is refused .*between 0"),
         ("declaration.novel", replaced(1), "declaration.novel is unknown"),
         ("provenance.versions.numpy", replaced(2),

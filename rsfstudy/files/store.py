@@ -70,7 +70,9 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
         beside.unlink(missing_ok=True)  # were it a link or a pipe, writing would go elsewhere
         # with a Dask client, xarray would wait for a lock of the cluster, perhaps for ever
         how: dict[str, Any] = {"engine": "netcdf4", "format": "NETCDF4"}
-        with dask.config.set(scheduler="synchronous"):
+        with dask.config.set(scheduler="synchronous"), warnings.catch_warnings():
+            # of older versions of Dask, although the client is set aside on purpose
+            warnings.filterwarnings("ignore", "Running on a single-machine scheduler", UserWarning)
             stored.to_netcdf(beside, **how, encoding=fill_value_encoding(clean))
         with open(beside, "ab") as file:
             file.write(_MARK + _digest_of_bytes(beside, beside.stat().st_size))

@@ -83,11 +83,14 @@ class _Statistic(Reduction):
         return self.results(f"{self.text} of {self.of} over {self.over}", found)
 
 
-def standard_deviation(of: xr.DataArray, over: str) -> xr.DataArray:
-    """Compute the standard deviation of samples; NaN for fewer than two of them."""
+def standard_deviation(of: xr.DataArray, over: str, ddof: int = 1) -> xr.DataArray:
+    """Compute the standard deviation of samples with a divisor of n - ddof.
+
+    It is NaN if there are no more than `ddof` samples.
+    """
     with warnings.catch_warnings():  # older versions of xarray let it through
         warnings.filterwarnings("ignore", "Degrees of freedom", RuntimeWarning)
-        return of.std(over, ddof=1)
+        return of.std(over, ddof=ddof)
 
 
 @guard_methods
@@ -130,7 +133,7 @@ class StandardDeviation(_Statistic):
         count, apart = of.notnull().sum(self.over), of - of.mean(self.over)
         rest = (apart**2).sum(self.over) - apart**2 * count / (count - 1.0)
         without = (rest.clip(min=0.0) / (count - 2.0).where(count > 2)) ** 0.5
-        scatter = without.std(self.over) * (count - 1.0) ** 0.5
+        scatter = standard_deviation(without, self.over, 0) * (count - 1.0) ** 0.5
         return standard_deviation(of, self.over), scatter
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
