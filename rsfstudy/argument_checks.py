@@ -1,7 +1,7 @@
 """Checks of arguments against the annotations of a signature.
 
-A public function that fails with an error of Python uses them to name the argument that is
-responsible: the functions themselves accept whatever behaves like the annotated type.
+Public functions accept any object that behaves like the annotated type. If a public function
+fails with a Python exception, these checks find the argument that caused the failure.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ _WORDS: Mapping[Any, str] = {
 
 
 def check_lengths(arguments: Mapping[str, Any]) -> None:
-    """Reject a `range`, or an array that repeats one value, with more than `MOST_ITEMS` items.
+    """Reject a range or a repeated-value array with more than ``MOST_ITEMS`` items.
 
-    The other checks would never end.
+    The other checks iterate over such arguments and would not finish.
 
     Raises
     ------
     InvalidValue
-        Naming the argument.
+        If an argument is too long. The error names the argument.
     """
     for name, value in arguments.items():
         for part in _parts(value, _LEVELS):
@@ -60,9 +60,11 @@ def check_lengths(arguments: Mapping[str, Any]) -> None:
 def find_text_for_list(
     function: Callable[..., Any], arguments: Mapping[str, Any], error: Exception
 ) -> InvalidValue | None:
-    """Return the error for the first text in the place of a list of texts, if any.
+    """Return an error if a string was passed in place of a list of strings.
 
-    The function takes its characters for the items, and complains about one of them.
+    A function that expects a list iterates over the characters of the string, so its own error
+    refers to a single character. Only the first such argument is reported. The result is None if
+    there is no such argument.
     """
     for name, value, annotation in _annotated(function, arguments):
         blamed = getattr(error, "value", None)
@@ -77,16 +79,21 @@ def find_text_for_list(
 def find_mismatch(
     function: Callable[..., Any], arguments: Mapping[str, Any], remedy: str
 ) -> InvalidValue | None:
-    """Return the error for the first argument that does not match its annotation, if any.
+    """Return an error for the first argument that does not match its annotation.
 
     Parameters
     ----------
     function : callable
         The function that failed.
     arguments : mapping of str to value
-        Its arguments, as `inspect.BoundArguments` holds them.
+        Arguments of the function, as in ``inspect.BoundArguments``.
     remedy : str
         Last sentence of the message.
+
+    Returns
+    -------
+    InvalidValue or None
+        None if all arguments match their annotations.
     """
     for name, value, annotation in _annotated(function, arguments):
         if not is_match(value, annotation):
@@ -98,10 +105,11 @@ def find_mismatch(
 def find_unusable(
     arguments: Mapping[str, Any], error: Exception, remedy: str
 ) -> InvalidValue | None:
-    """Return the error for the first argument that explains an exception by its value, if any.
+    """Return an error for the first argument whose value explains an exception.
 
-    Such a value is a number that is not finite or too large, a text that no file can hold, an
-    index out of range, or a function that fails.
+    Such values are non-finite or very large numbers, strings that UTF-8 cannot encode, invalid file
+    names, indices out of range, unknown names, and callables that raise exceptions. The result is
+    None if no argument explains the exception.
     """
     for name, value in arguments.items():
         for part in _parts(value, _LEVELS):
@@ -126,20 +134,26 @@ def find_unusable(
 
 
 def _is_part(value: object, path: object) -> bool:
-    """Return True if a text or a path is part of a longer path."""
+    """Return True if a string or path is contained in another path."""
     is_path = isinstance(value, str | os.PathLike) and isinstance(path, str | os.PathLike)
     return is_path and str(value) in str(path)
 
 
 def _missing(error: Exception) -> object:
-    """Return the name that a KeyError or an AttributeError did not find, or None."""
+    """Return the missing name of a KeyError or AttributeError.
+
+    The result is None if the exception contains no name.
+    """
     if isinstance(error, KeyError) and error.args:
         return error.args[0]
     return getattr(error, "name", None)
 
 
 def _has_failed(function: Callable[..., Any], error: Exception) -> bool:
-    """Return True if an exception was raised in a function, or by a call that does not fit it."""
+    """Return True if an exception was raised inside a function or by calling it.
+
+    A ``TypeError`` always counts, because the call may not match the signature.
+    """
     code, trace = getattr(function, "__code__", None), error.__traceback__
     while trace is not None:
         if trace.tb_frame.f_code is code:
@@ -149,9 +163,9 @@ def _has_failed(function: Callable[..., Any], error: Exception) -> bool:
 
 
 def is_match(value: object, annotation: Any, levels: int = _LEVELS) -> bool:
-    """Return True if a value has an annotated type, or behaves like one.
+    """Return True if a value has the annotated type or behaves like this type.
 
-    Lists, tuples and arrays are interchangeable, as are the numbers of Python and NumPy. A flag is
+    Lists, tuples and arrays are interchangeable, and so are Python and NumPy numbers. A Boolean is
     not a number.
     """
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
@@ -173,7 +187,7 @@ def is_match(value: object, annotation: Any, levels: int = _LEVELS) -> bool:
 
 
 def describe_type(annotation: Any) -> str:
-    """Return an annotated type as a phrase: "a text", "a list of numbers" and so on."""
+    """Return a description of an annotated type, such as "a number" or "a list"."""
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
     if origin in (Union, types.UnionType):
         words = list(dict.fromkeys(describe_type(each) for each in arguments))
@@ -211,7 +225,7 @@ def _is_number(value: object, kind: type) -> bool:
 
 
 def _is_container(value: object, origin: Any, arguments: tuple[Any, ...], levels: int) -> bool:
-    """Return True if a value is a container of the kind `origin`, with items of these types."""
+    """Return True if a value is a container of type ``origin`` with matching items."""
     if not isinstance(origin, type) or issubclass(origin, type):
         return isinstance(value, type)
     if origin in (Callable, typing.get_origin(Callable[..., Any])):
@@ -247,7 +261,7 @@ def _is_listed(value: object, origin: type) -> bool:
 
 
 def _is_list_of_texts(annotation: Any) -> bool:
-    """Return True if one of the types of an annotation is a list whose items may be texts."""
+    """Return True if an annotation allows a list of strings."""
     origin, items = typing.get_origin(annotation), typing.get_args(annotation)
     if origin in (Union, types.UnionType):
         return any(map(_is_list_of_texts, items))
@@ -257,7 +271,10 @@ def _is_list_of_texts(annotation: Any) -> bool:
 def _annotated(
     function: Callable[..., Any], arguments: Mapping[str, Any]
 ) -> Iterator[tuple[str, Any, Any]]:
-    """Yield the name, the value and the annotation of each argument."""
+    """Yield the name, value and annotation of each argument.
+
+    Arguments without an annotation and arguments that equal their default value are left out.
+    """
     for name, parameter in inspect.signature(function).parameters.items():
         if name not in arguments or parameter.annotation is parameter.empty or name == "self":
             continue
@@ -271,7 +288,11 @@ def _annotated(
 
 
 class _Names(dict[str, Any]):
-    """Names that an annotation may use: those of its module, and classes that are loaded later."""
+    """Namespace in which string annotations are evaluated.
+
+    The namespace contains the global names of the module. Missing names are looked up among the
+    known import aliases and among the classes of all rsfstudy modules that are loaded.
+    """
 
     def __missing__(self, name: str) -> Any:
         module = sys.modules.get(_ALIASES.get(name, ""))
@@ -285,7 +306,7 @@ class _Names(dict[str, Any]):
 
 
 def _resolve(function: Callable[..., Any], annotation: Any) -> Any:
-    """Return an annotation as types; Any if it names types that are not loaded."""
+    """Evaluate an annotation. Return ``Any`` if a name in the annotation is unknown."""
     annotation = getattr(annotation, "__forward_arg__", annotation)
     if not isinstance(annotation, str):
         return annotation
@@ -298,7 +319,7 @@ def _resolve(function: Callable[..., Any], annotation: Any) -> Any:
 
 
 def _parts(value: object, levels: int) -> Iterator[Any]:
-    """Yield a value and, if it is a list or a mapping, its first items, level by level."""
+    """Yield a value and, recursively, the first items of each list or mapping."""
     yield value
     if not levels or isinstance(value, range):
         return
@@ -310,7 +331,11 @@ def _parts(value: object, levels: int) -> Iterator[Any]:
 
 
 def _is_endless(value: Any) -> bool:
-    """Return True if a value takes no memory for its items and has more than `MOST_ITEMS`."""
+    """Return True if a lazy or repeated-value sequence exceeds ``MOST_ITEMS`` items.
+
+    Such sequences are a ``range`` and an array with a stride of zero. Their memory does not grow
+    with the number of items.
+    """
     if isinstance(value, range):
         return bool(value) and (value[-1] - value[0]) // value.step >= MOST_ITEMS
     is_array = type(value).__module__ == "numpy" and hasattr(value, "strides")

@@ -1,8 +1,8 @@
 """Error boundary of the public functions and classes.
 
-An exception that leaves the boundary is an error of rsfstudy: it names the argument that is
-responsible, the rule and the remedy. Calls from inside rsfstudy pass through unchanged, so that
-the error names the function that the user called.
+Every exception that leaves a public function is an error of rsfstudy. Its message contains the
+argument, the rule and the remedy. Calls from within rsfstudy bypass the boundary, so that the
+error refers to the function that the user called.
 """
 
 from __future__ import annotations
@@ -42,34 +42,35 @@ def error_boundary(
     is_inner: bool = False,
     passed: tuple[type[Exception], ...] = _PASSED,
 ) -> Callable[P, T]:
-    """Return a function that raises errors of rsfstudy only.
+    """Wrap a function so that it raises only errors of rsfstudy.
 
     Parameters
     ----------
     function : callable
         A public function or method.
     is_inner : bool
-        Guard the calls from inside rsfstudy as well.
+        If True, also guard calls from within rsfstudy.
     passed : tuple of type
-        Exceptions that leave the boundary as they are. By default these are errors of rsfstudy,
-        warnings, and the exception by which a debugger quits.
+        Exceptions that are not converted. By default these are errors of rsfstudy, warnings, and
+        the exception with which a debugger quits.
 
     Returns
     -------
     callable
-        If the arguments do not fit the signature, it raises `CallError`, a TypeError that lists
-        the parameters. Any other exception becomes an `InvalidValue`, or a `DataError` if a
-        dataset is responsible, with the original exception as its cause.
+        If the arguments do not match the signature, the wrapped function raises ``CallError``, a
+        TypeError that lists the parameters. Any other exception is converted to an
+        ``InvalidValue``, or to a ``DataError`` if a dataset caused the exception. The original
+        exception is the cause of the new exception.
     """
     return _enclose(function, is_inner=is_inner, passed=passed)
 
 
 def guard_methods(kind: C) -> C:
-    """Put the constructor and the public methods of a class within the error boundary.
+    """Apply the error boundary to the constructor and public methods of a class.
 
-    A constructor also rejects arguments that do not match their annotations, because most
-    dataclasses store whatever they are given and would fail much later. Static methods stay
-    as they are, because the engines compile those of parts.
+    The constructor also rejects arguments that do not match their annotations. Most dataclasses
+    store any argument, so a wrong argument would cause an error much later. Static methods are not
+    wrapped, because the engines compile the static methods of parts.
     """
     for name, member in list(vars(kind).items()):
         if name.startswith("_") and name not in _SPECIAL:
@@ -85,19 +86,19 @@ def guard_methods(kind: C) -> C:
 
 
 class CheckedKeywords:
-    """Base of classes from which users derive their own, for example measures.
+    """Base class for user-defined classes, such as measures.
 
-    It reports unknown keywords of a derived class, which `guard_methods` has not seen, together
-    with the valid ones.
+    If a keyword argument of the constructor is unknown, the error lists the valid keywords. The
+    check is needed because ``guard_methods`` is not applied to user-defined classes.
 
     Raises
     ------
     CallError
-        If a keyword is no parameter of the class.
+        If a keyword is not a parameter of the class.
     """
 
     def __new__(cls, *args: Any, **keywords: Any) -> Self:
-        """Create an instance once all keywords are known to be parameters."""
+        """Create an instance after checking the keyword arguments."""
         kind: type = cls
         valid = _parameters(kind)
         for name in keywords if valid else ():
@@ -108,14 +109,17 @@ class CheckedKeywords:
 
 @functools.cache
 def _parameters(cls: type) -> tuple[str, ...]:
-    """Return the names of the parameters of a class; none if it takes any keyword."""
+    """Return the parameter names of the constructor of a class.
+
+    The tuple is empty if the constructor accepts arbitrary keywords.
+    """
     parameters = inspect.signature(cls.__init__).parameters  # type: ignore[misc]
     takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters.values())
     return () if takes_any else tuple(parameters)[1:]
 
 
 def user_stacklevel() -> int:
-    """Return the ``stacklevel`` with which a warning shows the line of the user."""
+    """Return the ``stacklevel`` with which a warning refers to the code of the user."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back and frame.f_globals.get("__name__", "").startswith("rsfstudy."):
         level, frame = level + 1, frame.f_back
@@ -129,9 +133,10 @@ def _enclose(
     is_strict: bool = False,
     passed: tuple[type[Exception], ...] = _PASSED,
 ) -> Callable[P, T]:
-    """Return a function within the boundary, which if strict checks the annotations as well.
+    """Wrap a function in the error boundary.
 
-    It checks them last, because the function itself knows better what to say.
+    If ``is_strict`` is True, the arguments are also checked against their annotations. The check
+    follows the call, because the errors that the function itself raises are more specific.
     """
     signature = inspect.signature(inspect.unwrap(function))
     name = function.__qualname__.removesuffix(".__init__").removesuffix(".__new__")
@@ -182,7 +187,7 @@ def _enclose(
 
 
 def _unknown_keyword(name: str, keyword: str, valid: Iterable[str]) -> CallError:
-    """Return the error for a keyword that a function or a class does not take."""
+    """Return the error for an unknown keyword of a function or class."""
     names = list(valid)
     close = difflib.get_close_matches(brief(keyword), names, n=1)
     hint = "".join(f" Did you mean {each!r}?" for each in close)
@@ -191,7 +196,7 @@ def _unknown_keyword(name: str, keyword: str, valid: Iterable[str]) -> CallError
 
 
 def _is_internal() -> bool:
-    """Return True if a module of rsfstudy (other than the command line) made the call."""
+    """Return True if the caller is a module of rsfstudy other than the command line."""
     frame = sys._getframe(2)
     while frame.f_back and frame.f_globals.get("__name__") in _BETWEEN:
         frame = frame.f_back
@@ -200,7 +205,7 @@ def _is_internal() -> bool:
 
 
 def _explain(name: str, arguments: dict[str, Any], error: Exception) -> RsfStudyError:
-    """Return the error for a call that failed although its arguments have the right types."""
+    """Return the error for a failed call whose arguments have the correct types."""
     reason = in_words(error)
     if any(map(_is_dataset, arguments.values())):
         rule = f"is not as rsfstudy made it ({reason.partition(': ')[2] or reason})"
@@ -219,12 +224,15 @@ def _explain(name: str, arguments: dict[str, Any], error: Exception) -> RsfStudy
 
 
 def _is_dataset(value: object) -> bool:
-    """Return True for a dataset, and for the accessor of one."""
+    """Return True if a value is a dataset or the accessor of a dataset."""
     return hasattr(type(value), "data_vars") or "_dataset" in getattr(value, "__dict__", {})
 
 
 def in_words(error: BaseException) -> str:
-    """Return the type of an exception and its message, if it has one."""
+    """Format the type and the message of an exception.
+
+    If the message cannot be formatted, only the type is returned.
+    """
     try:
         return f"{type(error).__name__}: {brief(error)}"
     except Exception:  # its text may raise as well
@@ -232,7 +240,10 @@ def in_words(error: BaseException) -> str:
 
 
 def check_file(name: str, path: str | Path) -> None:
-    """Reject a path that exists but is not a file: reading a pipe or a device may never end."""
+    """Raise ``InvalidValue`` if a path exists but is not a regular file.
+
+    Reading from a pipe or a device might never return.
+    """
     try:
         is_other = Path(path).exists() and not Path(path).is_file()
     except (OSError, ValueError) as error:

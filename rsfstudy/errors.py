@@ -93,7 +93,7 @@ class InvalidValue(RsfStudyError, ValueError):
 
 
 class CallError(RsfStudyError, TypeError):
-    """A call whose arguments do not fit the signature of the function."""
+    """Error raised if the arguments of a call do not match the signature."""
 
 
 class DataError(RsfStudyError):
@@ -122,7 +122,11 @@ class Signalled(KeyboardInterrupt):
 
 
 class RsfStudyWarning(UserWarning):
-    """Base of the warnings, whose text is safe to print on a terminal."""
+    """Base class of all warnings of rsfstudy.
+
+    The message is shortened, and control characters are escaped, so that the message can be printed
+    safely on a terminal.
+    """
 
     def __str__(self) -> str:
         return spelt(brief(super().__str__(), _LONGEST))

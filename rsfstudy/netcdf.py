@@ -11,8 +11,9 @@ import xarray as xr
 def fill_value_encoding(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
     """Return an encoding without fill values for coordinates, flags and counts.
 
-    xarray writes ``_FillValue = NaN`` for every variable of floats. The CF conventions forbid the
-    attribute on coordinates, and on integers it would turn them into floats when they are read.
+    xarray writes ``_FillValue = NaN`` for every floating-point variable. The CF conventions do not
+    allow the attribute on coordinates. If an integer variable has the attribute, xarray converts
+    the variable to floats when reading the file.
     """
     return {
         name: {"_FillValue": None}
@@ -22,9 +23,10 @@ def fill_value_encoding(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
 
 
 def with_cf_encoding(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset that ``to_netcdf`` writes without fill values on coordinates and flags.
+    """Return a copy of a dataset whose encoding omits unwanted fill values.
 
-    The encoding travels with the variables, so that selections and renamed copies keep it.
+    ``to_netcdf`` then writes no fill values for coordinates, flags and counts. The encoding belongs
+    to the variables, so selections and renamed copies of the dataset keep the encoding.
     """
     encoded = dataset.copy()
     for name, encoding in fill_value_encoding(encoded).items():

@@ -1,4 +1,4 @@
-"""Checks of paths before the file system is asked about them."""
+"""Validation of paths before the file system is accessed."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ LONGEST_NAME, LONGEST_PATH = 255, 4096
 
 
 def check_path(name: str, path: str | Path) -> Path:
-    """Check that a file or a directory can have a path, whether it exists or not.
+    """Check that a path is valid, whether or not a file or directory exists there.
 
     Parameters
     ----------
     name : str
-        The argument or option, for the error.
+        Name of the argument or option, for the error message.
     path : str or Path
 
     Returns
@@ -26,8 +26,8 @@ def check_path(name: str, path: str | Path) -> Path:
     Raises
     ------
     InvalidValue
-        If the path is empty or not text, if it or one of its parts is too long, or if the system
-        does not accept it.
+        If the path is empty, cannot be encoded, or is rejected by the operating system, or if the
+        path or one of its components is too long.
     """
     text = str(path)
     if not text:

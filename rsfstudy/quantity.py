@@ -140,7 +140,7 @@ _CELL = 'style="text-align: left; vertical-align: top"'
 
 
 def as_html(text: object) -> str:
-    """Return a text as HTML, with control characters spelt out, which no browser shows."""
+    """Escape a string for HTML, and make control characters visible."""
     return escape(spelt(str(text)))
 
 

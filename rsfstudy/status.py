@@ -59,7 +59,7 @@ class Status(IntEnum):
 
     @property
     def has_values(self) -> bool:
-        """True if the values of the cell stand, with or without valid standard errors."""
+        """True if the cell has usable values, with or without valid standard errors."""
         return self in (Status.OK, Status.ERRORS_NOT_VALID)
 
     @property

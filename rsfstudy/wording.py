@@ -15,7 +15,10 @@ _LONG = re.compile(r"(?<![\w.])\d+\.\d{6,}(?:e[+-]?\d+)?")
 
 
 def flags_of(attributes: Mapping[str, Any]) -> dict[float, str]:
-    """Return the meaning of each flag value by CF attributes; empty for a numeric variable."""
+    """Return the meaning of each flag value, from CF attributes.
+
+    The mapping is empty for a variable without flags.
+    """
     words = str(attributes.get("flag_meanings", "")).split()
     return dict(zip(np.ravel(attributes.get("flag_values", [])).tolist(), words, strict=False))
 

@@ -47,7 +47,7 @@ class Accessor:
 
     @error_boundary
     def _repr_html_(self) -> str:
-        """Return the numbers of a dataset with the verdicts of its claims as HTML."""
+        """Return an HTML table of the dataset and the verdicts of its claims."""
         from rsfstudy.api import report
 
         self._must_be_ours()

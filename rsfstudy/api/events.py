@@ -1,6 +1,4 @@
-"""Catalogues of events as datasets; and the events of a record of a laboratory: drops of shear
-stress that its noise does not explain.
-"""
+"""Event catalogues, and detection of stress drops in laboratory records."""
 
 from __future__ import annotations
 
@@ -86,7 +84,11 @@ def catalogue(found: Sequence[Found], about: Mapping[str, Mapping[Any, Any]]) ->
 
 
 def _units(scale: str, about: Mapping[str, Mapping[Any, Any]]) -> dict[str, str]:
-    """Units and scale of a quantity, where times, slip and stresses have theirs."""
+    """Return the attributes ``units`` and ``scale`` of a quantity of an event.
+
+    Times, slips and stresses have the units of the variable from which they were read. A slip
+    rate is in units of slip over units of time. All other quantities are dimensionless.
+    """
     if scale in _MEASURED_AS:
         source = about[_MEASURED_AS[scale]]
         return {key: str(source[key]) for key in ("units", "scale") if key in source}
@@ -109,71 +111,80 @@ def events(
     stiffness: Any = None,
     sign: int | None = None,
 ) -> xr.Dataset:
-    """Find the events of a record: drops of shear stress that noise does not explain.
+    """Detect drops of shear stress in a laboratory record.
 
-    The mean stress of a window of samples is compared with that of the window behind it, for
-    windows of 4, 8, 16 and more sampling intervals, up to a hundredth of the record, at every
-    sample. The noise of the difference is the spread of its most frequent values, those of
-    loading. It may be correlated over times that are short compared with the longest window, and
-    drops may take up to 40 % of the record. If sampling intervals differ by more than a factor of
-    three, as in triggered bursts, samples are first averaged over even intervals of time. The
-    threshold is such that all comparisons together find something in one of 10,000 records of
-    Gaussian noise. Three lines are then fitted to all samples around a drop: their corners are the
-    beginning and the end of the event, the highest and the lowest stress.
+    A drop is a fall of shear stress that the noise of the record does not explain. The mean stress
+    of a window is compared with the mean of the next window, at every sample. The window lengths
+    are 4, 8, 16 and more sampling intervals, up to a hundredth of the record. The noise is
+    estimated from the most frequent differences between the two means, because most differences
+    occur during loading. The noise may be correlated over times that are short compared with the
+    longest window, and drops may take up to 40 % of the record. The threshold is chosen so that
+    one of 10,000 records of Gaussian noise contains a false detection. If sampling intervals differ
+    by more than a factor of three, as in triggered bursts, the samples are first averaged over
+    equal intervals of time.
 
-    A drop of ``smallest_drop`` that is separated from others by the longest window is missed once
-    in 1,000. With white noise it is less than three standard deviations of the noise from 3,200
-    samples on; it is larger with correlated noise. Glitches of single samples are no Gaussian
-    noise. Stress that relaxes by as much within a window, as in a hold, is a drop too.
+    Three straight lines are then fitted to the samples around each drop: before, during and after
+    the drop. The intersections of the lines are the beginning of the event, where stress is
+    highest, and the end of the event, where stress is lowest.
 
-    Slip is that of the fault: displacement less shear stress over `stiffness`, that of what lies
-    between the fault and where displacement is measured. Without it displacement is taken for that
-    of the fault, if it moves faster during the drops than before and after, by three standard
-    deviations of its noise and by a tenth. That of a load point does not. It is read some samples
-    away from each drop, whose place noise of stress may have moved.
+    A drop of size ``smallest_drop`` is missed once in 1,000 cases, provided that the longest window
+    separates the drop from other drops. If the noise is white and the record has at least 3,200
+    samples, ``smallest_drop`` is less than three standard deviations of the noise. If the noise is
+    correlated, ``smallest_drop`` is larger. Spikes of single samples are not Gaussian noise and may
+    cause false detections. A relaxation of stress within a window, as in a hold, counts as a drop.
+
+    Slip is computed as displacement minus shear stress divided by ``stiffness``. If ``stiffness``
+    is not passed, displacement must be the slip of the fault. The function accepts displacement as
+    slip if displacement moves faster during the drops than before and after them, by three standard
+    deviations of its noise and by a tenth. The displacement of a load point does not pass this
+    test. Displacement is read a few samples away from each drop, because noise of stress may have
+    shifted the times of the drop.
 
     Parameters
     ----------
     record : xarray.Dataset, Record, str or Path, optional
-        ``time``, ``shear_stress`` and, if it was measured, ``displacement``, with units; or a CSV
-        file of these, whose first line names columns and units (`read_table`). The shear stress of
-        a Record (`read_record`) is friction times normal stress, or friction if it has no normal
-        stress.
+        Dataset with ``time``, ``shear_stress`` and, if measured, ``displacement``, with units. A
+        path names a CSV file with these columns, whose first line contains names and units
+        (``read_table``). The shear stress of a Record (``read_record``) is the product of friction
+        and normal stress, or friction if the record has no normal stress.
     time, displacement, shear_stress : array_like
-        The same as arrays; one with the attribute ``units`` keeps them, and numbers that are read
-        of others have no attribute ``units``.
+        Arrays to use instead of ``record``. If an array has the attribute ``units``, the results
+        keep these units. Otherwise the results have no attribute ``units``.
     stiffness : quantity, optional
-        Shear stress over displacement, "0.05 MPa/um", or a number in units of the record: that of
-        the rig where displacement is that of the load point; ``inf`` where it is surely that of the
-        fault.
+        Stiffness between the fault and the point where displacement is measured, in shear stress
+        over displacement: a string such as "0.05 MPa/um", or a number in the units of the record.
+        If displacement was measured at the load point, pass the stiffness of the rig. If
+        displacement is known to be the slip of the fault, pass ``inf``.
     sign : {1, -1}, optional
-        Sign of shear stress in the direction of slip. Stress is multiplied by it, so that events
-        are falls. By default -1 if all samples are negative, otherwise 1.
+        Sign of shear stress in the direction of slip. Stress is multiplied by ``sign``, so that
+        stress falls during events. The default is -1 if all samples are negative, and 1 otherwise.
 
     Returns
     -------
     xarray.Dataset
-        Along ``event``, in the units of the record: ``time`` (of the beginning), ``duration``,
-        ``interval``, ``stress_before`` and ``stress_after``, ``static_stress_drop``, ``cut`` (1 if
-        the record begins within the event, 2 if it ends within it); with displacement ``slip``,
-        ``peak_slip_rate`` between neighbouring samples and ``dynamic_stress_drop``. What is not
-        above the noise is NaN. Each number has an ``_error``, the half width of a 95 % interval.
-        ``noise`` is the standard deviation of the noise, ``smallest_drop`` the smallest drop that
-        can be detected, and the attribute ``sign_of_shear_stress`` the sign that was used.
+        Variables along ``event``, in the units of the record: ``time`` (of the beginning),
+        ``duration``, ``interval``, ``stress_before``, ``stress_after``, ``static_stress_drop`` and
+        ``cut`` (1 if the record begins within the event, 2 if the record ends within the event).
+        If displacement is known, the dataset also has ``slip``, ``peak_slip_rate`` between
+        neighbouring samples, and ``dynamic_stress_drop``. Values that do not exceed the noise are
+        NaN. Each variable has a companion ``<name>_error``, the half width of a 95 % confidence
+        interval. The scalar ``noise`` is the standard deviation of the noise, and ``smallest_drop``
+        is the smallest drop that can be detected. The attribute ``sign_of_shear_stress`` contains
+        the sign that was used.
 
     Raises
     ------
     InvalidValue
-        For records that differ in length, hold NaN, or are too short, for times that do not
-        increase, and for a stiffness that is not positive.
+        If the arrays differ in length, contain NaN or are too short, if time does not increase, or
+        if the stiffness is not positive.
 
     Warns
     -----
     NoAnswer
-        Where displacement does not move faster during the drops; ``slip``, ``peak_slip_rate`` and
-        ``dynamic_stress_drop`` are NaN, and the attribute ``comment`` of slip says why.
-        If no drop is found although stress falls by more than ten times ``smallest_drop``; the
-        attribute ``comment`` of the dataset gives both numbers.
+        If displacement does not move faster during the drops. Then ``slip``, ``peak_slip_rate`` and
+        ``dynamic_stress_drop`` are NaN, and the attribute ``comment`` of ``slip`` gives the reason.
+        The function also warns if no drop is found although stress falls by more than ten times
+        ``smallest_drop``. The attribute ``comment`` of the dataset then contains both numbers.
     """
     given = {"time": time, "displacement": displacement, "shear_stress": shear_stress}
     if isinstance(record, str | Path):
@@ -266,7 +277,11 @@ def _samples(name: str, values: Any) -> np.ndarray:
 
 
 def _stress_of(record: Record) -> xr.Dataset:
-    """Return the shear stress of a record in MPa; its friction, if it has no normal stress."""
+    """Return time, displacement and shear stress of a record as a dataset.
+
+    Shear stress is in MPa. If the record has no normal stress, friction is returned in place of
+    shear stress.
+    """
     columns = record.columns
     if "normal_stress" in columns:
         stress, units = 1e-6 * columns["friction"] * columns["normal_stress"], "MPa"
@@ -281,7 +296,10 @@ def _stress_of(record: Record) -> xr.Dataset:
 
 
 def _sign(stress: np.ndarray, stated: int | None) -> float:
-    """Return the sign of shear stress in the direction of slip."""
+    """Return the sign of shear stress in the direction of slip.
+
+    If the user does not pass a sign, the sign is -1 if all samples are negative, and 1 otherwise.
+    """
     if stated is None:
         return -1.0 if stress.max() < 0.0 else 1.0
     if stated not in (-1, 1):
@@ -290,7 +308,13 @@ def _sign(stress: np.ndarray, stated: int | None) -> float:
 
 
 def _warn_of_nothing(detection: Detection) -> str:
-    """Warn if stress falls by much more than the smallest drop although no drop is found."""
+    """Warn if no drop is found although stress falls far more than the smallest drop.
+
+    Returns
+    -------
+    str
+        The text of the warning. The string is empty if no warning was issued.
+    """
     if not detection.variation > _SUSPECT * detection.smallest:
         return ""
     text = (

@@ -81,7 +81,14 @@ def place(one: xr.Dataset) -> dict[str, Any]:
 
 
 def shown(one: xr.Dataset) -> dict[str, str]:
-    """Names by laboratories of the numbers that tables show, in their order."""
+    """Return the column headings of the fitted parameters, in the order of the table.
+
+    Returns
+    -------
+    dict of str to str
+        Name of each variable of the dataset, and its heading in the notation of laboratories, such
+        as ``Dc`` and ``mu_0``.
+    """
     names, found = [*map(str, one["parameter"].values), "a_minus_b"], {}
     for short in dict.fromkeys(("a", "b", "b1", "b2", "a_minus_b", *PARAMETERS)):
         for name in (n for n in names if plain(n) == short):
@@ -90,13 +97,14 @@ def shown(one: xr.Dataset) -> dict[str, str]:
 
 
 def table(dataset: xr.Dataset) -> pd.DataFrame:
-    """Return a table with one row per fit and the column names that laboratories use.
+    """Return a table with one row per fit and the column names used in laboratories.
 
-    Lengths are in um. The columns ``<name>_std`` hold standard errors, which are not valid if the
-    status of the row is ``errors_not_valid``. The columns ``<name>_windows`` hold the range of a
-    parameter among windows, and ``p_value`` is that of the autocorrelation test of the whitened
-    residuals. ``normal_stress`` is the mean before the step in MPa, and ``k`` is the stiffness
-    divided by this normal stress in 1/um. The value is NaN for a parameter that was not free.
+    Lengths are in um. The columns ``<name>_std`` contain standard errors. If the status of a row is
+    ``errors_not_valid``, the standard errors of the row are not valid. The columns
+    ``<name>_windows`` contain the range of a parameter over the windows. The column ``p_value``
+    contains the p-value of the autocorrelation test of the whitened residuals. The column
+    ``normal_stress`` contains the mean normal stress before the step in MPa, and ``k`` contains the
+    stiffness divided by this normal stress, in 1/um. Parameters that were not free are NaN.
     """
     rows = []
     for one in cells(dataset):
@@ -119,7 +127,11 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
 
 
 def _normal_stresses(one: xr.Dataset) -> dict[str, float]:
-    """Return the normal stress before the step in MPa; before each step, if there are several."""
+    """Return the normal stress before each step in MPa.
+
+    If the fit has one step, the key is ``normal_stress``. If the fit has several steps, there is
+    one numbered key per step. Normal stresses that are not finite are left out.
+    """
     names = [str(n) for n in one.data_vars if str(n).startswith("normal_stress_before_")]
     stresses = {n: one[n].item() * 1e-6 for n in names or ["normal_stress_before"] if n in one}
     known = {n: stress for n, stress in stresses.items() if math.isfinite(stress)}
@@ -210,9 +222,9 @@ def laboratory(dataset: xr.Dataset) -> Laboratory:
 
 
 def answered(dataset: xr.Dataset) -> bool:
-    """Return True if all fits have verified values with valid standard errors.
+    """Return True if each fit has verified values and valid standard errors.
 
-    A fit with the status `not_identified` counts as answered.
+    The status ``not_identified`` counts as answered.
     """
     return all(status(one) in _ANSWERS for one in cells(dataset))
 
@@ -304,9 +316,9 @@ def _window(one: xr.Dataset) -> str:
 
 
 def with_error(one: xr.Dataset, name: str) -> str:
-    """Format a value and its standard error, rounded to two digits of the error.
+    """Format a value with its standard error, rounded to two digits of the error.
 
-    A standard error that is not valid is marked by an asterisk.
+    An asterisk marks a standard error that is not valid.
     """
     text = _rounded(one[name].item(), one[f"{name}_stderr"].item())
     is_marked = " +- " in text and status(one) == Status.ERRORS_NOT_VALID.label
@@ -314,7 +326,7 @@ def with_error(one: xr.Dataset, name: str) -> str:
 
 
 def _rounded(value: float, error: float) -> str:
-    """Format a value and its standard error."""
+    """Format a value with its standard error, rounded to two digits of the error."""
     if not math.isfinite(value):
         return "-"
     if error > _BOUNDLESS * abs(value) > 0.0:
@@ -332,7 +344,11 @@ def _rounded(value: float, error: float) -> str:
 
 
 def _remarks(one: xr.Dataset) -> Iterator[str]:
-    """Yield the remarks on a fit: its message, the windows, the posterior and the p-value."""
+    """Yield remarks on a fit.
+
+    The remarks are the message of the fit, the differences between windows, the intervals of the
+    posterior, and the result of the autocorrelation test.
+    """
     law, message = one["law"].item(), str(one["message"].item())
     if status(one) == Status.ERRORS_NOT_VALID.label:
         yield f"{law}: standard errors marked by {_MARK} are not valid: {message}"

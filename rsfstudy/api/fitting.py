@@ -262,7 +262,10 @@ def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]
 
 
 def _check_displacement(record: Record) -> None:
-    """Refuse a load point that jumps back between two rows, as one that is set to zero again."""
+    """Raise ``InvalidValue`` if the load point displacement was reset to zero.
+
+    A reset appears as a large backward jump between two rows.
+    """
     time, moved = record.time, record.columns["displacement"]
     jumps = np.diff(moved)
     row = int(np.argmin(jumps))
@@ -291,7 +294,7 @@ def _check_step(record: Record, number: int, step: Step) -> None:
 
 
 def _check_stressed(records: Sequence[Record], loading: str, numbers: Sequence[int]) -> None:
-    """Refuse to fit the effect of a normal stress that does not change."""
+    """Raise ``InvalidValue`` if alpha is fitted but normal stress is constant."""
     for record in records:
         stress = record.columns.get("normal_stress", np.zeros(1))
         steps = [record.found[n - 1] for n in numbers if n <= len(record.found)]
@@ -318,14 +321,15 @@ def _guess(record: Record, rig: Laboratory | None, number: int, stated: Any) -> 
 def _stiffness(
     rig: Laboratory | None, stated: Any, free: Sequence[str], records: Sequence[Record]
 ) -> tuple[float, float]:
-    """Read the stiffness to begin with, in units that it was stated in.
+    """Return the initial stiffness of the fit, in the units that the user chose.
 
     Returns
     -------
     ratio : float
-        Stiffness over normal stress in 1/um; 0 if the stiffness of the machine is stated.
+        Stiffness divided by normal stress in 1/um. The ratio is 0 if the stiffness of the machine
+        is known.
     machine : float
-        Stiffness of the machine in Pa/um, or 0.
+        Stiffness of the machine in Pa/um, or 0 if the ratio is known.
     """
     if stated is None:
         if rig is not None and rig.stiffness is not None:
@@ -353,7 +357,7 @@ def _stiffness(
 
 
 def _check_compressive(records: Sequence[Record], numbers: Sequence[int]) -> None:
-    """Refuse a normal stress that is not positive before a step."""
+    """Raise ``InvalidValue`` if the normal stress before a step is not positive."""
     for record in records:
         for number in numbers:
             if number > len(record.found):
@@ -367,7 +371,7 @@ def _check_compressive(records: Sequence[Record], numbers: Sequence[int]) -> Non
 
 
 def _with_normal_stress(record: Record, rig: Laboratory | None) -> Record:
-    """Return the record with the normal stress of the rig, if it holds none itself."""
+    """Return the record with the normal stress of the rig if it has none of its own."""
     if rig is None or "normal_stress" in record.columns:
         return record
     stress = np.full(len(record), float(rig.normal_stress))
@@ -398,7 +402,11 @@ def _of_laws(stated: Sequence[str], laws: Sequence[str], scene: Scene) -> tuple[
 
 
 def _describe_filter(averaging: Any, low_pass: str) -> str:
-    """Return the filter as the measure takes it, with its size in s or Hz."""
+    """Return a string that names the filter and its size in s or Hz.
+
+    The string is the argument that the measure expects. The string is empty if the user passes
+    neither ``averaging`` nor ``low_pass``.
+    """
     if averaging is not None and low_pass:
         remedy = "Pass `averaging=` or `low_pass=`."
         raise InvalidValue("low_pass", low_pass, "cannot follow an averaging", remedy=remedy)

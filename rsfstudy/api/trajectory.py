@@ -211,7 +211,7 @@ def simulate(
 
 
 def _along_time(scene: Scene, seen: np.ndarray, regimes: Sequence[str]) -> xr.Dataset:
-    """Return the rows of a recording as a dataset along time."""
+    """Convert the rows of a recording to a dataset along time."""
     fluid = scene.parts.fluid.unknowns
     columns = {quantity(name): seen[:, column] for column, name in enumerate(OBSERVED)}
     first = STATES + scene.states - len(fluid)
@@ -236,9 +236,10 @@ def _along_time(scene: Scene, seen: np.ndarray, regimes: Sequence[str]) -> xr.Da
 
 
 def attributes_of(about: Quantity, scene: Scene) -> dict[str, Any]:
-    """Return the attributes of a variable along a motion.
+    """Return the attributes of a variable of a motion.
 
-    Radiation damping is relative to that at V_*, so that spring stress and friction agree there.
+    If the scene has radiation damping, spring stress is reported minus the radiation damping stress
+    at V_*. Spring stress and frictional stress are then equal at V_*.
     """
     attributes = about.attributes
     if about.name in _OF_SPRING and scene.dynamics.damping(0.0):

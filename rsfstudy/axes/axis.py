@@ -256,7 +256,7 @@ def places_by_kind(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
 
 
 def point_key(row: Row) -> frozenset[tuple[str, Any]]:
-    """Return the fields and values of a row as a dictionary key."""
+    """Convert the fields and values of a row to a hashable key."""
     return frozenset(row.items())
 
 

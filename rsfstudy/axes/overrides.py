@@ -1,4 +1,4 @@
-"""Overrides of zipped and numbered axes: selected points, and new values of one field."""
+"""Overrides of zipped and numbered axes: point selection and new field values."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from rsfstudy.wording import short
 
 
 def select(axis: Axis, points: Sequence[Any]) -> Axis:
-    """Select points of a zipped axis by their labels, or of a numbered axis by their numbers.
+    """Select points of a zipped axis by label, or of a numbered axis by number.
 
-    The first `n` points of a set of samples keep the record of how they were drawn.
+    If the selection contains the first ``n`` samples in order, the axis keeps the record of the
+    sampling method.
     """
     rows: dict[Any, Row] = dict(zip(axis.labels or range(len(axis)), axis.rows, strict=True))
     for point in points:
@@ -39,16 +40,16 @@ def with_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
     axis : Axis
         Axis that sets several fields at each point.
     name : str
-        Field to override. Points that do not set it stay as they are.
+        Field to override. Points that do not set this field remain unchanged.
     values : sequence
-        New values; a numbered axis takes exactly one.
+        New values. A numbered axis accepts exactly one value.
 
     Returns
     -------
     Axis
-        A zipped axis has one point for each combination of a new value and the other fields. A
-        point that the axis already has keeps its label, and all other labels depend only on the
-        point, not on the rest of the list. A numbered axis no longer records how it was drawn.
+        A zipped axis has one point for each combination of a new value with the other fields. If a
+        point exists already, the point keeps its label. Each new label depends only on its own
+        point, not on the other values. A numbered axis loses the record of the sampling method.
     """
     if axis.is_numbered:
         if len(values) != 1:
@@ -77,11 +78,11 @@ def with_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
 
 
 def _new_label(label: str, name: str, old: Any, new: Any, *, is_unique: bool) -> str:
-    """Return the label of a point in which one field has another value.
+    """Return the label of a point after the value of one field has changed.
 
-    A label that contains the old value, such as ``"imposed, alpha = 0.25"``, has it replaced. Any
-    other label becomes ``"alpha = 0.3"`` if the value identifies the point (`is_unique`), and
-    otherwise precedes the value.
+    If the label contains the old value, as in ``"imposed, alpha = 0.25"``, the old value is
+    replaced. Otherwise, if the new value identifies the point (``is_unique``), the label becomes
+    ``"alpha = 0.3"``. In all other cases ``"alpha = 0.3"`` is appended to the label.
     """
     text = f"{name} = {_exact(new)}"
     stated = rf"(?<!\w){re.escape(name)} = {re.escape(_exact(old))}(?![\w.])"
@@ -92,7 +93,7 @@ def _new_label(label: str, name: str, old: Any, new: Any, *, is_unique: bool) ->
 
 
 def _exact(value: Any) -> str:
-    """Return a value as text, with six digits if they represent a float exactly."""
+    """Format a value, with all digits if six digits do not represent a float exactly."""
     short_text = short(value)
     is_rounded = isinstance(value, float) and float(short_text) != value
     return repr(value) if is_rounded else short_text

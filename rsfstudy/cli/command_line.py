@@ -97,7 +97,7 @@ def main() -> None:
 
 
 def _explain(error: Exception) -> str:
-    """Explain an error that no command expects."""
+    """Return a message for an exception that no command handles."""
     if isinstance(error, OSError) and error.strerror:
         place = f" ({brief(error.filename)})" if error.filename else ""
         remedy = "Check that the place exists, may be written to, and is not full."
@@ -118,14 +118,17 @@ def _end(number: int, _frame: object) -> None:
 
 
 class _Log(logging.Handler):
-    """Print each message of a library once, as a warning: Matplotlib logs one for each text."""
+    """Log handler that prints each message of a library once, as a warning.
+
+    Matplotlib logs the same message for each text of a figure.
+    """
 
     def __init__(self, level: int) -> None:
         super().__init__(level)
         self._printed: set[str] = set()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print the message of a record unless it was printed before."""
+        """Print the message of a log record unless it has been printed before."""
         text = record.getMessage()
         if text not in self._printed:
             self._printed.add(text)
@@ -257,11 +260,12 @@ def report() -> None:
 @click.argument("second")
 @options.output
 def compare() -> None:
-    """Compare two results files: declaration, versions, numbers.
+    """Compare two results files: declarations, versions and numbers.
 
-    Or the results of two studies, by name. Cells are matched by their places on the axes, and
-    numbers held against the sum of both error estimates. Exit status 0 where nothing differs beyond
-    them, 1 where a number or a status does, or no cell is in both.
+    The results of two studies can be compared by name. Cells are matched by their coordinates.
+    Two numbers agree if they differ by no more than the sum of both error estimates. The exit
+    status is 0 if all numbers and statuses agree, and 1 if a number or a status differs or if the
+    files have no cell in common.
     """
 
 

@@ -152,12 +152,13 @@ def _quantity(name: str, words: str, default: str | None = None) -> Callable[[F]
 def fit() -> None:
     """Fit friction parameters to RECORDS of velocity steps, with honest errors.
 
-    Prints the steps that are found, and a table of a, b, D_c and their standard errors, which count
-    the correlation of the noise. Says what the record does not tell, and writes figure and data.
+    Prints the detected steps and a table of a, b, D_c and their standard errors, which include
+    the correlation of the noise. Also prints which parameters the record does not constrain, and
+    writes a figure and a data file.
 
     The exit status is 1 if a fit has no values, values that are not verified or standard errors
-    that are not valid, and 2 for wrong usage. Otherwise it is 0, also if a parameter is not
-    identified.
+    that are not valid, and 2 for wrong usage. Otherwise the exit status is 0, even if a parameter
+    is not identified.
     """
 
 

@@ -145,13 +145,13 @@ def _list_steps(record: Record) -> None:
 
 
 def _normal_stresses(step: Step, listed: bool) -> dict[str, str]:
-    """Format the normal stresses of a step, if those of a record are listed."""
+    """Format the normal stresses of a step in MPa if ``listed`` is True."""
     stresses = {"sigma0 (MPa)": step.stress_before, "sigma1 (MPa)": step.stress_after}
     return {heading: f"{of * 1e-6:.6g}" for heading, of in stresses.items() if listed}
 
 
 def _check_replaceable(data: Path, is_one: Callable[[xr.Dataset], bool], kind: str) -> None:
-    """Raise InvalidValue if a file of another kind would be replaced."""
+    """Raise ``InvalidValue`` if the output file exists and has different contents."""
     check_file("--output", data)
     if not data.exists():
         return

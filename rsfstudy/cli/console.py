@@ -22,7 +22,10 @@ class Plain(Console):
 
     @property
     def size(self) -> ConsoleDimensions:
-        """Size of the terminal within the bounds, or of the environment variable COLUMNS."""
+        """Terminal size, with the width limited to a fixed range.
+
+        The environment variable COLUMNS overrides the width of the terminal.
+        """
         found = super().size
         return ConsoleDimensions(min(max(found.width, _NARROWEST), _WIDEST), found.height)
 

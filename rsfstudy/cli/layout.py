@@ -60,7 +60,7 @@ def _table(table: Table) -> None:
 
 
 def _cleaned(row: Mapping[str, str]) -> dict[str, str]:
-    """Return a row with control characters spelt out, in headings and in values."""
+    """Return a row with control characters replaced by visible escape sequences."""
     return {clean(head): clean(text) for head, text in row.items()}
 
 

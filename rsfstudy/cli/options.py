@@ -63,7 +63,7 @@ class Command(click.Command):
 
 
 class FilePath(click.Path):
-    """The type of arguments and options that are paths: not empty, and accepted by the system."""
+    """Parameter type for paths that are not empty and that the system accepts."""
 
     def __init__(self, **kind: Any) -> None:
         super().__init__(path_type=Path, **kind)
@@ -71,7 +71,7 @@ class FilePath(click.Path):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> str | bytes | os.PathLike[str]:
-        """Return a path; raise `InvalidValue` if it cannot be one."""
+        """Convert a value to a path. Raise ``InvalidValue`` if the path is not valid."""
         name = param.opts[0] if isinstance(param, click.Option) else str(param and param.name)
         check_path(name, value)
         return super().convert(value, param, ctx)
@@ -157,7 +157,13 @@ against = click.option(
 
 
 def _style(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
-    """Return a style; raise InvalidValue before any work if it cannot be used."""
+    """Check a plotting style before the command starts, and return the style.
+
+    Raises
+    ------
+    InvalidValue
+        If the style cannot be used.
+    """
     if value is not None:
         from rsfstudy.plots import styled
 
@@ -184,7 +190,13 @@ looks = together(
 
 
 def _image(_context: click.Context, option: click.Parameter, value: Path | None) -> Path | None:
-    """Return the path of a figure, which replaces nothing but a file."""
+    """Check the path of a figure and return the path.
+
+    Raises
+    ------
+    InvalidValue
+        If the suffix is not supported, or if the path exists and is not a regular file.
+    """
     if value is None:
         return None
     if value.suffix not in (".png", ".pdf", ".svg"):

@@ -87,11 +87,11 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def _unregister_safely(unregister: Callable[..., None]) -> Any:
-    """Wrap `resource_tracker.unregister` for names that the tracker does not know.
+    """Wrap ``resource_tracker.unregister`` so that unknown names cause no traceback.
 
-    If the tracker process is killed, Python starts another, which knows none of the semaphores
-    that exist already and prints a traceback for each one that is released. Registering a name
-    twice does no harm, so we register it before we release it.
+    If the tracker process is killed, Python starts another tracker process. The new process does
+    not know the existing semaphores and prints a traceback whenever a semaphore is released. The
+    wrapper registers each name again before releasing it. Registering a name twice is harmless.
     """
 
     @functools.wraps(unregister)
@@ -103,8 +103,10 @@ def _unregister_safely(unregister: Callable[..., None]) -> Any:
 
 
 def _survive_lost_tracker() -> None:
-    """Install `_unregister_safely` for the rest of the process, because semaphores are released
-    whenever they are garbage-collected.
+    """Install ``_unregister_safely`` for the lifetime of the process.
+
+    The wrapper must stay installed, because semaphores are released whenever they are
+    garbage-collected.
     """
     if not hasattr(resource_tracker.unregister, "__wrapped__"):
         resource_tracker.unregister = _unregister_safely(resource_tracker.unregister)

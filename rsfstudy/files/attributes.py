@@ -1,4 +1,7 @@
-"""Checks of variables in a file and of their attributes, which may come from any program."""
+"""Checks of the variables in a file and of their attributes.
+
+The checks are needed because files may have been written by other programs.
+"""
 
 from __future__ import annotations
 
@@ -24,12 +27,13 @@ _REMEDY = "Correct it with xarray, or run the study again."
 
 
 def check_attributes(dataset: xr.Dataset) -> None:
-    """Check the type and the length of the attributes that rsfstudy uses.
+    """Check the type and length of the attributes that rsfstudy uses.
 
     Raises
     ------
     DataError
-        If one has the wrong type, is too long, or if flags and their meanings do not match.
+        If an attribute has the wrong type or is too long, or if flag values and flag meanings do
+        not match.
     """
     for name, values in dataset.variables.items():
         for key, most in _TEXTS.items():
@@ -39,12 +43,12 @@ def check_attributes(dataset: xr.Dataset) -> None:
 
 
 def check_motion(dataset: xr.Dataset) -> None:
-    """Check that the variables along a motion are numbers.
+    """Check that the variables along a motion are numeric.
 
     Raises
     ------
     DataError
-        If one is not.
+        If a variable is not numeric.
     """
     along = dataset["slip"].dims if "slip" in dataset.variables else ()
     for name, values in dataset.variables.items():

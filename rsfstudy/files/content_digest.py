@@ -1,9 +1,10 @@
-"""Digest of the numbers, texts and declaration of a dataset, kept in its NetCDF file.
+"""Digest of the contents of a dataset, stored in its NetCDF file.
 
-The digest of all bytes at the end of a file is lost if the file is cut short or if another
-program saves it. This digest is an attribute, so it is still there. HDF5 protects small
-attributes, names and shapes by checksums of its own, but not the data and not attributes above
-4 kB, which the declaration may exceed.
+The digest covers the numbers, the strings and the declaration of the dataset. A second digest,
+at the end of the file, covers all bytes. The second digest is lost if the file is truncated or
+if another program saves the file, whereas the digest of the contents is an attribute and is
+preserved. HDF5 stores checksums of small attributes, names and shapes. HDF5 does not store
+checksums of the data, nor of attributes larger than 4 kB, such as a long declaration.
 """
 
 from __future__ import annotations
@@ -25,28 +26,28 @@ _ATTRIBUTES = ("declaration", "provenance", "scene", "end", "laboratory")
 
 
 def compute_content_digest(dataset: xr.Dataset) -> str:
-    """Compute the digests of all variables and of the declaration, as JSON."""
+    """Compute the digests of all variables and of the declaration, as a JSON string."""
     return json.dumps(_digests(dataset))
 
 
 def check_content(dataset: xr.Dataset, path: str) -> None:
-    """Check a dataset against the digest that it carries, if there is one.
+    """Check the contents of a dataset against its digest.
 
-    Only attributes and variables that the digest lists are compared, and variables only if their
-    dimensions, shape and units are still the listed ones. Another program may thus add, remove,
-    select or convert variables.
+    Datasets without a digest are not checked. The function compares only attributes and variables
+    that the digest lists. A variable is compared only if its dimensions, shape and units are
+    unchanged. Other programs may therefore add, remove, select or convert variables.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        The dataset as it was loaded.
+        Dataset that was loaded from the file.
     path : str
-        The file, for the error.
+        Path of the file, for the error message.
 
     Raises
     ------
     DataError
-        If a number, a text or the declaration differs from the digest.
+        If a number, a string or the declaration does not match the digest.
     """
     if ATTRIBUTE not in dataset.attrs:
         return
@@ -70,7 +71,10 @@ def _damaged(path: str, name: str) -> DataError:
 
 
 def _digests(dataset: xr.Dataset) -> dict[str, str]:
-    """Compute one digest per variable and attribute, preceded by its form."""
+    """Compute one digest for each variable and each attribute.
+
+    The digest of a variable is preceded by its sizes, units and scale.
+    """
     texts = {name: str(dataset.attrs[name]) for name in _ATTRIBUTES if name in dataset.attrs}
     found = {f"attribute {name}": f"text {_digest(text.encode())}" for name, text in texts.items()}
     for name, values in dataset.variables.items():
@@ -84,7 +88,7 @@ def _digest(content: bytes) -> str:
 
 
 def _to_bytes(values: np.ndarray) -> bytes:
-    """Return the same bytes for the same numbers or texts, however a file stores them."""
+    """Convert an array to bytes that do not depend on the storage format of the file."""
     if values.dtype.kind in "OUTS":
         return json.dumps([str(text) for text in values.flat]).encode()
     numbers = np.asarray(values, dtype="<f8")
@@ -92,7 +96,7 @@ def _to_bytes(values: np.ndarray) -> bytes:
 
 
 def _parse(text: object) -> Mapping[str, str]:
-    """Parse a digest; an empty mapping if it is not one."""
+    """Parse a digest. Return an empty mapping if the string is not a valid digest."""
     try:
         listed = json.loads(str(text))
     except (ValueError, RecursionError):

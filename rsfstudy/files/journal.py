@@ -157,7 +157,10 @@ class Journal:
         return DataError(f"cannot use {self._path}: {error}. {_REMEDY}")
 
     def _fingerprint_or(self, ours: str) -> Any:
-        """Return the fingerprint of the journal; a new journal is given `ours`."""
+        """Return the fingerprint stored in the journal.
+
+        If the journal is new, the function stores ``ours`` and returns ``ours``.
+        """
         with self._db:
             self._db.executescript(_TABLES)
             others = self._db.execute(_FOREIGN).fetchall()
@@ -170,8 +173,11 @@ class Journal:
         return ours if row is None else row[0]
 
     def _accept(self, theirs: Any, ours: Mapping[str, Any]) -> None:
-        """Take over a journal with another fingerprint if only the work budget differs and has
-        become larger, because no answer depends on it. Refuse any other journal.
+        """Accept a journal with a smaller work budget, and reject any other difference.
+
+        If the fingerprints differ only in the work budget and the new budget is larger, the new
+        fingerprint is stored. The results in the journal remain valid because no result depends on
+        the budget. Otherwise the method raises ``DataError``.
         """
         try:
             differ = differences(dict(json.loads(theirs)), ours)

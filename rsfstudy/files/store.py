@@ -1,9 +1,10 @@
-"""NetCDF files: written under a temporary name, read back, compared, and only then renamed.
+"""Reading and writing of NetCDF files.
 
-Each file ends with a digest of all its bytes, which HDF5 ignores. It is checked before HDF5 opens
-the file, because HDF5 may hang on damaged bytes. A file without it, because another program saved
-the file or because its end was cut off, is checked against the digest of its contents
-(`content_digest`).
+A file is written under a temporary name, read back and compared with the dataset. Only then is
+the file renamed. Each file ends with a digest of all its bytes, which HDF5 ignores. The digest is
+checked before HDF5 opens the file, because HDF5 may hang on damaged bytes. If the digest is
+missing, because another program saved the file or because the file was truncated, the file is
+checked against the digest of its contents (see ``content_digest``).
 """
 
 from __future__ import annotations
@@ -105,9 +106,10 @@ def _digest_of_bytes(path: Path, size: int) -> bytes:
 
 
 def open_store(path: Path) -> xr.Dataset:
-    """Open a Zarr store lazily, with flags of the type of their variables.
+    """Open a Zarr store lazily.
 
-    Zarr keeps attributes as JSON, which has one type of number.
+    Zarr stores attributes as JSON, which does not distinguish numeric types. The function therefore
+    converts flag values to the dtype of their variable.
     """
     dataset = xr.open_dataset(path, **ZARR)
     for variable in dataset.variables.values():
@@ -214,7 +216,10 @@ def read_any(path: Path) -> xr.Dataset:
 
 
 def _check_there(path: Path, where: str) -> None:
-    """Refuse anything but a file or a Zarr store, because opening a pipe could wait forever."""
+    """Raise ``DataError`` unless a path is a regular file or a Zarr store.
+
+    Opening a pipe could block forever.
+    """
     check_path("file", path)
     if not path.exists():
         raise DataError(f"{where} does not exist. Run the study first, or name another file.")

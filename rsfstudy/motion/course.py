@@ -165,9 +165,9 @@ def _begun(
 
 
 def _may_settle(scene: Scene, specs: Sequence[EventSpecification]) -> bool:
-    """Return False if small changes of steady sliding grow under the last segment of loading.
+    """Return False if steady sliding is unstable under the last segment of loading.
 
-    The growth rate is computed only if settling is among the specifications.
+    The growth rate of small perturbations is computed only if a specification asks for settling.
     """
     if scene.log_load_rate == -math.inf or all(spec.kind is not Kind.SETTLED for spec in specs):
         return True

@@ -1,23 +1,24 @@
-"""Kinds of events of a motion, and rows of their table; `within_steps` finds and locates them.
+"""Kinds of events of a motion, and the rows of the event table.
 
-The table has them in order, each with its time, slip and point.
+The module ``within_steps`` detects and locates the events. The table lists the events in order,
+each with its time, slip and point. A measure can request the following events:
 
-Who measures a motion asks to be told of
-
-    maximum(of), minimum(of)    an extremum of a quantity
-    rise(of, to), fall(of, to)  its crossing of a level, on the way up or down
-    settling(part)              the distance from steady sliding is below a fraction of the largest
+    maximum(of), minimum(of)    extremum of a quantity
+    rise(of, to), fall(of, to)  upward or downward crossing of a level by a quantity
+    settling(part)              distance from steady sliding below a fraction of the largest
                                 distance so far. The event is reported at the end of each such step
-                                in the last segment of loading, unless normal stress goes on
-                                changing there or small changes of steady sliding grow.
+                                in the last segment of loading, unless normal stress still changes
+                                or steady sliding is unstable.
 
-and of nothing else. Each may end the motion. Quantities are the numbers of a `Point`, and the
-friction coefficient that is read, ``reading`` (see `readings`); extrema are told of
-``log_slip_rate``, ``spring_stress`` and ``reading``. Beside what was asked for, a motion tells its
-start, every change of regime, every segment of its loading that begins, its end in time, and the
-end of the step with which all has been recorded that was asked for. What happens from one regime or
-segment to the next is told where that begins. A motion that cannot go on ends with `Halt`, which
-says why.
+Each requested event may end the motion. The quantities are the attributes of a ``Point`` and the
+observed friction coefficient, ``reading`` (see ``readings``). Extrema are available for
+``log_slip_rate``, ``spring_stress`` and ``reading``.
+
+In addition to the requested events, the table lists the start of the motion, each change of regime,
+the beginning of each segment of loading, the end of the motion, and the end of the step in which
+the last requested sample was recorded. An event at the transition between two regimes or segments
+is reported at the beginning of the later regime or segment. If a motion cannot continue, it raises
+``Halt`` with the reason.
 """
 
 from __future__ import annotations
@@ -80,10 +81,11 @@ def fall(of: str, to: float, *, ends: bool = False, waits: bool = False) -> Even
 
 
 def settling(part: float, *, ends: bool = False) -> EventSpecification:
-    """Return the specification of a motion that comes close to steady sliding.
+    """Return the specification of an event for motions that approach steady sliding.
 
-    The distance, in ln V or in a state over b, must fall below a fraction of the largest distance
-    so far. Unknowns that a part lists in `excluded_from_distance` do not count.
+    The event occurs if the distance from steady sliding falls below a fraction of the largest
+    distance so far. The distance is measured in ln V and in each state divided by b. Unknowns
+    listed in the attribute ``excluded_from_distance`` of a part are ignored.
     """
     return EventSpecification(Kind.SETTLED, level=part, ends=ends)
 

@@ -1,7 +1,7 @@
-"""Error estimate of the slow manifold along a recorded motion with inertia.
+"""Error estimate of the slow manifold approximation along a recorded motion.
 
-Two runs with different tolerances share this error if both stay on the slow manifold, so their
-difference does not show it.
+The comparison of two runs with different tolerances does not reveal this error, because both runs
+use the same approximation on the slow manifold.
 """
 
 from __future__ import annotations
@@ -38,32 +38,34 @@ _SLIP, _RATE = OBSERVED.index("slip"), OBSERVED.index("log10_slip_rate")
 def estimate_neglected_inertia(
     scene: Scene, rows: np.ndarray, slow: int, log_slip_rate: float
 ) -> np.ndarray:
-    """Estimate the error that the treatment of inertia leaves in a motion, as a change of ln V.
+    """Estimate the error in ln V that the approximate treatment of inertia causes.
 
-    The estimate has two contributions:
+    The estimate is the sum of two contributions:
 
-    - The residual of the full equation of motion on the slow manifold. With the weight of mass W
-      and the displacement s of slip and load point together, friction must fall short of spring
-      stress by ``a W d(ln V)/ds``. The residual over a is the local error e of ln V. It changes
-      spring stress and state by no more than the integral of e over ``(1 + K/a) d(slip) +
-      |dPsi|/a``, and the motion is attracted to its course, so the largest e is a bound as well.
-    - The slip in D_c that is left out where ln V jumps to the slow manifold. The state then misses
-      the evolution of that slip.
+    - The residual of the full equation of motion on the slow manifold. If W is the weight of mass
+      and s is the displacement of slip and load point together, friction is smaller than spring
+      stress by ``a W d(ln V)/ds``. The residual divided by a is the local error e of ln V. The
+      resulting change of spring stress and state is at most the integral of e over
+      ``(1 + K/a) d(slip) + |dPsi|/a``. The motion is attracted to its course, so the largest e is
+      an upper bound as well.
+    - The slip, in units of D_c, that is neglected when ln V jumps to the slow manifold. The state
+      does not evolve over this slip.
 
     Parameters
     ----------
     scene : Scene
     rows : ndarray
-        Rows of a recording, as `Recording.seen` returns them.
+        Rows of a recording, as in ``Recording.seen``.
     slow : int
-        Number of the regime of the slow manifold in these rows.
+        Number of the slow-manifold regime in these rows.
     log_slip_rate : float
         ln(V/V_*) before the first row.
 
     Returns
     -------
-    ndarray
-        Error of ln V by the motion up to each row, shape (rows,). It is 0 without inertia.
+    ndarray of shape (rows,)
+        Error estimate of ln V for the motion up to each row. The estimate is zero if the scene has
+        no inertia.
     """
     if not scene.has_mass:
         return np.zeros(len(rows))
@@ -87,7 +89,10 @@ def estimate_neglected_inertia(
 
 
 def _accumulated(scene: Scene, rows: np.ndarray, norms: np.ndarray) -> np.ndarray:
-    """Change of ln V by the residuals up to each row: no more than the largest residual."""
+    """Compute an upper bound of the change of ln V due to residuals up to each row.
+
+    The bound is the smaller of the integrated residual and the largest residual so far.
+    """
     residuals = np.array(list(_residuals(scene, rows, norms)))
     states = rows[:, STATES : STATES + scene.parts.law.states].sum(axis=1)
     softness = scene.stiffness / scene.a
@@ -99,7 +104,10 @@ def _accumulated(scene: Scene, rows: np.ndarray, norms: np.ndarray) -> np.ndarra
 
 
 def _residuals(scene: Scene, rows: np.ndarray, norms: np.ndarray) -> Iterator[float]:
-    """Residuals of the equation of motion over a, without those of a negligible mass."""
+    """Yield the residual of the equation of motion, divided by a, at each row.
+
+    The residual is set to zero where the mass is negligible.
+    """
     segments = list(_segments(scene))
     begins = [begin for begin, _acting, _p in segments]
     for row, norm in zip(rows, norms.tolist(), strict=True):
@@ -113,7 +121,10 @@ def _residuals(scene: Scene, rows: np.ndarray, norms: np.ndarray) -> Iterator[fl
 
 
 def _residual(acting: Scene, p: Numbers, row: np.ndarray, weight: float) -> float:
-    """Residual of the equation of motion over a, at a row on the slow manifold."""
+    """Compute the residual of the equation of motion, divided by a, at one row.
+
+    The row must be on the slow manifold.
+    """
     equations = by_displacement(acting)
     state = (row[STRESSES][0] - acting.mu_star, *row[STATES : STATES + acting.states].tolist())
     point = equations.point(state, equations.rate(state, p), p)
@@ -122,7 +133,7 @@ def _residual(acting: Scene, p: Numbers, row: np.ndarray, weight: float) -> floa
 
 
 def _segments(scene: Scene) -> Iterator[tuple[float, Scene, Numbers]]:
-    """Segments of loading: when each begins, the scene of its chain, and its numbers."""
+    """Yield the start time, the scene and the parameters of each segment of loading."""
     for acting, table in scene.chains:
         for n, row in enumerate(table.tolist()):
             p = list(acting.numbers)

@@ -29,16 +29,17 @@ def unsteady(scene: Scene, point: Point, load_velocity: float) -> float:
 
 
 def growth_along_path(scene: Scene, event: Event, load_velocity: float) -> float:
-    """Compute the growth of ln V at an event along the path between ruptures.
+    """Compute the growth rate of ln V at an event with respect to path length.
 
-    In a rupture the clock is the path in inertial time, which is another unit of length.
+    During a rupture the clock is the path length in inertial time. The growth rate is converted to
+    the unit of path length that is used between ruptures.
 
     Parameters
     ----------
     scene : Scene
     event : Event
     load_velocity : float
-        V_0/V_*.
+        Load point velocity V_0/V_*.
     """
     growth = event.point.growth
     if event.regime != IN_RUPTURE:

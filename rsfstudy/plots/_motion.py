@@ -100,7 +100,13 @@ def picture(
 
 
 def _check_motion(motion: xr.Dataset, against: str | None) -> None:
-    """Check that a dataset has the variables of a motion or a limit cycle."""
+    """Check that a dataset has the variables of a motion or a limit cycle.
+
+    Raises
+    ------
+    DataError
+        If a variable is missing, is not numeric, or has the wrong dimensions.
+    """
     stress = () if "friction_coefficient" in motion else ("shear_stress",)
     needed = ("slip", against or "time", "frictional_stress", "log10_slip_rate", *stress)
     known = [name for name in AGAINST if name in motion]
@@ -114,7 +120,7 @@ def _check_motion(motion: xr.Dataset, against: str | None) -> None:
 
 
 def _normal_stress(motion: xr.Dataset) -> str:
-    """Return the name of the variable that holds the normal stress."""
+    """Return the name of the normal stress variable of a motion."""
     return "normal_stress_ratio" if "normal_stress_ratio" in motion else "effective_normal_stress"
 
 

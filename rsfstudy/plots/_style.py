@@ -41,19 +41,21 @@ _BAR = 0.24
 
 @contextlib.contextmanager
 def styled(over: Any = None) -> Iterator[None]:
-    """Apply the style sheet of rsfstudy, and other styles on top of it.
+    """Apply the style sheet of rsfstudy and any additional styles.
 
     Parameters
     ----------
     over : path, str, dict or list of those, optional
-        A style sheet (a file that ends in ``.mplstyle``), the name of a style in
-        ``matplotlib.style.available``, or settings of matplotlib.
+        A style sheet (a file with the suffix ``.mplstyle``), the name of a style in
+        ``matplotlib.style.available``, or a dictionary of matplotlib settings. Later styles
+        override earlier styles.
 
     Raises
     ------
     InvalidValue
-        If a style is none of these, if it contains a setting that matplotlib does not have, or if
-        a figure cannot be drawn in it, for example because it needs a LaTeX that is not installed.
+        If an argument is not a valid style, if a style contains an unknown setting, or if a figure
+        cannot be drawn in this style, for example because the style needs LaTeX and LaTeX is not
+        installed.
     """
     others = over if isinstance(over, list | tuple) else [over]
     settings = [_settings_of(other) for other in others if other is not None]
@@ -71,10 +73,11 @@ def styled(over: Any = None) -> Iterator[None]:
 
 
 def _settings_of(over: Any) -> str | dict[str, Any]:
-    """Return what `matplotlib.style.use` takes: the name of a style, or checked settings.
+    """Convert a style to an argument of ``matplotlib.style.use``.
 
-    Matplotlib itself would import a package for a dotted name, download a style sheet, and read
-    any text file as a style sheet, with a warning for each of its lines.
+    The result is the name of a style or a dictionary of checked settings. Other arguments are not
+    passed on to matplotlib. Matplotlib would import a package for a dotted name, download a style
+    sheet from a URL, or parse any text file with one warning per line.
     """
     if isinstance(over, Mapping):
         return _checked(over)
@@ -91,7 +94,13 @@ def _plain(over: Any) -> Any:
 
 
 def _checked(settings: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return settings as matplotlib converts them; reject unknown names and invalid values."""
+    """Validate settings and convert the values as matplotlib does.
+
+    Raises
+    ------
+    InvalidValue
+        If a name is unknown or a value is invalid.
+    """
     checked: Any = RcParams()
     for name, value in settings.items():
         if name not in rcParams:
@@ -107,7 +116,7 @@ def _checked(settings: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def _read_sheet(path: Path) -> dict[str, Any]:
-    """Return the settings of a style sheet."""
+    """Read and validate the settings of a style sheet."""
     check_file("style", path)
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -129,7 +138,10 @@ def _read_sheet(path: Path) -> dict[str, Any]:
 
 
 def _without_comment(line: str) -> str:
-    """Return a line up to the first # outside double quotes, as matplotlib reads it."""
+    """Remove the comment from a line of a style sheet.
+
+    As in matplotlib, a comment starts at the first ``#`` outside double quotes.
+    """
     parts = line.split('"')
     for number in range(0, len(parts), 2):
         before, mark, _comment = parts[number].partition("#")

@@ -1,4 +1,4 @@
-"""Crossing of a level by a sampled curve, and bounds of where it may be between the samples."""
+"""Level crossing of a sampled curve, with bounds on its position between samples."""
 
 from __future__ import annotations
 
@@ -22,13 +22,16 @@ _NOTICEABLE = 0.1
 
 
 class Verdict(IntEnum):
-    """Outcome of the search for a crossing; its number stands in files."""
+    """Outcome of the search for a crossing.
+
+    Files contain the integer value, so the values must not change.
+    """
 
     OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW_POINTS = range(5)
 
 
 class Crossing(NamedTuple):
-    """Place where a curve reaches a level, the first and last place possible, and the verdict."""
+    """Position of a level crossing, with lower and upper bounds and the verdict."""
 
     place: float
     first: float
@@ -37,28 +40,31 @@ class Crossing(NamedTuple):
 
 
 def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
-    """Find the place where a curve through samples reaches a level.
+    """Find the position at which a sampled curve reaches a level.
 
-    Between two samples, a curve departs from their chord at u of the interval h by no more than
-    ``T u (h - u)/h``, where T is the total change of its slope within the interval. The estimate of
-    T is the change of slope from the chord before to the chord after, which is exact for one kink
-    and twice the change of a parabola. In the first and the last interval, a kink may also be next
-    to the end, so that the curve follows the neighbouring chord. If the slope does not rise, or
-    fall, all along the nearest intervals, twice the largest T of these is used for each, because
-    changes of opposite signs cancel in part. If they alternate, the samples may hide an
-    oscillation, and the place is bounded by its interval at best.
+    The bounds allow for curves that differ from the straight chord between two samples. If the
+    slope changes by T in total within an interval of width h, the curve departs from the chord at
+    distance u from the first sample by at most ``T u (h - u)/h``. T is estimated by the change of
+    slope from the previous chord to the next chord. This estimate is exact for a single kink, and
+    for a parabola the estimate is twice the true value. In the first and the last interval, the
+    kink may also be located next to the end, and the curve then follows the neighbouring chord.
+
+    If the slope does not vary monotonically over the neighbouring intervals, changes of opposite
+    sign partly cancel. The largest T among these intervals is then doubled and used for all of
+    them. If the changes of slope alternate in sign, the samples may hide an oscillation. The bounds
+    then enclose at least the whole interval.
 
     Parameters
     ----------
     x, y : ndarray
-        Samples, with x ascending.
+        Samples, with x in ascending order.
     level : float
 
     Returns
     -------
     Crossing
-        NaN unless there is exactly one crossing of the samples. The verdict is `UNRESOLVED` if an
-        oscillation that the samples may hide could reach the level in other intervals.
+        The position and the bounds are NaN unless the samples cross the level exactly once. The
+        verdict is ``UNRESOLVED`` if a hidden oscillation could reach the level in other intervals.
     """
     if x.size < FEWEST:
         return _nowhere(Verdict.TOO_FEW_POINTS)
@@ -86,7 +92,7 @@ def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
 
 
 def crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float]:
-    """Places where the interpolant through the samples reaches the level."""
+    """Return all positions at which the interpolant of the samples reaches a level."""
     off, curve = y - level, PchipInterpolator(x, y)
     places: list[float] = x[off == 0.0].tolist()
     # between two samples it is monotone, and at them it has their values but for rounding
@@ -102,7 +108,15 @@ def _nowhere(verdict: Verdict) -> Crossing:
 
 
 def _turns(slopes: np.ndarray, near: range) -> tuple[dict[int, float], bool]:
-    """Total change of slope within each of some intervals, and True if its changes alternate."""
+    """Estimate the total change of slope within each of the given intervals.
+
+    Returns
+    -------
+    turns : dict of int to float
+        Total change of slope, by the number of the interval.
+    alternates : bool
+        True if the changes of slope alternate in sign.
+    """
     bends = np.diff(slopes)
     sizes = np.abs(bends)
     turns = {}
@@ -120,14 +134,16 @@ def _turns(slopes: np.ndarray, near: range) -> tuple[dict[int, float], bool]:
 
 
 def _reversals(bends: np.ndarray, least: float) -> int:
-    """Number of reversals among changes of slope, without those smaller than the least."""
+    """Count the sign reversals among changes of slope larger than a minimum."""
     counted = bends[np.abs(bends) > least]
     return int((counted[1:] * counted[:-1] < 0.0).sum())
 
 
 def _span(slope: float, turn: float, width: float, rise: float) -> tuple[float, float] | None:
-    """First and last place in an interval where a level may be reached that is `rise` above its
-    first sample; None if it is out of reach.
+    """Return the first and last possible position of a crossing in an interval.
+
+    Positions are relative to the first sample, and ``rise`` is the level minus the value of the
+    first sample. The result is None if the level cannot be reached.
     """
     if slope < 0.0:
         slope, rise = -slope, -rise
@@ -152,10 +168,11 @@ def _span(slope: float, turn: float, width: float, rise: float) -> tuple[float, 
 def _span_at_end(
     slopes: np.ndarray, widths: np.ndarray, rise: float, is_first: bool
 ) -> tuple[float, float]:
-    """First and last place in an end interval where a curve with one kink may reach the level.
+    """Return the first and last possible position of a crossing in an end interval.
 
-    The curve departs from the chord by no more than the change of slope to the neighbouring chord,
-    times the distance from the neighbour.
+    The curve may have one kink in this interval. Its distance from the chord is at most the
+    difference between the slopes of this chord and the neighbouring chord, multiplied by the
+    distance from the inner sample.
     """
     slope, following = (slopes[0], slopes[1]) if is_first else (slopes[-1], slopes[-2])
     width = float(widths[0] if is_first else widths[-1])

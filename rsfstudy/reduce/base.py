@@ -35,23 +35,26 @@ ROUNDING = 1e-9
 @guard_methods
 @dataclass(frozen=True)
 class Reduction(CheckedKeywords):
-    """Base of all reductions: ``reduction(dataset)`` gives a dataset of the new variables.
+    """Base class of all reductions.
 
-    A user-defined reduction is a frozen dataclass derived from this class. Its fields besides
-    `name` and `of` are its options. The only method that it must define is::
+    Calling a reduction, as in ``reduction(dataset)``, returns a dataset of the new variables. To
+    write your own reduction, derive a frozen dataclass from this class. Fields other than ``name``
+    and ``of`` are options of the reduction. One method is required::
 
         __call__(self, dataset) -> xarray.Dataset
 
-    `name` is the name of the result, and `of` the variable to reduce. Failed cells hold NaN in
-    `dataset`, which also has their `status`. Optional class attributes and methods define the name
-    of the reduction in files (`kind`, by default the class name), the long names and units of its
-    results, and the derivatives that carry the numerical errors of cells over to
-    ``<name>_error``::
+    ``name`` is the name of the result, and ``of`` is the variable to reduce. In ``dataset``, the
+    values of failed cells are NaN, and the variable ``status`` contains the status of each cell.
+    The following class attributes and methods are optional::
 
         kind: ClassVar[str]
         long_names: ClassVar[Mapping[str, str]]
         measured_in: ClassVar[Mapping[str, Sequence[str]]]
         derivatives(self, dataset) -> Sequence[tuple[xarray.DataArray, Mapping]]
+
+    ``kind`` is the name of the reduction in files. The default is the class name. ``long_names``
+    and ``measured_in`` define the long names and the units of the results. ``derivatives`` returns
+    the derivatives with which the numerical errors of cells are propagated to ``<name>_error``.
     """
 
     #: Name of the kind in declarations; by default that of the class.
@@ -120,10 +123,18 @@ def worst(status: xr.DataArray, dims: Collection[Hashable]) -> xr.DataArray:
 
 
 def known(dataset: xr.Dataset, of: str, status: xr.DataArray) -> xr.Dataset:
-    """Return the dataset for a reduction of `of`, with NaN for values that must not be used.
+    """Return a copy of the dataset in which values that must not be used are NaN.
 
-    The status is that of the cells that `of` depends on. The values of failed cells become NaN,
-    and so do standard errors and confidence intervals that are not valid.
+    The values of failed cells are replaced by NaN. If ``of`` is a standard error or the bound of a
+    confidence interval, values that are not valid are replaced by NaN as well.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    of : str
+        Variable to reduce.
+    status : xarray.DataArray
+        Status of the cells on which ``of`` depends. The status is added to the result.
     """
     bad = failed(status)
     if of.endswith(_STATISTICAL):

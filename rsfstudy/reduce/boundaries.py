@@ -107,26 +107,29 @@ class Boundary(Reduction):
 @guard_methods
 @dataclass(frozen=True)
 class Inverse(Reduction):
-    """Place along a coordinate where a monotone variable reaches a level, by logarithms.
+    """Coordinate value at which a monotone variable reaches a level.
+
+    The variable is interpolated in logarithms of the variable and the coordinate.
 
     Parameters
     ----------
     name : str
-        Name of the result. Two more variables come with it. ``<name>_error`` adds the uncertainty
-        of the level, the distance to the farthest place where a curve through the cells may reach
-        the level, and the numerical errors of the cells. ``<name>_status`` is `ok`, or says why the
-        result is NaN: the level is `out_of_reach`, its place is `not_unique`, the cells leave it
-        `unresolved` because the variable seems to oscillate between them, or there are
-        `too_few_points`.
+        Name of the result. Two more variables are returned. ``<name>_error`` is the sum of three
+        contributions: the uncertainty of the level, the distance to the farthest position at which
+        a curve through the cells may reach the level, and the numerical errors of the cells.
+        ``<name>_status`` is ``ok`` or gives the reason why the result is NaN. ``out_of_reach``
+        means that the variable does not reach the level, and ``not_unique`` that the variable
+        reaches the level several times. ``unresolved`` means that the variable may oscillate
+        between the cells, and ``too_few_points`` that there are too few cells for an interpolation.
     of : str
-        Variable that reaches the level; positive.
+        Variable that reaches the level. The variable must be positive.
     on : str
-        Coordinate along one dimension; positive.
+        One-dimensional coordinate. The coordinate must be positive.
     levels : float, or mapping of str to float
-        The level; or one for each label of the dimension `along`, where labels that are missing
-        have none.
-    uncertainty : float
-        Relative uncertainty of the level; a mapping as `levels`.
+        A single level, or one level for each label of the dimension ``along``. Labels that are not
+        in the mapping have no level.
+    uncertainty : float, or mapping of str to float
+        Relative uncertainty of the level, in the same form as ``levels``.
     along : str
         Dimension of the labels.
     """
@@ -145,12 +148,12 @@ class Inverse(Reduction):
         return [Quantity(f"{self.name}_status", "", "1", text, flags=flags)]
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Interpolate along the dimension of `on`.
+        """Interpolate along the dimension of the coordinate ``on``.
 
         Raises
         ------
         InvalidValue
-            Where `on` is no coordinate along one dimension.
+            If ``on`` is not a one-dimensional coordinate.
         """
         dimension = dimension_of(dataset, self.on)
         if dataset.sizes[dimension] < FEWEST:

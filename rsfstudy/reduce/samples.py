@@ -84,9 +84,9 @@ class _Statistic(Reduction):
 
 
 def standard_deviation(of: xr.DataArray, over: str, ddof: int = 1) -> xr.DataArray:
-    """Compute the standard deviation of samples with a divisor of n - ddof.
+    """Compute the standard deviation of samples, with n - ddof degrees of freedom.
 
-    It is NaN if there are no more than `ddof` samples.
+    The result is NaN if there are no more than ``ddof`` samples.
     """
     with warnings.catch_warnings():  # older versions of xarray let it through
         warnings.filterwarnings("ignore", "Degrees of freedom", RuntimeWarning)
@@ -127,8 +127,11 @@ class StandardDeviation(_Statistic):
     least = 3
 
     def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
-        """That of n - 1 degrees of freedom, and its error by the jackknife: the scatter of those
-        without one sample. It takes no distribution for granted, only that samples are independent.
+        """Compute the standard deviation and its standard error.
+
+        The standard deviation has n - 1 degrees of freedom. Its standard error is estimated by the
+        jackknife, from the standard deviations of the samples without one sample each. The estimate
+        requires independent samples but no particular distribution.
         """
         count, apart = of.notnull().sum(self.over), of - of.mean(self.over)
         rest = (apart**2).sum(self.over) - apart**2 * count / (count - 1.0)

@@ -318,7 +318,7 @@ def read(path: Path) -> Problem:
 
 
 def _check_type(name: str, value: Any, kind: Any) -> None:
-    """Raise InvalidValue if a value of a problem does not have the declared type."""
+    """Raise ``InvalidValue`` if a value of a problem does not have the declared type."""
     try:
         msgspec.convert(value, kind)
     except msgspec.ValidationError as error:

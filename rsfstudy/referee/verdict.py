@@ -136,7 +136,10 @@ def verdict(
 
 
 def shown_digits(digits: float) -> float:
-    """Round digits down to a tenth, so that a failed problem never shows the digits of a pass."""
+    """Round a number of digits down to one decimal place.
+
+    Rounding down ensures that a failed problem never displays enough digits to pass.
+    """
     return math.floor(10.0 * digits) / 10.0
 
 
@@ -218,7 +221,13 @@ def _read_otherwise(problem: Problem, theirs: Table, answer: Table) -> Iterator[
 
 
 def _usual_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
-    """Return the usual factor that is equal to a factor within a tolerance, after its wording."""
+    """Return a common conversion factor that equals a factor within a tolerance.
+
+    Returns
+    -------
+    tuple of (str, float) or None
+        Description of the common factor, and its value. None if no common factor matches.
+    """
     if math.isclose(factor, -1.0, rel_tol=tolerance):
         return "has the opposite sign", -1.0
     for words, usual in _USUAL_FACTORS.items():
@@ -229,7 +238,7 @@ def _usual_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
 
 
 def _format_factor(factor: float) -> str:
-    """Format a factor so that it can be told from 1."""
+    """Format a factor so that the text differs from 1."""
     text, beyond = f"{factor:.6g}", factor - 1.0
     return text if text != "1" else f"(1 {'-' if beyond < 0.0 else '+'} {abs(beyond):.2g})"
 

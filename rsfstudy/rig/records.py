@@ -148,7 +148,11 @@ def _scale(key: str, units: str) -> float:
 
 
 def _load_point(values: dict[str, np.ndarray], stiffness: Any) -> np.ndarray:
-    """Compute load point displacement in um: slip plus friction over k, k being over stress."""
+    """Compute load point displacement in um from slip, friction and stiffness.
+
+    Load point displacement is slip plus shear stress divided by stiffness. If the stiffness is
+    divided by normal stress, friction replaces shear stress.
+    """
     if stiffness is None:
         remedy = "Give the stiffness that the correction used: read_record(..., stiffness="
         remedy += "'0.05 MPa/um'), or --stiffness."
@@ -271,7 +275,7 @@ def _selected(key: str, told: Any, headings: Sequence[str]) -> Selected:
 
 
 def _is_binary(path: Path) -> bool:
-    """Return True if a file begins with bytes that text does not contain."""
+    """Return True if the beginning of a file contains a null byte."""
     try:
         with path.open("rb") as file:
             return b"\0" in file.read(_BEGIN)

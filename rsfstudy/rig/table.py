@@ -46,14 +46,17 @@ Choose = Callable[[list[str], str], dict[str, Selected]]
 
 
 def check_heading(heading: str) -> None:
-    """Raise `InvalidValue` if a heading is too long to be parsed."""
+    """Raise ``InvalidValue`` if a heading is too long to be parsed."""
     if len(heading) > _LONGEST_HEADING:
         rule = f"must have at most {_LONGEST_HEADING} characters (it has {len(heading):,})"
         raise InvalidValue("heading", heading, rule, remedy=f"Write it as in {_EXAMPLE}.")
 
 
 def check_headings(headings: Iterable[str], place: str) -> None:
-    """Check the length of all headings of a file, and name the place in errors."""
+    """Check the length of all headings of a file.
+
+    Errors report ``place`` and the number of the column.
+    """
     for column, heading in enumerate(headings, start=1):
         try:
             check_heading(heading)

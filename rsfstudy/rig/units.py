@@ -165,7 +165,10 @@ def _rounded(number: Fraction | float) -> float:
 
 
 def _of_text(name: str, text: str, units: str) -> Fraction | float:
-    """Convert a text to SI units; a number that is not finite is returned as it is."""
+    """Convert a string with a number and units to SI units.
+
+    A number that is not finite is returned unchanged.
+    """
     if len(text) > _LONGEST_TEXT:
         rule = f"is no quantity, because it has more than {_LONGEST_TEXT} characters"
         remedy = f"Write a number and its units, as in '2.5 {units.removesuffix('1')}'."

@@ -1,4 +1,4 @@
-"""Derivatives of the state evolution in steady sliding, by finite differences."""
+"""Finite-difference derivatives of the state evolution in steady sliding."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Matrix = list[list[float]]
 
 
 class LawSlopes(NamedTuple):
-    """Derivatives of the state evolution per unit slip in steady sliding, with their error.
+    """Derivatives of the state evolution per unit slip in steady sliding.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class LawSlopes(NamedTuple):
     by_state : list of list of float
         Derivatives with respect to each state, of shape (states, states).
     relative_error : float
-        Largest relative error estimate of a derivative.
+        Largest relative error estimate among the derivatives.
     """
 
     by_rate: list[float]
@@ -43,7 +43,11 @@ class LawSlopes(NamedTuple):
     relative_error: float
 
     def with_relative_change(self, part: float) -> LawSlopes:
-        """Return derivatives that differ by a relative change, of opposite sign for states."""
+        """Return a copy in which all derivatives are changed by a relative amount.
+
+        The derivatives with respect to ln V and to the shift are multiplied by ``1 + part``. The
+        derivatives with respect to the states are multiplied by ``1 - part``.
+        """
         by_rate, by_shift = ([x * (1.0 + part) for x in row] for row in self[:2])
         by_state = [[x * (1.0 - part) for x in row] for row in self.by_state]
         return self._replace(by_rate=by_rate, by_shift=by_shift, by_state=by_state)
@@ -52,8 +56,8 @@ class LawSlopes(NamedTuple):
 def slopes_of_law(scene: Scene, steady: Steady) -> LawSlopes:
     """Compute the derivatives of the state evolution in steady sliding.
 
-    The step of the differences is halved until two estimates agree, so that laws that bend within
-    a fraction of a unit of ln V are resolved.
+    The step of the finite differences is halved until two successive estimates agree. Laws whose
+    evolution varies over a fraction of a unit of ln V are therefore resolved.
     """
     evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
     shift = relation_of(scene)(steady.friction)[2]
@@ -79,12 +83,12 @@ def slopes_of_law(scene: Scene, steady: Steady) -> LawSlopes:
 def _derivatives(
     function: Callable[[float], Numbers], step: float, rounding: float
 ) -> tuple[list[float], float]:
-    """Differentiate a function of a change at zero; also return the relative error.
+    """Differentiate a function at zero, and estimate the relative error.
 
-    Two steps of which the second is half of the first have converged if their derivatives differ by
-    no more than the rounding error. The derivatives are then those of the longer step, which has
-    the smaller rounding error. If no two steps converge, the pair with the smallest difference
-    decides.
+    The step is halved until the derivatives of two successive steps differ by no more than the
+    rounding error. The function then returns the derivatives of the longer step, which has the
+    smaller rounding error. If no two successive steps agree, the function uses the pair of steps
+    with the smallest difference, and returns the derivatives of the shorter step.
     """
     (coarse, _sizes), best, smallest = _order_eight(function, step), list[float](), math.inf
     for _ in range(_HALVINGS):
@@ -104,13 +108,15 @@ def _derivatives(
 def _order_eight(
     function: Callable[[float], Numbers], step: float
 ) -> tuple[list[float], list[float]]:
-    """Differentiate by central differences of order eight.
+    """Differentiate a function at zero by central differences of order eight.
 
     Returns
     -------
-    derivatives, sizes : list of float
-        The derivatives, and the largest quotient of a value and its distance from zero, to which
-        the rounding error is relative.
+    derivatives : list of float
+        Derivative of each component of the function.
+    sizes : list of float
+        Largest ratio of a function value to its distance from zero, for each component. The
+        rounding error is relative to this size.
     """
     slopes = [0.0] * len(function(0.0))
     sizes = slopes
@@ -124,7 +130,7 @@ def _order_eight(
 
 
 def _scales(scene: Scene, steady: Steady, shift: float) -> list[float]:
-    """Return the scales of ln V, of the shift and of each state."""
+    """Return the scales of ln V, the shift and each state for finite differences."""
     size = _PART * scene.a * scene.parts.law.size_over_a
     # b of several states may be next to nothing where each has a large one
     of_shift = size if scene.parts.law.states > 1 else _PART * abs(scene.b) or size

@@ -91,11 +91,12 @@ class Part:
                     setattr(cls, name, vars(base)[name])
 
     def numbers(self, scene: Scene) -> Numbers:
-        """Return the numbers that its functions read, from the place of its slot on.
+        """Return the values that the functions of the part read from ``p``.
 
-        A law may have any number of them, other parts as many as there are places (see `places`).
-        Fields that a subclass declares by `number` follow in the order of their declaration, so
-        that you override this method only if the functions read something else.
+        The first value is stored at the place of the slot. A law can have any number of values. The
+        number of values of other parts is limited (see ``places``). Fields that a subclass declares
+        with ``number`` are appended in the order of their declaration. Override this method only if
+        the functions read values other than these fields.
         """
         return ()
 
@@ -136,9 +137,22 @@ def number(
     remedy: str = "",
     if_stated: bool = False,
 ) -> Any:
-    """A field that holds a number: its default, what it means, and its rule, a key of `RULES`; and
-    whether it is among the values of a scene only if it was stated. What came later than files that
-    are to keep their names is so.
+    """Declare a numeric field of a part.
+
+    Parameters
+    ----------
+    default : float or None
+        Default value.
+    symbol, units, long_name, scale : str
+        Description of the field, for tables, figures and files.
+    rule : str
+        Condition that values must satisfy, a key of ``RULES``.
+    remedy : str
+        Last sentence of the error message if a value violates the rule.
+    if_stated : bool
+        If True, the field is included among the values of a scene only if the user sets the field.
+        Use True for fields that were introduced later, so that the file names of existing results
+        do not change.
     """
     if rule not in RULES:
         raise InvalidValue("rule", rule, "is unknown", choices=RULES)
@@ -181,14 +195,18 @@ def names_of(part: type[Part]) -> tuple[str, ...]:
 
 @cache
 def _appended(part: type[Part]) -> tuple[str, ...]:
-    """Return the names of number fields that were declared below the last override of `numbers`."""
+    """Return the names of the fields declared below the last ``numbers`` override.
+
+    The list contains number fields only. Their values are appended to the values that the override
+    returns.
+    """
     overriding = next(kind for kind in part.__mro__ if "numbers" in vars(kind))
     known = vars(overriding).get("__dataclass_fields__", {})
     return tuple(name for name in names_of(part) if name not in known and not is_flag(part, name))
 
 
 def numbers_of(part: Part, scene: Scene) -> Numbers:
-    """Return the numbers of a part as `numbers` gives them, then its other fields."""
+    """Return the values of ``part.numbers``, followed by the appended fields."""
     values = (getattr(part, name) for name in _appended(type(part)))  # type: ignore[arg-type]
     others = (math.nan if value is None else float(value) for value in values)
     return (*part.numbers(scene), *others)

@@ -198,7 +198,10 @@ def _check(slot: Slot, part: Any) -> None:
 
 
 def _check_excluded(slot: Slot, part: type[Part]) -> None:
-    """Raise InvalidValue if `excluded_from_distance` names something that is not an unknown."""
+    """Raise ``InvalidValue`` if ``excluded_from_distance`` contains an invalid name.
+
+    Each name must be the name of an unknown of the part.
+    """
     excluded: Any = part.excluded_from_distance
     unknowns = [about.name for about in part.unknowns]
     if isinstance(excluded, str):
@@ -225,7 +228,10 @@ def _check_name(slot: Slot, part: Own) -> None:
 
 
 def _origin(part: Own) -> tuple[str, str]:
-    """Module and name of a definition, which an earlier definition of the part shares."""
+    """Return the module and the qualified name of the definition of a part.
+
+    Both remain the same if a notebook cell with the definition is run again.
+    """
     return kind_of(part).__module__, kind_of(part).__qualname__
 
 

@@ -1,9 +1,9 @@
-"""Check that a scene provides the quantities that the rates of its parts need.
+"""Check that a scene provides the quantities that its parts need.
 
-The functions of a part receive the quantities that its slot lists as `receives`. Other quantities
-follow from those if effective normal stress never changes: shear stress is then the friction
-coefficient times the constant normal stress. A part that lists further quantities as `needs` is
-refused in any other scene, because its rates would use wrong values.
+The functions of a part receive the quantities in its attribute ``receives``. If effective
+normal stress is constant, shear stress can be computed from the friction coefficient and the normal
+stress. A part can list further quantities in ``needs``. The part is then rejected in every scene
+where these quantities are not known, because the rates would be computed from wrong values.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _FOLLOWS: Mapping[str, frozenset[str]] = {
 
 
 def check_declaration(slot: str, part: type[Part]) -> None:
-    """Raise InvalidValue if `needs` of a user-defined part is not a collection of known names."""
+    """Raise ``InvalidValue`` if ``needs`` of a part is not a set of known quantities."""
     needs: Any = part.needs
     if isinstance(needs, str):
         raise InvalidValue("needs", needs, "must be a set of names", remedy=f"Write {{{needs!r}}}.")
@@ -51,7 +51,7 @@ def check_declaration(slot: str, part: type[Part]) -> None:
 
 
 def check_needs(scene: Scene) -> None:
-    """Raise InvalidValue if a part needs a quantity that the scene does not provide to it."""
+    """Raise ``InvalidValue`` if a scene lacks a quantity that one of its parts needs."""
     for slot, part in zip(scene.parts._fields, scene.parts, strict=True):
         missing = sorted(set(part.needs) - provided(scene, part)) if part.needs else []
         if missing:
@@ -59,13 +59,16 @@ def check_needs(scene: Scene) -> None:
 
 
 def provided(scene: Scene, part: Part) -> frozenset[str]:
-    """Return the quantities that the functions of a part receive, or that follow from these.
+    """Return the quantities that are known to the functions of a part.
+
+    These are the quantities that the functions receive, and the quantities that can be computed
+    from them because parts of the scene are constant.
 
     Parameters
     ----------
     scene : Scene
     part : Part
-        One of its parts.
+        One of the parts of the scene.
     """
     constant = {NORMAL_STRESS, PORE_PRESSURE} - {change.quantity for change in _changes(scene)}
     found = constant | part.receives
@@ -75,7 +78,7 @@ def provided(scene: Scene, part: Part) -> frozenset[str]:
 
 
 class _Change(NamedTuple):
-    """A field of a scene because of which a quantity is not known to rates, and its remedy."""
+    """Field of a scene that makes a quantity unknown to the rates, with its remedy."""
 
     quantity: str
     cause: str
@@ -83,7 +86,7 @@ class _Change(NamedTuple):
 
 
 def _changes(scene: Scene) -> list[_Change]:
-    """Return the fields of a scene by which normal stress or friction is not that of a constant."""
+    """Return the fields of a scene that make normal stress or friction variable."""
     parts, found = scene.parts, []
     if parts.normal_stress.normal_stress is not None:
         cause = f"normal_stress={parts.normal_stress.name!r}"
@@ -102,7 +105,7 @@ def _changes(scene: Scene) -> list[_Change]:
 
 
 def _refusal(scene: Scene, slot: str, part: Part, missing: list[str]) -> InvalidValue:
-    """Return the error for a part whose rates need quantities that they do not receive."""
+    """Return the error for a part that needs quantities its rates do not receive."""
     known = provided(scene, part)
     # terms that are missing, of which a change of the scene may be the cause
     wanted = set[str]().union(*(_FOLLOWS.get(name, {name}) for name in missing)) - known

@@ -371,7 +371,10 @@ class Scene(Assembled):
 
     @derived
     def critical_stiffness(self) -> float:
-        """Critical stiffness k_cr(V_*) D_c/sigma_* (see `stability.critical_stiffness`)."""
+        """Dimensionless critical stiffness k_cr(V_*) D_c/sigma_*.
+
+        See ``stability.critical_stiffness``.
+        """
         slider, law, stress, pores, *_others = self.parts
         return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores)
 

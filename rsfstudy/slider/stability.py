@@ -159,20 +159,23 @@ def _grows(around: _Around, stiffness: float) -> bool:
 def response(
     scene: Scene, steady: Steady, slopes: LawSlopes | None = None
 ) -> tuple[Polynomial, Polynomial]:
-    """Compute the response of friction to slip around steady sliding.
+    """Compute the response of friction to small changes of slip in steady sliding.
 
-    The response is ``G(p) = p above(p)/below(p)``; the result holds the coefficients of the two
-    polynomials, from the constant one up.
-
-    ``G(p) = p [a + 1.(p - M)^-1 E_x]/[D - S 1.(p - M)^-1 E_s]``, as at the top of this file; by a
-    law of one state at constant normal stress ``G(p) = p [a - b/(p + 1)]``, over sigma_*/D_c.
+    The response is the rational function ``G(p) = p above(p)/below(p)``. See the module docstring
+    for its definition, ``G(p) = p [a + 1.(p - M)^-1 E_x]/[D - S 1.(p - M)^-1 E_s]``. For a law with
+    one state at constant normal stress, ``G(p) = p [a - b/(p + 1)]``, in units of sigma_*/D_c.
 
     Parameters
     ----------
     scene : Scene
     steady : Steady
     slopes : LawSlopes, optional
-        Derivatives of the state evolution. By default they are computed.
+        Derivatives of the state evolution. By default the derivatives are computed.
+
+    Returns
+    -------
+    above, below : list of float
+        Coefficients of the numerator and denominator polynomials, in ascending order.
 
     References
     ----------
@@ -251,12 +254,14 @@ def growth_rates(scene: Scene, log_slip_rate: float) -> np.ndarray:
 
 
 class GrowthRate(NamedTuple):
-    """Largest growth rate of small changes of steady sliding, per slip in D_c.
+    """Largest growth rate of small perturbations of steady sliding, per slip in D_c.
 
     Attributes
     ----------
-    value, error : float
-        The real part of the growth rate, and its error estimate.
+    value : float
+        Real part of the growth rate.
+    error : float
+        Error estimate of the real part.
     """
 
     value: float
@@ -264,20 +269,21 @@ class GrowthRate(NamedTuple):
 
     @property
     def is_positive(self) -> bool:
-        """True if small changes grow, beyond the error."""
+        """True if the growth rate exceeds its error estimate."""
         return self.value > self.error
 
     @property
     def is_undecided(self) -> bool:
-        """True if the growth rate is zero within its error."""
+        """True if the growth rate is zero within its error estimate."""
         return abs(self.value) <= self.error
 
 
 @once
 def largest_growth_rate(scene: Scene, log_slip_rate: float) -> GrowthRate | None:
-    """Compute the largest growth rate at the stiffness of the scene, with its error.
+    """Compute the largest growth rate of small perturbations of steady sliding.
 
-    The error includes that of the derivatives of the law and the rounding error of the roots.
+    The growth rate is computed at the stiffness of the scene. Its error estimate includes the
+    errors of the derivatives of the law and the rounding errors of the roots.
 
     Parameters
     ----------
@@ -288,7 +294,7 @@ def largest_growth_rate(scene: Scene, log_slip_rate: float) -> GrowthRate | None
     Returns
     -------
     GrowthRate or None
-        None if there is no steady sliding.
+        None if steady sliding does not exist at this slip rate.
     """
     scene = scene.unforced
     steady = steady_sliding(scene, log_slip_rate)

@@ -343,7 +343,7 @@ def system_of(
 
 
 def excluded_places(scene: Scene) -> tuple[int, ...]:
-    """Return the places, among all states, of those that do not count for the distance."""
+    """Return the indices of states excluded from the distance from steady sliding."""
     law, source = scene.parts.law, scene.pressure_source
     unknowns = enumerate(source.unknowns, start=law.states)
     return tuple(n for n, about in unknowns if about.name in source.excluded_from_distance)

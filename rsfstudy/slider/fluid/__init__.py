@@ -15,17 +15,20 @@ from rsfstudy.slider.requirements import PORE_PRESSURE, SLIP_RATE
 
 @dataclass(frozen=True, kw_only=True)
 class Fluid(Part):
-    """Base of the cases of pore fluid.
+    """Base class of all pore fluid cases.
 
-    A case with unknowns of its own says what they are, pore pressure P last, and states
+    A case with unknowns declares them in ``unknowns``, with pore pressure P as the last unknown.
+    Such a case defines two functions:
 
-    - ``auxiliary_rates(log_slip_rate, states, fraction, p)``: their changes per unit slip in D_c,
-      times a fraction;
-    - ``auxiliary_steady_states(log_slip_rate, p)``: what they are in steady sliding, where P is 0.
+    - ``auxiliary_rates(log_slip_rate, states, fraction, p)`` returns the changes of the unknowns
+      per unit slip in D_c, multiplied by a fraction.
+    - ``auxiliary_steady_states(log_slip_rate, p)`` returns the unknowns in steady sliding, where P
+      is zero.
 
-    A case may list unknowns in `excluded_from_distance`. The distance from steady sliding, by which
-    a motion settles or a cycle repeats, then leaves them out. This is meant for unknowns whose
-    steady values are huge at the slip rate of a rupture.
+    The distance from steady sliding determines if a motion has settled and if a cycle repeats. A
+    case can exclude unknowns from this distance by listing their names in
+    ``excluded_from_distance``. Exclude an unknown if its steady value at the slip rate of a rupture
+    is extremely large.
     """
 
     conclusions = ("highest_pressure",)

@@ -69,7 +69,10 @@ class Recharged:
 
     @property
     def excluded_from_distance(self) -> tuple[str, ...]:
-        """Names of the unknowns of both parts that do not count for the distance."""
+        """Names of the unknowns that are excluded from the distance from steady sliding.
+
+        The names come from both the loading and the fluid.
+        """
         return (*self.loading.excluded_from_distance, *self.fluid.excluded_from_distance)
 
     @property

@@ -51,29 +51,34 @@ def cutoff_velocity() -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class LawOfStates(Part):
-    """Base class of all laws. Laws with a single b are derived from `Law`.
+    """Base class of all state evolution laws.
 
-    The functions of a law receive ln(V/V_*), the states and the numbers of the law. The friction
-    coefficient ``tau/sigma = mu_* + a ln(V/V_*) + sum of Theta_i`` of forward slip follows from
-    these. The functions do not receive shear stress, normal stress or pore pressure. A law whose
-    state evolves with one of these lists it in `needs`, for example ``needs = {"shear_stress"}``.
-    It is then accepted only in scenes with constant effective normal stress, where shear stress
-    over sigma_* is the friction coefficient.
+    Laws with a single b are derived from ``Law``, which is a subclass of this class.
 
-    A law states ``evolution(log_slip_rate, state, p)``: the change of its state variable per unit
-    of slip in D_c, at constant normal stress. It comes to rest at Theta = -b ln(V/V_*), unless it
-    states ``steady_states(log_slip_rate, shift, p)``: the states Psi of steady sliding, of which
-    stress has taken `shift`. At V_* they add up to nothing, because friction is mu_* there. A scene
-    refuses a law that changes where it says that it rests.
+    The functions of a law receive ln(V/V_*), the state variables and the parameters of the law. The
+    friction coefficient of forward slip, ``tau/sigma = mu_* + a ln(V/V_*) + sum of Theta_i``, can
+    be computed from these arguments. The functions do not receive shear stress, normal stress or
+    pore pressure. If the state evolution depends on one of these quantities, list the quantity in
+    ``needs``, for example ``needs = {"shear_stress"}``. The law is then rejected in scenes with
+    variable effective normal stress. If effective normal stress is constant, shear stress divided
+    by sigma_* equals the friction coefficient.
 
-    A law of several states says how many (``states = 3``), and states ``evolutions(log_slip_rate,
-    psis, shift, fraction, p)`` instead, a tuple of the change of each, all of them times the
-    fraction that slip has in what the clock counts, and `steady_states`. Both say how much of the
-    shift each state has; the parts add up to all of it. What the states together have for b it says
-    as `b_over_a`, a field or a property; `two_slip_states` is an example.
+    A law with one state defines ``evolution(log_slip_rate, state, p)``. The function returns the
+    change of the state variable per unit slip in D_c at constant normal stress. The steady state is
+    ``Theta = -b ln(V/V_*)`` unless the law also defines ``steady_states(log_slip_rate, shift, p)``,
+    which returns the states Psi in steady sliding. The argument ``shift`` is the amount by which
+    stress has lowered the state variable. At V_* the states must add up to zero, because friction
+    is mu_* there. A scene rejects a law whose evolution does not vanish at its steady states.
 
-    Any unknown that friction depends on may be a state, for example temperature, if it is written
-    as the friction coefficient that it adds.
+    A law with several states sets their number, for example ``states = 3``. Such a law must define
+    ``steady_states`` and ``evolutions(log_slip_rate, psis, shift, fraction, p)``. The latter
+    function returns a tuple with the change of each state, multiplied by ``fraction``, which is the
+    ratio of slip to the clock of the integration. Both functions distribute the shift among the
+    states, and the parts must add up to the whole shift. The field or property ``b_over_a`` is the
+    evolution effect of all states together, divided by a. See ``two_slip_states`` for an example.
+
+    Any unknown that affects friction, such as temperature, can be modelled as a state. Its value
+    must be expressed as a contribution to the friction coefficient.
     """
 
     stress_dependence: float = number(
@@ -119,7 +124,10 @@ class LawOfStates(Part):
         raise TypeError(f"{type(self).__name__} states no b_over_a")
 
     def numbers(self, scene: Scene) -> Numbers:
-        """Return the numbers that all laws have in their places: none."""
+        """Return the parameters that precede the fields of a law.
+
+        The base class has no such parameters.
+        """
         return ()
 
     @property
@@ -160,25 +168,28 @@ class LawOfStates(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Law(LawOfStates):
-    """Base of the laws with one b.
+    """Base class of the laws with a single b.
 
-    What one writes, a plain function of floats, kept as ``evolution = staticmethod(evolution)``::
+    A law is defined by a plain function of floats, which is stored in the class as
+    ``evolution = staticmethod(evolution)``::
 
         evolution(log_slip_rate, state, p) -> float
 
-    It returns dTheta per unit of slip in D_c, at constant normal stress. `log_slip_rate` is
-    ln(V/V_*) and `state` is Theta. ``p[LAW]`` is b (`rsfstudy.slider.places.LAW`). Parameters of
-    the law are fields declared by `rsfstudy.slider.parts.number`; they follow b in the order of
-    their declaration, as ``p[LAW + 1]``, ``p[LAW + 2]`` and so on. Optional methods are::
+    The function returns the change of Theta per unit slip in D_c at constant normal stress. The
+    argument ``log_slip_rate`` is ln(V/V_*), and ``state`` is Theta. The element ``p[LAW]`` is b
+    (``rsfstudy.slider.places.LAW``). Declare the parameters of the law as fields, with
+    ``rsfstudy.slider.parts.number``. The parameters follow b in the order of their declaration, as
+    ``p[LAW + 1]``, ``p[LAW + 2]`` and so on. Two methods are optional::
 
         numbers(self, scene) -> tuple[float, ...]
         check(self, scene) -> None
 
-    Override the first, which returns ``(*super().numbers(scene), ...)``, if `evolution` reads other
-    numbers than the fields, such as their logarithms. The second raises `InvalidValue` if values
-    contradict each other. The class attribute ``name`` names the law. `relaxation`,
-    `steady_states` and `state_effect` are optional, too. A law with one b may have several states,
-    and then defines `evolutions` and `steady_states`, as described for `LawOfStates`.
+    Override ``numbers`` if ``evolution`` uses values other than the fields, such as logarithms of
+    the fields. The method must return ``(*super().numbers(scene), ...)``. Override ``check`` to
+    raise ``InvalidValue`` if field values contradict each other. The class attribute ``name`` is
+    the name of the law. The attributes ``relaxation``, ``steady_states`` and ``state_effect`` are
+    optional as well. A law with one b can have several states. Such a law defines ``evolutions``
+    and ``steady_states``, as described for ``LawOfStates``.
     """
 
     b_over_a: float = number(2.0, "$b/a$", "1", "ratio of evolution effect to direct effect")
