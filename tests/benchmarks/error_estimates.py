@@ -1,10 +1,11 @@
-"""Error estimates against references: ``python tests/benchmarks/error_estimates.py KIND``.
+"""Comparison of error estimates with the errors relative to reference values.
 
-KIND is `elasticities`, `inertia`, `inverse` or `all`; further arguments are the number of random
-cases and a seed. References of elasticities extrapolate differences at rtol 1e-11. References of
-readings with inertia are measurements a thousand times tighter. The curves for `Inverse` are known.
-The script prints each error that exceeds its estimate, and ends with status 1 if a share of covered
-numbers is too small.
+Usage: ``python tests/benchmarks/error_estimates.py KIND COUNT SEED``, where KIND is
+`elasticities`, `inertia`, `inverse` or `all`. COUNT is the number of random cases. The reference
+values of elasticities are extrapolated differences, computed with rtol = 1e-11. The reference
+values of motions with inertia are computed with tolerances a thousand times smaller. The exact
+curves are known for `Inverse`. The script prints each error that exceeds its estimate. The exit
+status is 1 if the estimates cover too few of the errors.
 """
 
 from __future__ import annotations
@@ -30,14 +31,14 @@ from rsfstudy.reduce import Inverse, reduced
 from rsfstudy.status import Status
 
 Random = np.random.Generator
-#: Steps of ln p of the differences that are extrapolated.
+#: Steps in ln p for the extrapolated differences.
 STEPS = (0.004, 0.002, 0.001, 0.0005)
-#: Kinds of curves, and shares of them that may at most be flagged.
+#: Kinds of curves, and the largest fraction of curves that may be flagged.
 CURVES = {"smooth": 0.0, "kinked": 0.2, "oscillating": 0.2}
 
 
 class Number(NamedTuple):
-    """A number with its error estimate, and the reference with its own uncertainty."""
+    """Computed value with its error estimate, and reference value with its uncertainty."""
 
     label: str
     value: float
@@ -48,13 +49,13 @@ class Number(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Error beyond the uncertainty of the reference, and rounding."""
+        """Absolute error that exceeds rounding and the uncertainty of the reference value."""
         rounding = 1e-12 * abs(self.reference)
         return max(abs(self.value - self.reference) - self.uncertainty - rounding, 0.0)
 
 
 def decades(random: Random, low: float, high: float) -> float:
-    """Draw a number of which each decade is equally likely."""
+    """Draw a number from a log-uniform distribution."""
     return float(math.exp(random.uniform(math.log(low), math.log(high))))
 
 
@@ -78,7 +79,7 @@ def random_slider(random: Random) -> dict[str, Any]:
 
 
 def elasticities(random: Random) -> Iterator[Number]:
-    """Draw an elasticity of a critical step or a limit cycle."""
+    """Compute an elasticity of a random critical step or limit cycle, and its reference value."""
     fields = random_slider(random)
     measure: Measure = CriticalStep(
         str(random.choice(["load_velocity_ratio", "displacement_step"]))
@@ -105,7 +106,7 @@ def elasticities(random: Random) -> Iterator[Number]:
 
 
 def extrapolated(measure: Measure, scene: Scene, name: str) -> tuple[float, float]:
-    """Extrapolate central differences of ln|y|, and tell the difference of the last two columns."""
+    """Extrapolate central differences of ln|y| to zero step, and estimate the uncertainty."""
     accuracy = Accuracy(TIGHTEST_RTOL, engine="compiled", budget=20_000_000)
 
     def level(by: float) -> float:
@@ -128,7 +129,7 @@ def extrapolated(measure: Measure, scene: Scene, name: str) -> tuple[float, floa
 
 
 def inertia(random: Random) -> Iterator[Number]:
-    """Draw a hold or a velocity step of a slider with inertia, and give all its numbers."""
+    """Measure a random hold or velocity step with inertia, and yield all values."""
     fields = random_slider(random) | {"inertia": True, "reference_rate": 1e-3}
     fields["stiffness_ratio"] = decades(random, 1.1, 100.0)
     fields["period"] = 2.0 * math.pi * decades(random, 1e-5, 0.3) / fields["reference_rate"]
@@ -157,7 +158,7 @@ def inertia(random: Random) -> Iterator[Number]:
 
 
 def curve_of(kind: str, random: Random, length: float, cells: int) -> Callable[[Any], Any]:
-    """Draw a curve of ln y that rises over ln x from 0 to a length."""
+    """Draw an increasing curve of ln y as a function of ln x between 0 and `length`."""
     slope, bend = random.uniform(0.3, 3.0), random.uniform(-0.4, 0.5)
     if kind == "smooth" and random.uniform() < 0.5:
         rate = random.uniform(0.3, 4.0) / length
@@ -176,7 +177,10 @@ def curve_of(kind: str, random: Random, length: float, cells: int) -> Callable[[
 
 
 def inverse(kind: str, random: Random) -> tuple[list[Number], int]:
-    """Draw a curve and a level; give each place where it has the level, and the status."""
+    """Apply `Inverse` to a random curve, and compare the result with each exact crossing.
+
+    The second return value is the status of the result.
+    """
     cells, length = int(random.integers(5, 17)), math.log(10.0) * random.uniform(0.7, 3.0)
     curve = curve_of(kind, random, length, cells)
     x = np.linspace(0.0, length, cells)
@@ -203,7 +207,7 @@ def inverse(kind: str, random: Random) -> tuple[list[Number], int]:
 
 
 def report(title: str, numbers: list[Number], least: float) -> bool:
-    """Print the statistics of some numbers; True if enough of them are covered."""
+    """Print the coverage of the error estimates, and return True if it is at least `least`."""
     missed = [number for number in numbers if number.error > number.estimate]
     for number in missed:
         print(f"  {number.error / number.estimate:.3g} times its estimate: {number.label}")
@@ -216,12 +220,12 @@ def report(title: str, numbers: list[Number], least: float) -> bool:
 
 
 def check_inverse(count: int, random: Random) -> bool:
-    """Check curves of each kind: those that are flagged count as covered."""
+    """Check `Inverse` for each kind of curve, counting flagged results as covered."""
     passed = True
     for kind, most in CURVES.items():
         numbers, flagged = list[Number](), 0
         for _ in range(count):
-            # of several places with the level, the farthest counts
+            # if the curve has several crossings, count the largest error
             found, status = inverse(kind, random)
             flagged += status != 0
             numbers += sorted(found, key=lambda number: number.error)[-1:]
@@ -235,7 +239,7 @@ def check_inverse(count: int, random: Random) -> bool:
 def check_random(
     title: str, draw: Callable[[Random], Iterator[Number]], count: int, seed: int
 ) -> bool:
-    """Check numbers of random scenes."""
+    """Check the error estimates of random scenes."""
     numbers, random = list[Number](), np.random.default_rng(seed)
     while len(numbers) < count:
         numbers += draw(random)
@@ -243,7 +247,7 @@ def check_random(
 
 
 def main(kind: str, count: int, seed: int) -> int:
-    """Check one kind of error estimates, or all."""
+    """Check one kind of error estimates, or all kinds."""
     passed = True
     if kind in ("inverse", "all"):
         passed &= check_inverse(count, np.random.default_rng(seed))

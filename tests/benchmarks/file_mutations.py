@@ -1,4 +1,4 @@
-"""Random damage of bytes, of texts and of datasets, for `fuzz_files`."""
+"""Random changes of bytes, text files and datasets for `fuzz_files`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 ESCAPE = "\x1b]0;title\x07\x1b[31m"
-#: Texts in the place of a number, a heading or a unit.
+#: Strings that replace a number, a heading or a unit.
 ODD = (
     "nan", "inf", "-inf", "1e400", "9" * 400, "0x10", "1,5", "1_000", "", " ", "None", "\u0663",
     "\u00b5m", ESCAPE, "\0", "1e-400", "-0", "--", "=1+1", '"', "(", ")", "um", "MPa" * 60,
@@ -23,7 +23,7 @@ ODD = (
 
 
 def damaged(content: bytes, chance: random.Random) -> bytes:
-    """Return other bytes than `content`, which may be empty."""
+    """Return a randomly damaged copy of `content`, which may be empty."""
     found = content
     while found == content:
         found = bytes(chance.choice(_BYTES)(bytearray(content), chance))
@@ -89,7 +89,7 @@ _BYTES: tuple[Callable[[bytearray, random.Random], bytearray], ...] = (
 
 
 def hostile_text(content: bytes, chance: random.Random) -> bytes:
-    """Return the bytes of a text file with one hostile change."""
+    """Apply one hostile change to the content of a text file."""
     text = content.decode("utf-8", "replace")
     changed = chance.choice(_TEXTS)(text, chance)
     return changed if isinstance(changed, bytes) else changed.encode("utf-8", "replace")
@@ -170,7 +170,7 @@ _ATTRIBUTES = (
 
 
 def hostile_dataset(dataset: xr.Dataset, chance: random.Random) -> xr.Dataset:
-    """Return a dataset with one to three hostile changes."""
+    """Apply one to three hostile changes to a copy of a dataset."""
     for _ in range(chance.choice((1, 1, 2, 3))):
         dataset = chance.choice(_DATASETS)(dataset.copy(deep=True), chance)
     return dataset

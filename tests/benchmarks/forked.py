@@ -1,4 +1,4 @@
-"""Calls of a function in a forked process, with limits of time and memory."""
+"""Function calls in a forked process with time and memory limits."""
 
 from __future__ import annotations
 
@@ -13,19 +13,27 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-#: Seconds of CPU time, the factor on the clock, and bytes of memory that a call may take.
+#: Limits of a call: CPU time in s, wall time relative to CPU time, and memory in bytes.
 LIMIT, PATIENCE, MEMORY = 20, 4.0, 8 * 2**30
 
 
 def call_in_child(function: Callable[[], Any], place: Path) -> tuple[Any, str]:
-    """Call a function in a forked process, in a directory.
+    """Call a function in a forked process with `place` as the working directory.
+
+    Parameters
+    ----------
+    function : callable
+        Function without arguments. Its return value must be picklable.
+    place : Path
+        Existing directory.
 
     Returns
     -------
     value : object
-        Its result; None if the process did not return one.
+        Return value of the function. None if the process did not return a value.
     how : str
-        ``"hangs"`` or ``"dies of signal N"`` in that case.
+        ``"hangs"`` or ``"dies of signal N"`` if the process did not return a value, otherwise an
+        empty string.
     """
     reads, writes = os.pipe()
     child = os.fork()
@@ -47,7 +55,7 @@ def call_in_child(function: Callable[[], Any], place: Path) -> tuple[Any, str]:
 
 
 def _run(function: Callable[[], Any], place: Path, writes: int) -> None:
-    """Call the function, send its result, and end this process."""
+    """Call the function, write its pickled result to a pipe, and end the process."""
     try:
         os.chdir(place)
         os.setsid()
@@ -61,7 +69,7 @@ def _run(function: Callable[[], Any], place: Path, writes: int) -> None:
 
 
 def _received(reads: int) -> bytes:
-    """Receive all bytes until the sender closes the pipe or time is up."""
+    """Read from a pipe until the other end closes it or the time limit is reached."""
     content, end = b"", time.monotonic() + PATIENCE * LIMIT
     while select.select([reads], [], [], max(0.0, end - time.monotonic()))[0]:
         part = os.read(reads, 2**16)

@@ -1,12 +1,14 @@
-"""Run random command lines, and report those that are answered badly.
+"""Fuzzer of the command line.
 
-``python tests/benchmarks/fuzz_commands.py --seed N --count N`` composes command lines by a grammar
-over all commands and options, which are read from click, so new commands are included. Values are
-valid, junk or hostile. Each line runs in a forked process, whose output goes to a pipe or to a
-terminal of 80 columns, in a fresh copy of a directory with results, records, damaged files,
-folders, links and devices. Reported are tracebacks, hangs, control characters, exit statuses other
-than 0 to 3, and answers that only name a Python exception. ``--case SEED:INDEX`` runs one line and
-prints its output. The exit status is 1 if anything was reported.
+Usage: ``python tests/benchmarks/fuzz_commands.py --seed N --count N``. The script generates random
+command lines from all commands and options. It reads the commands from click, so new commands are
+included. Values are valid, junk or hostile. Each command line runs in a forked process, whose
+output goes to a pipe or to a terminal with 80 columns. The working directory is a new copy of a
+directory with results, records, damaged files, directories, links and devices.
+
+The script reports tracebacks, hangs, control characters, exit statuses other than 0 to 3, and
+messages that only name a Python exception. ``--case SEED:INDEX`` runs one command line and prints
+its output. The exit status is 1 if the script reported a problem.
 """
 
 from __future__ import annotations
@@ -44,11 +46,11 @@ from rsfstudy.cli.command_line import cli
 STUDIES = Path(__file__).parents[2] / "studies"
 #: Columns of the terminal.
 WIDTH = 80
-#: Memory in bytes, and size of a file, that a command may use.
+#: Largest memory and file size of a command, in bytes.
 MEMORY, FILE_SIZE = 6 * 2**30, 2**28
-#: Exit statuses that commands document.
+#: Documented exit statuses.
 STATUSES = (0, 1, 2, 3)
-#: Wall clock seconds per CPU second allowed: other processes may share the machine.
+#: Wall time limit relative to the CPU time limit, because other processes may use the machine.
 PATIENCE = 4.0
 
 # ---- values --------------------------------------------------------------------------------------
@@ -120,7 +122,7 @@ COLUMNS = (
     "displacement=lp (um) * 0.1 + 5", "time=", "=t", "time", "time=t (furlong)", "time=t,time=t",
     "x=y", ",", "time=t (s", "displacement=lp * 1e400", "displacement=lp * nan + " + "9" * 400,
 )  # fmt: skip
-#: Files that are damaged before each command that names them, and what they are copies of.
+#: Files that are damaged before each command that names them, with their originals.
 DAMAGED = {
     "damaged_results.nc": "outputs/tiny.nc", "damaged_motion.nc": "rig.nc",
     "damaged_fit.nc": "fit.nc",
@@ -129,9 +131,9 @@ DAMAGED = {
     "damaged_problem.toml": "own.toml", "damaged_study.py": "tiny.py",
     "damaged_sheet.mplstyle": "mine.mplstyle",
 }  # fmt: skip
-#: A file that commands read without being asked to.
+#: A file that commands read although no argument names it.
 JOURNAL = "outputs/tiny.cells.sqlite"
-#: Values of options and arguments by their names; others follow from their types.
+#: Values of options and arguments by name. Other values follow from the type.
 KNOWN: dict[str, tuple[str, ...]] = {
     "name": ("tiny.py", "tiny", "own.py", "linear_stability", "outputs/tiny.nc", "motion.nc"),
     "first": ("outputs/tiny.nc", "other/tiny.nc", "tiny"),
@@ -162,26 +164,26 @@ KNOWN: dict[str, tuple[str, ...]] = {
     "time_limit": ("10", "0", "-1", "nan", "inf", "1e400"),
     "rtol": ("1e-4", "1e-5", "1e-12", "0.1", "nan"),
 }  # fmt: skip
-#: Limits of work that are added unless they are in the line.
+#: Work limits that are added to a command line that does not set them.
 CHEAP = {"budget": ("--budget", "2000"), "posterior": (), "serial": ("--serial",)}
-#: Named studies whose cells cost next to nothing with a budget of a few hundred.
+#: Named studies whose cells are fast with a budget of a few hundred evaluations.
 CHEAP_STUDIES = (
     "rate_step_boundary", "linear_stability", "rigid_response", "dilatancy", "two_states",
     "laws_zeta", "slide_hold_slide", "velocity_steps", "effects", "injection", "rig_recurrence",
 )  # fmt: skip
-#: Flags that are left out, because they compute all named studies.
+#: Excluded flags, because they compute all named studies.
 DEAR = {("run", "every")}
 
 
 def fields() -> tuple[str, ...]:
-    """Names that ``--set`` takes, and a few that it does not."""
+    """Return names that ``--set`` accepts, and a few unknown names."""
     from rsfstudy.slider import registry
 
     return (*registry.defaults(), "case", "sample", "stiffnes", "B_over_a", "rtol", "numbers")
 
 
 def value_of(command: str, param: click.Parameter, chance: random.Random) -> str:
-    """A value of an option or an argument: valid at least half of the time, else junk."""
+    """Draw a value of an option or argument that is valid with a probability of at least 0.5."""
     kind, name, drawn = param.type, str(param.name), chance.random()
     if drawn < 0.06:
         return mutated(chance.choice(HOSTILE), chance)
@@ -206,7 +208,7 @@ def value_of(command: str, param: click.Parameter, chance: random.Random) -> str
 
 
 def setting(chance: random.Random) -> str:
-    """A value of ``--set``."""
+    """Draw a value of ``--set``."""
     name = chance.choice((*fields(), *("load_velocity_ratio", "case", "law", "loading") * 6))
     pools = (FIELD_VALUES, FIELD_VALUES, NUMBERS, ODD_NUMBERS, QUANTITIES, ODD_QUANTITIES, RANGES)
     values = [chance.choice(chance.choice(pools)) for _ in range(chance.choice((1, 1, 1, 2, 3)))]
@@ -216,7 +218,7 @@ def setting(chance: random.Random) -> str:
 
 
 def mutated(text: str, chance: random.Random) -> str:
-    """The text, sometimes with one character changed."""
+    """Change one character of a string with a certain probability."""
     if chance.random() < 0.7 or not text or len(text) > 2000:
         return text
     place = chance.randrange(len(text))
@@ -226,21 +228,21 @@ def mutated(text: str, chance: random.Random) -> str:
 
 
 class Line(NamedTuple):
-    """A command line, and whether its output goes to a terminal."""
+    """Command line, and True if its output goes to a terminal."""
 
     words: tuple[str, ...]
     terminal: bool
 
 
 def line_of(seed: int, index: int) -> Line:
-    """The command line of a seed and an index."""
+    """Draw the command line that belongs to a seed and an index."""
     chance = random.Random(f"{seed}:{index}")
     names = sorted(cli.commands)
     if chance.random() < 0.02:
         words = [chance.choice((*HOSTILE, *names, "--version", "--help")) for _ in range(2)]
     else:
         words = _command_line(chance.choice(names), chance)
-    # a word of a command line holds no NUL
+    # arguments of a process cannot contain NUL
     return Line(tuple(word.replace("\0", "") for word in words), chance.random() < 0.4)
 
 
@@ -338,7 +340,7 @@ FITTING = [
     "--step",
     "1",
 ]
-#: Commands that make results, and compile what fits need before processes fork.
+#: Commands that create results. The fit also compiles code before processes are forked.
 MAKING = (
     ["run", "tiny.py", "--serial", "--quiet"],
     ["run", "tiny.py", "--serial", "--quiet", "--format", "zarr"],
@@ -353,7 +355,7 @@ MAKING = (
 
 
 def fill(place: Path) -> None:
-    """Write files of all kinds into a directory, which must be the working directory."""
+    """Write files of all kinds to `place`, which must be the working directory."""
     texts = {
         "tiny.py": TINY, "own.py": OWN, "own.toml": OWN_PROBLEM, "none.py": "x = 1\n",
         "raises.py": "raise RuntimeError('\\x1b[2J')\n", "syntax.py": "study = (\n",
@@ -389,7 +391,7 @@ def fill(place: Path) -> None:
         if ending != ".html":
             os.symlink(f"loop{ending}", f"loop{ending}")
             os.symlink("nowhere/at/all", f"dangling{ending}")
-        # written to as root, the device itself would be replaced
+        # root could replace the device that a link points to
         os.symlink("/dev/null", f"device{ending}") if os.getuid() else os.mknod(
             f"device{ending}", 0o020666, os.makedev(1, 3)
         )
@@ -397,7 +399,7 @@ def fill(place: Path) -> None:
 
 
 def damage(words: Sequence[str], chance: random.Random) -> None:
-    """Damage the files that a command line names, and sometimes a journal."""
+    """Damage the files that a command line names, and occasionally the journal."""
     for target, source in (*DAMAGED.items(), (JOURNAL, JOURNAL)):
         named = any(target in word for word in words)
         if named or (target == JOURNAL and chance.random() < 0.1):
@@ -408,7 +410,7 @@ def damage(words: Sequence[str], chance: random.Random) -> None:
 
 
 def _damage_once(data: bytearray, chance: random.Random) -> None:
-    """Overwrite, remove or repeat some bytes."""
+    """Overwrite, delete or repeat a range of bytes in place."""
     place = chance.randrange(len(data) + 1)
     other = place + chance.choice((1, 1, 4, 64, 1000))
     kind = chance.randrange(5)
@@ -426,7 +428,7 @@ def _damage_once(data: bytearray, chance: random.Random) -> None:
 
 
 def _write_foreign_files() -> None:
-    """Write NetCDF files that rsfstudy did not write, or that were altered."""
+    """Write a NetCDF file of another program, and a results file with altered attributes."""
     import xarray as xr
 
     xr.Dataset({"x": ("t", [1.0, 2.0])}).to_netcdf("plain.nc")
@@ -449,7 +451,7 @@ def _in_process(words: Sequence[str]) -> None:
 
 
 class Answer(NamedTuple):
-    """Exit status of a command line (negative for a signal), its output, and its CPU time in s."""
+    """Exit status (negative for a signal), output and CPU time in s of a command line."""
 
     status: int
     output: str
@@ -458,16 +460,16 @@ class Answer(NamedTuple):
 
 
 class Server:
-    """Process that has imported the commands, and forks for each command line.
+    """Process that imports the commands once and forks for each command line.
 
     Parameters
     ----------
     terminal : bool
-        Whether the output of the commands goes to a terminal, or to a pipe.
+        If True, the output of the commands goes to a terminal, otherwise to a pipe.
     home : Path
-        Directory for the files that commands are called with.
+        Directory for the files that the commands use.
     limit : float
-        CPU seconds after which a command counts as hanging.
+        CPU time in s after which a command is reported as a hang.
     """
 
     def __init__(self, terminal: bool, home: Path, limit: float) -> None:
@@ -485,10 +487,13 @@ class Server:
         theirs.close()
         os.close(write) if not terminal else None  # a terminal without a writer reports an error
         os.set_blocking(self._read, False)
-        self._receive(60.0 * limit)  # until it is ready
+        self._receive(60.0 * limit)  # wait until the process is ready
 
     def _receive(self, seconds: float) -> tuple[dict[str, Any] | None, bytes]:
-        """The next message, None if there was none in time, and the output meanwhile."""
+        """Wait for the next message, and return it with the output in the meantime.
+
+        The message is None if the time limit is reached.
+        """
         end, output = time.monotonic() + seconds, b""
         while b"\n" not in self._pending:
             if (left := end - time.monotonic()) <= 0.0:
@@ -511,7 +516,7 @@ class Server:
         return output
 
     def run(self, words: Sequence[str], place: Path) -> Answer:
-        """Run a command line in a directory."""
+        """Run a command line in the directory `place`."""
         self._link.sendall(json.dumps([words, str(place)]).encode() + b"\n")
         began, _output = self._receive(60.0)
         assert began is not None
@@ -528,7 +533,7 @@ class Server:
         return Answer(message["status"], text, message["seconds"], hangs)
 
     def close(self) -> None:
-        """End the process."""
+        """Kill the process and close the connection."""
         os.kill(self._process, signal.SIGKILL)
         os.waitpid(self._process, 0)
         self._link.close()
@@ -536,12 +541,12 @@ class Server:
 
 
 def _serve(link: socket.socket, output: int, home: Path, limit: float) -> None:
-    """Import the commands, then fork for each command line that arrives."""
+    """Import the commands, then fork for each command line received."""
     os.setsid()
     nothing = os.open(os.devnull, os.O_RDONLY)
     for number, stream in enumerate((nothing, output, output)):
         os.dup2(stream, number)
-    # the streams of this process were made before
+    # the standard streams of Python still refer to the old descriptors
     sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
     sys.stderr = open(2, "w", encoding="utf-8", closefd=False, buffering=1)  # noqa: SIM115
     os.environ |= {"MPLBACKEND": "agg", "TERM": "xterm-256color"}
@@ -576,7 +581,7 @@ def _serve(link: socket.socket, output: int, home: Path, limit: float) -> None:
 
 
 def _run(words: Sequence[str], place: str, limit: float) -> None:
-    """Run a command line in this process, and end it."""
+    """Run a command line in this process, and end the process."""
     status = 70
     try:
         os.setsid()
@@ -606,14 +611,14 @@ def _run(words: Sequence[str], place: str, limit: float) -> None:
 
 # ---- reports -------------------------------------------------------------------------------------
 
-#: What Rich sends to a terminal for colours, a progress bar and the cursor.
+#: Escape sequences of Rich for colours, progress bars and the cursor.
 _OF_RICH = re.compile(r"\x1b\[(?:[0-9;]*m|\?25[lh]|2K|1A)")
 _EXCEPTION = re.compile(r"(?<!raises )\b(?:[A-Z]\w*(?:Error|Exception|Halt)|Exception)\b(?::|\))")
 _LAST_RESORT = ("cannot be answered (", "cannot be had of this dataset", "Look at what it names")
 
 
 def faults(line: Line, answer: Answer) -> Iterator[str]:
-    """Kinds of what is wrong with an answer."""
+    """Yield the kinds of problems in an answer."""
     text = answer.output
     if answer.hangs:
         yield "hang"
@@ -635,7 +640,7 @@ def faults(line: Line, answer: Answer) -> Iterator[str]:
 
 
 def fuzz(seed: int, indices: Sequence[int], limit: float, show: bool) -> int:
-    """Run command lines, print reports and counts, and return the number of reports."""
+    """Run command lines, print a report of each problem, and return the number of reports."""
     reports, kinds, statuses = 0, collections.Counter[str](), collections.Counter[int]()
     slowest, total, began = list[tuple[float, int]](), 0.0, time.monotonic()
     with tempfile.TemporaryDirectory(prefix="fuzz_commands_") as home:

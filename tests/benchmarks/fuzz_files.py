@@ -1,12 +1,14 @@
-"""Read random damaged and hostile files, and report those that are answered badly.
+"""Fuzzer of the functions and commands that read files.
 
-``python tests/benchmarks/fuzz_files.py --seed N --count N`` writes results, stores, motions,
-journals, records, protocols, problems, tables of cases, answers and styles; damages each file; and
-lets a function or a command read it in a forked process. Reported are exceptions that are not
-errors of rsfstudy, answers that only name a Python exception, hangs, control characters, and
-damage that is read without an error although a number or the declaration differs. ``--case N``
-runs one case and prints its answer, and ``--only REGEX`` those whose kind, change and reader match.
-The exit status is 1 if anything was reported.
+Usage: ``python tests/benchmarks/fuzz_files.py --seed N --count N``. The script writes results,
+Zarr stores, motions, journals, records, protocols, problems, tables of cases, answers and styles.
+It then damages each file, and a function or a command reads the file in a forked process.
+
+The script reports exceptions other than errors of rsfstudy, messages that only name a Python
+exception, hangs and control characters. It also reports damaged files that are read without an
+error although a number or the declaration differs. ``--case N`` runs one case and prints the
+answer. ``--only REGEX`` runs the cases whose kind, change and reader match. The exit status is 1
+if the script reported a problem.
 """
 
 from __future__ import annotations
@@ -65,7 +67,7 @@ RIG = rsfstudy.Laboratory(
 
 
 class Kind(NamedTuple):
-    """The name, the readers and the changes of a kind of file."""
+    """Kind of file, with its name, readers and changes."""
 
     name: str
     readers: tuple[Callable[[Path], Any], ...]
@@ -76,7 +78,10 @@ class Kind(NamedTuple):
 
 
 def command(*words: str) -> Callable[[Path], Any]:
-    """Return a reader that runs a command, with ``{}`` for the file."""
+    """Return a reader that runs a command.
+
+    In `words`, ``{0}`` is replaced by the path of the file, and ``{1}`` by its directory.
+    """
 
     def read(path: Path) -> str:
         from rsfstudy.cli import command_line
@@ -132,7 +137,10 @@ def _reading(function: Callable[..., Any], **options: Any) -> Callable[[Path], A
 
 
 def damage(path: Path, chance: random.Random) -> bool:
-    """Damage the bytes of a file, or of one file of a store; half of the time without its end."""
+    """Damage a file, or one file of a Zarr store, and return True.
+
+    Half of the NetCDF files lose the digest at their end before the damage.
+    """
     if path.is_dir():
         path = chance.choice(sorted(file for file in path.rglob("*") if file.is_file()))
     content = path.read_bytes()
@@ -143,7 +151,7 @@ def damage(path: Path, chance: random.Random) -> bool:
 
 
 def rewrite(path: Path, chance: random.Random) -> bool:
-    """Write a hostile dataset in the place of a results file, as an attacker would."""
+    """Replace a results file by a hostile dataset, and return False."""
     with warnings.catch_warnings(), contextlib.suppress(Exception):  # xarray may refuse it
         warnings.simplefilter("ignore")
         dataset = hostile_dataset(xr.load_dataset(path), chance)
@@ -155,7 +163,7 @@ def rewrite(path: Path, chance: random.Random) -> bool:
 
 
 def retype(path: Path, chance: random.Random) -> bool:
-    """Rewrite a text file with hostile contents."""
+    """Rewrite a text file with hostile contents, and return False."""
     content = path.read_bytes()
     for _ in range(chance.choice((1, 1, 2, 3))):
         content = hostile_text(content, chance)
@@ -164,7 +172,7 @@ def retype(path: Path, chance: random.Random) -> bool:
 
 
 def tamper(path: Path, chance: random.Random) -> bool:
-    """Change what a journal holds by SQL."""
+    """Change the contents of a journal with SQL, and return True."""
     value = chance.choice((None, 5, -1.5, "x", b"\0\xff", "[" * 100_000, "\x1b[31m", "9" * 400))
     column = chance.choice(("status", "message", "work", "seconds", "numbers", "checksum", "json"))
     table = "fingerprint" if column == "json" else "cells"
@@ -178,7 +186,7 @@ def tamper(path: Path, chance: random.Random) -> bool:
 
 
 def rename(path: Path, chance: random.Random) -> bool:
-    """Write the name of a study file that is not there, or is no file, next to the file."""
+    """Replace the file by the name of an invalid or missing study file, and return False."""
     names = ("a" * 300, "\x1b[31m", "nul\0", "", " ", "..", "a/b", "*", "\udcff", "é" * 200, "-x")
     path.write_text(chance.choice(names) + chance.choice((".py", "", ".PY", ".py.py")), "utf-8",
                     "surrogateescape")  # fmt: skip
@@ -224,7 +232,7 @@ KINDS = {
 
 
 def fill(place: Path) -> dict[str, Any]:
-    """Write a whole file of each kind; return the contents that damage must not change."""
+    """Write a valid file of each kind, and return the true datasets by kind."""
     results = rsfstudy.run(STUDY, output=place, workers=0, progress=False)
     rsfstudy.run(STUDY, output=place / "zarr", workers=0, progress=False, format="zarr")
     (place / "zarr" / "small.zarr").rename(place / "small.zarr")
@@ -261,7 +269,7 @@ def _xlook(*columns: np.ndarray) -> bytes:
 
 
 class Answer(NamedTuple):
-    """The answer of a reader: its kind, its text, and everything that was printed."""
+    """Answer of a reader, with its kind, its text, the output and the first difference."""
 
     how: str
     text: str
@@ -270,7 +278,7 @@ class Answer(NamedTuple):
 
 
 def read(reader: Callable[[Path], Any], path: Path, truth: xr.Dataset | None) -> Answer:
-    """Call a reader in this process."""
+    """Call a reader in this process, and compare a returned dataset with the truth."""
     out, differs = io.StringIO(), ""
     with (
         contextlib.redirect_stdout(out),
@@ -292,12 +300,12 @@ def read(reader: Callable[[Path], Any], path: Path, truth: xr.Dataset | None) ->
 
 
 def difference(found: xr.Dataset, truth: xr.Dataset) -> str:
-    """Return the name of the first part that differs from the truth."""
+    """Return the name of the first attribute or variable that differs from the truth."""
     for name in ("declaration", "scene"):
         if found.attrs.get(name) != truth.attrs.get(name):
             return f"attribute {name}"
     for name, values in truth.variables.items():
-        if name in ("wall_time", "rhs_evaluations"):  # of cells that are computed again
+        if name in ("wall_time", "rhs_evaluations"):  # differ if cells are computed again
             continue
         if name not in found.variables or not values.equals(found[name].variable):
             return str(name)
@@ -305,7 +313,7 @@ def difference(found: xr.Dataset, truth: xr.Dataset) -> str:
 
 
 class Case(NamedTuple):
-    """A file, the change of it, and its reader."""
+    """File, with the change to apply and the reader to call."""
 
     chance: random.Random
     file: str
@@ -324,7 +332,7 @@ class Case(NamedTuple):
 
 
 def run_case(case: Case, whole: Path, truths: dict[str, Any]) -> Answer:
-    """Change a file and let it be read in a forked process; return the answer."""
+    """Change a copy of a file, call the reader in a forked process, and return the answer."""
     chance, file, change, reader = case
     with tempfile.TemporaryDirectory() as place:
         copy = Path(place)
@@ -347,7 +355,7 @@ _OF_RICH = re.compile(r"\x1b\[(?:[0-9;]*m|\?25[lh]|2K|1A)")
 
 
 def faults(answer: Answer) -> Iterator[str]:
-    """Yield what is wrong with an answer."""
+    """Yield the problems in an answer."""
     everything = f"{answer.text} {answer.printed}"
     if answer.how.startswith(("raised", "hangs", "dies")):
         yield answer.how
@@ -362,7 +370,7 @@ def faults(answer: Answer) -> Iterator[str]:
 
 
 def main() -> int:
-    """Run the cases that the command line asks for."""
+    """Run the cases that the command line selects, and return the exit status."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--count", type=int, default=2000)
@@ -374,7 +382,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as place, tempfile.TemporaryDirectory() as warm:
         truths = fill(Path(place))
         shutil.copytree(place, warm, dirs_exist_ok=True)
-        for file, kind in KINDS.items():  # imports and compiles what all cases need
+        for file, kind in KINDS.items():  # import and compile the code that all cases need
             for reader in kind.readers:
                 read(reader, Path(warm, file), None)
         for index in range(asked.count) if asked.case is None else [asked.case]:

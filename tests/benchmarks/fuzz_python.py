@@ -1,16 +1,17 @@
-"""Fuzzer of the Python interface: valid calls of every public function, constructor and method,
-in which one or two arguments are replaced by junk.
+"""Fuzzer of the Python interface.
 
-    python tests/benchmarks/fuzz_python.py --seed 1 --count 2000
+Usage: ``python tests/benchmarks/fuzz_python.py --seed 1 --count 2000``. The script makes valid
+calls of every public function, constructor and method, in which it replaces one or two arguments
+by junk. Each call should return a value or raise an error of rsfstudy. The script reports:
 
-Each call ends with an answer, an error of rsfstudy, or a signature error. The fuzzer reports
+- raw: any other exception
+- catch-all: an error of rsfstudy that only repeats a Python exception
+- hang: a call that takes longer than 20 s
+- died: a process that ends during a call
+- control: a control character in a message, a warning or a representation
 
-- raw: any other exception;
-- catch-all: an error of rsfstudy that only repeats an exception of Python;
-- hang: a call that takes longer than 20 s;
-- control: a control character in a message, a warning or a representation.
-
-A call is determined by the seed and its number: ``--first N --count 1`` repeats one call.
+The seed and the number of a call determine the call. To repeat one call, pass
+``--first N --count 1``.
 """
 
 from __future__ import annotations
@@ -52,12 +53,12 @@ from rsfstudy.measures.linear_stability import LinearStability
 LIMIT = 20.0
 START = 120.0
 CATCH_ALL = re.compile(r"cannot be answered|not as rsfstudy made it|cannot be had of this dataset")
-#: Parameters that junk would turn into a cluster of processes.
+#: Parameters without junk, because a random value could start many processes.
 CLUSTERS = ("workers",)
 
 
 class Odd:
-    """An object whose methods all fail."""
+    """Object whose ``repr`` and comparison raise an exception."""
 
     def __repr__(self) -> str:
         raise RuntimeError("no repr")
@@ -69,7 +70,10 @@ class Odd:
 
 
 def junk() -> list[Any]:
-    """Return values of every type, made anew because calls may change them."""
+    """Create a list of unusual values of many types.
+
+    The values are new objects in each call, because the tested functions may change them.
+    """
     numbers = [
         0, 1, -1, 3, 7.5, -0.0, 1e308, 5e-324, float("nan"), float("inf"), -float("inf"), 10**30,
         10**400, -(10**400), 2**63, 1j, True, False,
@@ -112,7 +116,7 @@ def junk() -> list[Any]:
 
 
 def record() -> Any:
-    """A velocity step in 60 rows."""
+    """Create a record of 60 rows with one velocity step."""
     time = np.arange(60.0)
     moved = np.where(time < 30.0, time, 30.0 + 10.0 * (time - 30.0))
     friction = 0.6 + np.where(time < 30.0, 0.0, 0.01 * np.exp(-(time - 30.0)))
@@ -121,7 +125,7 @@ def record() -> Any:
 
 
 def inputs(place: Path) -> dict[str, Any]:
-    """The objects that valid calls use: scenes, studies, datasets, records and files."""
+    """Create the scenes, studies, datasets, records and files for valid calls."""
     quick = {"rtol": 1e-2, "engine": "scipy"}
     scene = Scene(stiffness_ratio=1.5, load_velocity_ratio=2.0, normal_stress="constant")
     cycling = Scene(stiffness_ratio=0.8, normal_stress="constant")
@@ -148,7 +152,7 @@ def inputs(place: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
-#: Arguments of valid reductions, as far as each takes them.
+#: Arguments of valid reductions. Each reduction uses those in its signature.
 REDUCED = {
     "name": "made", "of": "critical_stiffness", "on": "b_over_a", "over": "b_over_a",
     "along": "b_over_a", "reference": 2.0, "q": 0.5, "form": "velocity_step_at_critical_stiffness",
@@ -157,9 +161,9 @@ RIG = {"normal_stress": "5 MPa", "slip_distance": "10 um", "reference_velocity":
 
 
 def targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
-    """Return every public function, constructor and method, with the arguments of a valid call.
+    """Return all public functions, constructors and methods, with the arguments of a valid call.
 
-    A function without an entry here is called with junk for each required parameter.
+    If there are no arguments for a required parameter, the fuzzer passes junk.
     """
     quick, place = {"rtol": 1e-2, "engine": "scipy"}, known["place"]
     still = {"workers": 0, "progress": False}
@@ -263,8 +267,10 @@ def targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[s
 
 
 def composed(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
-    """Return functions that make an object and use it: declarations that end in a run or a figure,
-    datasets that were altered or went through a file, and named studies.
+    """Return functions that create an object and then use it.
+
+    Examples are a study that is run, a figure that is drawn, and a dataset that is altered, written
+    to a file and read.
     """
     dataset, study, place = known["dataset"], known["study"], known["place"]
     still: dict[str, Any] = {"workers": 0, "progress": False, "output": None}
@@ -298,7 +304,7 @@ def composed(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[
         path.unlink(missing_ok=True)
         try:
             of.to_netcdf(path)
-        except Exception:  # of xarray or netCDF4
+        except Exception:  # xarray or netCDF4 cannot write the dataset
             return None
         return use(path)
 
@@ -359,7 +365,7 @@ def composed(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[
 
 
 def properties(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
-    """Return functions that read each property of the accessor of a dataset."""
+    """Return functions that read the properties of the dataset accessor."""
     found: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {}
     for of in ("dataset", "motion", "fitted", "cycle"):
         for name in ("scene", "laboratory", "study"):
@@ -378,7 +384,7 @@ def _is_ours(method: Any) -> bool:
 
 
 def mutated(value: Any, draw: random.Random) -> Any:
-    """Return junk, or the value with junk somewhere inside."""
+    """Return junk, or a copy of a value with junk in one place."""
     if draw.random() < 0.35:
         if isinstance(value, dict) and value:
             key = draw.choice(list(value))
@@ -399,7 +405,7 @@ def mutated(value: Any, draw: random.Random) -> Any:
 
 
 def altered(dataset: xr.Dataset, draw: random.Random) -> xr.Dataset:
-    """Return a dataset as a notebook may have changed it."""
+    """Change a dataset as a user may change it in a notebook."""
     names = [str(name) for name in dataset.variables]
     dims = [str(name) for name in dataset.dims]
     if not names or not dataset.attrs:
@@ -433,7 +439,7 @@ def altered(dataset: xr.Dataset, draw: random.Random) -> xr.Dataset:
 def call_of(
     function: Callable[..., Any], valid: dict[str, Any], draw: random.Random
 ) -> tuple[tuple[Any, ...], dict[str, Any]]:
-    """Return the arguments of a call that is valid but for one or two of them."""
+    """Return the arguments of a valid call with one or two invalid changes."""
     parameters = inspect.signature(function).parameters
     plain = [n for n, p in parameters.items() if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
     plain = [n for n in plain if n not in CLUSTERS and n != "self"]
@@ -461,12 +467,12 @@ def call_of(
 
 
 def is_clean(text: str) -> bool:
-    """Return True if a terminal shows a text as it is."""
+    """Return True if a string contains no control characters except newline and tab."""
     return all(c.isprintable() or c in "\n\t" for c in text)
 
 
 def shown(answer: Any) -> Iterator[str]:
-    """Yield what a terminal or a notebook shows of an answer of rsfstudy."""
+    """Yield the text and HTML representations of an object of rsfstudy."""
     if not type(answer).__module__.startswith("rsfstudy"):
         return
     yield repr(answer)
@@ -475,7 +481,7 @@ def shown(answer: Any) -> Iterator[str]:
 
 
 def outcome(function: Callable[..., Any], args: Any, options: Any) -> tuple[str, str]:
-    """Make a call and return the kind of its outcome with its text."""
+    """Call a function, and return the kind and the message of the outcome."""
     texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -511,7 +517,7 @@ def text_of(value: Any) -> str:
 
 
 def work(seed: int, first: int, count: int, step: int) -> None:
-    """Make calls, and print a line of JSON before and after each of them."""
+    """Make the selected calls, and print a line of JSON before and after each call."""
     lines = os.fdopen(os.dup(1), "w")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     top = Path(tempfile.mkdtemp())
@@ -537,7 +543,7 @@ def work(seed: int, first: int, count: int, step: int) -> None:
 
 
 def watch(seed: int, first: int, count: int, step: int, found: queue.Queue[Any]) -> None:
-    """Run calls in a process, which is replaced whenever a call takes too long."""
+    """Run the calls in a subprocess, and start a new subprocess after a hang or a crash."""
     number = first
     while number < count:
         words = [sys.executable, __file__, "--seed", str(seed), "--first", str(number)]

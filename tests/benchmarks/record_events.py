@@ -1,10 +1,12 @@
-"""Print how well `rsfstudy.events` recovers the drops of synthetic records.
+"""Test of `rsfstudy.events` with synthetic records of known drops.
 
-Each kind of record is made 30 times by seed. The table shows the share of drops of at least three
-times the smallest detectable drop that are found, the number of false events, and the shares of
-found drops whose size and time lie within the stated errors::
+Usage: ``python tests/benchmarks/record_events.py``. The script generates 30 records of each kind,
+with seeds from 0 to 29. For each kind, it prints a row of a table with
 
-    python tests/benchmarks/record_events.py
+- the number of large drops, which have at least three times the smallest detectable size
+- the percentage of large drops that are found
+- the number of false events
+- the percentages of found drops whose true size and time lie within the estimated errors
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ import rsfstudy
 
 
 class Catalogue(NamedTuple):
-    """A record with known drops: times at which they begin, durations and sizes."""
+    """Synthetic record, with the start times, durations and sizes of its drops."""
 
     time: np.ndarray
     stress: np.ndarray
@@ -31,7 +33,21 @@ class Catalogue(NamedTuple):
 
 
 class Score(NamedTuple):
-    """Counts of drops: large ones, those found, false events, and covered sizes and times."""
+    """Counts of drops and events.
+
+    Attributes
+    ----------
+    large : int
+        Drops of at least three times the smallest detectable size.
+    found : int
+        Large drops that are found.
+    false : int
+        Events without a drop.
+    matched : int
+        Events with a drop of any size.
+    sizes, times : int
+        Matched events whose size or time agrees with the true value within the estimated error.
+    """
 
     large: int = 0
     found: int = 0
@@ -55,14 +71,35 @@ def draw(
     noise: float = 0.02,
     correlation: float = 0.0,
 ) -> Catalogue:
-    """Make a record of loading with drops at random times, sizes and durations."""
+    """Generate a record with steady loading and random drops.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    time : ndarray, shape (samples,)
+        Sampling times in s.
+    size : (float, float), optional
+        Range of drop sizes.
+    lasts : (float, float), optional
+        Range of drop durations in s.
+    every : float, optional
+        Mean interval between drops in s.
+    noise : float, optional
+        Standard deviation of the noise.
+    correlation : float, optional
+        Correlation of the noise of successive samples.
+
+    Returns
+    -------
+    Catalogue
+    """
     count = int((time[-1] - time[0]) / every) - 1
     jitter = rng.uniform(-0.15, 0.15, count) * every
     begins = time[0] + every * (1.0 + np.arange(count)) + jitter
     durations, sizes = rng.uniform(*lasts, count), rng.uniform(*size, count)
     share = (time[:, None] - begins) / np.maximum(durations, 1e-9)
     fallen = (np.clip(share, 0.0, 1.0) * sizes).sum(axis=1)
-    # loading makes up for the drops, but not during them
+    # loading compensates the drops, and stops during each drop
     rests = np.clip(time[:, None] - begins, 0.0, durations).sum(axis=1)
     loading = sizes.sum() / (time[-1] - time[0] - durations.sum())
     white = rng.standard_normal(len(time) + 500)
@@ -73,12 +110,12 @@ def draw(
 
 
 def whole(rng: np.random.Generator, **options: float) -> Catalogue:
-    """Make sudden drops, sampled at 50 Hz."""
+    """Generate sudden drops, sampled at 50 Hz."""
     return draw(rng, 0.02 * np.arange(10_000), **options)  # type: ignore[arg-type]
 
 
 def triggered(rng: np.random.Generator) -> Catalogue:
-    """Make drops of some milliseconds, sampled at 10 Hz with bursts of 1 kHz."""
+    """Generate drops of 10 to 50 ms, sampled at 10 Hz with bursts at 1 kHz."""
     state = rng.bit_generator.state
     slow = 0.1 * np.arange(2_000)
     begins = draw(rng, slow, lasts=(0.01, 0.05)).begins
@@ -89,17 +126,17 @@ def triggered(rng: np.random.Generator) -> Catalogue:
 
 
 def slow(rng: np.random.Generator) -> Catalogue:
-    """Make drops that last 2 to 4 of 10 s."""
+    """Generate slow drops that last 2 to 4 s, at intervals of 10 s."""
     return draw(rng, 0.02 * np.arange(10_000), lasts=(2.0, 4.0))
 
 
 def short(rng: np.random.Generator) -> Catalogue:
-    """Make drops over 2 to 6 samples."""
+    """Generate short drops that last 2 to 6 sampling intervals."""
     return draw(rng, 0.02 * np.arange(10_000), lasts=(0.04, 0.12))
 
 
 def cut(rng: np.random.Generator) -> Catalogue:
-    """Make a record that ends within a drop."""
+    """Generate a record that ends during a drop."""
     made = draw(rng, 0.02 * np.arange(10_000), lasts=(0.2, 1.0))
     stop = made.begins[-1] + rng.uniform(0.4, 0.8) * made.durations[-1]
     rows = made.time <= stop
@@ -109,23 +146,23 @@ def cut(rng: np.random.Generator) -> Catalogue:
 
 
 def negative(rng: np.random.Generator) -> Catalogue:
-    """Make drops of a shear stress with negative sign."""
+    """Generate sudden drops of a negative shear stress."""
     made = whole(rng)
     return made._replace(stress=-made.stress)
 
 
 def small(rng: np.random.Generator) -> Catalogue:
-    """Make sudden drops of 1.5 to 10 standard deviations of the noise."""
+    """Generate sudden drops of 1.5 to 10 standard deviations of the noise."""
     return whole(rng, size=(0.03, 0.2), noise=0.02)  # type: ignore[arg-type]
 
 
 def correlated(rng: np.random.Generator) -> Catalogue:
-    """Make drops over 2 to 6 samples with noise whose samples repeat 0.5 of those before."""
+    """Generate short drops in noise with a correlation of 0.5 between successive samples."""
     return draw(rng, 0.02 * np.arange(10_000), lasts=(0.04, 0.12), correlation=0.5)
 
 
 def uneven(rng: np.random.Generator) -> Catalogue:
-    """Make drops over some samples of a clock that is uneven by 30 %."""
+    """Generate drops of up to 0.3 s with sampling times that vary by 30 % of the interval."""
     time = 0.02 * (np.arange(10_000) + rng.uniform(-0.3, 0.3, 10_000))
     return draw(rng, time, lasts=(0.0, 0.3))
 
@@ -137,7 +174,7 @@ KINDS: dict[str, Callable[[np.random.Generator], Catalogue]] = {
 
 
 def score(catalogue: Catalogue) -> Score:
-    """Compare the events of a record with its drops."""
+    """Compare the events that `rsfstudy.events` finds with the drops of a record."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = rsfstudy.events(time=catalogue.time, shear_stress=catalogue.stress)
@@ -170,7 +207,7 @@ def score(catalogue: Catalogue) -> Score:
 
 
 def main(count: int = 30) -> None:
-    """Print a row for each kind of record."""
+    """Print a table with one row per kind of record."""
     print("kind         drops  found %  false  size %  time %")
     for kind, make in KINDS.items():
         total = Score()
