@@ -57,7 +57,7 @@ def test_quantities_of_pint():
 
 #: Units of stress, of those known here and of those that pint knows.
 STRESSES = ("Pa", "kPa", "MPa", "bar", "kg/m/s^2", "kg*m**-1*s-2", "MPa m/mm", "MPa s / s")
-OF_PINT = ("psi", "inH2O", "lbf/m^2", "percent MPa", "mPa", "psi um/um")
+OF_PINT = ("psi", "inHg", "lbf/m^2", "percent MPa", "mPa", "psi um/um")
 #: What has been read as a product of its numbers, ended in a traceback, or never ended.
 WRONG = (
     "2,5 MPa", "2 5 MPa", "25 MPa 3", "2 MPa!", "2*3 MPa", "1 kPa^999", "5 9**9**9**9",
