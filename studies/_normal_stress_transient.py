@@ -231,8 +231,10 @@ class NormalStressTransient(Recorded):
         return found
 
     def _read(self, scene: Scene, record: _Record) -> dict[str, float]:
-        """Numbers that are read off; none where no exponential goes through what is left, or the
-        spring has not taken up the change of strength.
+        """Return the numbers that are read from the record.
+
+        The result is empty if the remaining strength change does not fit an exponential, or if the
+        spring has not followed the change of strength.
         """
         first, last = record.left(self.fit_from), record.left(self.fit_to)
         if not first or not 0.0 < last / first < 1.0:

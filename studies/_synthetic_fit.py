@@ -1,4 +1,4 @@
-"""A fit of a synthetic record, whose parameters are known: does it find them within its errors?"""
+"""Fits of synthetic records with known parameters, to test the errors of fits."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def designs(protocols: Mapping[str, str]) -> Axis:
 
 
 class _Piece(NamedTuple):
-    """A piece of a protocol: velocity in um/s, how long it lasts in s, and its rows."""
+    """Segment of a protocol: velocity in um/s, duration in s, and number of rows."""
 
     velocity: float
     lasts: float
@@ -83,34 +83,36 @@ class _Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class SyntheticFit(Measure):
-    """A fit of a record that was computed, with noise that was drawn, held to the truth.
+    """Fit of a synthetic record, compared with the exact parameters.
 
-    The record is that of the scene, whose unit of slip is `slip_distance`, under a protocol; rows
-    are evenly spaced in load point displacement, in a hold in time.
+    The record is computed from the scene under a given protocol. Rows are evenly spaced in load
+    point displacement, or in time during a hold. The unit of slip of the scene is
+    ``slip_distance``.
 
     Parameters
     ----------
     protocol : str
-        Velocities in um/s and displacements in um: ``"1:30, 10:270"`` is a step after 30 um; a hold
-        states its time, ``"0:100 s"``. Windows that are fitted together are parted by semicolons.
+        Velocities in um/s and displacements in um: ``"1:30, 10:270"`` is a step after 30 um. A hold
+        is specified by its duration: ``"0:100 s"``. Semicolons separate windows that are fitted
+        jointly.
     free : tuple of str
-        Parameters to look for.
+        Names of the free parameters.
     slip_distance : float
-        D_c in um.
+        Slip distance D_c in um.
     rows : int
-        Rows of each window.
+        Number of rows in each window.
     noise_size : float
         Standard deviation of the noise.
     process : str
-        The noise that is drawn: "white"; "ar1", autoregressive with a correlation of 0.9; "ma3", a
-        moving average of four rows; or a kind of laboratory record (`_noise_kinds.KINDS`), which
-        chooses the times of the rows itself.
+        Noise process: "white", "ar1" (autoregressive with a correlation of 0.9), "ma3" (a moving
+        average of four rows), or a kind of laboratory record (``_noise_kinds.KINDS``), which
+        selects its own sample times.
     noise : str
-        The noise that the fit looks for, as `Fit` takes it.
+        Noise model of the fit (see ``Fit``).
     fitted_law : str
-        The law that is fitted; that of the scene, if empty.
+        Law that is fitted. By default, the law of the scene.
     seed : int
-        Tells the noise.
+        Seed of the random noise.
     """
 
     protocol: str = UP
@@ -170,7 +172,7 @@ class SyntheticFit(Measure):
         return numbered(self.free, len(self._windows()))
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Draw a record, and fit it."""
+        """Draw a record and fit it."""
         if self.process in KINDS:
             return self._find_in_record(scene, accuracy, meter)
         true = self._true(scene)
@@ -190,7 +192,7 @@ class SyntheticFit(Measure):
         return Outcome(Status.OK, self._compared(search, found, true, promised, reasons))
 
     def _find_in_record(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Draw a laboratory record, and fit it as `rsfstudy.fit` does."""
+        """Draw a laboratory record and fit it in the same way as ``rsfstudy.fit``."""
         kind, true = KINDS[self.process], self._true(scene)
         if "trend1" in true:
             true["trend1"] = kind.trend
@@ -228,7 +230,7 @@ class SyntheticFit(Measure):
         promised: np.ndarray,
         reasons: Sequence[str],
     ) -> dict[str, Value]:
-        """Compare the result of a search with the truth."""
+        """Compare the result of a fit with the exact parameters."""
         naive = found
         if self.noise != "white":
             naive = Search(search.model, found.values, self._free, "white").run()
@@ -255,11 +257,11 @@ class SyntheticFit(Measure):
         return values | {"flagged": float(bool(reasons))}
 
     def _windows(self) -> list[list[_Piece]]:
-        """The pieces of each window."""
+        """Return the segments of each window."""
         return [_pieces(text, self.rows) for text in self.protocol.split(";")]
 
     def _true(self, scene: Scene) -> dict[str, float]:
-        """All parameters of the scene, with the numbers of windows."""
+        """Return the exact values of all parameters."""
         longer = self.slip_distance * (scene.as_dict().get("length_ratio") or 1.0)
         plainly = parameters_of(scene, self.slip_distance, longer)
         plainly |= {name: 0.0 for name in self.free if name not in plainly}
@@ -346,7 +348,7 @@ def _root(process: str, rows: int) -> np.ndarray:
 
 
 def _correlations(process: str, rows: int) -> np.ndarray:
-    """Autocorrelations of a process at each lag."""
+    """Return the autocorrelations of a noise process at each lag."""
     if process == "ar1":
         return np.asarray(_AR1 ** np.arange(rows))
     weights = _MOVING_AVERAGES[process]

@@ -1,4 +1,4 @@
-"""Numbers of drops of stress in a record: times and stresses, and slip by its displacement."""
+"""Properties of stress drops in a record: times, stresses, slip and slip rate."""
 
 from __future__ import annotations
 
@@ -18,7 +18,17 @@ _FASTER, _LEAST_EXCESS = 3.0, 0.1
 
 
 class Place(NamedTuple):
-    """Samples of a drop: the first in it, that behind it, and samples of a window beside it."""
+    """Location of a drop among the samples.
+
+    Attributes
+    ----------
+    begin : int
+        Index of the first sample in the drop.
+    end : int
+        Index of the first sample after the drop.
+    window : int
+        Number of samples before and after the drop that are averaged.
+    """
 
     begin: int
     end: int
@@ -26,7 +36,11 @@ class Place(NamedTuple):
 
 
 def moves_with_drops(times: np.ndarray, moves: np.ndarray, found: Sequence[Place]) -> bool:
-    """True where displacement moves faster during the drops than for as long before and after."""
+    """Return True if displacement is faster during drops than around them.
+
+    The displacement during each drop is compared with the displacement over the same duration
+    before and after the drop.
+    """
     excess = usual = variance = 0.0
     quantum = quantum_of(moves)
     noises = {n: max(spread(falls(moves, n)), quantum) for n in {place.window for place in found}}
@@ -46,7 +60,11 @@ def moves_with_drops(times: np.ndarray, moves: np.ndarray, found: Sequence[Place
 
 
 def place_of(times: np.ndarray, found: FoundDrop, room: tuple[float, float]) -> Place:
-    """Locate a drop among the samples, with the window that fits between its neighbours."""
+    """Locate a drop among the samples.
+
+    The window is shortened if it would overlap with a neighbouring drop or extend beyond the
+    record.
+    """
     drop, candidate = found
     begin = int(np.searchsorted(times, drop.begins, "right"))
     end = max(int(np.searchsorted(times, drop.ends, "left")), begin)
@@ -65,7 +83,16 @@ def numbers_of(
     place: Place,
     room: tuple[float, float],
 ) -> tuple[dict[str, tuple[float, float]], int]:
-    """Make the numbers of one event of a record, each with half of its 95 % interval."""
+    """Compute the properties of one event and their errors.
+
+    Returns
+    -------
+    row : dict
+        Pairs of a value and its error, which is the half width of a 95 % interval.
+    cut : int
+        0 if the record contains the stress before and after the event. 1 is added if the record
+        begins during the event, and 2 if the record ends during the event.
+    """
     drop = found.drop
     row = {
         "time": (drop.begins, drop.begins_error),
@@ -91,7 +118,14 @@ def _slip(
     place: Place,
     room: tuple[float, float],
 ) -> dict[str, tuple[float, float]]:
-    """Read slip, peak slip rate and dynamic stress drop of an event, with errors."""
+    """Compute slip, peak slip rate and dynamic stress drop of an event.
+
+    Returns
+    -------
+    dict
+        Pairs of a value and its error. The peak slip rate and the dynamic stress drop are NaN if
+        the slip rate does not exceed its noise.
+    """
     (drop, candidate), (begin, end, window) = found, place
     size = drop.before - drop.after
     first, last = (int(np.searchsorted(times, at)) for at in room)

@@ -1,12 +1,12 @@
-"""The critical step: the smallest step of load point velocity, load point displacement or normal
-stress that triggers instability.
+"""Critical step: the smallest step of the load that triggers instability.
 
-A step is critical when the peak slip rate of the motion it sets off just touches the instability
-norm. Where mass hardly acts up to the norm, the touching path is known at its end: ln V is at the
-norm and at rest there. Followed against time, where it attracts its neighbours, it leads to the
-step that started it; see `critical_path`. Where mass acts below the norm, the peak is followed
-forward; see `after_step`. Either way the answer counts only once a motion on each side of it has
-confirmed it.
+The step may be a change of load point velocity, load point displacement or normal stress. A step is
+critical if the peak slip rate of the motion that follows just reaches the instability norm. If the
+effect of inertia is small up to the norm, the end of this critical path is known: ln V equals the
+norm, and its rate is zero. The path is followed backwards in time, in which direction it attracts
+neighbouring paths, to the step at which it starts (see ``critical_path``). If inertia is important
+below the norm, the peak is followed forwards in time (see ``after_step``). In both cases, the
+result is accepted only if motions on both sides of the critical step confirm it.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
-"""Linear stability of steady sliding: the critical stiffness from the friction relation, from
-growth of the assembled equations, and in closed form.
+"""Linear stability of steady sliding.
+
+The critical stiffness is computed from the friction relation, from the growth of perturbations of
+the assembled equations, and in closed form.
 """
 
 from __future__ import annotations
@@ -49,18 +51,22 @@ _OUTPUTS = (
 @guard_methods
 @dataclass(frozen=True)
 class LinearStability(Measure):
-    """Critical stiffness of steady sliding at the load point velocity of the scene, over
-    sigma_*/D_c.
+    """Critical stiffness of steady sliding at the load point velocity of the scene.
 
-    Twice: from the friction relation, and as the stiffness at which small perturbations of the
-    assembled equations neither grow nor decay, so that they vouch for each other; and, for what
-    mass and radiation leave, by the closed form. A perturbation of slip by exp(p s), s being slip
-    over D_c, changes frictional stress by G(p) times itself, and ``K (1 + w**2 p**2) + eta V p +
-    G(p) = 0`` with K over sigma_*/D_c and w = V T/(2 pi D_c). K is critical where p is imaginary
-    (`rsfstudy.slider.stability`): at V_*, by the slip and the slowness law, quasi-statically and
-    drained, ``K = (b - a)/[1 - (mu_* - alpha) cot(phi)]``, without cot(phi) where normal stress is
-    constant. Stiffnesses are over sigma_*/D_c, stresses over sigma_*; the relative one is over that
-    at V_*.
+    The critical stiffness is computed in three ways, which verify each other. The first result
+    follows from the friction relation. The second result is the stiffness at which small
+    perturbations of the assembled equations neither grow nor decay. The third result is the
+    quasi-static closed form, corrected for inertia and radiation damping.
+
+    Let s be slip over D_c. A perturbation of slip that grows as exp(p s) changes frictional stress
+    by G(p) times the perturbation. The growth rate p satisfies ``K (1 + w**2 p**2) + eta V p + G(p)
+    = 0`` with the stiffness K over sigma_*/D_c and w = V T/(2 pi D_c). K is critical if p is
+    imaginary (see ``rsfstudy.slider.stability``). Under the slip and the slowness law, the critical
+    stiffness of quasi-static and drained motion at V_* is ``K = (b - a)/[1 - (mu_* - alpha)
+    cot(phi)]``. If normal stress is constant, the term with cot(phi) is absent.
+
+    Stiffnesses are relative to sigma_*/D_c, and stresses are relative to sigma_*. The relative
+    critical stiffness is the ratio of the critical stiffness to its value at V_*.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""The motion after a step: its peaks of slip rate, one after the other, and the path it takes."""
+"""Motion after a step: the peaks of slip rate, and the recorded path."""
 
 from __future__ import annotations
 
@@ -134,18 +134,20 @@ class StepResponse(Recorded):
 
 
 def _tops_at_start(scene: Scene, event: Event) -> bool:
-    """True if mass rises to a maximum at the start: as a jump where the motion begins on the slow
-    manifold, and the tolerance does not ask to follow the rise.
+    """Return True if the slip rate has a maximum at the start due to inertia.
+
+    If the motion starts on the slow manifold, the initial rise of the slip rate is a jump. The rise
+    is followed only if the tolerance requires it.
     """
     return _jumps(scene) and event.kind is Kind.START and event.point.growth <= 0.0
 
 
 def _left_out(scene: Scene, accuracy: Accuracy) -> float:
-    """Error of log10(V/V_*) after a jump, by the slip of a rise that is not followed."""
+    """Return the error of log10(V/V_*) due to a rise that is not followed."""
     slip = accuracy.remaining_slip if _jumps(scene) else 0.0
     return (1.0 + scene.stiffness / scene.a) * slip / LN10
 
 
 def _jumps(scene: Scene) -> bool:
-    """True if slip rate rises from V_* to another one against mass."""
+    """Return True if inertia delays an initial rise of the slip rate from V_*."""
     return scene.has_mass and (scene.begins_elsewhere or scene.spring_stress_step > 0.0)

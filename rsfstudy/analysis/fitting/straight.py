@@ -1,4 +1,4 @@
-"""The part of a record in which friction before a step is a straight line."""
+"""Selection of the part of a record with linear friction before a step."""
 
 from __future__ import annotations
 
@@ -27,11 +27,12 @@ _CORRELATED = 0.98
 
 @lru_cache(maxsize=256)
 def find_straight_start(record: Record, begins: float, ends: float) -> float:
-    """Find the time from which friction is a straight line up to a step.
+    """Find the time from which friction is linear in time up to a step.
 
-    A line that breaks at the best place must explain friction far better than one line, counting
-    the correlation of the residuals, and the earlier part must depart from the later line by an
-    amount that matters. The earlier part is then left out, and the rest is tested again.
+    Two conditions are tested. First, two separate lines must describe friction far better than a
+    single line, after allowing for the correlation of the residuals. Second, the earlier part must
+    deviate significantly from the line through the later part. If both conditions hold, the earlier
+    part is discarded, and the remainder is tested again.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def find_straight_start(record: Record, begins: float, ends: float) -> float:
     Returns
     -------
     float
-        Time in s.
+        Time in s. The result is ``begins`` if friction is linear throughout.
     """
     rows = np.flatnonzero((record.time >= begins) & (record.time < ends))
     time, friction = record.time[rows], record.columns["friction"][rows]
@@ -59,7 +60,13 @@ def find_straight_start(record: Record, begins: float, ends: float) -> float:
 
 
 def _find_break(t: np.ndarray, friction: np.ndarray) -> int:
-    """Find the place at which a broken line parts friction; 0 if one line is as good."""
+    """Find the row at which two separate lines describe friction best.
+
+    Returns
+    -------
+    int
+        0 if a single line describes friction equally well.
+    """
     count = len(t)
     sums = RunningSums(t - t[0], friction - friction[0], np.ones(count))
     places = np.arange(_FEWEST, count - _FEWEST + 1)
