@@ -69,7 +69,7 @@ _FLAGGED = Output("flagged", "", "1", "1 if standard errors are reported as not 
 
 
 def designs(protocols: Mapping[str, str]) -> Axis:
-    """An axis of protocols, by what they are called."""
+    """Return an axis of named protocols."""
     return Axis("design", {name: {"protocol": text} for name, text in protocols.items()})
 
 
@@ -153,7 +153,7 @@ class SyntheticFit(Measure):
 
     @property
     def outputs(self) -> Sequence[Output]:
-        """By parameter, how far off it is and how far it may be; and what laws are compared by."""
+        """Deviations and errors by parameter, and quantities to compare laws."""
         by = [
             Output(name, "", "1", text, dims=("parameter",), error=name == self.headline)
             for name, text in _OF_PARAMETER
@@ -164,7 +164,10 @@ class SyntheticFit(Measure):
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        """The parameters; of those that each window has for itself, that of the first one."""
+        """Names of the parameters.
+
+        If each window has its own value of a parameter, the first window is reported.
+        """
         return {"parameter": np.array(self.free, dtype=object)}
 
     @property
@@ -269,7 +272,7 @@ class SyntheticFit(Measure):
         return {name: plainly[plain(name)] for name in names}
 
     def _first(self, scene: Scene, true: Values) -> dict[str, float]:
-        """Parameters that the search begins with: near the truth, and not at it."""
+        """Return initial parameters that differ slightly from the exact values."""
         first = {
             n: v * (_OFF if n in LOGARITHMIC and n in self.free else 1.0) for n, v in true.items()
         }
@@ -282,7 +285,7 @@ class SyntheticFit(Measure):
     def _joint(
         self, scene: Scene, accuracy: Accuracy, meter: Meter, friction: np.ndarray | None = None
     ) -> Joint:
-        """The model of the windows, with friction along their rows."""
+        """Return the model of the windows."""
         smooth = replace(accuracy, rtol=min(accuracy.rtol, 1e-9))
         parts = []
         for number, pieces in enumerate(self._windows()):
@@ -293,7 +296,7 @@ class SyntheticFit(Measure):
         return Joint(tuple(parts))
 
     def _promised(self, truth: Joint, true: Values) -> np.ndarray:
-        """Standard errors by Fisher's information, the noise being known."""
+        """Compute standard errors from the Fisher information of the known noise."""
         correlations = _correlations(self.process, self.rows)
         jacobian = truth.jacobian(true, self._free)
         information = np.zeros((len(self._free),) * 2)
@@ -306,7 +309,7 @@ class SyntheticFit(Measure):
 
 
 def _pieces(text: str, rows: int) -> list[_Piece]:
-    """The pieces of a window."""
+    """Return the segments of a window."""
     found: list[tuple[float, float, float]] = []
     for part in text.split(","):
         stated = _PIECE.fullmatch(part)
@@ -327,7 +330,10 @@ def _pieces(text: str, rows: int) -> list[_Piece]:
 
 
 def _rows(pieces: Sequence[_Piece]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times, displacements from the first step, and the loading of a window."""
+    """Return the times, displacements and loading history of a window.
+
+    Displacements are relative to the first step.
+    """
     begins = np.cumsum([0.0, *(piece.lasts for piece in pieces)])
     moved = np.cumsum([0.0, *(piece.lasts * piece.velocity for piece in pieces)])
     time, displacement = [], []
@@ -343,7 +349,7 @@ def _rows(pieces: Sequence[_Piece]) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 @lru_cache(maxsize=8)
 def _root(process: str, rows: int) -> np.ndarray:
-    """Matrix that makes white noise that of a process."""
+    """Return the matrix that converts white noise to the noise of a process."""
     return np.asarray(np.linalg.cholesky(toeplitz(_correlations(process, rows))))
 
 

@@ -21,26 +21,26 @@ import numpy as np
 from scipy.signal import find_peaks
 from scipy.stats import norm
 
-#: Chance that any drop is found in a record of Gaussian noise.
+#: Probability of a false detection in a record of Gaussian noise.
 CHANCE = 1e-4
 #: Shortest windows in samples, and samples of a record for each sample of the longest window.
 SHORTEST, SAMPLES = 4, 100
 #: Standard deviations by which a drop must exceed the threshold to be missed once in 1,000.
 FOUND = 3.1
-#: Standard deviations down to which a fall is followed from its peak.
+#: Scaled difference down to which a drop extends from its peak, in standard deviations.
 _FOLLOWED = 2.0
-#: Share of values in the shortest interval, from which noise is taken.
+#: Fraction of the values in the shortest interval, from which the noise is estimated.
 _SHARE = 0.4
-#: Standard deviation over the median of absolute deviations of Gaussian noise.
+#: Ratio of standard deviation to median absolute deviation of Gaussian noise.
 _NORMAL = 1.4826
-#: Sampling intervals that differ by more than this factor are brought to one by means.
+#: A record is resampled if its sampling intervals differ by more than this factor.
 _UNEVEN = 3.0
-#: A window that is 2 or 4 times as long shows a drop better if its scaled fall, over the square
-#: root of its length, is larger by this factor: then the shorter window sees a part of the drop.
+#: A window covers only a part of a drop if the score of a window 2 or 4 times as long is larger by
+#: this factor. The score is the scaled difference divided by the square root of the window length.
 _PARTIAL = 1.4
-#: Number of the shortest window, from 0, that shows how noise is correlated: 16 samples.
+#: Index of the shortest window from which the correlation of the noise is estimated: 16 samples.
 _LEAST_SCALE = 2
-#: Peaks are separate if the scaled fall between them is less by this share of the lower one.
+#: Peaks are separate if the minimum between them is lower by this fraction of the lower peak.
 _SEPARATE = 0.5
 
 
@@ -223,16 +223,16 @@ class _Scale:
         change = falls(stress, window)
         self.window, self.samples = window, len(stress)
         self.usual, spread = most_frequent(change)
-        # a record without noise has that of its resolution
+        # if there is no noise, the resolution determines the spread
         self.spread = max(spread, quantum / math.sqrt(6.0 * window))
-        # the spread itself is known from so many windows only
+        # allow for the error of the spread, which is estimated from few independent windows
         surely = 1.0 + 2.33 / math.sqrt(len(stress) / (2.0 * window))
         self.threshold = max(looks * surely * self.spread, 2.0 * quantum)
         self.smallest = self.threshold + FOUND * self.spread
         self.net = change - max(0.0, self.usual)
         lag = most_frequent(stress[window:] - stress[:-window])[1]
         self.noise = max(lag / math.sqrt(2.0), quantum / math.sqrt(12.0))
-        # from that of white noise to that of noise which does not change within a window
+        # between white noise and noise that is constant within a window
         ratio = self.spread / (self.noise or 1.0) / math.sqrt(2.0 / window)
         self.correlation = min(max(ratio, 1.0), math.sqrt(window))
 
@@ -280,7 +280,7 @@ class _Scale:
         for peak in peaks[complete].tolist():
             place = int(np.searchsorted(below, peak))
             start, stop = int(below[place - 1]), int(below[place])  # in terms of `padded`
-            # a step is seen from all windows that it is in
+            # a sudden drop affects all windows that contain it
             begin = min(start + self.window - 1, peak - 1)
             end = max(stop - 1 - self.window, peak - 1)
             found.append((begin + self.window, end + self.window))

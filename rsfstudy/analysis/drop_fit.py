@@ -20,26 +20,26 @@ import numpy as np
 
 from rsfstudy.analysis.drop_detection import Candidate
 
-#: Windows and durations on either side that are fitted, and the fewest and most samples of a side.
+#: Length of each side of the fit, in windows and in durations; fewest and most samples of a side.
 _SPAN, _DURATIONS, _LEAST, _MOST = 3.0, 1.0, 16, 400
-#: Most samples of a fit; of more, means are fitted.
+#: Largest number of samples in a fit. Longer records are averaged.
 _THIN = 300
 #: Windows beyond the candidate in which the drop may begin or end.
 _REACH = 2.0
-#: Times that are tried at once for beginning and end, and how often the grid is refined.
+#: Number of times in each grid for the beginning and the end, and number of grid refinements.
 _GRID, _REFINED = 16, 3
-#: Share of the slope of the drop that lines before and behind it must not reach.
+#: Largest slope of the lines before and after the drop, relative to the slope of the drop.
 _STEEP = 0.3
-#: Share of the drop by which the line on one side must not fall more than that on the other side.
+#: Largest difference between the falls of stress on both sides, relative to the drop.
 _FALLS = 0.5
 #: Excess of the sum of squares, in variances of the noise, at the ends of 95 % intervals: of the
 #: time of a sudden change (twice -ln 0.0253), and of a parameter.
 _OF_TIME, _OF_SIZE = 7.4, 3.84
 #: Standard errors in half of a 95 % interval.
 HALF = 1.96
-#: Share of a sampling interval by which a time between samples is unknown.
+#: Error of a time between two samples, relative to the sampling interval.
 _BETWEEN = 0.55
-#: Samples beside a drop at an end of the record that show stress before it or after it.
+#: Fewest samples next to a drop that show the stress before or after the drop.
 _SHOWS_END = 3
 
 
@@ -234,7 +234,7 @@ def _lines(t: np.ndarray, y: np.ndarray, pairs: np.ndarray) -> _Lines:
     columns = np.stack([1.0 - share, share, np.minimum(t - t0, 0.0), np.maximum(t - t1, 0.0)], -1)
     turned = columns.transpose(0, 2, 1)
     normal = turned @ columns
-    # a tiny ridge: without samples on one side there is no slope to fit
+    # a small ridge term, because a slope is undetermined if one side has no samples
     normal += 1e-9 * np.eye(4) * len(t)
     inverse = np.linalg.inv(normal)
     centre = y.mean()

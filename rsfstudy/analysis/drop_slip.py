@@ -13,7 +13,7 @@ from rsfstudy.analysis.drop_detection import CHANCE, FOUND, falls, quantum_of, s
 from rsfstudy.analysis.drop_fit import HALF
 from rsfstudy.analysis.drops import FoundDrop
 
-#: Standard deviations by which slip exceeds what moves on anyway, and its least excess over that.
+#: Smallest excess of slip over the usual displacement: in standard deviations, and as a fraction.
 _FASTER, _LEAST_EXCESS = 3.0, 0.1
 
 
@@ -51,7 +51,7 @@ def moves_with_drops(times: np.ndarray, moves: np.ndarray, found: Sequence[Place
         lasts, slips = (
             np.diff([of[at : at + window].mean() for at in starts]) for of in (times, moves)
         )
-        # nothing is before the very begin of the record, nor after its end
+        # the record may not extend far enough before or after a drop
         ratios = (lasts[1] / np.where(lasts > 0.0, lasts, math.inf))[::2]
         moved, ratio = float((ratios * slips[::2]).max()), float(ratios.max())
         excess, usual = excess + float(slips[1]) - moved, usual + abs(moved)
@@ -129,8 +129,9 @@ def _slip(
     (drop, candidate), (begin, end, window) = found, place
     size = drop.before - drop.after
     first, last = (int(np.searchsorted(times, at)) for at in room)
-    # moved by m samples, the mean of stress falls less by m drop/window, with noise of a deviation
-    # of sqrt(3 m/window) of the error: so far may noise have moved the place, but once in 1,000
+    # If the window is shifted by m samples, the difference of means decreases by m drop/window.
+    # The noise of this change has a standard deviation of sqrt(3 m/window) times the error. Noise
+    # shifts the drop further than this limit only once in 1,000.
     off = math.ceil(3.0 * window * (FOUND * candidate.error / size) ** 2)
     off = max(0, min(off, window, begin - window - first, last - end - window))
     begin, end = begin - off, end + off
@@ -143,7 +144,7 @@ def _slip(
     row["peak_slip_rate"] = row["dynamic_stress_drop"] = math.nan, math.nan
     if rates[fastest] > noise * norm.isf(CHANCE / len(rates)):
         row["peak_slip_rate"] = rates[fastest], HALF * noise
-        # stress then lies between that of the two samples
+        # the stress at this time is between the values of the two samples
         ends = stress[fastest : fastest + 2]
         reading = 0.5 * float(np.ptp(ends)) + HALF * spread(np.diff(stress))
         row["dynamic_stress_drop"] = drop.before - ends.mean(), drop.before_error + reading

@@ -9,7 +9,7 @@ import numpy as np
 from rsfstudy.analysis.drop_detection import Candidate, Detection, detect_drops
 from rsfstudy.analysis.drop_fit import Drop, fit_drop
 
-#: Standard errors by which a fitted drop must differ from zero, in half widths of its interval.
+#: Smallest fitted drop, in half widths of its 95 % interval.
 _DIFFERS = 1.0
 
 
@@ -44,7 +44,7 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FoundDrop], D
             break
         candidates = merged
     sure = [of for of in found if _size(of.drop) > _DIFFERS * of.drop.drop_error]
-    if sure:  # long windows take slow drops for noise
+    if sure:  # slow drops increase the noise estimate of long windows
         residual = float(np.median([of.drop.residual for of in sure]))
         detection = detection._replace(noise=min(detection.noise, residual))
     return sure, detection

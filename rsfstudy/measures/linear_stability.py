@@ -84,8 +84,9 @@ class LinearStability(Measure):
         return ("stiffness_ratio",)
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """The critical stiffness by the friction relation, and where growth changes its sign; their
-        difference is the error.
+        """Compute the critical stiffness from friction and from growth rates.
+
+        The error estimate is the difference between both results.
         """
         scene = scene.unforced
         load = scene.log_load_rate
@@ -144,7 +145,13 @@ class LinearStability(Measure):
 
 
 def _explicit(scene: Scene) -> float:
-    """The published formula, for scenes it speaks of; NaN for others."""
+    """Compute the critical stiffness from the published formula.
+
+    Returns
+    -------
+    float
+        NaN if the formula does not apply to the scene.
+    """
     law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
     others = law.steady_states or law.feels_stress or scene.parts.fluid.effects
     if coupling is None or others or scene.imposed_normal_stress:
@@ -155,8 +162,12 @@ def _explicit(scene: Scene) -> float:
 
 
 def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float:
-    """Stiffness at which perturbations of steady sliding neither grow nor decay; NaN where they do
-    not grow below it and decay above.
+    """Find the stiffness at which the largest growth rate is zero.
+
+    Returns
+    -------
+    float
+        NaN if perturbations do not grow below this stiffness, or do not decay above it.
     """
     with_mass = scene.dynamics.norm(scene, steady.log_slip_rate) > _MASS_SHOWS
 
@@ -181,12 +192,18 @@ def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float
 
 
 def growth(jacobian: np.ndarray) -> float:
-    """Growth rate of the fastest growing perturbation, per unit of the clock."""
+    """Return the growth rate of the fastest-growing perturbation.
+
+    The unit is the inverse of the independent variable of the equations.
+    """
     return float(np.linalg.eigvals(jacobian).real.max())
 
 
 def jacobian(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
-    """Derivatives of the rates (rows) by the unknowns (columns), by central differences."""
+    """Compute the Jacobian of the rates by central differences.
+
+    Rows are rates, and columns are unknowns.
+    """
     columns = []
     for number, scale in enumerate(equations.scales):
         step = _DIFFERENCE * scale

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import cholesky_banded, solve_banded
 
-#: Variance of noise that is not averaged, relative to averaged noise: without it, notches of the
-#: spectrum would have infinite weight. And the largest number of rows within an averaging time.
+#: Variance of unaveraged noise relative to averaged noise, which prevents an infinite weight of the
+#: notches of the spectrum; and the largest number of rows within an averaging time.
 _FLOOR, _WIDEST = 0.002, 200
 
 
@@ -34,7 +34,7 @@ class Overlap:
                 break
             band.append(np.append(overlap, np.zeros(lag)))
         self.factor = cholesky_banded(np.array(band), lower=True)
-        #: Rows that one independent row stands for.
+        #: Number of correlated rows per independent row.
         self.rows = float(1.0 + 2.0 * np.sum(band[1:]) / len(time))
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:

@@ -99,7 +99,7 @@ class Fitted:
         matrix.
         """
         variances = np.einsum("ij,jk,ik->i", self.jacobian, self.covariance, self.jacobian)
-        # below 0 by rounding, where a parameter is not told
+        # rounding errors may cause negative values if a parameter is not constrained
         return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
     def stderr(self, name: str) -> float:

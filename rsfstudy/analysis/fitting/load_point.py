@@ -24,8 +24,8 @@ from rsfstudy.analysis.fitting.steps import Step
 _MEANS = 1000
 #: Part of the displacement of a record that noise exceeds.
 _CLEAN = 1e-7
-#: Standard deviation of residuals of displacement, over its quantum, below which there is no noise
-#: that would make rounding errors random; and draws of their phases.
+#: Ratio of the standard deviation of displacement residuals to the quantum below which rounding
+#: errors are not random; and the number of random phases that are drawn.
 _DITHERED, _DRAWS = 0.4, 200
 
 
@@ -127,7 +127,7 @@ def _errors(
         root = _rounding_root(columns[:, :-1], exact, np.searchsorted(at, t), quantum)
     else:
         root = _noise_root(t, columns)
-    # steps are found where displacement parts best, which need not be where all of it would have it
+    # the detected steps differ from the least-squares solution for all rows
     missed = best[:-1] - np.concatenate([np.zeros(len(at)), speeds[moves]])
     root = np.column_stack([root, missed])
     faster = np.zeros((len(speeds), root.shape[1]))

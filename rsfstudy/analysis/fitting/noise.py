@@ -362,8 +362,8 @@ class _Products:
         width = columns.shape[1]
         self.levels = sorted({(run.number, run.level) for run in runs})
         self.sums = np.zeros((len(self.levels), order + 1, order + 1, width, width))
-        #: The first rows of each run with the rows before that predict them, the number of the
-        #: latter, the process of the run, and the levels of all these rows.
+        #: For each run: the first rows and the rows before them that predict them, the number of
+        #: rows before them, the process of the run, and the levels of these rows.
         self.early: list[tuple[np.ndarray, int, int, np.ndarray]] = []
         levels = index_rows(runs, "level")
         for run in runs:

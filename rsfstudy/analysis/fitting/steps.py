@@ -43,7 +43,7 @@ _LOCAL_ROWS, _LOUDER = 31, 2.0
 _NORMAL = 1.4826
 
 
-#: Sum of squares that remains of rows i to j.
+#: Function that returns the sum of squared residuals of rows i to j.
 Squares = Callable[[np.ndarray | int, np.ndarray | int], np.ndarray]
 #: Displacement at time 0, and velocity.
 _Line = tuple[float, float]
@@ -340,7 +340,7 @@ def _ramps(
         last = n
         while last + 1 < len(times) and changes[last + 1] == changes[n] and is_short(n, last + 1):
             last += 1
-        # beyond its set point and back
+        # overshoot and return
         back = last + 1
         while back < len(times) and changes[back] != changes[n] and _is_back(speeds, n, last, back):
             if not is_short(n, back):

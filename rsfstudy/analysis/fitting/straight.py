@@ -19,9 +19,9 @@ _GAINS = 15.0
 #: standard deviations of the residuals. A step of velocity by a factor of ten changes friction by
 #: 0.02 or so.
 _DEPARTS, _STANDS_OUT = 4e-4, 4.0
-#: Share of friction, next to the step, from which noise is taken.
+#: Fraction of the rows, next to the step, from which the noise is estimated.
 _LAST = 0.4
-#: Largest correlation of successive means that is believed.
+#: Upper bound of the estimated correlation of successive means.
 _CORRELATED = 0.98
 
 
@@ -73,13 +73,13 @@ def _find_break(t: np.ndarray, friction: np.ndarray) -> int:
     both = sums.residual_squares(0, places) + sums.residual_squares(places, count)
     place = int(places[np.argmin(both)])
     time, moved = t - t[0], friction - friction[0]
-    # noise is that of the last part: what is left of a curved part is no noise
+    # the noise is estimated from the last part, because residuals of a curved part are not noise
     last = count - max(int(_LAST * count), _FEWEST)
     (x0, v0), (x1, v1) = sums.line(last, count), sums.line(place, count)
     left = (moved - x0 - v0 * time)[last:]
     size = float(np.sqrt(left @ left / (len(left) - 2)))
     rho = float(left[1:] @ left[:-1] / max(left @ left, 1e-300))
-    rho += 4.0 * (1.0 + rho) / len(left)  # the line takes up a part of the correlation
+    rho += 4.0 * (1.0 + rho) / len(left)  # the fit of the line reduces the correlation
     rho = min(max(rho, 0.0), _CORRELATED)
     gain = float(sums.residual_squares(0, count)) - float(both.min())
     departs = float(np.abs(moved[:place] - x1 - v1 * time[:place]).max())

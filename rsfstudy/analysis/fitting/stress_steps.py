@@ -23,9 +23,10 @@ from rsfstudy.analysis.fitting.steps import Step
 #: Least change of level, relative to the level before, and relative to the robust standard
 #: deviation of differences.
 CHANGES, _STANDS_OUT = 0.02, 6.0
-#: Share of a change by which levels over longer parts may differ: else it is part of a ramp.
+#: Largest difference of levels over longer windows, as a fraction of the change. A larger
+#: difference indicates that the change is a part of a ramp.
 _LEVEL = 0.25
-#: Share of the least change down to which a change is followed.
+#: Fraction of the smallest change down to which a change extends.
 _FOLLOWED = 0.4
 #: Most rows at once (of a longer record, means of several rows), parts of the record that are
 #: compared, and the fewest rows of a part.
@@ -119,7 +120,7 @@ def _changes(stress: np.ndarray, window: int) -> list[slice]:
             elif signed[rows].max() > least:
                 joined.append(rows)
         found += joined
-    # at the ends of the record a change has no level on one side
+    # a change at an end of the record has no constant level on one side
     inside = [rows for rows in found if rows.start > 0 and rows.stop < len(change)]
     return [slice(rows.start, rows.stop - 1 + 2 * window) for rows in inside]
 
@@ -190,7 +191,7 @@ def with_levels(
             before, after = (during[0].before, during[-1].after) if during else (level, level)
             step = step._replace(stress_before=before, stress_after=after)
         if step.begins == step.ends and step.stress_ratio != 1.0:
-            # a change of normal stress takes a sample at least
+            # a change of normal stress lasts at least one sampling interval
             row = int(np.clip(np.searchsorted(time, step.begins, "right"), 1, len(time) - 1))
             step = step._replace(begins=float(time[row - 1]), ends=float(time[row]))
         found.append(step)
@@ -206,7 +207,7 @@ def _overlap(step: Step, change: StressStep) -> bool:
 def _step(time: np.ndarray, stress: np.ndarray, before: float, after: float) -> StressStep:
     """Locate the ramp between two levels by a linear fit."""
     share = (stress - before) / (after - before)
-    middle = int(np.argmax(np.cumsum(0.5 - share)))  # where rows part best by the half
+    middle = int(np.argmax(np.cumsum(0.5 - share)))  # the best boundary at half of the change
     first = int(np.flatnonzero(share[: middle + 1] <= _RAMP[0]).max(initial=0))
     reached = np.flatnonzero(share[middle:] >= _RAMP[1])
     last = middle + int(reached[0]) if len(reached) else len(share) - 1

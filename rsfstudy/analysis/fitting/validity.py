@@ -19,7 +19,7 @@ from rsfstudy.wording import counted
 
 #: Parameters that are slip distances.
 DISTANCES = ("slip_distance", "slip_distance_2")
-#: p-value below which whitened residuals are called autocorrelated.
+#: Significance level of the test for autocorrelated whitened residuals.
 SIGNIFICANT = 0.01
 #: Standard deviation of friction below which residuals are numerical, not statistical.
 NEGLIGIBLE = 1e-7
@@ -28,7 +28,7 @@ _LARGEST_RATIO = 2.0
 #: Standard deviation of the noise, over the quantum of friction, below which rounding errors depend
 #: on friction; and the largest fraction of rows that may be outliers.
 _LEAST_NOISE, _MOST_OUTLIERS = 0.4, 0.05
-#: Fewest rows within a slip distance for which intervals were found to cover.
+#: Fewest rows within a slip distance for which confidence intervals are reliable.
 _FEWEST_ROWS = 1.5
 #: Largest number of outliers that a message names.
 _NAMED = 10

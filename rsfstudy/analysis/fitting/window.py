@@ -24,13 +24,13 @@ from rsfstudy.status import Status
 _BACK, _ROWS = 0.5, 3
 #: Part of the time before the first step by which loading may come late.
 _LATE = 0.2
-#: Share of a stated extent below which a window is called cut.
+#: Smallest fraction of a requested extent for which no remark is made.
 _CUT = 0.98
 LOADINGS = ("steps", "recorded")
 #: Rows of the running median by which noise of normal stress is reduced, the quantile of departures
 #: that is compared, and the standard deviations of noise by which it may exceed the limit.
 _SMOOTHED, _MOST_OF, _NOISE_ALLOWED = 5, 0.99, 2.0
-#: Logarithm of the ratio of velocities below which a step shows neither a nor b at a glance.
+#: Logarithm of the ratio of velocities below which the initial a and b are not read from the step.
 _LEAST_RATIO = 0.02
 
 
