@@ -1,7 +1,8 @@
-"""Synthetic records with the imperfections of laboratory records.
+"""Synthetic records with typical imperfections of laboratory records.
 
-Each kind turns the friction of a velocity step into a record: it chooses the times of the rows,
-adds noise, and degrades friction or displacement as data acquisition does.
+Each kind of imperfection converts the friction of a velocity step into a record. The conversion
+selects the sample times, adds noise, and modifies friction or displacement in the same way as data
+acquisition systems do.
 """
 
 from __future__ import annotations
@@ -18,16 +19,16 @@ if TYPE_CHECKING:
 
 
 class Truth(NamedTuple):
-    """The true velocity step of a record.
+    """The exact response to a velocity step.
 
     Attributes
     ----------
     step, ends : float
         Times in s of the step and of the end of the record.
     before, after : float
-        Load point velocities in um/s.
+        Load point velocities in um/s before and after the step.
     friction : callable
-        From times in s to friction.
+        Function that returns friction at given times in s.
     noise_size : float
         Standard deviation of the noise of friction.
     """
@@ -40,43 +41,43 @@ class Truth(NamedTuple):
     noise_size: float
 
     def displacement(self, time: np.ndarray) -> np.ndarray:
-        """Return the load point displacement from the step, in um."""
+        """Return the load point displacement relative to the step, in um."""
         late = time - self.step
         return np.where(late < 0.0, self.before, self.after) * late
 
 
 @dataclass(frozen=True)
 class NoiseKind:
-    """A kind of imperfection.
+    """A kind of imperfection of a laboratory record.
 
     Attributes
     ----------
     rate : tuple of float
-        Rows per second before and after the step.
+        Sampling rates in Hz before and after the step.
     jitter : float
-        Standard deviation of the sample times, as a fraction of the interval.
+        Standard deviation of the sample times, as a fraction of the sampling interval.
     correlation : float
-        Correlation of the noise of successive rows.
+        Correlation between the noise of successive rows.
     correlation_time : float
-        Correlation time in s of the noise, instead.
+        Correlation time of the noise in s, as an alternative to ``correlation``.
     louder : float
-        Factor by which the noise is larger after the step.
+        Ratio of the noise after the step to the noise before the step.
     spikes : float
-        Fraction of rows with an outlier.
+        Fraction of rows that are outliers.
     quantum : float
-        To which friction is rounded, relative to the noise.
+        Quantum to which friction is rounded, relative to the standard deviation of the noise.
     mean_of : int
-        Rows of a running mean of friction.
+        Number of rows in a running mean of friction.
     displacement_noise, displacement_quantum : float
-        Of the recorded load point displacement, in um.
+        Noise and quantum of the recorded load point displacement, in um.
     pink : bool
-        True for noise with a power of 1/f.
+        If True, the power spectrum of the noise is proportional to 1/f.
     trend : float
-        Of friction, in 1/um.
+        Trend of friction in 1/um.
     noise_factor : float
-        Factor of the standard deviation of the noise.
+        Factor by which the standard deviation of the noise is multiplied.
     states_filter : bool
-        True if the running mean is stated to the fit.
+        If True, the fit is given the length of the running mean.
     """
 
     rate: tuple[float, float] = (2.0, 20.0)
@@ -96,16 +97,19 @@ class NoiseKind:
 
     @property
     def filter(self) -> str:
-        """The filter that is stated to the fit."""
+        """The filter that is passed to the fit, or an empty string."""
         return f"mean {self.mean_of / self.rate[1]!r}" if self.states_filter else ""
 
     @property
     def finds_steps(self) -> bool:
-        """True if the steps are found in the recorded displacement, and not stated."""
+        """True if the fit detects the steps in the recorded displacement.
+
+        Otherwise the exact steps are passed to the fit.
+        """
         return self.displacement_noise > 0.0 or self.displacement_quantum > 0.0
 
     def draw(self, truth: Truth, rng: np.random.Generator) -> Record:
-        """Draw a record."""
+        """Draw a random record."""
         from rsfstudy.analysis.fitting.record import Record  # imports xarray, which is slow
 
         margin = self.mean_of // 2

@@ -1,4 +1,7 @@
-"""A step of normal stress under a load point that moves on, as Linker and Dieterich read it off."""
+"""Transient of friction after a step of normal stress at a moving load point.
+
+The evaluation follows Linker and Dieterich (1992).
+"""
 
 from __future__ import annotations
 
@@ -77,8 +80,17 @@ _OUTPUTS = (
 
 
 class _Record(NamedTuple):
-    """Instant after a step, what was recorded, and friction at the slips where it is read; at none
-    where the spring has not taken up the change of strength.
+    """Record after a step of normal stress.
+
+    Attributes
+    ----------
+    begin : Event
+        Beginning of the record, immediately after the step.
+    rows : ndarray
+        Recorded samples.
+    friction : mapping of float to float
+        Friction at the slips at which it is read. Empty if the spring has not followed the change
+        of strength.
     """
 
     begin: Event
@@ -91,29 +103,29 @@ class _Record(NamedTuple):
         return float(friction_coefficient_of(self.rows[-1:])[0])
 
     def left(self, slip: float) -> float:
-        """Transient of friction that is left after so much slip."""
+        """Return the remaining transient of friction at a slip."""
         return self.friction.get(slip, math.nan) - self.after
 
 
 @dataclass(frozen=True)
 class NormalStressTransient(Recorded):
-    """Response of friction to a step of imposed normal stress by a ratio r, while the load point
-    moves on at V_*.
+    """Transient of friction after a step of imposed normal stress by a ratio r.
 
-    An exponential through what is left of the transient at two slips gives its slip distance, and
-    followed back to the step its size, which over -ln r is alpha. A rigid slider whose state
-    evolves by the slip law shows -alpha ln r exp(-slip/D_c), and one by the slowness law b ln{1 +
-    [r^(-alpha/b) - 1] exp(-slip/D_c)}: what is read off it is alpha by the slip law alone.
+    The load point moves at V_* throughout. An exponential is fitted to the remaining transient at
+    two slips, and gives the slip distance. The size of the transient follows by extrapolation to
+    the step, and alpha is this size divided by -ln r. The transient of a rigid slider is -alpha ln
+    r exp(-slip/D_c) under the slip law, and b ln{1 + [r^(-alpha/b) - 1] exp(-slip/D_c)} under the
+    slowness law. The fitted alpha therefore equals the parameter alpha only under the slip law.
 
     Parameters
     ----------
     fit_from, fit_to : float
-        Slips since the step at which the exponential is read, in D_c: the spring must have taken up
-        the change of strength before the first, where slip rate is V_* again to a factor of two.
+        Slips since the step at which the exponential is read, in D_c. At the first slip, the spring
+        must have followed the change of strength, so that slip rate is V_* within a factor of two.
     record : float
-        Load point displacement that is recorded, in D_c; friction at its end counts as steady.
+        Load point displacement of the record, in D_c. Friction at its end is taken as steady.
     phases : int
-        Points of the record that are kept along `phase`.
+        Number of points of the record along ``phase``.
 
     References
     ----------
@@ -150,7 +162,10 @@ class NormalStressTransient(Recorded):
         return {name: part * abs(values[name]) for name in names}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Follow the motion, and once more with smaller tolerances for the errors."""
+        """Compute the transient, and its errors from a second motion.
+
+        The second motion has smaller tolerances.
+        """
         check_leaves_alone(scene)
         step = scene.parts.loading.segments[0]
         if not step.normal_stress:
@@ -182,7 +197,7 @@ class NormalStressTransient(Recorded):
         return Outcome(Status.OK, {**values, **errors, **shown})
 
     def _speaks_against(self, scene: Scene) -> str:
-        """Why there is nothing to read; empty where there is."""
+        """Return the reason why the transient cannot be read, or an empty string."""
         step, coupling = scene.parts.loading.segments[0], scene.parts.normal_stress.coupling
         if step.load_velocity != 1.0 or step.displacement:
             return "the load point does not move on at V_* as before"
@@ -193,7 +208,10 @@ class NormalStressTransient(Recorded):
         return ""
 
     def _follow(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> _Record | None:
-        """Record of the motion; None where slip does not come as far as it is read."""
+        """Record the motion.
+
+        The result is None if slip does not reach the values at which friction is read.
+        """
         recording = Recording()
         begin, *_others = follow(
             scene, accuracy, meter, clock=True, recording=recording, until=self.record
@@ -211,8 +229,11 @@ class NormalStressTransient(Recorded):
     def _at_slips(
         self, scene: Scene, rows: np.ndarray, accuracy: Accuracy, meter: Meter
     ) -> dict[float, float]:
-        """Friction at the slips where it is read: followed until then, and not between the steps of
-        an integrator; rows tell nearly when that is, and slip rate the rest.
+        """Return friction at the slips at which it is read.
+
+        The recorded rows give an estimate of the time at which a slip is reached. The motion is
+        then followed to this time, and the time is corrected with the slip rate. Friction is not
+        interpolated between integration steps.
         """
         found, elapsed, slipped = dict[float, float](), 0.0, 0.0
         stepped, start = scene.acting(0), None
@@ -231,8 +252,10 @@ class NormalStressTransient(Recorded):
         return found
 
     def _read(self, scene: Scene, record: _Record) -> dict[str, float]:
-        """Numbers that are read off; none where no exponential goes through what is left, or the
-        spring has not taken up the change of strength.
+        """Return the numbers that are read from the record.
+
+        The result is empty if the remaining strength change does not fit an exponential, or if the
+        spring has not followed the change of strength.
         """
         first, last = record.left(self.fit_from), record.left(self.fit_to)
         if not first or not 0.0 < last / first < 1.0:
@@ -264,9 +287,7 @@ class NormalStressTransient(Recorded):
         }
 
     def _shown(self, scene: Scene, record: _Record) -> dict[str, float | np.ndarray]:
-        """Change of friction at once, whether it has settled, its departure from that of a stiff
-        slider, and the record itself.
-        """
+        """Return the direct change of friction, the flag, the departure and the record."""
         rows, friction = record.rows, friction_coefficient_of(record.rows)
         late = rows[:, 0] >= (1.0 - _LAST) * self.record
         is_flat = bool(np.ptp(friction[late]) < _STAYS * abs(record.left(self.fit_from)))
@@ -301,6 +322,6 @@ class NormalStressTransient(Recorded):
 
 
 def _direct(scene: Scene, record: _Record) -> float:
-    """Change of friction at once, less the direct effect of slip rate."""
+    """Compute the immediate change of friction without the direct effect."""
     point = record.begin.point
     return point.coefficient - scene.mu_star - scene.a * point.log_slip_rate

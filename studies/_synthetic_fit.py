@@ -1,4 +1,4 @@
-"""A fit of a synthetic record, whose parameters are known: does it find them within its errors?"""
+"""Fits of synthetic records with known parameters, to test the errors of fits."""
 
 from __future__ import annotations
 
@@ -68,12 +68,12 @@ _FLAGGED = Output("flagged", "", "1", "1 if standard errors are reported as not 
 
 
 def designs(protocols: Mapping[str, str]) -> Axis:
-    """An axis of protocols, by what they are called."""
+    """Return an axis of named protocols."""
     return Axis("design", {name: {"protocol": text} for name, text in protocols.items()})
 
 
 class _Piece(NamedTuple):
-    """A piece of a protocol: velocity in um/s, how long it lasts in s, and its rows."""
+    """Segment of a protocol: velocity in um/s, duration in s, and number of rows."""
 
     velocity: float
     lasts: float
@@ -82,34 +82,36 @@ class _Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class SyntheticFit(Measure):
-    """A fit of a record that was computed, with noise that was drawn, held to the truth.
+    """Fit of a synthetic record, compared with the exact parameters.
 
-    The record is that of the scene, whose unit of slip is `slip_distance`, under a protocol; rows
-    are evenly spaced in load point displacement, in a hold in time.
+    The record is computed from the scene under a given protocol. Rows are evenly spaced in load
+    point displacement, or in time during a hold. The unit of slip of the scene is
+    ``slip_distance``.
 
     Parameters
     ----------
     protocol : str
-        Velocities in um/s and displacements in um: ``"1:30, 10:270"`` is a step after 30 um; a hold
-        states its time, ``"0:100 s"``. Windows that are fitted together are parted by semicolons.
+        Velocities in um/s and displacements in um: ``"1:30, 10:270"`` is a step after 30 um. A hold
+        is specified by its duration: ``"0:100 s"``. Semicolons separate windows that are fitted
+        jointly.
     free : tuple of str
-        Parameters to look for.
+        Names of the free parameters.
     slip_distance : float
-        D_c in um.
+        Slip distance D_c in um.
     rows : int
-        Rows of each window.
+        Number of rows in each window.
     noise_size : float
         Standard deviation of the noise.
     process : str
-        The noise that is drawn: "white"; "ar1", autoregressive with a correlation of 0.9; "ma3", a
-        moving average of four rows; or a kind of laboratory record (`_noise_kinds.KINDS`), which
-        chooses the times of the rows itself.
+        Noise process: "white", "ar1" (autoregressive with a correlation of 0.9), "ma3" (a moving
+        average of four rows), or a kind of laboratory record (``_noise_kinds.KINDS``), which
+        selects its own sample times.
     noise : str
-        The noise that the fit looks for, as `Fit` takes it.
+        Noise model of the fit (see ``Fit``).
     fitted_law : str
-        The law that is fitted; that of the scene, if empty.
+        Law that is fitted. By default, the law of the scene.
     seed : int
-        Tells the noise.
+        Seed of the random noise.
     """
 
     protocol: str = UP
@@ -150,7 +152,7 @@ class SyntheticFit(Measure):
 
     @property
     def outputs(self) -> Sequence[Output]:
-        """By parameter, how far off it is and how far it may be; and what laws are compared by."""
+        """Deviations and errors by parameter, and quantities to compare laws."""
         by = [
             Output(name, "", "1", text, dims=("parameter",), error=name == self.headline)
             for name, text in _OF_PARAMETER
@@ -161,7 +163,10 @@ class SyntheticFit(Measure):
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        """The parameters; of those that each window has for itself, that of the first one."""
+        """Names of the parameters.
+
+        If each window has its own value of a parameter, the first window is reported.
+        """
         return {"parameter": np.array(self.free, dtype=object)}
 
     @property
@@ -169,7 +174,7 @@ class SyntheticFit(Measure):
         return numbered(self.free, len(self._windows()))
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Draw a record, and fit it."""
+        """Draw a record and fit it."""
         if self.process in KINDS:
             return self._find_in_record(scene, accuracy, meter)
         true = self._true(scene)
@@ -189,7 +194,7 @@ class SyntheticFit(Measure):
         return Outcome(Status.OK, self._compared(search, found, true, promised, reasons))
 
     def _find_in_record(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Draw a laboratory record, and fit it as `rsfstudy.fit` does."""
+        """Draw a laboratory record and fit it in the same way as ``rsfstudy.fit``."""
         from rsfstudy.measures.fit import Fit  # imports xarray, which is slow
 
         kind, true = KINDS[self.process], self._true(scene)
@@ -229,7 +234,7 @@ class SyntheticFit(Measure):
         promised: np.ndarray,
         reasons: Sequence[str],
     ) -> dict[str, Value]:
-        """Compare the result of a search with the truth."""
+        """Compare the result of a fit with the exact parameters."""
         naive = found
         if self.noise != "white":
             naive = Search(search.model, found.values, self._free, "white").run()
@@ -256,11 +261,11 @@ class SyntheticFit(Measure):
         return values | {"flagged": float(bool(reasons))}
 
     def _windows(self) -> list[list[_Piece]]:
-        """The pieces of each window."""
+        """Return the segments of each window."""
         return [_pieces(text, self.rows) for text in self.protocol.split(";")]
 
     def _true(self, scene: Scene) -> dict[str, float]:
-        """All parameters of the scene, with the numbers of windows."""
+        """Return the exact values of all parameters."""
         longer = self.slip_distance * (scene.as_dict().get("length_ratio") or 1.0)
         plainly = parameters_of(scene, self.slip_distance, longer)
         plainly |= {name: 0.0 for name in self.free if name not in plainly}
@@ -268,7 +273,7 @@ class SyntheticFit(Measure):
         return {name: plainly[plain(name)] for name in names}
 
     def _first(self, scene: Scene, true: Values) -> dict[str, float]:
-        """Parameters that the search begins with: near the truth, and not at it."""
+        """Return initial parameters that differ slightly from the exact values."""
         first = {
             n: v * (_OFF if n in LOGARITHMIC and n in self.free else 1.0) for n, v in true.items()
         }
@@ -281,7 +286,7 @@ class SyntheticFit(Measure):
     def _joint(
         self, scene: Scene, accuracy: Accuracy, meter: Meter, friction: np.ndarray | None = None
     ) -> Joint:
-        """The model of the windows, with friction along their rows."""
+        """Return the model of the windows."""
         smooth = replace(accuracy, rtol=min(accuracy.rtol, 1e-9))
         parts = []
         for number, pieces in enumerate(self._windows()):
@@ -292,7 +297,7 @@ class SyntheticFit(Measure):
         return Joint(tuple(parts))
 
     def _promised(self, truth: Joint, true: Values) -> np.ndarray:
-        """Standard errors by Fisher's information, the noise being known."""
+        """Compute standard errors from the Fisher information of the known noise."""
         correlations = _correlations(self.process, self.rows)
         jacobian = truth.jacobian(true, self._free)
         information = np.zeros((len(self._free),) * 2)
@@ -305,7 +310,7 @@ class SyntheticFit(Measure):
 
 
 def _pieces(text: str, rows: int) -> list[_Piece]:
-    """The pieces of a window."""
+    """Return the segments of a window."""
     found: list[tuple[float, float, float]] = []
     for part in text.split(","):
         stated = _PIECE.fullmatch(part)
@@ -326,7 +331,10 @@ def _pieces(text: str, rows: int) -> list[_Piece]:
 
 
 def _rows(pieces: Sequence[_Piece]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times, displacements from the first step, and the loading of a window."""
+    """Return the times, displacements and loading history of a window.
+
+    Displacements are relative to the first step.
+    """
     begins = np.cumsum([0.0, *(piece.lasts for piece in pieces)])
     moved = np.cumsum([0.0, *(piece.lasts * piece.velocity for piece in pieces)])
     time, displacement = [], []
@@ -342,12 +350,12 @@ def _rows(pieces: Sequence[_Piece]) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 @lru_cache(maxsize=8)
 def _root(process: str, rows: int) -> np.ndarray:
-    """Matrix that makes white noise that of a process."""
+    """Return the matrix that converts white noise to the noise of a process."""
     return np.asarray(np.linalg.cholesky(toeplitz(_correlations(process, rows))))
 
 
 def _correlations(process: str, rows: int) -> np.ndarray:
-    """Autocorrelations of a process at each lag."""
+    """Return the autocorrelations of a noise process at each lag."""
     if process == "ar1":
         return np.asarray(_AR1 ** np.arange(rows))
     weights = _MOVING_AVERAGES[process]

@@ -1,13 +1,14 @@
-"""Do the errors of a fit cover the truth? Synthetic velocity steps with noise of many kinds.
+"""Coverage of the confidence intervals of fits for many kinds of noise.
 
-A velocity step from 1 to 10 um/s with noise that is white, autoregressive with a correlation of
-0.9, or a moving average, is fitted by the law that made it. Errors that count the correlation of
-the noise (full markers) cover the truth as often as they promise; those of the usual formula, which
-takes residuals for white noise (open markers), cover it far less often where noise is correlated.
+Synthetic records of a velocity step from 1 to 10 um/s are fitted with the law that was used to
+compute them. The noise is white, autoregressive with a correlation of 0.9, or a moving average. If
+the standard errors account for the correlation of the noise (full markers), the intervals contain
+the exact parameters with the nominal probability. The usual formula assumes white noise (open
+markers), and its intervals contain the exact parameters far less often if the noise is correlated.
 Further kinds of noise imitate laboratory records: a noise level that changes, outliers, rounded
-friction, an uneven clock, displacement with jitter or from an encoder, and averaged friction. The
-fit reports that errors are not valid if friction is rounded too coarsely, or if it was averaged and
-the average was not stated.
+friction, an uneven clock, displacement with jitter or from an encoder, and averaged friction. If
+friction is rounded too coarsely, or if friction was averaged without a corresponding option of the
+fit, the fit reports that the standard errors are not valid.
 """
 
 from collections.abc import Mapping
@@ -40,17 +41,17 @@ CHANCE = 3.5
 
 @dataclass(frozen=True)
 class ShareInside(Reduction):
-    """Share of records whose truth lies within an interval.
+    """Fraction of records with the exact value inside an interval.
 
     Parameters
     ----------
     name : str
-        Gives the share ``<name>``; and ``<name>_least``, how far that of the parameter with the
-        least is above `covers`, in binomial standard deviations.
+        Name of the fraction. ``<name>_least`` is the smallest fraction of any parameter minus
+        ``covers``, in binomial standard deviations.
     of : str
-        Variable that is 1 inside and 0 outside.
+        Variable that is 1 inside the interval and 0 outside.
     covers : float
-        Share that the interval promises.
+        Nominal coverage of the interval.
     """
 
     covers: float = ONE
@@ -61,7 +62,7 @@ class ShareInside(Reduction):
     }
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Mean over records."""
+        """Compute the mean over records."""
         share = dataset[self.of].mean("seed")
         spread = np.sqrt(self.covers * (1.0 - self.covers) / dataset.sizes["seed"])
         least = (share.min("parameter") - self.covers) / spread
@@ -70,14 +71,14 @@ class ShareInside(Reduction):
 
 @dataclass(frozen=True)
 class ShareFlagged(Reduction):
-    """Share of records whose standard errors are reported as not valid.
+    """Fraction of records for which the fit reports invalid standard errors.
 
     Parameters
     ----------
     name : str
-        Name of the share.
+        Name of the fraction.
     of : str
-        Variable that is 1 for a flagged record and 0 otherwise.
+        Variable that is 1 for a record with invalid standard errors, and 0 otherwise.
     """
 
     kind: ClassVar[str] = "share_flagged"
@@ -91,7 +92,7 @@ class ShareFlagged(Reduction):
 
 
 def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
-    """Shares by parameter, of the fit and of the naive formula."""
+    """Plot the fractions by parameter, for the fit and for the usual formula."""
     from rsfstudy.plots import look, marker
 
     places = np.arange(dataset.sizes["parameter"])
@@ -120,7 +121,7 @@ shares = Panel(
 
 
 def covers(series: str, words: str, **where: str) -> list[Claim]:
-    """Two claims of a series: intervals cover what they promise, within chance."""
+    """Return two claims that intervals have their nominal coverage."""
     return [
         Claim.above(
             id=f"{series}{number}",
@@ -137,7 +138,7 @@ def covers(series: str, words: str, **where: str) -> list[Claim]:
 
 
 def is_flagged(process: str, law: str, least: float) -> Claim:
-    """Return the claim that errors of a kind that cannot be modelled are flagged."""
+    """Return the claim that the fit detects noise that it cannot model."""
     return Claim.above(
         id="F6",
         statement=f"{process} record, {law} law: the fit reports that errors are not valid",
@@ -150,7 +151,7 @@ def is_flagged(process: str, law: str, least: float) -> Claim:
 
 
 def is_seldom_flagged(process: str, law: str) -> Claim:
-    """Return the claim that errors of a kind that can be modelled are seldom flagged."""
+    """Return the claim that the fit accepts noise that it can model."""
     return Claim.below(
         id="F7",
         statement=f"{process} record, {law} law: the fit seldom reports errors that are not valid",
@@ -164,7 +165,7 @@ def is_seldom_flagged(process: str, law: str) -> Claim:
 
 
 def naive_fails(process: str, law: str) -> Claim:
-    """F3: residuals taken for white noise make errors too small."""
+    """Return the claim that the usual formula underestimates errors."""
     return Claim.below(
         id="F3",
         statement=f"{process} noise, {law} law: naive 68.3 % intervals cover far less",

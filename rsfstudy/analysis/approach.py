@@ -1,25 +1,28 @@
-"""The way of a motion to its limit cycle.
+"""Convergence of a motion to its limit cycle.
 
-Of one state, one number decides what follows a rise of V through V_0, the spring stress there: the
-state goes with it, and what a departure along the motion changes is forgotten. So two cycles in a
-row tell the derivative of the map from one rise to the next, and where cycles come closer slowly,
-the motion leaps to the fixed point which that implies.
+If a scene has one state, the spring stress at a rise of V through V_0 determines the motion that
+follows. The map from one rise to the next forgets one direction, because a departure along the
+motion only shifts the time. Two successive cycles therefore determine the derivative of the map. If
+the cycles converge slowly, the motion leaps to the fixed point that this derivative implies.
 
-The section of a motion where V rises through V_0 is s = (f, Psi), and P(s) is its image: the
-section a cycle later, and behind it the headline numbers of that cycle. The derivative P' has a
-column b by f, and a column c by Psi. Spring stress is highest at a section, so that the motion
-passes it along (0, dPsi/dt): to begin a time dt later makes the cycle shorter by dt, and changes
-nothing else. So c is -1/(dPsi/dt) in the recurrence interval, and 0 in all other rows. Where the
-sections of two cycles differ by (df, dPsi), and their images by dP,
+The section of a motion at a rise of V through V_0 is s = (f, Psi), the spring stress and the state.
+The image P(s) holds the section one cycle later, followed by the headline numbers of that cycle.
+The derivative P' has a column b for f and a column c for Psi. Spring stress is highest at a
+section, so the motion passes the section in the direction (0, dPsi/dt). If the motion starts a time
+dt later, the cycle is shorter by dt, and nothing else changes. Therefore c is -1/(dPsi/dt) in the
+row of the recurrence interval, and 0 in all other rows. If the sections of two cycles differ by
+(df, dPsi) and their images by dP, the other column is
 
     b = (dP - c dPsi)/df.
 
-The first two rows of P', the derivative A of the next section, have c = 0: A has rank one, and its
-trace is the eigenvalue that is not 0. So A**2 = (tr A) A, and from s to the fixed point it is
+The first two rows of P' are the derivative A of the next section. Column c of A is zero, so A has
+rank one, and its nonzero eigenvalue is its trace. Therefore A**2 = (tr A) A, and the vector from s
+to the fixed point is
 
     (1 - A)^-1 (P(s) - s) = P(s) - s + A (P(s) - s)/(1 - tr A).
 
-With several states a motion is followed cycle by cycle: after how many it repeats itself, if ever.
+If a scene has several states, the motion is followed cycle by cycle. The cycles are then compared
+to find the number of cycles after which the motion repeats, if it does.
 """
 
 from __future__ import annotations
@@ -59,19 +62,19 @@ _CRITICAL = 1e-5
 
 
 class Approach:
-    """The way to the limit cycle of a scene with one state.
+    """Convergence to the limit cycle of a scene with one state.
 
     Parameters
     ----------
     scene : Scene
     accuracy : Accuracy
     meter : Meter
-        Charged with the motion.
+        Counter of the work of the motion.
 
     Attributes
     ----------
     seen : list of Cycle
-        The cycles so far; the last is the limit cycle once `follow` has returned true.
+        Cycles so far. The last one is the limit cycle after ``follow`` has returned True.
     """
 
     def __init__(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> None:
@@ -93,13 +96,17 @@ class Approach:
         self._left_at_leap = np.inf
 
     def follow(self, events: int) -> bool:
-        """Follow cycles until one is the limit cycle; false where the motion settles to steady
-        sliding.
+        """Follow cycles until the motion reaches the limit cycle.
+
+        Returns
+        -------
+        bool
+            False if the motion settles to steady sliding.
 
         Raises
         ------
         Halt
-            With `work_budget_spent` where none is within so many events.
+            With ``work_budget_spent`` if no cycle repeats within ``events`` cycles.
         """
         start = None
         while True:
@@ -123,7 +130,7 @@ class Approach:
 
     @property
     def _hopeless(self) -> str:
-        """Why no number of events would do, where stiffness is the critical one; else empty."""
+        """Explanation if the stiffness is critical; otherwise an empty string."""
         critical = critical_stiffness(self._scene, self._scene.log_load_rate)
         off = abs(self._scene.stiffness / critical - 1.0) if critical else math.inf
         if off > _CRITICAL:
@@ -132,20 +139,24 @@ class Approach:
 
     @property
     def orbit(self) -> Orbit:
-        """The last cycle, and what it implies of the limit cycle."""
+        """The last cycle and its correction to the limit cycle."""
         last, slopes = self.seen[-1:], np.array(self._slopes).T
         return Orbit(tuple(last), (slopes,), np.array(self._ahead), self._accuracy, self._work)
 
     @property
     def _return(self) -> float:
-        """Part of its distance to the limit cycle that a cycle keeps: the trace of the derivative
-        A of the map, whose other eigenvalue is zero, because the motion forgets one direction.
+        """Trace of the derivative A of the map.
+
+        The trace is the ratio of successive distances to the limit cycle. The other eigenvalue of A
+        is zero, because the motion forgets one direction.
         """
         return self._slopes[0][0] + self._slopes[1][1]
 
     def _learn(self) -> None:
-        """Take the derivatives from the last two cycles, as long as numerical errors allow, and
-        what is ahead from the last (the formulas are those of the module).
+        """Update the derivatives and the distance to the fixed point.
+
+        The derivatives follow from the last two cycles, unless numerical errors dominate their
+        difference. The module docstring contains the formulas.
         """
         last = self.seen[-1]
         begin, end = last.begin, last.end
@@ -168,13 +179,14 @@ class Approach:
         self._implied = self._by_slopes(self._ahead)
 
     def _by_slopes(self, move: Sequence[float]) -> list[float]:
-        """What a move of the section where a cycle begins changes of the image."""
+        """Compute the change of the image due to a change of the section."""
         by_stress, by_state = move
         return [x * by_stress + y * by_state for x, y in zip(*self._slopes, strict=True)]
 
     def _repeats(self) -> bool:
-        """True if the next cycles would all be the same: as the derivatives say, or because the
-        last two are.
+        """Return True if all further cycles would be the same.
+
+        The cycles repeat if the derivatives imply so, or if the last two cycles agree.
         """
         allowed = [0.3 * self._accuracy.rtol * abs(number) for number in self._image[2:]]
         if self._known and self._return < _DIVERGES and _within(self._implied[2:], allowed):
@@ -188,9 +200,10 @@ class Approach:
         return _within([change * left for change in self._changes[2:]], allowed)
 
     def _wavers(self) -> bool:
-        """True if the last two cycles go to and fro, as near the limit cycle as it is ever closed:
-        by numerical errors, because on a plane no motion passes another, so that cycles approach
-        their limit from one side.
+        """Return True if the last two cycles alternate around the limit cycle.
+
+        Only numerical errors cause such an alternation. In a plane, trajectories cannot cross, so
+        exact cycles approach the limit cycle from one side.
         """
         before, last = (
             cycle.end.spring_stress - cycle.begin.spring_stress for cycle in self.seen[-2:]
@@ -199,9 +212,11 @@ class Approach:
         return before * last <= 0.0 and abs(last) <= near
 
     def _may_leap(self) -> bool:
-        """True if to leap to the fixed point: not where the next cycle comes as close, nor where
-        that is far, because the swings may be headed for steady sliding; and not again where the
-        last leap came no closer, because leaps may go round in a circle.
+        """Return True if the motion should leap to the fixed point.
+
+        The motion does not leap if the next cycle would come as close, or if the fixed point is far
+        away, because the motion may then settle to steady sliding. It does not leap again if the
+        last leap did not reduce the distance, because leaps may repeat in a loop.
         """
         cycle = self.seen[-1]
         left = abs(cycle.end.spring_stress - cycle.begin.spring_stress)
@@ -214,22 +229,22 @@ class Approach:
 
 
 def _within(changes: Sequence[float], allowed: Sequence[float]) -> bool:
-    """True if none of some changes is larger than is allowed."""
+    """Return True if no change exceeds its tolerance."""
     return all(abs(change) <= most for change, most in zip(changes, allowed, strict=True))
 
 
 @dataclass(frozen=True)
 class Course:
-    """State of a motion in its course.
+    """Cycles of a motion, and the orbit that the motion approaches.
 
     Attributes
     ----------
     seen : list of Cycle
-        Its cycles (the events of `measures.limit_cycle`).
+        Cycles of the motion (the events of ``measures.limit_cycle``).
     orbit : Orbit or None
-        The periodic orbit it ends in; none, where it has not found one.
+        Periodic orbit that the motion approaches. None if no orbit was found.
     open : bool
-        Whether it may still find one, as far as its cycles tell.
+        True if the motion may still approach a periodic orbit, as far as its cycles show.
     """
 
     seen: list[Cycle]
@@ -240,8 +255,22 @@ class Course:
 def course(
     scene: Scene, accuracy: Accuracy, meter: Meter, events: int, *, to_its_end: bool = False
 ) -> Course | None:
-    """Follow a motion until it comes to an orbit that attracts, for so many cycles at most; or `to
-    its end` in any case. None where it settles to steady sliding.
+    """Follow a motion until it approaches an attracting periodic orbit.
+
+    Parameters
+    ----------
+    scene : Scene
+    accuracy : Accuracy
+    meter : Meter
+    events : int
+        Largest number of cycles.
+    to_its_end : bool
+        If True, follow all ``events`` cycles even if an orbit is found earlier.
+
+    Returns
+    -------
+    Course or None
+        None if the motion settles to steady sliding.
     """
     seen, orbit, repels = list[Cycle](), None, False
     fine = accuracy.at(min(accuracy.rtol, _FINE))
@@ -267,9 +296,10 @@ def course(
 
 
 def _on_its_way(seen: Sequence[Cycle]) -> bool:
-    """Return True if the cycles are too few to judge, or still change in one direction.
+    """Return True if a motion may still approach a periodic orbit.
 
-    The range of ln V, or a slow unknown, then grows or falls from each cycle to the next.
+    A motion with few cycles may still do so. A motion with many cycles may do so if the range of ln
+    V or a state increases, or decreases, from each cycle to the next.
     """
     if len(seen) < _FIRST_LOOK:
         return True
@@ -279,9 +309,11 @@ def _on_its_way(seen: Sequence[Cycle]) -> bool:
 
 
 def _counted(scene: Scene) -> tuple[tuple[int, ...], ...]:
-    """Return the states by which a cycle repeats: those that count, or only those of the law.
+    """Return the sets of states that are compared to detect a repeating cycle.
 
-    An unknown that follows the motion slowly approaches its cycle long after the law has.
+    The first set contains all states that count for the distance from steady sliding. The second
+    set contains the states of the law only, because a slow unknown of the fluid may approach its
+    cycle long after the law has.
     """
     of_law = tuple(range(scene.parts.law.states))
     return tuple(dict.fromkeys((scene.functions.friction.counted, of_law)))
@@ -290,25 +322,26 @@ def _counted(scene: Scene) -> tuple[tuple[int, ...], ...]:
 def recurrence(
     scene: Scene, seen: Sequence[Cycle], counted: Sequence[int] | None = None
 ) -> tuple[int, float]:
-    """Find the number of cycles after which a motion comes closest to repeating itself.
+    """Find the number of cycles after which a motion nearly repeats itself.
 
-    After n cycles the motion is off by the largest ``|Psi(i + n) - Psi(i)|`` of any state at the
-    ends of the later half of its cycles, relative to a times the range of ln V.
+    The states at the ends of cycles i and i + n are compared over the second half of the motion.
+    The difference for n cycles is the largest ``|Psi(i + n) - Psi(i)|`` of any state, divided by
+    ``a`` times the range of ln V.
 
     Parameters
     ----------
     scene : Scene
     seen : sequence of Cycle
     counted : sequence of int, optional
-        Places of the states that are compared. By default, all states that a part does not list in
-        `excluded_from_distance`.
+        Indices of the states to compare. By default, all states are compared except those that a
+        part lists in ``excluded_from_distance``.
 
     Returns
     -------
     period : int
-        The smallest n that is within twice the smallest difference.
+        The smallest n whose difference is at most twice the smallest difference.
     off : float
-        The difference after n cycles, infinite if there are too few cycles.
+        The difference after ``period`` cycles, or infinity if there are too few cycles.
     """
     if len(seen) < 4:
         return 1, math.inf

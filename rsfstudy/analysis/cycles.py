@@ -1,6 +1,6 @@
-"""The stick-slip cycles of a motion, one after the other, put together from its events.
+"""Stick-slip cycles of a motion, assembled from its events.
 
-A cycle runs from one maximum of spring stress, where V rises through V_0, to the next.
+A cycle extends from one maximum of spring stress, at which V rises through V_0, to the next.
 """
 
 from __future__ import annotations
@@ -49,23 +49,25 @@ _AT_REST = 1e-6
 
 
 class Cycle(NamedTuple):
-    """One cycle: time in D_c/V_*, stress in sigma_*, slip rate in V_*.
+    """One stick-slip cycle.
+
+    Times are in D_c/V_*, stresses in sigma_*, and slip rates in V_*.
 
     Attributes
     ----------
     interval : float
         Time from one maximum of spring stress to the next.
     highest, lowest, at_peak : float
-        Deviation of spring stress at its maximum, its minimum, and at peak slip rate.
+        Deviation of spring stress at its maximum, at its minimum, and at the peak slip rate.
     sliding : float
-        Friction coefficient at peak slip rate.
+        Friction coefficient at the peak slip rate.
     slowest, fastest : float
         Extremes of ln(V/V_*).
     landed, rested : Point
-        Where friction balances the spring again below V_0 after the rupture, and at the slowest
-        slip rate.
+        Point below V_0 at which friction balances the spring again after the rupture, and point
+        with the lowest slip rate.
     begin, end : Point
-        The maxima of spring stress that begin and end the cycle.
+        Maxima of spring stress at which the cycle begins and ends.
     """
 
     interval: float
@@ -86,11 +88,17 @@ class Cycle(NamedTuple):
         return self.fastest - self.slowest
 
     def numbers(self) -> tuple[float, ...]:
-        """The headline numbers, in the order of their names: recurrence interval (D_c/V_*), static
-        and dynamic stress drop (sigma_*), and the decimal logarithms of the extremes of V/V_*.
+        """Return the headline numbers in the order of their names.
 
-        Stress drops, down to the lowest spring stress and to that at peak slip rate, are from where
-        the event begins, because the next may begin elsewhere.
+        Stress drops are measured from the spring stress at the beginning of the event, because the
+        next event may begin at a different stress.
+
+        Returns
+        -------
+        tuple of float
+            Recurrence interval (D_c/V_*), static and dynamic stress drops (sigma_*), and the
+            decimal logarithms of the extremes of V/V_*. The static drop extends to the lowest
+            spring stress, and the dynamic drop to the spring stress at the peak slip rate.
         """
         highest = self.begin.spring_stress
         drops = highest - self.lowest, highest - self.at_peak
@@ -104,10 +112,23 @@ def cycles(
     start: Point | None,
     recording: Recording | None = None,
 ) -> Iterator[Cycle | None]:
-    """Yield the cycles of a motion, and None once it has settled to steady sliding.
+    """Iterate over the cycles of a motion.
 
-    Without a `start` the motion begins with the step of the scene, and what precedes the first
-    maximum of spring stress is left out.
+    Parameters
+    ----------
+    scene : Scene
+    accuracy : Accuracy
+    meter : Meter
+    start : Point or None
+        Point at which the motion starts. If None, the motion starts with the step of the scene, and
+        everything before the first maximum of spring stress is skipped.
+    recording : Recording, optional
+
+    Yields
+    ------
+    Cycle or None
+        The next cycle. None is the last item, and means that the motion has settled to steady
+        sliding.
     """
     begin, begun, fallen, seen = None, 0.0, start is None, list[Event]()
     ahead = 0 if start else scene.parts.loading.told
@@ -139,16 +160,16 @@ def cycles(
 
 
 def more_events(events: int, name: str = "events") -> str:
-    """Remedy of waiting for more events, to be added to a message."""
+    """Return the advice to wait for more events, for use in a message."""
     return f"--set {name}={2 * events} ({name}=) waits for more"
 
 
 def path_of(scene: Scene, seen: Sequence[Cycle], recording: Recording | None) -> np.ndarray:
-    """Record of cycles that follow each other, a row for each sample (see `Recording.seen`); their
-    ends, where nothing was recorded.
+    """Return the record of successive cycles, one row per sample.
 
-    Slip over a cycle is what the load point moves, less what the spring is longer by:
-    ``V_0 T - (f_end - f_begin)/K``.
+    If nothing was recorded, the record holds the ends of the cycles. The slip of the cycles is the
+    displacement of the load point minus the extension of the spring: ``V_0 T - (f_end -
+    f_begin)/K`` (see ``Recording.seen`` for the columns).
     """
     begin, end = seen[0].begin, seen[-1].end
     passed = math.fsum(cycle.interval for cycle in seen)
@@ -164,7 +185,7 @@ def path_of(scene: Scene, seen: Sequence[Cycle], recording: Recording | None) ->
 
 @lru_cache(maxsize=256)
 def _asked(load: float) -> tuple[EventSpecification, ...]:
-    """Event specifications by which cycles of a motion are seen, at ln(V_0/V_*)."""
+    """Return the event specifications that delimit the cycles at ln(V_0/V_*)."""
     return (
         maximum("log_slip_rate", waits=True),
         minimum("log_slip_rate", waits=True),
@@ -175,10 +196,11 @@ def _asked(load: float) -> tuple[EventSpecification, ...]:
 
 
 def _dies_down(swings: list[float]) -> bool:
-    """True if swings that shrink, time after time, are headed for nothing rather than for a cycle.
+    """Return True if shrinking swings of ln V approach zero.
 
-    Geometrically extrapolated from the last three, whose differences are d_1 and d_2, they have
-    d_2**2/(d_1 - d_2) to go; near the onset of stick-slip cycles shrink slowly to a finite limit.
+    The last three swings, with differences d_1 and d_2, are extrapolated geometrically. Their
+    remaining decrease is d_2**2/(d_1 - d_2). Near the onset of stick-slip, the swings shrink slowly
+    towards a finite limit instead.
     """
     if len(swings) <= _SHRINKING or not all(y < x for x, y in pairwise(swings[-_SHRINKING:])):
         return False
@@ -188,7 +210,7 @@ def _dies_down(swings: list[float]) -> bool:
 
 
 def _cycle(begin: Point, begun: float, seen: Sequence[Event]) -> Cycle:
-    """The cycle that has begun at a point and a time, and ends with the last of some events."""
+    """Assemble the cycle that ends with the last event."""
     points, end = [event.point for event in seen], seen[-1]
     fastest, rested = max(points, key=_LOG_RATE), min(points, key=_LOG_RATE)
     return Cycle(
@@ -207,7 +229,7 @@ def _cycle(begin: Point, begun: float, seen: Sequence[Event]) -> Cycle:
 
 
 def _landed(seen: Sequence[Event]) -> Point | None:
-    """Point where slip is below V_0 after the rupture, and friction balances the spring."""
+    """Return the first point after the rupture at which friction balances the spring."""
     fallen = False
     for event in seen:
         fallen = fallen or event.kind is _FALL

@@ -1,13 +1,14 @@
-"""Detection of drops of shear stress in a record with noise.
+"""Detection of drops of shear stress in a noisy record.
 
-The mean of stress in a window of time is compared with the mean in the window behind it, for
-windows of 4, 8, 16 and more sampling intervals. Falls between them are scaled by their noise, which
-is the spread of the most frequent falls: those of loading, also if drops take up to a third of the
-record. Peaks of the scaled fall above a threshold are drops [1]_.
+The mean stress in a window before each sample is compared with the mean stress in a window after
+the sample. The windows are 4, 8, 16 and more sampling intervals long. The difference is divided by
+its standard deviation under noise. The standard deviation is estimated from the most frequent
+differences, which occur during loading. This estimate is valid if drops occupy no more than a third
+of the record. Peaks of the scaled difference that exceed a threshold are drops [1]_.
 
 References
 ----------
-.. [1] `scipy.signal.find_peaks`, by height and prominence.
+.. [1] ``scipy.signal.find_peaks``, with a minimum height and a minimum prominence.
 .. [2] Rousseeuw and Leroy (1988), Statistica Neerlandica 42, 103-116, for the shortest half.
 """
 
@@ -20,42 +21,42 @@ import numpy as np
 from scipy.signal import find_peaks
 from scipy.stats import norm
 
-#: Chance that any drop is found in a record of Gaussian noise.
+#: Probability of a false detection in a record of Gaussian noise.
 CHANCE = 1e-4
 #: Shortest windows in samples, and samples of a record for each sample of the longest window.
 SHORTEST, SAMPLES = 4, 100
 #: Standard deviations by which a drop must exceed the threshold to be missed once in 1,000.
 FOUND = 3.1
-#: Standard deviations down to which a fall is followed from its peak.
+#: Scaled difference down to which a drop extends from its peak, in standard deviations.
 _FOLLOWED = 2.0
-#: Share of values in the shortest interval, from which noise is taken.
+#: Fraction of the values in the shortest interval, from which the noise is estimated.
 _SHARE = 0.4
-#: Standard deviation over the median of absolute deviations of Gaussian noise.
+#: Ratio of standard deviation to median absolute deviation of Gaussian noise.
 _NORMAL = 1.4826
-#: Sampling intervals that differ by more than this factor are brought to one by means.
+#: A record is resampled if its sampling intervals differ by more than this factor.
 _UNEVEN = 3.0
-#: A window that is 2 or 4 times as long shows a drop better if its scaled fall, over the square
-#: root of its length, is larger by this factor: then the shorter window sees a part of the drop.
+#: A window covers only a part of a drop if the score of a window 2 or 4 times as long is larger by
+#: this factor. The score is the scaled difference divided by the square root of the window length.
 _PARTIAL = 1.4
-#: Number of the shortest window, from 0, that shows how noise is correlated: 16 samples.
+#: Index of the shortest window from which the correlation of the noise is estimated: 16 samples.
 _LEAST_SCALE = 2
-#: Peaks are separate if the scaled fall between them is less by this share of the lower one.
+#: Peaks are separate if the minimum between them is lower by this fraction of the lower peak.
 _SEPARATE = 0.5
 
 
 class Candidate(NamedTuple):
-    """A fall of stress that noise does not explain.
+    """A drop of stress that exceeds the noise.
 
     Attributes
     ----------
     begins, ends : float
-        Times between which stress falls, as seen by the window.
+        Times between which stress falls, at the resolution of the window.
     window : float
-        Length of the window in time.
+        Length of the window, in units of time.
     error : float
-        Standard error of the difference of two means over windows, by noise.
+        Standard error of the difference between two window means.
     correlation : float
-        Factor by which correlation of the noise increases standard errors of means.
+        Factor by which the correlation of the noise increases the standard error of a mean.
     """
 
     begins: float
@@ -66,18 +67,18 @@ class Candidate(NamedTuple):
 
 
 class Detection(NamedTuple):
-    """Drops found in a record.
+    """Drops that were detected in a record.
 
     Attributes
     ----------
     candidates : list of Candidate
-        In the order of time.
+        Drops in order of time.
     noise : float
         Standard deviation of the noise.
     smallest : float
-        Smallest drop that is missed once in 1,000 records.
+        Size of a drop that is missed once in 1,000 records.
     variation : float
-        Largest fall of the mean over a window.
+        Largest decrease of the moving average of stress.
     """
 
     candidates: list[Candidate]
@@ -87,21 +88,32 @@ class Detection(NamedTuple):
 
 
 def spread(values: np.ndarray) -> float:
-    """Estimate a standard deviation by the median of absolute deviations."""
+    """Estimate the standard deviation from the median absolute deviation."""
     return _NORMAL * float(np.median(np.abs(values - np.median(values))))
 
 
 def quantum_of(values: np.ndarray) -> float:
-    """Return the smallest difference between neighbouring samples; infinity if all are equal."""
+    """Return the smallest nonzero difference between successive samples.
+
+    Returns
+    -------
+    float
+        Infinity if all samples are equal.
+    """
     steps = np.abs(np.diff(values))
     return float(steps[steps > 0.0].min(initial=math.inf))
 
 
 def most_frequent(values: np.ndarray) -> tuple[float, float]:
-    """Estimate mean and standard deviation of the most frequent values of a mixture.
+    """Estimate the mean and standard deviation of the most frequent values.
 
-    Both are those of a Gaussian whose central 40 % lie in the shortest interval with 40 % of the
-    values.
+    The function finds the shortest interval that contains 40 % of the values. The interval is then
+    matched to the central 40 % of a Gaussian distribution. Other values of the mixture have little
+    effect on the estimate.
+
+    Returns
+    -------
+    mean, standard_deviation : float
     """
     ordered = np.sort(values)
     count = max(int(_SHARE * len(ordered)), 1)
@@ -112,14 +124,26 @@ def most_frequent(values: np.ndarray) -> tuple[float, float]:
 
 
 def falls(values: np.ndarray, window: int) -> np.ndarray:
-    """Compute means of the samples before each place less means of as many samples behind it."""
+    """Compute the difference of window means before and after each sample.
+
+    Parameters
+    ----------
+    values : ndarray, shape (samples,)
+    window : int
+        Length of each window in samples.
+
+    Returns
+    -------
+    ndarray, shape (samples - 2 * window + 1,)
+        Mean of the window before the sample minus mean of the window after the sample.
+    """
     sums = np.concatenate([[0.0], np.cumsum(values - values.mean())])
     fallen = 2.0 * sums[window:-window] - sums[: -2 * window] - sums[2 * window :]
     return np.asarray(fallen / window)
 
 
 def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
-    """Detect drops of stress.
+    """Detect drops of stress in a record.
 
     Parameters
     ----------
@@ -155,10 +179,11 @@ def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
 
 
 def _even(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bring samples to even intervals of time, if their intervals differ much.
+    """Resample a record to even intervals if its sampling intervals vary.
 
-    The interval is that at which half of the record was sampled or at shorter ones. Samples within
-    an interval are averaged; intervals without samples are interpolated.
+    The new sampling interval is chosen such that half of the record duration was sampled at this
+    interval or at shorter intervals. Samples within a new interval are averaged. Values for empty
+    intervals are interpolated.
     """
     gaps = np.diff(time)
     if gaps.max() < _UNEVEN * gaps.min():
@@ -180,15 +205,16 @@ def _even(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 class _Scale:
-    """Falls between windows of one length.
+    """Differences of window means for one window length.
 
     Parameters
     ----------
     stress : ndarray, shape (samples,)
     window : int
-        Length in samples.
+        Window length in samples.
     looks : float
-        Threshold in standard deviations, for all windows and places together.
+        Detection threshold in standard deviations. The threshold accounts for the number of windows
+        and samples that are tested.
     quantum : float
         Resolution of stress.
     """
@@ -197,33 +223,50 @@ class _Scale:
         change = falls(stress, window)
         self.window, self.samples = window, len(stress)
         self.usual, spread = most_frequent(change)
-        # a record without noise has that of its resolution
+        # if there is no noise, the resolution determines the spread
         self.spread = max(spread, quantum / math.sqrt(6.0 * window))
-        # the spread itself is known from so many windows only
+        # allow for the error of the spread, which is estimated from few independent windows
         surely = 1.0 + 2.33 / math.sqrt(len(stress) / (2.0 * window))
         self.threshold = max(looks * surely * self.spread, 2.0 * quantum)
         self.smallest = self.threshold + FOUND * self.spread
         self.net = change - max(0.0, self.usual)
         lag = most_frequent(stress[window:] - stress[:-window])[1]
         self.noise = max(lag / math.sqrt(2.0), quantum / math.sqrt(12.0))
-        # from that of white noise to that of noise which does not change within a window
+        # between white noise and noise that is constant within a window
         ratio = self.spread / (self.noise or 1.0) / math.sqrt(2.0 / window)
         self.correlation = min(max(ratio, 1.0), math.sqrt(window))
 
     def score(self, places: np.ndarray) -> np.ndarray:
-        """Compute the scaled fall at places, over the square root of the window."""
+        """Compute the scaled difference divided by the square root of the window.
+
+        Parameters
+        ----------
+        places : ndarray of int
+            Indices of samples.
+
+        Returns
+        -------
+        ndarray
+            The values are 0 for samples too close to the ends of the record.
+        """
         at = places - self.window
         inside = (at >= 0) & (at < len(self.net))
         net = np.where(inside, self.net[np.clip(at, 0, len(self.net) - 1)], 0.0)
         return np.asarray(net / (self.spread or 1.0) / math.sqrt(self.window))
 
     def peaks(self, longer: list[_Scale]) -> list[tuple[int, int]]:
-        """Find drops, as the first sample behind their beginning and that behind their end.
+        """Find the drops that are detected best with this window.
 
         Parameters
         ----------
         longer : list of _Scale
-            Scales of longer windows. A drop that they show better is left to them.
+            Scales with longer windows. Drops that stand out more with a longer window are skipped.
+
+        Returns
+        -------
+        list of (int, int)
+            For each drop, the index of the first sample after its beginning, and the index of the
+            first sample after its end.
         """
         padded = np.concatenate([[0.0], self.net, [0.0]])  # so that peaks may be at the ends
         peaks, about = find_peaks(padded, height=self.threshold, prominence=0.0)
@@ -237,7 +280,7 @@ class _Scale:
         for peak in peaks[complete].tolist():
             place = int(np.searchsorted(below, peak))
             start, stop = int(below[place - 1]), int(below[place])  # in terms of `padded`
-            # a step is seen from all windows that it is in
+            # a sudden drop affects all windows that contain it
             begin = min(start + self.window - 1, peak - 1)
             end = max(stop - 1 - self.window, peak - 1)
             found.append((begin + self.window, end + self.window))

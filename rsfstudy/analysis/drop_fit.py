@@ -1,9 +1,11 @@
 """Sizes and times of drops of shear stress, with errors.
 
-Stress around a drop is taken for a line before it, a line during it and a line after it, which meet
-where the drop begins and ends. For each pair of these times the lines follow by least squares. The
-best pair gives the drop, highest less lowest stress. Pairs whose sum of squares is larger by less
-than a number of variances of the noise bound the times [1]_.
+The stress around a drop is modelled by three connected lines: before, during and after the drop.
+The lines meet at the times at which the drop begins and ends. For each pair of times, the lines are
+fitted by least squares. The pair with the smallest sum of squares determines the drop, which is the
+difference between the highest and the lowest stress. The confidence intervals of the times contain
+all pairs whose sum of squares exceeds the minimum by less than a fixed multiple of the noise
+variance [1]_.
 
 References
 ----------
@@ -18,31 +20,31 @@ import numpy as np
 
 from rsfstudy.analysis.drop_detection import Candidate
 
-#: Windows and durations on either side that are fitted, and the fewest and most samples of a side.
+#: Length of each side of the fit, in windows and in durations; fewest and most samples of a side.
 _SPAN, _DURATIONS, _LEAST, _MOST = 3.0, 1.0, 16, 400
-#: Most samples of a fit; of more, means are fitted.
+#: Largest number of samples in a fit. Longer records are averaged.
 _THIN = 300
 #: Windows beyond the candidate in which the drop may begin or end.
 _REACH = 2.0
-#: Times that are tried at once for beginning and end, and how often the grid is refined.
+#: Number of times in each grid for the beginning and the end, and number of grid refinements.
 _GRID, _REFINED = 16, 3
-#: Share of the slope of the drop that lines before and behind it must not reach.
+#: Largest slope of the lines before and after the drop, relative to the slope of the drop.
 _STEEP = 0.3
-#: Share of the drop by which the line on one side must not fall more than that on the other side.
+#: Largest difference between the falls of stress on both sides, relative to the drop.
 _FALLS = 0.5
 #: Excess of the sum of squares, in variances of the noise, at the ends of 95 % intervals: of the
 #: time of a sudden change (twice -ln 0.0253), and of a parameter.
 _OF_TIME, _OF_SIZE = 7.4, 3.84
 #: Standard errors in half of a 95 % interval.
 HALF = 1.96
-#: Share of a sampling interval by which a time between samples is unknown.
+#: Error of a time between two samples, relative to the sampling interval.
 _BETWEEN = 0.55
-#: Samples beside a drop at an end of the record that show stress before it or after it.
+#: Fewest samples next to a drop that show the stress before or after the drop.
 _SHOWS_END = 3
 
 
 class Drop(NamedTuple):
-    """A drop of stress, with half widths of 95 % intervals.
+    """A fitted drop of stress. Errors are half widths of 95 % intervals.
 
     Attributes
     ----------
@@ -51,10 +53,11 @@ class Drop(NamedTuple):
     before, after : float
         Highest and lowest stress.
     begins_error, ends_error, before_error, after_error, drop_error : float
+        Errors of the values above, and of the drop ``before - after``.
     residual : float
-        Standard deviation of the samples about the lines.
+        Standard deviation of the samples around the fitted lines.
     starts_inside, stops_inside : bool
-        True if the record holds no stress before the drop, or none after it.
+        True if the record contains no stress before the drop, or no stress after it.
     """
 
     begins: float
@@ -72,7 +75,19 @@ class Drop(NamedTuple):
 
 
 class _Lines(NamedTuple):
-    """Least squares for pairs of times: coefficients, inverse matrices and sums of squares."""
+    """Least-squares fits of three connected lines, one for each pair of times.
+
+    Attributes
+    ----------
+    pairs : ndarray, shape (pairs, 2)
+        Times at which the lines meet.
+    values : ndarray, shape (pairs, 4)
+        Coefficients (see ``_lines``).
+    inverse : ndarray, shape (pairs, 4, 4)
+        Inverse of the normal matrix.
+    squares : ndarray, shape (pairs,)
+        Sum of squares of the residuals.
+    """
 
     pairs: np.ndarray
     values: np.ndarray
@@ -81,7 +96,10 @@ class _Lines(NamedTuple):
 
     @property
     def best(self) -> int:
-        """The first pair with the least sum of squares, but for rounding errors."""
+        """Index of the first pair with the smallest sum of squares.
+
+        Differences due to rounding errors are ignored.
+        """
         return int(np.argmax(self.squares <= self.squares.min() * (1.0 + 1e-9)))
 
 
@@ -92,16 +110,20 @@ def fit_drop(
     room: tuple[float, float],
     noise: float,
 ) -> Drop:
-    """Fit the lines around a drop.
+    """Fit three connected lines to the stress around a drop.
 
     Parameters
     ----------
     time, stress : ndarray, shape (samples,)
     candidate : Candidate
     room : (float, float)
-        Times of the end of the drop before and of the beginning of the next drop.
+        End of the previous drop and beginning of the next drop.
     noise : float
         Standard deviation of the noise.
+
+    Returns
+    -------
+    Drop
     """
     rows = _rows_around(time, candidate, room)
     every = -(-len(rows) // _THIN)
@@ -145,7 +167,7 @@ def fit_drop(
 
 
 def _rows_around(time: np.ndarray, candidate: Candidate, room: tuple[float, float]) -> np.ndarray:
-    """Select the rows around a drop, without those of its neighbours."""
+    """Return the rows around a drop, without the rows of neighbouring drops."""
     begins, ends, window = candidate[:3]
     reach = max(_SPAN * window, _DURATIONS * (ends - begins))
     first = int(np.searchsorted(time, begins, "left"))
@@ -159,7 +181,11 @@ def _rows_around(time: np.ndarray, candidate: Candidate, room: tuple[float, floa
 
 
 def _search(t: np.ndarray, y: np.ndarray, begins: float, ends: float, window: float) -> _Lines:
-    """Try pairs of times at which the drop begins and ends, finer and finer around the best."""
+    """Search for the times at which the drop begins and ends.
+
+    The search evaluates a grid of pairs of times. The grid is refined around the best pair several
+    times.
+    """
     reach = max(_REACH * window, ends - begins)
     halves = np.sort(np.concatenate([t, 0.5 * (t[1:] + t[:-1])]))
     starts = halves[(halves >= begins - reach) & (halves < ends)]
@@ -177,13 +203,16 @@ def _search(t: np.ndarray, y: np.ndarray, begins: float, ends: float, window: fl
 
 
 def _thinned(times: np.ndarray) -> list[float]:
-    """Select some of many times, evenly."""
+    """Select an evenly spaced subset of the times."""
     places = np.unique(np.linspace(0, len(times) - 1, _GRID).round().astype(int))
     return [float(times[place]) for place in places] if len(times) else []
 
 
 def _near(times: np.ndarray, at: float, extent: float, level: int) -> np.ndarray:
-    """Select times near the best one, and at the finest level its neighbours."""
+    """Select the times near the best time for the next level of the search.
+
+    The last levels contain the immediate neighbours of the best time.
+    """
     reach = extent / _GRID * (4.0 / _GRID) ** level
     place = int(np.searchsorted(times, at))
     around = times[max(place - _GRID // 3, 0) : place + _GRID // 3 + 1]
@@ -192,18 +221,20 @@ def _near(times: np.ndarray, at: float, extent: float, level: int) -> np.ndarray
 
 
 def _lines(t: np.ndarray, y: np.ndarray, pairs: np.ndarray) -> _Lines:
-    """Fit three lines that meet at each pair of times.
+    """Fit three connected lines for each pair of times.
 
-    Coefficients are the stress at both times, and slopes before and behind. Lines that fall outside
-    of the drop almost as steeply as in it, or by half as much more than on the other side, are
-    ruled out: the drop would go on.
+    The coefficients are the stress at both times, and the slopes before and after the drop. Some
+    pairs describe only a part of a longer drop, and are rejected. A pair is rejected if stress
+    outside the drop falls at more than 0.3 times the rate within the drop. It is also rejected if
+    the line on one side falls by half of the drop more than it would with the slope of the other
+    side.
     """
     t0, t1 = pairs[:, :1], pairs[:, 1:]
     share = np.clip((t - t0) / (t1 - t0), 0.0, 1.0)
     columns = np.stack([1.0 - share, share, np.minimum(t - t0, 0.0), np.maximum(t - t1, 0.0)], -1)
     turned = columns.transpose(0, 2, 1)
     normal = turned @ columns
-    # a tiny ridge: without samples on one side there is no slope to fit
+    # a small ridge term, because a slope is undetermined if one side has no samples
     normal += 1e-9 * np.eye(4) * len(t)
     inverse = np.linalg.inv(normal)
     centre = y.mean()

@@ -1,4 +1,4 @@
-"""Numbers of drops of stress in a record: times and stresses, and slip by its displacement."""
+"""Properties of stress drops in a record: times, stresses, slip and slip rate."""
 
 from __future__ import annotations
 
@@ -13,12 +13,22 @@ from rsfstudy.analysis.drop_detection import CHANCE, FOUND, falls, quantum_of, s
 from rsfstudy.analysis.drop_fit import HALF
 from rsfstudy.analysis.drops import FoundDrop
 
-#: Standard deviations by which slip exceeds what moves on anyway, and its least excess over that.
+#: Smallest excess of slip over the usual displacement: in standard deviations, and as a fraction.
 _FASTER, _LEAST_EXCESS = 3.0, 0.1
 
 
 class Place(NamedTuple):
-    """Samples of a drop: the first in it, that behind it, and samples of a window beside it."""
+    """Location of a drop among the samples.
+
+    Attributes
+    ----------
+    begin : int
+        Index of the first sample in the drop.
+    end : int
+        Index of the first sample after the drop.
+    window : int
+        Number of samples before and after the drop that are averaged.
+    """
 
     begin: int
     end: int
@@ -26,7 +36,11 @@ class Place(NamedTuple):
 
 
 def moves_with_drops(times: np.ndarray, moves: np.ndarray, found: Sequence[Place]) -> bool:
-    """True where displacement moves faster during the drops than for as long before and after."""
+    """Return True if displacement is faster during drops than around them.
+
+    The displacement during each drop is compared with the displacement over the same duration
+    before and after the drop.
+    """
     excess = usual = variance = 0.0
     quantum = quantum_of(moves)
     noises = {n: max(spread(falls(moves, n)), quantum) for n in {place.window for place in found}}
@@ -37,7 +51,7 @@ def moves_with_drops(times: np.ndarray, moves: np.ndarray, found: Sequence[Place
         lasts, slips = (
             np.diff([of[at : at + window].mean() for at in starts]) for of in (times, moves)
         )
-        # nothing is before the very begin of the record, nor after its end
+        # the record may not extend far enough before or after a drop
         ratios = (lasts[1] / np.where(lasts > 0.0, lasts, math.inf))[::2]
         moved, ratio = float((ratios * slips[::2]).max()), float(ratios.max())
         excess, usual = excess + float(slips[1]) - moved, usual + abs(moved)
@@ -46,7 +60,11 @@ def moves_with_drops(times: np.ndarray, moves: np.ndarray, found: Sequence[Place
 
 
 def place_of(times: np.ndarray, found: FoundDrop, room: tuple[float, float]) -> Place:
-    """Locate a drop among the samples, with the window that fits between its neighbours."""
+    """Locate a drop among the samples.
+
+    The window is shortened if it would overlap with a neighbouring drop or extend beyond the
+    record.
+    """
     drop, candidate = found
     begin = int(np.searchsorted(times, drop.begins, "right"))
     end = max(int(np.searchsorted(times, drop.ends, "left")), begin)
@@ -65,7 +83,16 @@ def numbers_of(
     place: Place,
     room: tuple[float, float],
 ) -> tuple[dict[str, tuple[float, float]], int]:
-    """Make the numbers of one event of a record, each with half of its 95 % interval."""
+    """Compute the properties of one event and their errors.
+
+    Returns
+    -------
+    row : dict
+        Pairs of a value and its error, which is the half width of a 95 % interval.
+    cut : int
+        0 if the record contains the stress before and after the event. 1 is added if the record
+        begins during the event, and 2 if the record ends during the event.
+    """
     drop = found.drop
     row = {
         "time": (drop.begins, drop.begins_error),
@@ -91,12 +118,20 @@ def _slip(
     place: Place,
     room: tuple[float, float],
 ) -> dict[str, tuple[float, float]]:
-    """Read slip, peak slip rate and dynamic stress drop of an event, with errors."""
+    """Compute slip, peak slip rate and dynamic stress drop of an event.
+
+    Returns
+    -------
+    dict
+        Pairs of a value and its error. The peak slip rate and the dynamic stress drop are NaN if
+        the slip rate does not exceed its noise.
+    """
     (drop, candidate), (begin, end, window) = found, place
     size = drop.before - drop.after
     first, last = (int(np.searchsorted(times, at)) for at in room)
-    # moved by m samples, the mean of stress falls less by m drop/window, with noise of a deviation
-    # of sqrt(3 m/window) of the error: so far may noise have moved the place, but once in 1,000
+    # If the window is shifted by m samples, the difference of means decreases by m drop/window.
+    # The noise of this change has a standard deviation of sqrt(3 m/window) times the error. Noise
+    # shifts the drop further than this limit only once in 1,000.
     off = math.ceil(3.0 * window * (FOUND * candidate.error / size) ** 2)
     off = max(0, min(off, window, begin - window - first, last - end - window))
     begin, end = begin - off, end + off
@@ -109,7 +144,7 @@ def _slip(
     row["peak_slip_rate"] = row["dynamic_stress_drop"] = math.nan, math.nan
     if rates[fastest] > noise * norm.isf(CHANCE / len(rates)):
         row["peak_slip_rate"] = rates[fastest], HALF * noise
-        # stress then lies between that of the two samples
+        # the stress at this time is between the values of the two samples
         ends = stress[fastest : fastest + 2]
         reading = 0.5 * float(np.ptp(ends)) + HALF * spread(np.diff(stress))
         row["dynamic_stress_drop"] = drop.before - ends.mean(), drop.before_error + reading

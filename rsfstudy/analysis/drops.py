@@ -1,4 +1,4 @@
-"""Drops of shear stress in a record: detected, fitted, and merged where they overlap."""
+"""Detection and fitting of drops of shear stress in a record."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import numpy as np
 from rsfstudy.analysis.drop_detection import Candidate, Detection, detect_drops
 from rsfstudy.analysis.drop_fit import Drop, fit_drop
 
-#: Standard errors by which a fitted drop must differ from zero, in half widths of its interval.
+#: Smallest fitted drop, in half widths of its 95 % interval.
 _DIFFERS = 1.0
 
 
 class FoundDrop(NamedTuple):
-    """A drop with the candidate from which it was fitted."""
+    """A fitted drop, and the candidate from which it was fitted."""
 
     drop: Drop
     candidate: Candidate
 
 
 def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FoundDrop], Detection]:
-    """Find the drops of stress in a record.
+    """Find and fit the drops of stress in a record.
 
-    Drops whose fits overlap are parts of one drop: they are merged and fitted again.
+    If two fitted drops overlap, their candidates are merged and fitted again as one drop.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FoundDrop], D
     Returns
     -------
     drops : list of FoundDrop
-        In the order of time.
+        Drops in order of time.
     detection : Detection
     """
     detection = detect_drops(time, stress)
@@ -44,7 +44,7 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FoundDrop], D
             break
         candidates = merged
     sure = [of for of in found if _size(of.drop) > _DIFFERS * of.drop.drop_error]
-    if sure:  # long windows take slow drops for noise
+    if sure:  # slow drops increase the noise estimate of long windows
         residual = float(np.median([of.drop.residual for of in sure]))
         detection = detection._replace(noise=min(detection.noise, residual))
     return sure, detection
@@ -57,7 +57,7 @@ def _size(drop: Drop) -> float:
 def _fitted(
     time: np.ndarray, stress: np.ndarray, candidates: list[Candidate], detection: Detection
 ) -> list[FoundDrop]:
-    """Fit each candidate between its neighbours."""
+    """Fit each candidate, limited to the interval between its neighbours."""
     ends = [float(time[0]), *(one.ends for one in candidates)]
     begins = [*(one.begins for one in candidates[1:]), float(time[-1])]
     return [
@@ -67,7 +67,7 @@ def _fitted(
 
 
 def _merged(found: list[FoundDrop]) -> list[Candidate]:
-    """Merge candidates whose drops overlap."""
+    """Merge the candidates of overlapping drops."""
     merged: list[Candidate] = []
     reached = -np.inf
     for drop, candidate in found:

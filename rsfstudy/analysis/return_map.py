@@ -1,20 +1,22 @@
-"""Periodic orbits, as fixed points of the map from one stick-slip cycle of a motion to the next.
+"""Periodic orbits, computed as fixed points of a return map.
 
-A cycle (an event of `measures.limit_cycle`) runs from where V rises through V_0 to the next such
-instant. Spring stress and states say all there is to say there, because V is known: with mass, the
-spring carries what accelerates the slider besides what friction does. So a motion is a map of
-spring stress and states from one such section to the next, and an orbit of n cycles is a fixed
-point of its n-th power. The eigenvalues of the derivative there are its Floquet multipliers: what
-becomes of a small departure once around. Beyond 1 in size, the orbit repels; at -1, one of twice as
-many cycles comes off it.
+A cycle (an event of ``measures.limit_cycle``) extends from one rise of V through V_0 to the next. V
+is known at such a rise, so spring stress and the states determine the motion. With inertia, the
+spring stress also includes the stress that accelerates the slider. The motion is therefore a map of
+spring stress and states from one section to the next, and an orbit of n cycles is a fixed point of
+the n-th power of this map. The eigenvalues of its derivative are the Floquet multipliers, the
+factors by which small perturbations grow during one orbit. The orbit repels if the absolute value
+of a multiplier exceeds 1. At a multiplier of -1, an orbit with twice the number of cycles branches
+off.
 
-There is one unknown more than a departure can have directions, as long as mass hardly acts: the
-motion forgets one along itself, which is a change of states at the same spring stress, because
-spring stress is highest there.
+If the effect of inertia is small, perturbations have one direction fewer than the section has
+unknowns. The motion forgets a perturbation along itself. This direction is a change of the states
+at constant spring stress, because spring stress is highest at a section.
 
-Sections are arrays (f, Psi_1, ...) of shape (1 + states,): spring stress over sigma_*, and states.
-With P the map of n cycles, an orbit solves P(s) - s = 0 by Newton's method, whose Jacobian dP - 1
-comes from differences of order four, and is corrected by what each step finds (Broyden).
+Sections are arrays (f, Psi_1, ...) of shape (1 + states,), which contain spring stress over sigma_*
+and the states. If P is the map of n cycles, an orbit solves P(s) - s = 0. The equation is solved by
+Newton's method. The Jacobian dP - 1 is computed by finite differences of order four, and updated
+after each step by Broyden's method.
 
 References
 ----------
@@ -56,23 +58,23 @@ CLOSED = 0.3
 
 @dataclass(frozen=True)
 class Orbit:
-    """A motion that closes after some cycles.
+    """Closed orbit of one or several cycles.
 
     Attributes
     ----------
     cycles : tuple of Cycle
-        One after the other.
+        Successive cycles.
     slopes : tuple of ndarray
-        Of each cycle, the derivatives of the section at its end, and of its numbers below that, by
-        the section at its beginning: of shape (1 + states + numbers, 1 + states).
+        For each cycle, the derivatives of the section at its end and of its headline numbers with
+        respect to the section at its beginning, of shape (1 + states + numbers, 1 + states).
     ahead : ndarray
-        From the section where the cycles begin to that of the orbit which they imply.
+        Vector from the section at which the cycles begin to the section of the closed orbit.
     accuracy : Accuracy
-        With which the cycles were followed.
+        Accuracy with which the cycles were computed.
     work : int
-        Right-hand sides that took.
+        Number of right-hand-side evaluations.
     recording : Recording or None
-        What was recorded along the cycles, and beyond.
+        Recording along the cycles, which may extend beyond their end.
     """
 
     cycles: tuple[Cycle, ...]
@@ -84,38 +86,38 @@ class Orbit:
 
     @property
     def period(self) -> int:
-        """Number of its cycles."""
+        """Number of cycles in the orbit."""
         return len(self.cycles)
 
     @property
     def begin(self) -> np.ndarray:
-        """The section where the orbit begins."""
+        """Section at which the orbit begins."""
         return np.asarray(section(self.cycles[0].begin) + self.ahead)
 
     @cached_property
     def implied(self) -> np.ndarray:
-        """Corrections of the numbers of its first cycle, because its cycles do not close."""
+        """Corrections of the numbers of the first cycle for the closure error."""
         return np.asarray(self.slopes[0][len(self.ahead) :] @ self.ahead)
 
     @cached_property
     def numbers(self) -> np.ndarray:
-        """The headline numbers of its first cycle, had its cycles closed."""
+        """Headline numbers of the first cycle, corrected for the closure error."""
         return np.asarray(np.array(self.cycles[0].numbers()) + self.implied)
 
     @property
     def multipliers(self) -> np.ndarray:
-        """Floquet multipliers, complex, the largest in size first."""
+        """Complex Floquet multipliers in order of decreasing absolute value."""
         found = np.linalg.eigvals(product(self.slopes)).astype(complex)
         return np.asarray(found[np.argsort(-np.abs(found), kind="stable")])
 
     @property
     def attracts(self) -> bool:
-        """True if motions close to it come closer."""
+        """True if the orbit attracts nearby motions."""
         return bool(abs(self.multipliers[0]) < 1.0)
 
     @property
     def from_largest(self) -> Orbit:
-        """This orbit, beginning with the cycle that has the fastest peak."""
+        """The same orbit, starting with the cycle that has the highest slip rate."""
         at = max(range(self.period), key=lambda place: self.cycles[place].fastest)
         if not at:
             return self
@@ -128,18 +130,22 @@ class Orbit:
 
 
 def section(point: Point) -> np.ndarray:
-    """Spring stress and states: all there is to say where V rises through V_0."""
+    """Return the section at a point: spring stress and states."""
     return np.array((point.spring_stress, *point.psis))
 
 
 def image_of(cycle: Cycle) -> np.ndarray:
-    """The section at the end of a cycle, and its numbers below that."""
+    """Return the section at the end of a cycle, followed by its headline numbers."""
     return np.array((cycle.end.spring_stress, *cycle.end.psis, *cycle.numbers()))
 
 
 def product(slopes: Sequence[np.ndarray]) -> np.ndarray:
-    """The derivative of the section over several cycles, one after the other: the product of
-    theirs, of shape (1 + states, 1 + states).
+    """Return the derivative of the section over several successive cycles.
+
+    Returns
+    -------
+    ndarray, shape (1 + states, 1 + states)
+        Product of the derivatives of the cycles.
     """
     size = slopes[0].shape[1]
     together = slopes[0][:size]
@@ -152,20 +158,20 @@ _unit = lru_cache(np.eye)
 
 
 class ReturnMap:
-    """The map of spring stress and states from one rise of V through V_0 to the next.
+    """Map of spring stress and states from one rise of V through V_0 to the next.
 
     Parameters
     ----------
     scene : Scene
-        Whose load point moves.
+        A scene with a moving load point.
     accuracy : Accuracy
     meter : Meter
-        Charged with the motions.
+        Counter of the work of the motions.
     recorded : bool
-        Whether to keep what the motions along an orbit do, besides its ends.
+        If True, record the motions along an orbit. Otherwise only the ends of the cycles are kept.
     counted : sequence of int, optional
-        Places of the states that count for the distance between two sections. By default, all
-        states that a part does not list in `excluded_from_distance`.
+        Indices of the states that count for the distance between two sections. By default, all
+        states count except those that a part lists in ``excluded_from_distance``.
     """
 
     def __init__(
@@ -184,12 +190,14 @@ class ReturnMap:
         self._counted = [0, *(1 + place for place in places)]
 
     def point(self, at: np.ndarray) -> Point:
-        """The slider at a section: on the slow manifold, or at V_0 where mass acts there.
+        """Return the point of the slider at a section.
+
+        The point lies on the slow manifold, or at V_0 if inertia is important there.
 
         Raises
         ------
         Halt
-            Where spring stress leaves no friction of forward slip.
+            If the spring stress is incompatible with friction of forward slip.
         """
         spring_stress, *psis = at.tolist()
         scene, states = self.scene, tuple(psis)
@@ -199,7 +207,7 @@ class ReturnMap:
         return at_rate(self.scene, point, self.scene.log_load_rate) if self._acts(point) else point
 
     def _acts(self, point: Point) -> bool:
-        """True if mass acts beyond what the slow manifold holds of it."""
+        """Return True if the effect of inertia exceeds that on the slow manifold."""
         if not self.scene.has_mass:
             return False
         inertial_stress = point.spring_stress - point.friction
@@ -209,7 +217,13 @@ class ReturnMap:
     def cycles(
         self, start: np.ndarray, count: int, recording: Recording | None = None
     ) -> list[Cycle]:
-        """So many cycles from a section on; fewer where the motion settles or cannot go on."""
+        """Follow a number of cycles from a section.
+
+        Returns
+        -------
+        list of Cycle
+            The list is shorter than ``count`` if the motion settles or cannot continue.
+        """
         seen = list[Cycle]()
         try:
             moving = cycles(self.scene, self.accuracy, self._meter, self.point(start), recording)
@@ -225,15 +239,32 @@ class ReturnMap:
         return seen
 
     def image(self, start: np.ndarray) -> np.ndarray | None:
-        """The section one cycle later, and the numbers of the cycle below it, of shape (1 + states
-        + numbers,); None where the motion does not come that far.
+        """Return the section one cycle later, and the numbers of the cycle.
+
+        Returns
+        -------
+        ndarray, shape (1 + states + numbers,), or None
+            None if the motion does not complete a cycle.
         """
         seen = self.cycles(start, 1)
         return image_of(seen[0]) if seen else None
 
     def slopes(self, start: np.ndarray, count: int, scale: float) -> tuple[np.ndarray, ...]:
-        """Derivatives of so many cycles, one after the other, none of which takes a small step far;
-        fewer where the motion does not come that far. States are of the size of the scale.
+        """Compute the derivatives of successive cycles by finite differences.
+
+        Parameters
+        ----------
+        start : ndarray
+            Section at which the first cycle begins.
+        count : int
+            Number of cycles.
+        scale : float
+            Magnitude of the states, which determines the step of the differences.
+
+        Returns
+        -------
+        tuple of ndarray
+            The tuple is shorter than ``count`` if the motion does not complete all cycles.
         """
         found, step = list[np.ndarray](), STEP * math.sqrt(self.accuracy.refinement) * scale
         current: np.ndarray | None = start
@@ -247,8 +278,17 @@ class ReturnMap:
         return tuple(found)
 
     def along(self, point: Point) -> tuple[Numbers, Numbers]:
-        """The direction in which the motion passes a section, and what going that way changes of
-        the section and the numbers of a cycle, as long as mass hardly acts: the time it takes.
+        """Return the direction of the motion at a section, and its effect.
+
+        A displacement of the start along the motion changes only the time of the cycle, if the
+        effect of inertia is small.
+
+        Returns
+        -------
+        way : tuple of float
+            Rates of change of the section.
+        passed : tuple of float
+            Corresponding change of the section and of the numbers of the cycle.
         """
         scene, states = self.scene, len(point.psis)
         spring_stress = point.friction + scene.dynamics.radiated(scene.log_load_rate)
@@ -257,8 +297,9 @@ class ReturnMap:
         return (0.0, *rates[1:-1]), (*(0.0,) * (1 + states), -rates[-1], *rest)
 
     def _slopes(self, start: np.ndarray, step: float) -> np.ndarray | None:
-        """Of the section after one cycle and of its numbers, by differences of order four; along
-        the motion, as it passes on.
+        """Compute the derivatives of one cycle by differences of order four.
+
+        The derivative along the motion follows from the rates of the motion.
         """
         point = self.point(start)
         way, passed = self.along(point)
@@ -281,23 +322,24 @@ class ReturnMap:
     def orbit(
         self, start: np.ndarray, count: int, swing: float, reach: float = _NEAR
     ) -> Orbit | None:
-        """Find the orbit of a number of cycles, or of a divisor of it, close to a section.
+        """Find a periodic orbit close to a section.
 
         Parameters
         ----------
         start : ndarray
-            The section.
+            Section at which the search starts.
         count : int
-            The number of cycles.
+            Number of cycles of the orbit. The orbit that is found may repeat after a divisor of
+            this number.
         swing : float
             Range of ln V.
         reach : float
-            Largest distance of the orbit from the section, relative to `a` times the range of ln V.
+            Largest distance of the orbit from ``start``, relative to ``a`` times the range of ln V.
 
         Returns
         -------
         Orbit or None
-            None if there is no orbit.
+            None if no orbit is found.
         """
         scale = self.scene.a * swing
         slopes = self.slopes(start, count, scale)
@@ -312,7 +354,13 @@ class ReturnMap:
         return replace(found, cycles=found.cycles[:count], slopes=slopes[:count])
 
     def again(self, known: Orbit) -> Orbit | None:
-        """An orbit that is known at another accuracy; None where it does not close."""
+        """Compute a known orbit at the accuracy of this map.
+
+        Returns
+        -------
+        Orbit or None
+            None if the orbit does not close.
+        """
         if known.accuracy == self.accuracy:
             return known
         return self._solve(known.begin, known.slopes, self.scene.a * known.cycles[0].swing, _NEAR)
@@ -320,11 +368,15 @@ class ReturnMap:
     def _solve(
         self, start: np.ndarray, slopes: Sequence[np.ndarray], scale: float, reach: float
     ) -> Orbit | None:
-        """The orbit of as many cycles as derivatives are known of, within reach of a section; None
-        where there is none.
+        """Solve for an orbit with as many cycles as there are derivatives.
 
-        By Newton's method, ``J move = -(P(s) - s)``, with Broyden's corrections: where P(s) - s is
-        still `off` after a move, J changes by ``off move^T/(move . move)``.
+        The equation ``J move = -(P(s) - s)`` is solved by Newton's method with Broyden's updates.
+        If ``off`` is the value of P(s) - s after a move, J changes by ``off move^T/(move . move)``.
+
+        Returns
+        -------
+        Orbit or None
+            None if there is no orbit within ``reach`` of the section.
         """
         at, enough, last = start, CLOSED * self.accuracy.rtol * scale, math.inf
         jacobian, move = product(slopes) - _unit(len(start)), None
@@ -348,10 +400,10 @@ class ReturnMap:
         return None
 
     def _size(self, move: np.ndarray, at: np.ndarray, scale: float) -> float:
-        """Return the largest change of a section.
+        """Return the largest component of a change of a section.
 
-        The unknowns of a fluid may be huge. If they are larger than the scale of the states, their
-        changes are relative to their values, in units of that scale.
+        The unknowns of a fluid may have large values. If such a value exceeds the scale of the
+        states, the change is divided by the ratio of the value to the scale.
         """
         changes, first = np.abs(move), 1 + self.scene.parts.law.states
         changes[first:] /= np.maximum(1.0, np.abs(at[first:]) / scale)

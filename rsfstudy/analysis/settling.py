@@ -1,4 +1,4 @@
-"""Decision whether a motion that comes close to steady sliding settles there."""
+"""Test whether a motion close to steady sliding settles."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from rsfstudy.status import Status
 
 
 def is_attracted(scene: Scene) -> bool:
-    """Return True if steady sliding at the load point velocity attracts motions close to it.
+    """Return True if steady sliding at the load point velocity is stable.
 
     Parameters
     ----------
     scene : Scene
-        A scene whose load point moves.
+        A scene with a moving load point.
 
     Raises
     ------
     Halt
-        With `unverified` if the largest growth rate of small changes is zero within its error, and
-        with `no_steady_state` if there is no steady sliding.
+        With ``unverified`` if the largest growth rate of small perturbations is zero within its
+        error, and with ``no_steady_state`` if steady sliding does not exist.
     """
     growth = largest_growth_rate(scene.acting(-1), scene.log_load_rate)
     if growth is None:
@@ -39,20 +39,20 @@ def is_attracted(scene: Scene) -> bool:
 
 
 def settled_flag(scene: Scene, *, is_flat: bool) -> float:
-    """Return the flag of a record that has settled if it ends flat.
+    """Return 1 if friction has settled at the end of a record, and 0 if not.
 
     Parameters
     ----------
     scene : Scene
-        A scene under the segment of loading at the end of the record.
+        A scene under the last loading segment of the record.
     is_flat : bool
-        Whether friction hardly changes at the end of the record.
+        True if friction is nearly constant at the end of the record.
 
     Returns
     -------
     float
-        1 if the record ends flat, and 0 if not or if small changes of steady sliding grow; NaN if
-        their growth rate is zero within its error.
+        0 if friction is not constant, or if small perturbations of steady sliding grow. NaN if the
+        growth rate of small perturbations is zero within its error. Otherwise 1.
     """
     if not is_flat:
         return 0.0

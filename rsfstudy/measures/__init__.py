@@ -1,10 +1,13 @@
-"""Measures: from a scene to named numbers with a status, an error estimate and a cost; one file
-each, found by name. Those that studies alone use stand beside these.
+"""Measures: named results of a scene, with a status, error estimates and cost.
 
-A measure is a frozen dataclass derived from `Measure` that fills in the physics. It is picklable,
-so Dask can send it, and describes itself as plain data, so a NetCDF file can hold it. Its fields
-that hold a number, a flag or a text may vary along an axis, as those of the scene do, but for those
-that decide which numbers it gives.
+Each measure has its own module and is looked up by its name. Measures that only the studies use are
+kept with the studies.
+
+A measure is a frozen dataclass derived from ``Measure`` that implements the physics. Measures are
+picklable, so Dask can distribute them. A measure describes itself as plain data, so the description
+can be stored in a NetCDF file. Fields that hold a number, a flag or a string may vary along an
+axis, in the same way as the fields of a scene. Fields that determine the names of the results may
+not vary.
 """
 
 from __future__ import annotations
@@ -34,17 +37,17 @@ from rsfstudy.vocabulary import DERIVED
 @guard_methods
 @dataclass(frozen=True)
 class Outcome:
-    """Findings of a measure in one scene.
+    """Results of a measure for one scene.
 
     Attributes
     ----------
     status : Status
     values : mapping of str to float or 1-d array
-        The named numbers; names that are missing become NaN in the lattice.
+        Named results. Missing names become NaN in the lattice.
     message : str
-        More about the status, in words.
+        Details about the status.
     rhs_evaluations : int
-        Right-hand sides spent.
+        Number of right-hand-side evaluations.
     """
 
     status: Status
@@ -60,22 +63,26 @@ TAKEN = frozenset({"status", "message", "rhs_evaluations", "wall_time", *FIELDS,
 @guard_methods
 @dataclass(frozen=True)
 class Measure(CheckedKeywords):
-    """Base of all measures: runs `find` under a work budget and turns a `Halt` into a status.
+    """Base class of all measures.
 
-    What one writes, in a frozen dataclass whose fields are the options of the measure::
+    A measure runs ``find`` with a work budget, and converts a ``Halt`` into a status. To define a
+    measure, write a frozen dataclass with the following members. The fields of the dataclass are
+    the options of the measure::
 
-        name: ClassVar[str]                       # what it is called
-        headline: str                             # the number it is about
-        outputs: Sequence[Output]                 # its numbers, with units and error estimates
+        name: ClassVar[str]                       # name of the measure
+        headline: str                             # name of the main result
+        outputs: Sequence[Output]                 # results, with units and error estimates
         typical_work: int                         # right-hand sides of a cell
         find(self, scene, accuracy, meter) -> Outcome
 
-    `find` returns ``Outcome(status, values)``. `values` has a number for each name of `outputs`,
-    and one called ``<name>_error`` for each with ``error=True``. `accuracy` holds the requested
-    accuracy (``accuracy.rtol``), and `meter` counts right-hand sides and stops a motion that takes
-    too many. To follow a motion, pass both on: ``rsfstudy.simulate(scene, accuracy=accuracy,
-    meter=meter)``. To use another measure, call its `charged`. Override `scales` to report a cell
-    as ``unverified`` if its error estimates are far too large::
+    ``find`` returns ``Outcome(status, values)``. ``values`` contains a number for each name in
+    ``outputs``, and a number called ``<name>_error`` for each output with ``error=True``. The
+    argument ``accuracy`` contains the requested relative accuracy, ``accuracy.rtol``. The argument
+    ``meter`` counts right-hand-side evaluations, and stops a motion that exceeds the work budget.
+    To compute a motion, pass both arguments to ``rsfstudy.simulate``: ``rsfstudy.simulate(scene,
+    accuracy=accuracy, meter=meter)``. To use the results of another measure, call the ``charged``
+    method of that measure. Override ``scales`` to report a cell as ``unverified`` if its error
+    estimates are far too large::
 
         scales(self, scene, values) -> Mapping[str, float]
     """
@@ -89,29 +96,33 @@ class Measure(CheckedKeywords):
 
     @property
     def headline(self) -> str:
-        """The number the measure is about."""
+        """Name of the main result of the measure."""
         raise TypeError(f"{type(self).__name__} names no headline")
 
     @property
     def outputs(self) -> Sequence[Output]:
-        """The numbers it gives."""
+        """Results of the measure."""
         return ()
 
     @derived
     def variables(self) -> Mapping[str, tuple[str, ...]]:
-        """Name of each number and of each error estimate, and the inner dimensions it has within
-        one cell (none for a plain number).
+        """Names of results and error estimates, with their inner dimensions.
+
+        Scalar results have no inner dimensions.
         """
         return {name: about.dims for about in self.outputs for name in about.names}
 
     @derived
     def optional(self) -> Sequence[str]:
-        """Numbers with an error estimate that an ok outcome may leave out; its message says why."""
+        """Names of results that may be missing from a successful outcome.
+
+        If such a result is missing, the message of the outcome explains why.
+        """
         return tuple(about.name for about in self.outputs if about.optional)
 
     @derived
     def estimated(self) -> tuple[str, ...]:
-        """Names of the numbers that have an error estimate."""
+        """Names of the results that have an error estimate."""
         names = self.variables
         return tuple(name for name in names if f"{name}_error" in names)
 
@@ -122,51 +133,60 @@ class Measure(CheckedKeywords):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Meaning of its numbers, inner dimensions and fields, with their units: those that the
-        vocabulary does not hold.
+        """Meanings and units of results, inner dimensions and fields.
+
+        Quantities in the common vocabulary are not included.
         """
         return (*(about for about in self.outputs if about.long_name), *self.dimensions)
 
     @property
     def sought(self) -> tuple[str, ...]:
-        """Fields of the scene the measure looks for, whatever value the scene holds."""
+        """Fields of the scene that the measure solves for.
+
+        The values of these fields in the scene are ignored.
+        """
         return ()
 
     @property
     def classes(self) -> tuple[type[Measure], ...]:
-        """Its class, and those of measures that it holds: their code decides its numbers."""
+        """Class of this measure, and classes of measures in its fields.
+
+        The code of these classes determines the results.
+        """
         held = (getattr(self, f.name) for f in fields(self))
         return (type(self), *(c for m in held if isinstance(m, Measure) for c in m.classes))
 
     @property
     def typical_work(self) -> int:
-        """Right-hand sides one cell usually takes at the default accuracy."""
+        """Typical number of right-hand sides per cell at the default accuracy."""
         raise TypeError(f"{type(self).__name__} states no typical work")
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Right-hand sides by digits asked for, over those at the default accuracy, as the study
-        accuracy_cost measured them; here for a limit cycle, the most demanding.
+        """Number of right-hand sides by number of digits, relative to the default.
+
+        The study accuracy_cost measured these ratios. The default values apply to a limit cycle,
+        the most demanding measure.
         """
         return {2.0: 0.3, 3.0: 0.33, 5.0: 0.55, 7.0: 1.0, 8.0: 1.35, 9.0: 1.97, 10.0: 3.5}
 
     def expected_work(self, accuracy: Accuracy) -> float:
-        """Right-hand sides one cell usually takes at an accuracy."""
+        """Return the typical number of right-hand sides per cell at an accuracy."""
         return self.typical_work * relative_work(accuracy.rtol, self.work_by_digits)
 
     @property
     def plain_fields(self) -> dict[str, Plain]:
-        """Its fields that hold a number, a flag or a text: those an axis may vary."""
+        """Fields that hold a number, a flag or a string, which an axis may vary."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.init}
         return {name: value for name, value in values.items() if isinstance(value, Plain)}
 
     def with_(self, **changes: Any) -> Measure:
-        """A copy with other plain fields, checked anew.
+        """Return a copy with other values of plain fields.
 
         Raises
         ------
         InvalidValue
-            For an unknown name, a value of another type, or one that the measure refuses.
+            If a name is unknown, if a value has the wrong type, or if the measure rejects a value.
         """
         if not changes:
             return self
@@ -186,20 +206,21 @@ class Measure(CheckedKeywords):
             raise InvalidValue("fields", changes, rule) from error
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """By name of a number with a numerical error, what the accuracy asked for is relative to.
+        """Return the scale of the numerical error of each result.
 
-        Where the estimate of one stays more than a hundred times above that, an outcome is not ok,
-        but `unverified`. Numbers left out are held to nothing: those that are statistical, or
-        resolved by what the measure is told rather than by the accuracy.
+        The requested accuracy is relative to this scale. If the error estimate of a result exceeds
+        the requested error more than a hundredfold, the status becomes ``unverified``. Results that
+        are not included are not checked, such as statistical results, or results whose resolution
+        is an option of the measure.
         """
         return {}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """The physics: measure one scene, charging `meter`."""
+        """Compute the results for one scene, and count the work in ``meter``."""
         raise TypeError(f"{type(self).__name__} measures nothing")
 
     def check(self) -> None:
-        """Raise InvalidValue where the measure declares what no lattice can hold."""
+        """Raise ``InvalidValue`` if a lattice cannot hold the declared results."""
         try:
             for name in ("__call__", "charged", "metered"):
                 if getattr(type(self), name) is not getattr(Measure, name):
@@ -214,15 +235,20 @@ class Measure(CheckedKeywords):
             raise InvalidValue("measure", type(self).__name__, rule) from error
 
     def __call__(self, scene: Scene, accuracy: Accuracy) -> Outcome:
-        """Measure one scene; a motion that cannot go on becomes its status."""
+        """Compute the results for one scene.
+
+        If a motion cannot continue, the reason becomes the status of the outcome.
+        """
         outcome, meter = self.metered(scene, accuracy)
         if outcome.status is Status.WORK_BUDGET_SPENT and meter.spent > meter.budget:
             return replace(outcome, message=outcome.message + more_work(meter.budget))
         return outcome
 
     def charged(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """The outcome of `__call__`, for a measure that asks this one: its work is added to that of
-        the other.
+        """Compute the results for another measure.
+
+        The outcome is the same as that of ``__call__``. The work is added to the meter of the other
+        measure.
         """
         outcome, own = self.metered(scene, accuracy)
         for regime, spent in own.by_regime.items():
@@ -230,7 +256,7 @@ class Measure(CheckedKeywords):
         return outcome
 
     def metered(self, scene: Scene, accuracy: Accuracy) -> tuple[Outcome, Meter]:
-        """The outcome of `__call__`, and the meter with the work that was spent."""
+        """Compute the results for one scene, and return the meter of the work."""
         meter = Meter(accuracy.budget, dict(accuracy.methods), accuracy.engine)
         try:
             outcome = self._checked(self.find(scene, accuracy, meter))
@@ -242,14 +268,15 @@ class Measure(CheckedKeywords):
         return Outcome(outcome.status, outcome.values, outcome.message, spent), meter
 
     def _checked(self, outcome: Outcome) -> Outcome:
-        """An outcome whose numbers are as declared; ok without one that it must have becomes
-        `not_finite`.
+        """Check that the results of an outcome agree with their declarations.
+
+        The status becomes ``not_finite`` if a required result of a successful outcome is missing.
 
         Raises
         ------
         InvalidValue
-            For anything but an outcome, and for a number that is not declared, not real, or of
-            another shape.
+            If the argument is not an outcome, or if a result is not declared, not real, or has the
+            wrong shape.
         """
         if not isinstance(outcome, Outcome) or not isinstance(outcome.status, Status):
             raise InvalidValue("measured", outcome, "must be an Outcome with a Status")
@@ -275,8 +302,10 @@ class Measure(CheckedKeywords):
         return Outcome(outcome.status, values, outcome.message)
 
     def _lacking(self, values: Mapping[str, Value]) -> str | None:
-        """The first number of an ok outcome that is missing or not finite: the headline, and each
-        that has an error estimate, with that, but for those left out that are optional.
+        """Return the first required result that is missing or not finite.
+
+        Required results are the headline, and all results with an error estimate, including the
+        error. Optional results are required only if they are present.
         """
         known = [n for n in self.estimated if n in values or n not in self.optional]
         for name in (self.headline, *known, *(f"{name}_error" for name in known)):
@@ -287,7 +316,7 @@ class Measure(CheckedKeywords):
         return None
 
     def _held_to(self, rtol: float, scene: Scene, outcome: Outcome) -> Outcome:
-        """An ok outcome, or `unverified` with what is known too badly."""
+        """Change the status to ``unverified`` if an error estimate is too large."""
         values, doubts = outcome.values, []
         for name, scale in self.scales(scene, values).items():
             error, asked = values.get(f"{name}_error", 0.0), rtol * scale
@@ -300,10 +329,13 @@ class Measure(CheckedKeywords):
         return Outcome(Status.UNVERIFIED, values, message)
 
     def describe(self) -> dict[str, Any]:
-        """The measure as plain data."""
+        """Return a description of the measure as plain data."""
         return {"name": self.name, **asdict(self)}
 
     @classmethod
     def restored_fields(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Fields that are no plain data, taken out of a description that stands at `path`."""
+        """Return the fields that are not plain data from a description.
+
+        The argument ``path`` is the location of the description.
+        """
         return {}

@@ -1,4 +1,4 @@
-"""Numbers and rows that a fit of a record gives, with their units."""
+"""Outputs of a fit of a record, with their units."""
 
 from __future__ import annotations
 
@@ -63,16 +63,21 @@ _DRAWN = (
 
 
 def outputs_of(parameters: Sequence[str], drawn: bool, windows: int) -> tuple[Output, ...]:
-    """List the outputs of a fit: parameters with errors, draws, other numbers, and rows.
+    """Return the outputs of a fit.
 
     Parameters
     ----------
     parameters : sequence of str
+        Names of the free parameters.
     drawn : bool
-        Include draws from the posterior.
+        If True, include draws from the posterior.
     windows : int
-        Number of windows that are fitted together. If there are several, the normal stress before
-        the step is an output for each.
+        Number of windows in the fit. If there are several windows, the outputs include the normal
+        stress before each step.
+
+    Returns
+    -------
+    tuple of Output
     """
     found = [output for name in parameters for output in _of_parameter(name)]
     stresses = [

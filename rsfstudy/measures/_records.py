@@ -1,6 +1,4 @@
-"""Records of motions: what the measures share that keep points of a motion, or read numbers off it
-as an experimenter does.
-"""
+"""Records of motions, shared by measures that store or evaluate a motion."""
 
 from __future__ import annotations
 
@@ -45,29 +43,30 @@ KEPT = (
 
 
 def recorded(*names: str) -> tuple[Output, ...]:
-    """Outputs along `phase`: quantities of the vocabulary, of each point that is kept."""
+    """Return the outputs along ``phase`` for some quantities of the vocabulary."""
     return tuple(Output(name, dims=("phase",)) for name in names)
 
 
 class Record(NamedTuple):
-    """A motion from the beginning of a segment of loading on.
+    """A motion from the beginning of a loading segment.
 
     Attributes
     ----------
     begun : list of Event
-        Where that segment begins, and each later one.
+        Beginnings of this segment and of all later segments.
     before : list of float
-        The friction coefficient the instant before. With mass, that after tells of the slow
-        manifold that the motion comes to within the inertial time.
+        Friction coefficient immediately before each beginning. With inertia, the friction
+        coefficient immediately after a beginning is the value on the slow manifold, which the
+        motion approaches within the inertial time.
     peak : Event or None
-        The extreme that was asked for; None where there is none.
+        The requested extremum. None if there is no extremum.
     end : Event
         The last event.
     rows : ndarray
-        What was recorded, shape (rows, columns): see `motion.recording`.
+        Recorded samples, shape (rows, columns). See ``motion.recording`` for the columns.
     neglected : ndarray
-        Error of ln V by the inertia that is neglected up to each row: see
-        `motion.neglected_inertia`.
+        Error of ln V due to inertia that is neglected up to each row (see
+        ``motion.neglected_inertia``).
     """
 
     begun: list[Event]
@@ -79,11 +78,11 @@ class Record(NamedTuple):
 
     @property
     def begin(self) -> Event:
-        """Where the record begins."""
+        """Beginning of the record."""
         return self.begun[0]
 
     def neglected_until(self, time: float) -> float:
-        """Return the error of ln V by the inertia that is neglected up to a time."""
+        """Return the error of ln V due to inertia neglected up to a given time."""
         row = min(int(np.searchsorted(self.rows[:, 0], time)), len(self.rows) - 1)
         return float(self.neglected[row])
 
@@ -99,8 +98,10 @@ def followed(
     until: float = math.inf,
     halts: bool = False,
 ) -> Record:
-    """Record of a motion up to its first extreme in a segment of loading, or to where the next one
-    begins without one; or as long as told.
+    """Record a motion up to its first extremum in a loading segment.
+
+    If there is no extremum, the record ends at the beginning of the next segment. If ``until`` is
+    given, the record ends at this time.
 
     Parameters
     ----------
@@ -108,19 +109,23 @@ def followed(
     accuracy : Accuracy
     meter : Meter
     asked : sequence of EventSpecification
-        The extreme first; others may end the motion.
+        The extremum, followed by other events that may end the motion.
     first, within : int
-        Numbers, from 0, of the segment at which the record begins, and of the one in which the
-        extreme is.
+        Indices of the segment at which the record begins, and of the segment that contains the
+        extremum.
     until : float
-        Time at which to end, in D_c/V_*.
+        End time in D_c/V_*.
     halts : bool
-        Whether the motion may be unable to go on once the extreme is reached.
+        If True, ignore a ``Halt`` after the extremum.
+
+    Returns
+    -------
+    Record
 
     Raises
     ------
     Halt
-        Where the motion cannot go on.
+        If the motion cannot continue.
     """
     recording, begun, peak = Recording(), list[Event](), None
     try:
@@ -150,7 +155,7 @@ def followed(
 
 
 def since(begin: Event, path: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Quantities of a record along its path, with time and slip since its beginning."""
+    """Return the quantities along a record, with time and slip from its start."""
     found = {name: path[name] for name in ("friction_coefficient", "log10_slip_rate")}
     return {"time": path["time"] - begin.time, "slip": path["slip"] - path["slip"][0], **found}
 
@@ -158,8 +163,9 @@ def since(begin: Event, path: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]
 @guard_methods
 @dataclass(frozen=True)
 class Recorded(Measure):
-    """Base of them: the record is kept along `phase`, at so many points as the field `phases`
-    says.
+    """Base class of measures that keep a record along ``phase``.
+
+    The field ``phases`` is the number of points of the record.
     """
 
     def __post_init__(self) -> None:
@@ -184,20 +190,22 @@ def error_of(
     accuracy: Accuracy,
     neglected: float = 0.0,
 ) -> float:
-    """Estimate the error of a number that is read at single instants.
+    """Estimate the error of a result that is read at a single instant.
 
-    On a stiff machine stability limits the steps, so that the errors of two runs may agree at an
-    instant by chance. What that hides is a part of the number, and of the friction that it is a
-    difference of: of a, by which friction changes where ln V does by 1. So of y, of y' by the
-    refined run, with eps the accuracy asked for and e the neglected inertia, the error is ``3 |y -
-    y'| + 0.01 eps |y| + (0.1 eps + e) a |dy/dmu|``.
+    If the machine is stiff, stability limits the time steps. The errors of two runs may then agree
+    at an instant by chance. The estimate therefore includes two additional terms: a fraction of the
+    result, and a fraction of the friction from which the result is read. Let y and y' be the
+    results of the first and the refined run, eps the requested accuracy, and e the error of ln V
+    due to neglected inertia. The error is ``3 |y - y'| + 0.01 eps |y| + (0.1 eps + e) a |dy/dmu|``,
+    because friction changes by ``a`` if ln V changes by 1.
 
     Parameters
     ----------
     value, refined : float
-        Results of the first run, and of the refined one.
+        Results of the first run and of the refined run.
     by_friction : float
-        Change of the number by that of a friction coefficient which it is read from, dy/dmu.
+        Derivative dy/dmu of the result with respect to the friction coefficient from which the
+        result is read.
     scene : Scene
     accuracy : Accuracy
     neglected : float
@@ -206,7 +214,7 @@ def error_of(
     Returns
     -------
     float
-        In the units of the number.
+        Error in the units of the result.
     """
     friction = (_AT_AN_INSTANT * accuracy.rtol + neglected) * scene.a
     chance = BY_CHANCE * accuracy.rtol
@@ -221,7 +229,15 @@ def errors_of(
     accuracy: Accuracy,
     neglected: Mapping[str, float] | None = None,
 ) -> dict[str, float]:
-    """Estimate the errors of several numbers, as `<name>_error` (see `error_of`)."""
+    """Estimate the errors of several results that are read at single instants.
+
+    See ``error_of`` for the estimate.
+
+    Returns
+    -------
+    dict
+        Errors by name, as ``<name>_error``.
+    """
     shared = neglected or dict.fromkeys(values, 0.0)
     return {
         f"{name}_error": error_of(

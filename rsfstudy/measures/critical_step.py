@@ -1,12 +1,12 @@
-"""The critical step: the smallest step of load point velocity, load point displacement or normal
-stress that triggers instability.
+"""Critical step: the smallest step of the load that triggers instability.
 
-A step is critical when the peak slip rate of the motion it sets off just touches the instability
-norm. Where mass hardly acts up to the norm, the touching path is known at its end: ln V is at the
-norm and at rest there. Followed against time, where it attracts its neighbours, it leads to the
-step that started it; see `critical_path`. Where mass acts below the norm, the peak is followed
-forward; see `after_step`. Either way the answer counts only once a motion on each side of it has
-confirmed it.
+The step may be a change of load point velocity, load point displacement or normal stress. A step is
+critical if the peak slip rate of the motion that follows just reaches the instability norm. If the
+effect of inertia is small up to the norm, the end of this critical path is known: ln V equals the
+norm, and its rate is zero. The path is followed backwards in time, in which direction it attracts
+neighbouring paths, to the step at which it starts (see ``critical_path``). If inertia is important
+below the norm, the peak is followed forwards in time (see ``after_step``). In both cases, the
+result is accepted only if motions on both sides of the critical step confirm it.
 """
 
 from __future__ import annotations
@@ -67,29 +67,29 @@ def _outputs(of: str) -> tuple[Output, ...]:
 @guard_methods
 @dataclass(frozen=True)
 class CriticalStep(Measure):
-    """Critical step of the load point, or of normal stress: the smallest after which slip rate
-    reaches the instability norm, V T/(2 pi D_c).
+    """Smallest step after which slip rate reaches the instability norm.
 
-    It is V_0/V_*, or a displacement in D_c, or a change of normal stress over sigma_*; beside it
-    stand the sizes of two steps that confirm it, of which one settles and one triggers. By the slip
-    law at constant normal stress, critical stiffness and an infinite norm it is ``V_0/V_* = 1 +
-    a/(b - a)``, or a displacement of ``D_c a/(b - a)``.
+    The norm is V T/(2 pi D_c). The critical step is a velocity ratio V_0/V_*, a displacement in
+    D_c, or a change of normal stress over sigma_*. The outputs include the sizes of two steps that
+    confirm the critical step: the slider settles after one of them, and becomes unstable after the
+    other. Under the slip law at constant normal stress, critical stiffness and an infinite norm,
+    the critical step is ``V_0/V_* = 1 + a/(b - a)``, or a displacement of ``D_c a/(b - a)``.
 
     Parameters
     ----------
     of : {"load_velocity_ratio", "displacement_step", "normal_stress_step"}
-        What is stepped, whatever value the scene holds for it; "velocity_step" is another name of
-        "load_velocity_ratio". After a step of displacement or of
-        normal stress the load point is held (V_0 = 0) unless the scene states its
-        `load_velocity_ratio`. Normal stress that is constant has no steps; falls of it trigger
-        (direction "down", and a negative number).
+        Type of the step. The value of this field in the scene is ignored. "velocity_step" is an
+        alias of "load_velocity_ratio". After a step of displacement or of normal stress, the load
+        point is held (V_0 = 0) unless the scene specifies ``load_velocity_ratio``. Steps of normal
+        stress require a normal stress that is not constant. A decrease of normal stress can trigger
+        an instability (direction "down", and a negative number).
     direction : {"up", "down"}
-        Steps that increase, or decrease.
+        Steps that increase or decrease the load.
 
     References
     ----------
-    Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196; eqs. 10, 11 and 14
-    of doi:10.1007/s11589-014-0098-4.
+    Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196; eqs. 10, 11 and 14 of
+    doi:10.1007/s11589-014-0098-4.
     """
 
     of: str = "load_velocity_ratio"
@@ -120,19 +120,23 @@ class CriticalStep(Measure):
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """As the study accuracy_cost measured it for a rate step."""
+        """Relative work by number of digits, as measured for velocity steps.
+
+        The study accuracy_cost measured these ratios.
+        """
         return {3.0: 0.59, 5.0: 0.74, 7.0: 1.0, 8.0: 1.21, 9.0: 1.58, 10.0: 1.89}
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """The change that the step is."""
+        """Return the scale of the numerical error, which is the size of the change."""
         still = 1.0 if self.of == "load_velocity_ratio" else 0.0
         return {self.headline: abs(values[self.headline] - still)}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Find the boundary, then confirm it with a motion on each side.
+        """Find the critical step, and confirm it with a motion on each side.
 
-        Where mass hardly acts below the norm it is found from the `critical_path`; where there is
-        no such path, or mass acts, from motions followed forward.
+        If the effect of inertia is small below the norm, the critical step follows from
+        ``critical_path``. If there is no such path, or if inertia is important, the critical step
+        is found from motions that are followed forwards in time.
         """
         check_single_step(scene)
         if scene.begins_elsewhere:
@@ -228,8 +232,9 @@ class CriticalStep(Measure):
         }
 
     def _surveyed(self, steps: Steps, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Follow motions forward, from small steps to large, until one is unstable; then close in
-        on the boundary.
+        """Find the critical step from motions after steps of increasing size.
+
+        The search continues until a motion is unstable, and is then refined.
         """
 
         smallest, largest = math.log(steps.smallest), math.log(steps.largest)
@@ -312,7 +317,10 @@ class CriticalStep(Measure):
 
 
 def _excess(steps: Steps, size: float, accuracy: Accuracy, meter: Meter) -> float | None:
-    """Excess of the motion after a step of this size; None where it cannot go on."""
+    """Compute the excess of the motion after a step of a given size.
+
+    The result is None if the motion cannot continue.
+    """
     try:
         return after_step.excess_over_norm(steps.scene_at(size), accuracy, meter)
     except Halt as halt:
@@ -322,7 +330,10 @@ def _excess(steps: Steps, size: float, accuracy: Accuracy, meter: Meter) -> floa
 
 
 def _at_light_norm(steps: Steps, meter: Meter) -> float | None:
-    """Size of the critical step for a norm low enough to leave mass out: close by, and cheap."""
+    """Compute the critical step for a norm at which inertia is negligible.
+
+    The result is an inexpensive approximation of the critical step.
+    """
     norm = min(steps.scene.instability_norm, _LIGHT_NORM)
     massless = type(steps)(steps.scene.without_mass().with_(instability_norm=norm), steps.sign)
     if massless.largest <= massless.smallest or not massless.scene.critical_stiffness:
@@ -333,8 +344,9 @@ def _at_light_norm(steps: Steps, meter: Meter) -> float | None:
 def _neighbours(
     steps: Steps, near: float, accuracy: Accuracy, meter: Meter
 ) -> tuple[float, float] | None:
-    """A stable and an unstable log size around a guess; None where there are none within a factor
-    of four.
+    """Find a stable and an unstable logarithm of size around a guess.
+
+    The result is None if there are no such sizes within a factor of four.
     """
     middle = math.log(near)
     reached = after_step.reaches_norm(steps.scene_at(near), accuracy, meter)

@@ -1,4 +1,4 @@
-"""Elasticities: per cent by which a number changes where a number of its scene changes by one."""
+"""Elasticities: relative sensitivities of a result to the scene parameters."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _USUAL = 8
 
 
 class _Level(NamedTuple):
-    """ln|y| and its error, which is that of y over |y|."""
+    """Value and error of ln|y|. The error is the error of y divided by |y|."""
 
     value: float
     error: float
@@ -54,29 +54,31 @@ class _Level(NamedTuple):
 @guard_methods
 @dataclass(frozen=True)
 class Elasticities(Measure):
-    """Primary output y of a measure and its elasticities, d ln|y|/d ln p, by scene parameters p.
+    """Elasticities d ln|y|/d ln p of the headline y of a measure.
 
-    Each elasticity is a partial derivative: the other parameters stay fixed. For example, it is 2
-    if y is proportional to the square of p. The elasticity and its error are dimensionless and
-    have the shape (parameters,).
+    Each elasticity is a partial derivative with respect to a scene parameter p. All other
+    parameters remain fixed. If y is proportional to p squared, for example, the elasticity is 2.
+    The elasticities and their errors are dimensionless and have the shape (parameters,).
 
-    The derivatives are central differences of the fourth order, from points at ln p = -2h, -h, h
-    and 2h. The step h = (e/2)^(1/3) follows from e, the error estimate of y. The error estimate
-    of an elasticity is 1.5 e/h for the errors of y, plus a quarter of the difference between the
-    formulas of the fourth and of the second order, plus a bound by the fourth difference. The
-    measure is thus evaluated four times per parameter, and once at the scene itself.
+    The derivatives are fourth-order central differences with points at ln p = -2h, -h, h and 2h,
+    relative to the scene. The measure is therefore evaluated four times per parameter, and once for
+    the scene. The step h = (e/2)^(1/3) depends on the relative error estimate e of y. The error
+    estimate of an elasticity is the sum of three terms. The first term, 1.5 e/h, accounts for the
+    errors of y. The second term is a quarter of the difference between the fourth-order and the
+    second-order formula. The third term is a bound computed from the fourth difference.
 
     If y has no value on one side, for example near a stability boundary, up to three shorter steps
-    are tried, each an eighth of the one before. At the boundary itself, for example at the critical
-    stiffness, the difference is one-sided.
+    are tried. Each of these steps is an eighth of the previous step. If the scene is exactly at a
+    boundary, such as the critical stiffness, the derivative is a one-sided difference.
 
     Parameters
     ----------
     measure : Measure
+        A measure whose headline is a single number.
     parameters : sequence of str
         Scene parameters, along the dimension ``parameter``. By default, all parameters that the
-        measure does not solve for. The elasticity is NaN for a parameter that a scene does not
-        have, or that is zero.
+        measure does not solve for. The elasticity is NaN if the scene does not have the parameter,
+        or if the parameter is zero.
     """
 
     measure: Measure
@@ -133,7 +135,7 @@ class Elasticities(Measure):
         return self.measure.work_by_digits
 
     def describe(self) -> dict[str, Any]:
-        """The measure as plain data."""
+        """Return a description of the measure as plain data."""
         return {
             "name": self.name,
             "measure": self.measure.describe(),
@@ -141,7 +143,7 @@ class Elasticities(Measure):
         }
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """The headline, and its elasticities by measurements on both sides of each number."""
+        """Compute the headline and its elasticities."""
         outcome = self.measure.charged(scene, accuracy, meter)
         if outcome.status is not Status.OK:
             return Outcome(outcome.status, message=outcome.message)
@@ -175,8 +177,27 @@ class Elasticities(Measure):
         accuracies: Sequence[Accuracy],
         meter: Meter,
     ) -> tuple[float, float]:
-        """The derivative by one number, and its error: over shorter steps too where there is no
-        number on one side or the error is large. Accuracies are those of each step.
+        """Compute the derivative with respect to one parameter, and its error.
+
+        If the headline has no value on one side, or if the error is large, the derivative is
+        recomputed with shorter steps.
+
+        Parameters
+        ----------
+        scene : Scene
+        name : str
+            Name of the parameter.
+        here : _Level
+            Value at the scene.
+        step : float
+            Longest step of ln p.
+        accuracies : sequence of Accuracy
+            Accuracy for each step.
+        meter : Meter
+
+        Returns
+        -------
+        slope, error : float
         """
         found: list[tuple[bool, float, float]] = []
         for part, accuracy in zip(_SHORTER, accuracies, strict=True):
@@ -200,12 +221,17 @@ class Elasticities(Measure):
     def _at(
         self, scene: Scene, name: str, by: float, accuracy: Accuracy, meter: Meter
     ) -> _Level | None:
-        """ln|y| where ln p is larger by a step; None where the answer there is no number.
+        """Compute ln|y| after a change of ln p.
+
+        Returns
+        -------
+        _Level or None
+            None if the measure has no numerical result there.
 
         Raises
         ------
         Halt
-            Where it failed there.
+            If the measure fails.
         """
         try:
             beside = scene.with_(**{name: getattr(scene, name) * math.exp(by)})
@@ -218,8 +244,12 @@ class Elasticities(Measure):
         return self._level(outcome)
 
     def _level(self, outcome: Outcome) -> _Level | None:
-        """ln|y| with the error of y, and what rounding leaves of it, of y and of p; None without a
-        number, or where it is zero.
+        """Return ln|y| and its error, including rounding errors.
+
+        Returns
+        -------
+        _Level or None
+            None if the outcome has no headline, or if the headline is zero.
         """
         y = float(outcome.values[self.headline]) if outcome.status is Status.OK else 0.0
         if not y:
@@ -231,13 +261,22 @@ class Elasticities(Measure):
 def _derivative(
     here: _Level, sides: Sequence[_Level | None], step: float
 ) -> tuple[float, float, float]:
-    """Compute the derivative of ln|y| by ln p from levels at `_PLACES`, as far as there are any.
+    """Compute the derivative of ln|y| with respect to ln p.
+
+    Parameters
+    ----------
+    here : _Level
+        Value at the scene.
+    sides : sequence of _Level or None
+        Values at ``_PLACES``, or None for missing values.
+    step : float
+        Step of ln p.
 
     Returns
     -------
     slope, error, of_levels : float
-        The derivative, its error, and the part of the error that follows from errors of y; NaN
-        without a level on either side.
+        The derivative, its error, and the contribution of the errors of y to this error. All are
+        NaN if the values on both sides are missing.
     """
     far_below, below, above, far_above = sides
     if far_below and below and above and far_above:

@@ -1,4 +1,4 @@
-"""A fit: the friction parameters that a record of a laboratory tells, with statistical errors."""
+"""Fits of friction parameters to laboratory records, with standard errors."""
 
 from __future__ import annotations
 
@@ -61,61 +61,66 @@ _LEAST = 1.001
 @guard_methods
 @dataclass(frozen=True)
 class Fit(Measure):
-    """Friction parameters by least squares, under the noise that the residuals tell.
+    """Fit of friction parameters to a laboratory record by least squares.
 
-    The model is the motion of the scene under the loading that the record tells, read as the rig
-    reads it, plus a trend of powers of load point displacement from the step:
+    The least-squares fit accounts for the noise that is estimated from the residuals. The model is
+    the motion of the scene under the loading of the record, plus a trend in powers of load point
+    displacement from the step:
 
         mu(t) = mu_* + a ln(V/V_0) + Theta + c_1 x + c_2 x^2 + ...,    dmu/dt = k (V_l - V)
 
-    with V_l the load point velocity, V_0 that before the step and k stiffness over normal stress;
-    Theta evolves by the law (dmu/dt is that of constant normal stress, without mass). Lengths are
-    in um, times in s, normal stress in Pa. What is given along the rows has the shape (rows,),
-    `covariance` and `correlation` (parameters, parameters).
+    Here V_l is the load point velocity, V_0 is the load point velocity before the step, and k is
+    stiffness over normal stress. Theta evolves by the friction law. The equation for dmu/dt applies
+    at constant normal stress and without inertia. Lengths are in um, times in s, and normal
+    stresses in Pa. Outputs along the rows have the shape (rows,), and ``covariance`` and
+    ``correlation`` have the shape (parameters, parameters).
 
-    Errors are standard errors ``<name>_stderr`` and the ends of 95 % intervals, ``<name>_low`` and
-    ``<name>_high``; ``<name>_error`` is numerical. A parameter that the record does not tell makes
-    the outcome `not_identified`; the message names it. The ends of its interval are then the bounds
-    of the search, or NaN where it has none: nothing is excluded.
+    For each parameter, ``<name>_stderr`` is the standard error, and ``<name>_low`` and
+    ``<name>_high`` are the ends of the 95 % confidence interval. ``<name>_error`` is the numerical
+    error. If the record does not constrain a parameter, the status is ``not_identified``, and the
+    message names the parameter. Its interval then extends to the bounds of the search, or is NaN if
+    there are no bounds.
 
     Parameters
     ----------
     records : tuple of Record
-        What may be fitted.
+        Records that may be fitted.
     free : tuple of str
-        Parameters to look for (see `analysis.fitting.model.PARAMETERS`). The others are those of
-        the scene.
+        Names of the free parameters (see ``analysis.fitting.model.PARAMETERS``). The other
+        parameters have the values of the scene.
     slip_distance_guess : float
-        D_c in um of which the scene makes its unit of slip; the first guess where it is free.
+        Slip distance D_c in um, the unit of slip of the scene. If D_c is free, this is its initial
+        value.
     slip_distance_2_guess : float
-        The same of the second state, where the law has two.
+        Slip distance in um of the second state, if the law has two states.
     record : str
-        Name of the one to fit; the first one, if empty.
+        Name of the record to fit. By default, the first record.
     step : int
-        Number of the step that is fitted, from 1.
+        Number of the step to fit, from 1.
     together : tuple of (str, int)
-        Records and numbers of steps that are fitted together, instead: each has friction before it,
-        trends and the time of the step for itself, as ``mu_star_1`` and so on.
+        Names of records and numbers of steps for a joint fit, which replaces ``record`` and
+        ``step``. Each step has its own friction before the step, trend and step time, named
+        ``mu_star_1`` and so on.
     before, after : float
-        Load point displacement in um that is fitted before the step and after it. Zero: half the
-        way back to the step before, and up to the next, or to its window if that is fitted
-        together with this one.
+        Load point displacements in um to fit before and after the step. By default, the window
+        begins halfway between the previous step and this step. It ends at the next step, or at the
+        window of the next step in a joint fit.
     part : float
-        Part of what follows the step that is fitted.
+        Fraction of the displacement after the step to fit.
     noise : str
-        "white", with errors by the usual formula; "ar", an autoregressive process whose order a
-        criterion chooses; or "ar1" and so on.
+        Noise model: "white" for the usual formula of standard errors, "ar" for an autoregressive
+        process of automatic order, or "ar1", "ar2" and so on.
     loading : {"steps", "recorded"}
-        The load point moves steadily between its steps; or as recorded, and normal stress with it,
-        unless that of the scene is constant.
+        Loading by steps with constant velocities between them, or recorded loading. Recorded
+        loading includes normal stress, unless the normal stress of the scene is constant.
     machine_stiffness : float
-        Stiffness of the machine in Pa/um. It is divided by the normal stress before the step of
-        each window. Zero: stiffness over normal stress is that of the scene in all windows.
+        Stiffness of the machine in Pa/um, which is divided by the normal stress before the step of
+        each window. If 0, the stiffness over normal stress of the scene is used in all windows.
     filter : str
-        Filter that friction passed before it was recorded, such as "mean 1.0" (see
-        `analysis.fitting.filters.Filter`). Empty if there is no filter.
+        Filter applied to friction before it was recorded, such as "mean 1.0" (see
+        ``analysis.fitting.filters.Filter``). Empty if there is no filter.
     posterior : int
-        Draws from the posterior (see `analysis.fitting.posterior`); none, unless asked for.
+        Number of draws from the posterior (see ``analysis.fitting.posterior``).
 
     References
     ----------
@@ -184,27 +189,27 @@ class Fit(Measure):
 
     @property
     def sought(self) -> tuple[str, ...]:
-        """Fields of the scene that are found, or follow from what is."""
+        """Fields of the scene that the fit determines."""
         return (*_SOUGHT, *(name for name in ("alpha", "law_exponent") if name in self.free))
 
     @property
     def headline(self) -> str:
-        """The first parameter that every law has."""
+        """Name of the first parameter that all laws have."""
         return next((n for n in self.parameters if n not in OF_SOME_LAWS), self.parameters[0])
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of what is looked for."""
+        """Names of the free parameters, numbered by window if necessary."""
         return numbered(self.free, len(self._steps))
 
     @property
     def _steps(self) -> tuple[tuple[str, int], ...]:
-        """Records and numbers of steps that are fitted."""
+        """Names of the records and numbers of the steps to fit."""
         return self.together or ((self.record or self.records[0].name, self.step),)
 
     @cached_property
     def _windows(self) -> tuple[Window, ...]:
-        """The windows of steps that are fitted."""
+        """Windows of the steps to fit."""
         by_name = {record.name: record for record in self.records}
         others = {name: {n for other, n in self.together if other == name} for name in by_name}
         ends = self.before, self.after, self.part
@@ -212,18 +217,18 @@ class Fit(Measure):
 
     @property
     def outputs(self) -> Sequence[Output]:
-        """Each parameter with its errors, what goes with all of them, and the rows."""
+        """Parameters with their errors, properties of the fit, and rows."""
         return outputs_of(self.parameters, self.posterior > 0, len(self._steps))
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Meaning of its numbers, dimensions and fields."""
+        """Meanings and units of results, dimensions and fields."""
         draws = [Quantity("draw", "", "1", "number of the draw")] if self.posterior else []
         return (*super().quantities, *draws)
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        """Names of the parameters, and numbers of rows."""
+        """Names of the parameters, and indices of rows and draws."""
         names = np.array(self.parameters, dtype=object)
         together = sum(map(len, self._first_rows))
         rows = np.arange(together if self.together else max(map(len, self.records)))
@@ -231,8 +236,11 @@ class Fit(Measure):
         return {"parameter": names, "other_parameter": names, "row": rows, **draws}
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """The parameter itself, many of its standard errors, or a size that matters where it is 0:
-        records may be without noise.
+        """Return the scale of the numerical error of each parameter.
+
+        The scale is the sum of the absolute value of the parameter and a large multiple of its
+        standard error. Parameters that may be zero have an additional constant, because a record
+        may have no noise.
         """
         extent = abs(values["window_ends"] - values["window_begins"])
         sizes = dict.fromkeys(("b", "b1", "b2"), values.get("a", scene.a))
@@ -248,27 +256,28 @@ class Fit(Measure):
         }
 
     def describe(self) -> dict[str, Any]:
-        """The measure as plain data; records by their digests."""
+        """Return a description of the measure, with hashes of the records."""
         stated = {f.name: getattr(self, f.name) for f in fields(self)}
         records = {record.name: record.digest for record in self.records}
         return {"name": self.name, **stated, "free": list(self.free), "records": records}
 
     @classmethod
     def restored_fields(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Raises InvalidValue: records are told by their digests."""
+        """Raise ``InvalidValue``, because a file contains only hashes of records."""
         rule = "are fitted, and the file has no more than digests of them"
         remedy = "Fit them again: show FILE tells the command."
         raise InvalidValue("records", [*described["records"]], rule, remedy=remedy)
 
     @cached_property
     def _first_rows(self) -> dict[Record, int]:
-        """The records that are fitted, each with the number of its first row among all."""
+        """Records that are fitted, with the index of their first row in the result."""
         records = [*dict.fromkeys(window.record for window in self._windows)]
         return {record: sum(map(len, records[:n])) for n, record in enumerate(records)}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """The parameters that leave the least, with their errors and intervals; those that the law
-        does not have are left out.
+        """Fit the parameters and compute their errors and confidence intervals.
+
+        Parameters that the law does not have are omitted.
         """
         own = of_law(scene, self.free)
         if own != self.free:
@@ -306,7 +315,13 @@ class Fit(Measure):
         return Outcome(status, values, "; ".join(filter(None, (*reasons, *cuts, *remarks))))
 
     def solve(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> tuple[Search, Fitted]:
-        """Fit the windows by a law that has all free parameters."""
+        """Fit the windows with a law that has all free parameters.
+
+        Returns
+        -------
+        search : Search
+        found : Fitted
+        """
         smooth = accuracy.at(min(accuracy.rtol, _SMOOTH))
         windows = self._windows
         per_um = self.machine_stiffness * self.slip_distance_guess
@@ -329,7 +344,18 @@ class Fit(Measure):
         return search, search.run()
 
     def find_reasons(self, search: Search, found: Fitted) -> tuple[str, ...]:
-        """Find the reasons why the standard errors of a fit are not valid."""
+        """Return the reasons why the standard errors of a fit are not valid.
+
+        Parameters
+        ----------
+        search : Search
+        found : Fitted
+
+        Returns
+        -------
+        tuple of str
+            Empty if the standard errors are valid.
+        """
         reasons = find_reasons(found, search.model.friction)
         # a recorded load point has noise that any average would reduce
         is_recorded = self.loading == "recorded"
@@ -339,7 +365,7 @@ class Fit(Measure):
         return (*find_averaging(found, search.model.time, self.noise), *reasons)
 
     def _widened(self, outcome: Outcome) -> Outcome:
-        """An outcome of fewer parameters, with NaN in matrices where those of other laws stand."""
+        """Insert NaN into the matrices for parameters that the law does not have."""
         values = dict(outcome.values)
         has = np.array([name in values for name in self.parameters])
         before = np.cumsum(has)[~has]
@@ -349,7 +375,7 @@ class Fit(Measure):
         return replace(outcome, values=values)
 
     def _told(self, found: Fitted, rows: np.ndarray, model: Joint) -> dict[str, Value]:
-        """Numbers and rows of what was found."""
+        """Return the numbers and the rows of a fit."""
         values: dict[str, Value] = {}
         for name in found.free:
             values[name], values[f"{name}_error"] = found.values[name], found.errors[name]

@@ -1,16 +1,15 @@
-"""The stick-slip limit cycle: recurrence interval, stress drops and range of slip rate, once cycles
-repeat.
+"""Stick-slip limit cycle: recurrence interval, stress drops and slip rates.
 
-A cycle runs from one maximum of spring stress, where V rises through V_0, to the next. Spring
-stress and states there decide those at the next: a return map, whose fixed point is the limit
-cycle. The motion is followed loosely up to it, and the cycle is closed in every unknown, as
-accurately as asked and once more with smaller tolerances; the event that the step itself sets off
-is never taken for it. Where an error estimate stays a hundred times above what was asked for, the
-cycle is `unverified`.
+A cycle extends from one maximum of spring stress, at which V rises through V_0, to the next. Spring
+stress and states at one maximum determine their values at the next maximum. This return map has a
+fixed point, the limit cycle. The motion is followed with a low accuracy until it approaches the
+limit cycle. The cycle is then closed in all unknowns, first with the requested accuracy and then
+with smaller tolerances. The first event after the step is never taken as the limit cycle. If an
+error estimate exceeds the requested error more than a hundredfold, the status is ``unverified``.
 
-With several states, those of a law or of the fluid, cycles need not repeat each other: a motion may
-come back to itself after 2, 4 or any other number of events, or never. The numbers are then those
-of one event, the one with the fastest peak, and no mean; the orbit is that of the whole period.
+If the law or the fluid has several states, the motion may repeat only after 2, 4 or more events, or
+never. The results then describe the event with the highest slip rate, and are not averages. The
+recorded orbit covers the whole period.
 """
 
 from __future__ import annotations
@@ -98,25 +97,27 @@ _OUTPUTS = (
 class LimitCycle(Recorded):
     """Limit cycle of stick-slip under a steady load point velocity.
 
-    Where a motion of several states repeats itself after `period_events` events only, the numbers
-    are those of the event with the fastest peak, from one maximum of spring stress to the next;
-    where it never does, it ends as `not_periodic`, and the message tells the range of its events.
+    If a motion with several states repeats only after ``period_events`` events, the results
+    describe the event with the highest slip rate, from one maximum of spring stress to the next. If
+    the motion never repeats, the status is ``not_periodic``, and the message reports the range of
+    the events.
 
-    `slip_mode` is stick-slip where the peak slip rate reaches a sigma_*/eta with radiation damping,
-    at which waves take as much of a change of stress as the direct effect, else where it reaches
-    the instability norm; slow slip below. A motion that settles does so by a damped oscillation
-    where the eigenvalues of steady sliding that decay last are a complex pair, else steadily.
+    ``slip_mode`` is stick-slip if the peak slip rate reaches a limit, and slow slip otherwise. With
+    radiation damping, the limit is a sigma_*/eta, at which the radiated stress responds to slip
+    rate as strongly as the direct effect. Without radiation damping, the limit is the instability
+    norm. If a motion settles and the slowest-decaying eigenvalues of steady sliding are a complex
+    pair, ``slip_mode`` is damped oscillation. Otherwise a motion that settles is steady.
 
-    A motion is reported to settle (`no_limit_cycle`) only if small changes of steady sliding decay.
-    If their growth rate is zero within its error, the outcome is `unverified`.
+    The status is ``no_limit_cycle`` only if small perturbations of steady sliding decay. If the
+    growth rate of small perturbations is zero within its error, the status is ``unverified``.
 
     Parameters
     ----------
     phases : int
-        Points of the orbit that are kept along `phase`, spread over its slow part and its
+        Number of points of the orbit along ``phase``, distributed over its slow part and its
         rupture.
     events : int
-        Most events to wait for a cycle that repeats.
+        Largest number of events to wait for a cycle that repeats.
     """
 
     phases: int = 400
@@ -132,8 +133,10 @@ class LimitCycle(Recorded):
             raise InvalidValue("events", self.events, "must be a whole number from 1")
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Follow events until one repeats, then go round once more with smaller tolerances: for the
-        error, and to record the orbit.
+        """Compute the limit cycle of a scene.
+
+        The motion is followed until an event repeats. The cycle is then recomputed with smaller
+        tolerances, to estimate the error and to record the orbit.
         """
         check_leaves_alone(scene)
         if scene.log_load_rate == -math.inf:
@@ -160,8 +163,10 @@ class LimitCycle(Recorded):
         return outcome if found else settled(scene)
 
     def _of_several_states(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Follow events loosely up to a cycle of any period that attracts, and close it from its
-        largest event on.
+        """Compute the limit cycle of a scene with several states.
+
+        The motion is followed with a low accuracy until it approaches a periodic orbit. The orbit
+        is then closed, starting from its largest event.
         """
         motion = course(scene, accuracy.at(max(accuracy.rtol, _LOW)), meter, self.events)
         if motion is None:
@@ -173,8 +178,10 @@ class LimitCycle(Recorded):
     def _closed(
         self, scene: Scene, accuracy: Accuracy, meter: Meter, known: Orbit, events: int
     ) -> Outcome:
-        """A cycle that is known, as accurately as asked, and once more with smaller tolerances: for
-        the error, and to record the orbit.
+        """Close a known cycle with the requested accuracy.
+
+        The cycle is closed again with smaller tolerances, to estimate the error and to record the
+        orbit.
         """
         one = ReturnMap(scene, accuracy, meter).again(known)
         fine = ReturnMap(scene, accuracy.refined(), meter, recorded=self.phases > _ENDS)
@@ -201,7 +208,7 @@ class LimitCycle(Recorded):
 
 
 def _of_period(orbit: Orbit) -> str:
-    """What the numbers are of, where a motion repeats itself after several events only."""
+    """Return a message if a motion repeats only after several events."""
     if orbit.period == 1:
         return ""
     return (
@@ -215,7 +222,7 @@ SETTLES = Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady s
 
 
 def settled(scene: Scene) -> Outcome:
-    """The outcome of a motion that comes to steady sliding: with an oscillation or without."""
+    """Return the outcome of a motion that settles to steady sliding."""
     try:
         last = growth_rates(scene, scene.log_load_rate)[0]
     except ValueError:  # there is none in closed form
@@ -224,15 +231,16 @@ def settled(scene: Scene) -> Outcome:
 
 
 def _mode(scene: Scene, log_peak: float) -> float:
-    """Slow slip or stick-slip, by the peak of ln V."""
+    """Return slow slip or stick-slip, depending on the peak of ln V."""
     damping = scene.parts.dynamics.damping(0.0)
     limit = math.log(scene.a / damping) if damping else scene.log_norm_rate
     return _STICK_SLIP if log_peak >= limit else _SLOW
 
 
 def without_period(scene: Scene, motion: Course, remedy: str) -> Outcome:
-    """The outcome of a motion that has not come to a cycle: because it never will, or because it
-    takes its time, and what to do then.
+    """Return the outcome of a motion that has not reached a periodic orbit.
+
+    The status depends on whether the motion may still reach a periodic orbit.
     """
     latest = motion.seen[len(motion.seen) // 2 :]
     peaks = [cycle.fastest / LN10 for cycle in latest]
@@ -251,8 +259,13 @@ def without_period(scene: Scene, motion: Course, remedy: str) -> Outcome:
 def judged(
     accuracy: Accuracy, one: Orbit, errors: np.ndarray, places: slice = slice(None)
 ) -> tuple[Status, str]:
-    """The status that the errors of the headline numbers of a cycle at these places leave: ok, or
-    `unverified`, and why.
+    """Return the status that follows from the errors of the headline numbers.
+
+    Returns
+    -------
+    status : Status
+        OK, or ``unverified`` if an error is too large.
+    message : str
     """
     worst = float((errors / _scales(one))[places].max())
     if worst <= MUCH_WORSE * accuracy.rtol:
@@ -262,9 +275,10 @@ def judged(
 
 
 def _scales(orbit: Orbit) -> list[float]:
-    """What the errors of the headline numbers are relative to.
+    """Return the scales of the errors of the headline numbers.
 
-    Slip rates err as logarithms do, by a part of how far they swing: the logarithm of V_* is zero.
+    The scale of a logarithm of slip rate is at least half of the range of the logarithms, because
+    the logarithm is zero at V_*.
     """
     *others, slowest, fastest = orbit.numbers.tolist()
     half = 0.5 * (fastest - slowest)
@@ -272,8 +286,10 @@ def _scales(orbit: Orbit) -> list[float]:
 
 
 def cycle_errors(accuracy: Accuracy, one: Orbit, again: Orbit) -> np.ndarray:
-    """Error estimates of the headline numbers: from two runs, and what of them is implied, by
-    derivatives that both share, because the events do not quite close.
+    """Estimate the errors of the headline numbers.
+
+    The estimate includes the difference between two runs, and the corrections for the closure
+    error, which both runs share.
     """
     chance, scales = _BY_CHANCE * accuracy.rtol, _scales(one)
     pairs = zip(one.numbers.tolist(), again.numbers.tolist(), scales, strict=True)
@@ -282,7 +298,7 @@ def cycle_errors(accuracy: Accuracy, one: Orbit, again: Orbit) -> np.ndarray:
 
 
 def _properties(scene: Scene, cycle: Cycle) -> dict[str, float]:
-    """What else is told of a cycle."""
+    """Return additional properties of a cycle."""
     return {
         "healing_exponent": _healing_exponent(scene, cycle),
         "residual_friction": cycle.sliding,
@@ -291,7 +307,10 @@ def _properties(scene: Scene, cycle: Cycle) -> dict[str, float]:
 
 
 def _healing_exponent(scene: Scene, cycle: Cycle) -> float:
-    """d ln(theta)/d ln(V), where Theta = b ln(theta/theta_*); NaN where there is no such theta."""
+    """Return d ln(theta)/d ln(V), where Theta = b ln(theta/theta_*).
+
+    The result is NaN if the law has no such theta.
+    """
     slowed = cycle.rested.log_slip_rate - cycle.landed.log_slip_rate
     law = scene.parts.law
     if law.states > 1 or not law.logarithmic or not abs(slowed) > 1.0:

@@ -1,5 +1,7 @@
-"""Linear stability of steady sliding: the critical stiffness from the friction relation, from
-growth of the assembled equations, and in closed form.
+"""Linear stability of steady sliding.
+
+The critical stiffness is computed from the friction relation, from the growth of perturbations of
+the assembled equations, and in closed form.
 """
 
 from __future__ import annotations
@@ -49,18 +51,22 @@ _OUTPUTS = (
 @guard_methods
 @dataclass(frozen=True)
 class LinearStability(Measure):
-    """Critical stiffness of steady sliding at the load point velocity of the scene, over
-    sigma_*/D_c.
+    """Critical stiffness of steady sliding at the load point velocity of the scene.
 
-    Twice: from the friction relation, and as the stiffness at which small perturbations of the
-    assembled equations neither grow nor decay, so that they vouch for each other; and, for what
-    mass and radiation leave, by the closed form. A perturbation of slip by exp(p s), s being slip
-    over D_c, changes frictional stress by G(p) times itself, and ``K (1 + w**2 p**2) + eta V p +
-    G(p) = 0`` with K over sigma_*/D_c and w = V T/(2 pi D_c). K is critical where p is imaginary
-    (`rsfstudy.slider.stability`): at V_*, by the slip and the slowness law, quasi-statically and
-    drained, ``K = (b - a)/[1 - (mu_* - alpha) cot(phi)]``, without cot(phi) where normal stress is
-    constant. Stiffnesses are over sigma_*/D_c, stresses over sigma_*; the relative one is over that
-    at V_*.
+    The critical stiffness is computed in three ways, which verify each other. The first result
+    follows from the friction relation. The second result is the stiffness at which small
+    perturbations of the assembled equations neither grow nor decay. The third result is the
+    quasi-static closed form, corrected for inertia and radiation damping.
+
+    Let s be slip over D_c. A perturbation of slip that grows as exp(p s) changes frictional stress
+    by G(p) times the perturbation. The growth rate p satisfies ``K (1 + w**2 p**2) + eta V p + G(p)
+    = 0`` with the stiffness K over sigma_*/D_c and w = V T/(2 pi D_c). K is critical if p is
+    imaginary (see ``rsfstudy.slider.stability``). Under the slip and the slowness law, the critical
+    stiffness of quasi-static and drained motion at V_* is ``K = (b - a)/[1 - (mu_* - alpha)
+    cot(phi)]``. If normal stress is constant, the term with cot(phi) is absent.
+
+    Stiffnesses are relative to sigma_*/D_c, and stresses are relative to sigma_*. The relative
+    critical stiffness is the ratio of the critical stiffness to its value at V_*.
 
     References
     ----------
@@ -78,8 +84,9 @@ class LinearStability(Measure):
         return ("stiffness_ratio",)
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """The critical stiffness by the friction relation, and where growth changes its sign; their
-        difference is the error.
+        """Compute the critical stiffness from friction and from growth rates.
+
+        The error estimate is the difference between both results.
         """
         scene = scene.unforced
         load = scene.log_load_rate
@@ -138,7 +145,13 @@ class LinearStability(Measure):
 
 
 def _explicit(scene: Scene) -> float:
-    """The published formula, for scenes it speaks of; NaN for others."""
+    """Compute the critical stiffness from the published formula.
+
+    Returns
+    -------
+    float
+        NaN if the formula does not apply to the scene.
+    """
     law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
     others = law.steady_states or law.feels_stress or scene.parts.fluid.effects
     if coupling is None or others or scene.imposed_normal_stress:
@@ -149,8 +162,12 @@ def _explicit(scene: Scene) -> float:
 
 
 def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float:
-    """Stiffness at which perturbations of steady sliding neither grow nor decay; NaN where they do
-    not grow below it and decay above.
+    """Find the stiffness at which the largest growth rate is zero.
+
+    Returns
+    -------
+    float
+        NaN if perturbations do not grow below this stiffness, or do not decay above it.
     """
     with_mass = scene.dynamics.norm(scene, steady.log_slip_rate) > _MASS_SHOWS
 
@@ -175,12 +192,18 @@ def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float
 
 
 def growth(jacobian: np.ndarray) -> float:
-    """Growth rate of the fastest growing perturbation, per unit of the clock."""
+    """Return the growth rate of the fastest-growing perturbation.
+
+    The unit is the inverse of the independent variable of the equations.
+    """
     return float(np.linalg.eigvals(jacobian).real.max())
 
 
 def jacobian(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
-    """Derivatives of the rates (rows) by the unknowns (columns), by central differences."""
+    """Compute the Jacobian of the rates by central differences.
+
+    Rows are rates, and columns are unknowns.
+    """
     columns = []
     for number, scale in enumerate(equations.scales):
         step = _DIFFERENCE * scale

@@ -1,4 +1,4 @@
-"""The motion after a step: its peaks of slip rate, one after the other, and the path it takes."""
+"""Motion after a step: the peaks of slip rate, and the recorded path."""
 
 from __future__ import annotations
 
@@ -44,22 +44,22 @@ _OUTPUTS = (
 @guard_methods
 @dataclass(frozen=True)
 class StepResponse(Recorded):
-    """Oscillations of slip rate that the step of a scene sets off: peaks of log10(V/V_*), and the
-    path between them.
+    """Oscillations of slip rate after a step: peaks of log10(V/V_*) and the path.
 
-    It is followed until it has so many peaks, or until ln V and the states are closer to steady
-    sliding than a thousandth of the farthest that they were. `peak_ratio` is ln(V_2/V_0) over
-    ln(V_1/V_0), with V_1 and V_2 the slip rates of the first two peaks and V_0 that of the load
-    point: 1 where oscillations repeat, as small ones do at critical stiffness, and 0 where there is
-    no second peak. `peak_log10_slip_rate` has the shape (peaks,), NaN where there are fewer; the
-    path, in D_c, D_c/V_* and sigma_*, the shape (phases,).
+    The motion is followed until it has the requested number of peaks, or until it settles. A motion
+    has settled if the distance of ln V and the states from steady sliding is less than a thousandth
+    of the largest distance. Let V_1 and V_2 be the slip rates of the first two peaks, and V_0 the
+    load point velocity. ``peak_ratio`` is ln(V_2/V_0) over ln(V_1/V_0). The ratio is 1 if
+    oscillations repeat, as small oscillations do at the critical stiffness, and 0 if there is no
+    second peak. ``peak_log10_slip_rate`` has the shape (peaks,), with NaN for missing peaks. The
+    path, in units of D_c, D_c/V_* and sigma_*, has the shape (phases,).
 
     Parameters
     ----------
     peaks : int
-        Peaks of slip rate to follow; fewer where the oscillation dies down before.
+        Largest number of peaks of slip rate to follow.
     phases : int
-        Points of the path that are kept along `phase`, spread over its slow parts and its
+        Number of points of the path along ``phase``, distributed over its slow parts and its
         ruptures.
 
     References
@@ -86,11 +86,17 @@ class StepResponse(Recorded):
         return {"peak": np.arange(1, self.peaks + 1), **super().inner_coordinates}
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """The logarithm, and an e-fold of slip rate: that of V_* is zero."""
+        """Return the scale of the numerical error of the largest logarithm.
+
+        The scale includes an e-fold of slip rate, because the logarithm of V_* is zero.
+        """
         return {"max_log10_slip_rate": abs(values["max_log10_slip_rate"]) + 1.0 / LN10}
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Peaks and path of the motion, and of one with smaller tolerances for their error."""
+        """Compute the peaks and the path of the motion, with error estimates.
+
+        The errors are estimated from a second motion with smaller tolerances.
+        """
         check_leaves_alone(scene)
         if scene.log_load_rate == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
@@ -118,7 +124,7 @@ class StepResponse(Recorded):
     def _follow(
         self, scene: Scene, accuracy: Accuracy, meter: Meter
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The peaks of log10(V/V_*), and what is recorded on the way."""
+        """Follow the motion, and return the peaks of log10(V/V_*) and the record."""
         peaks: list[float] = []
         recording, asked = Recording(), (maximum("log_slip_rate"), settling(_OVER))
         for event in follow(scene, accuracy, meter, asked, clock=True, recording=recording):
@@ -134,18 +140,20 @@ class StepResponse(Recorded):
 
 
 def _tops_at_start(scene: Scene, event: Event) -> bool:
-    """True if mass rises to a maximum at the start: as a jump where the motion begins on the slow
-    manifold, and the tolerance does not ask to follow the rise.
+    """Return True if the slip rate has a maximum at the start due to inertia.
+
+    If the motion starts on the slow manifold, the initial rise of the slip rate is a jump. The rise
+    is followed only if the tolerance requires it.
     """
     return _jumps(scene) and event.kind is Kind.START and event.point.growth <= 0.0
 
 
 def _left_out(scene: Scene, accuracy: Accuracy) -> float:
-    """Error of log10(V/V_*) after a jump, by the slip of a rise that is not followed."""
+    """Return the error of log10(V/V_*) due to a rise that is not followed."""
     slip = accuracy.remaining_slip if _jumps(scene) else 0.0
     return (1.0 + scene.stiffness / scene.a) * slip / LN10
 
 
 def _jumps(scene: Scene) -> bool:
-    """True if slip rate rises from V_* to another one against mass."""
+    """Return True if inertia delays an initial rise of the slip rate from V_*."""
     return scene.has_mass and (scene.begins_elsewhere or scene.spring_stress_step > 0.0)

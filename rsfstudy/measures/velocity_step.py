@@ -1,4 +1,4 @@
-"""A step of load point velocity, as an experimenter reads it off friction against displacement."""
+"""Response of friction to a step of load point velocity."""
 
 from __future__ import annotations
 
@@ -64,7 +64,10 @@ _OUTPUTS = (
 
 
 class _Step(NamedTuple):
-    """The step that is read: velocities in V_*, when it begins, and how long it is recorded."""
+    """The step that is evaluated.
+
+    Velocities are in V_*, and times in D_c/V_*.
+    """
 
     before: float
     after: float
@@ -73,42 +76,44 @@ class _Step(NamedTuple):
 
     @property
     def ratio(self) -> float:
-        """ln r, the logarithm of the velocity after over that before."""
+        """Logarithm ln r of the ratio of the velocities after and before the step."""
         return math.log(self.after / self.before)
 
 
 @guard_methods
 @dataclass(frozen=True)
 class VelocityStep(Recorded):
-    """Response to one step of load point velocity, by the definitions of the laboratory.
+    """Response to one step of load point velocity, as read from a record.
 
-    With mu_0 before the step by a factor r, mu_p at the first extremum after it (a peak of a step
-    up, a trough of a step down) and mu_1 at the end of the record:
+    The definitions are those used in the laboratory. Let mu_0 be friction before a step by a factor
+    r, mu_p friction at the first extremum after the step, and mu_1 friction at the end of the
+    record. The extremum is a peak for a step up, and a trough for a step down. Then
 
-        a = (mu_p - mu_0)/ln r,   b = (mu_p - mu_1)/ln r,   a - b = (mu_1 - mu_0)/ln r;
+        a = (mu_p - mu_0)/ln r,   b = (mu_p - mu_1)/ln r,   a - b = (mu_1 - mu_0)/ln r.
 
-    D_c is the displacement from the extremum until mu_1 + (mu_p - mu_1)/e, of the load point as
-    recorded, and of slip, which is that less the shortening of the spring. Nothing is corrected for
-    the stiffness of the rig: what a soft spring does to the numbers is what is measured. Friction
-    has settled if it stays within a hundredth of mu_p - mu_0 over the last tenth of the record, and
-    small changes of steady sliding do not grow (NaN if that is undecided).
-    Where there is no extremum, or no more evolution than its own error, the measure is
-    `not_applicable`, with the numbers that there are. Distances are in D_c. The record, from the
-    step on, has the shape (phases,).
+    D_c is the displacement from the extremum until friction reaches mu_1 + (mu_p - mu_1)/e. D_c is
+    reported as load point displacement and as slip, which excludes the change of length of the
+    spring. The results are not corrected for the stiffness of the machine, so they show the effect
+    of a soft spring. Friction has settled if it varies by less than a hundredth of mu_p - mu_0 over
+    the last tenth of the record, and if small perturbations of steady sliding do not grow. If the
+    stability is undecided within its error, ``settled`` is NaN. If there is no extremum, or if b is
+    smaller than its error, the status is ``not_applicable``, and the results that exist are
+    included. Distances are in D_c. The record begins at the step and has the shape (phases,).
 
-    `closed_form_departure` is from what a rigid slider shows after so much slip, ``(a - b) ln r + b
-    g(ln r, x)``: g is ``ln r exp(-x)`` by the slip law and ``ln[1 + (r - 1) exp(-x)]`` by the
-    slowness law; NaN where normal stress or a fluid acts, or the law has no such form.
+    ``closed_form_departure`` is the largest difference from the friction of a rigid slider at the
+    same slip x, ``(a - b) ln r + b g(ln r, x)``. The function g is ``ln r exp(-x)`` for the slip
+    law and ``ln[1 + (r - 1) exp(-x)]`` for the slowness law. The result is NaN if normal stress or
+    a fluid affects friction, or if the law has no closed form.
 
     Parameters
     ----------
     step_number : int
-        Which segment of the loading to read.
+        Number of the loading segment to read, from 1.
     record : float
-        Longest load point displacement after the step that is recorded, in D_c; at the next step
-        the record ends.
+        Longest load point displacement after the step to record, in D_c. The record also ends at
+        the next step.
     phases : int
-        Points of the record that are kept along `phase`.
+        Number of points of the record along ``phase``.
 
     References
     ----------
@@ -131,15 +136,20 @@ class VelocityStep(Recorded):
             raise InvalidValue("record", self.record, "must be at least 1 D_c, and finite")
 
     def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """The numbers themselves, and what a change of friction by a makes of them."""
+        """Return the scale of the numerical error of each result.
+
+        The scale is the sum of the absolute value of the result, and of its change if friction
+        changes by ``a``.
+        """
         slopes = self._by_friction(self._step(scene).ratio, values)
         return {name: abs(values[name]) + scene.a * abs(slopes[name]) for name in slopes}
 
     def _by_friction(self, ratio: float, values: Mapping[str, Any]) -> dict[str, float]:
-        """Change of each number by that of the friction it is read from.
+        """Return the derivative of each result with respect to friction.
 
-        It is 1/ln r of a, b and a - b. Where an exponential has 1/e left, b ln r, friction falls by
-        b ln r/(e D_c) per displacement.
+        The derivative is 1/ln r for a, b and a - b. For slip distances, friction changes by b ln
+        r/(e D_c) per displacement, because 1/e of the evolution b ln r remains at this point of an
+        exponential.
         """
         evolved = values["apparent_b"] * ratio
         over_friction = math.e / evolved if evolved else math.nan
@@ -151,8 +161,10 @@ class VelocityStep(Recorded):
         }
 
     def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
-        """Numbers read off a motion, and off that from its peak on to where 1/e is left; and once
-        more with smaller tolerances for the errors.
+        """Compute the response to the step, and the errors of the results.
+
+        The motion is computed again with smaller tolerances to estimate the errors. In each run,
+        the motion is also followed from its peak until 1/e of the evolution remains.
         """
         check_leaves_alone(scene)
         step = self._step(scene)
@@ -168,7 +180,7 @@ class VelocityStep(Recorded):
         return Outcome(Status.OK, found)
 
     def _step(self, scene: Scene) -> _Step:
-        """The step to read; `Halt` says why there is none."""
+        """Return the step to read, or raise ``Halt`` if the segment is not a step."""
         history = scene.parts.loading.segments
         if self.step_number > len(history):
             raise Halt(Status.NOT_APPLICABLE, f"the loading has {len(history)} segments")
@@ -187,7 +199,7 @@ class VelocityStep(Recorded):
     def _follow(
         self, scene: Scene, step: _Step, accuracy: Accuracy, meter: Meter
     ) -> tuple[Record, dict[str, float]]:
-        """The record, and what is read off it."""
+        """Record the motion, and return the record and the results."""
         extreme = maximum if step.ratio > 0.0 else minimum
         number, end = self.step_number - 1, step.start_time + step.duration
         turn = extreme(watched(scene)[0])
@@ -195,7 +207,10 @@ class VelocityStep(Recorded):
         return record, self._read(step, record, self._left(scene, record, accuracy, meter))
 
     def _read(self, step: _Step, record: Record, left: Event | None) -> dict[str, float]:
-        """Numbers that are read off; NaN for those of the peak where there is none."""
+        """Return the results that are read from a record.
+
+        Results that depend on the peak are NaN if there is no peak.
+        """
         before, after = record.before[0], record.end.point.reading
         top = record.peak.point.reading if record.peak else math.nan
         return {
@@ -210,9 +225,11 @@ class VelocityStep(Recorded):
         }
 
     def _left(self, scene: Scene, record: Record, accuracy: Accuracy, meter: Meter) -> Event | None:
-        """Event where 1/e of the evolution is left, with time and slip since the peak: followed
-        from there, because the step that holds the peak may hold a crossing of the level on either
-        side.
+        """Return the event at which 1/e of the evolution remains.
+
+        The time and slip of the event are relative to the peak. The motion is followed from the
+        peak, because the integration step that contains the peak may contain a crossing of the
+        level on either side.
         """
         peak = record.peak
         if peak is None or not peak.time < record.end.time:
@@ -228,7 +245,7 @@ class VelocityStep(Recorded):
         return next((event for event in events if event.watch == watch), None)
 
     def _shown(self, scene: Scene, step: _Step, record: Record) -> dict[str, float | np.ndarray]:
-        """Return the record, if it has settled, and its departure from that of a stiff slider."""
+        """Return the record, the flag ``settled`` and the closed-form departure."""
         rows, friction = record.rows, friction_coefficient_of(record.rows)
         late = record.end.time - _LAST * step.duration
         # there may be few samples, in long steps
@@ -247,9 +264,15 @@ class VelocityStep(Recorded):
 
 
 def _departure(scene: Scene, step: _Step, record: Record) -> float:
-    """Largest departure of friction, from the peak on, from what a stiff slider shows after so much
-    slip: the steady change, ``(a - b) ln r`` by most laws, and ``b relaxation(ln r, slip)``; NaN
-    where there is no such form.
+    """Compute the largest difference from the friction of a rigid slider.
+
+    Only friction after the peak is compared. A rigid slider with the same slip shows the steady
+    change, ``(a - b) ln r`` for most laws, plus ``b relaxation(ln r, slip)``.
+
+    Returns
+    -------
+    float
+        NaN if there is no closed form.
     """
     relaxation = scene.parts.law.relaxation
     if relaxation is None or record.peak is None or not _has_closed_form(scene, step, record):
@@ -266,8 +289,10 @@ def _departure(scene: Scene, step: _Step, record: Record) -> float:
 
 
 def _has_closed_form(scene: Scene, step: _Step, record: Record) -> bool:
-    """True if friction alone acts, and slides steadily before the step, at a rate from which the
-    law counts.
+    """Return True if the closed form of a rigid slider applies.
+
+    The closed form applies if friction is the only effect and if sliding before the step is steady.
+    If the law has a characteristic slip rate, the velocity before the step must also be V_*.
     """
     law, stress, fluid = scene.parts.law, scene.parts.normal_stress, scene.parts.fluid
     stress_acts = stress.normal_stress or stress.state_effect or law.feels_stress

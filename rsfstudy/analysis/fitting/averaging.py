@@ -1,24 +1,25 @@
-"""Noise that a data logger has averaged: its correlation, and its signature in residuals."""
+"""Correlation of noise that a data logger has averaged."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import cholesky_banded, solve_banded
 
-#: Variance of noise that is not averaged, relative to averaged noise: without it, notches of the
-#: spectrum would have infinite weight. And the largest number of rows within an averaging time.
+#: Variance of unaveraged noise relative to averaged noise, which prevents an infinite weight of the
+#: notches of the spectrum; and the largest number of rows within an averaging time.
 _FLOOR, _WIDEST = 0.002, 200
 
 
 class Overlap:
-    """Correlation of rows whose averaging times overlap.
+    """Correlation matrix of rows with overlapping averaging times.
 
-    Averages of white noise over a time T have the correlation ``1 - |t_i - t_j|/T``, 0 at least.
+    If white noise is averaged over a time T, the correlation of two rows is ``max(1 - |t_i -
+    t_j|/T, 0)``.
 
     Parameters
     ----------
     time : ndarray, shape (rows,)
-        Times in s; a clock that begins again belongs to another window.
+        Times in s. If the clock restarts, the rows that follow belong to another window.
     averaging : float
         Averaging time in s.
     """
@@ -33,11 +34,20 @@ class Overlap:
                 break
             band.append(np.append(overlap, np.zeros(lag)))
         self.factor = cholesky_banded(np.array(band), lower=True)
-        #: Rows that one independent row stands for.
+        #: Number of correlated rows per independent row.
         self.rows = float(1.0 + 2.0 * np.sum(band[1:]) / len(time))
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
-        """Remove the correlation from columns, shape (rows, columns)."""
+        """Remove the correlation from columns.
+
+        Parameters
+        ----------
+        columns : ndarray, shape (rows, columns)
+
+        Returns
+        -------
+        ndarray, shape (rows, columns)
+        """
         if not columns.size:
             return columns
         return np.asarray(solve_banded((len(self.factor) - 1, 0), self.factor, columns))
@@ -49,9 +59,22 @@ class Overlap:
 
 
 def average(time: np.ndarray, columns: np.ndarray, averaging: float) -> np.ndarray:
-    """Average columns of one clock, shape (rows, columns), over a time about each row.
+    """Average columns over a time interval centred at each row.
 
-    Columns are linear between rows, and constant before the first and after the last row.
+    The columns are interpolated linearly between the rows. Before the first row and after the last
+    row, the columns are constant.
+
+    Parameters
+    ----------
+    time : ndarray, shape (rows,)
+        Times in s, in increasing order.
+    columns : ndarray, shape (rows, columns)
+    averaging : float
+        Averaging time in s.
+
+    Returns
+    -------
+    ndarray, shape (rows, columns)
     """
     at = np.concatenate([[time[0] - averaging], time, [time[-1] + averaging]])
     padded = np.concatenate([columns[:1], columns, columns[-1:]])

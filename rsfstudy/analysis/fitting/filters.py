@@ -1,7 +1,7 @@
-"""Filters that friction passed before it was recorded, and that the model must pass too.
+"""Filters of recorded friction, which the fit applies to the model too.
 
-A filter smooths the peak of a velocity step, so a model without it gives a direct effect that is
-too small and a slip distance that is too long.
+A filter smooths the peak of a velocity step. If the model does not include the filter, the fitted
+direct effect is too small, and the fitted slip distance is too long.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ class Filter:
     Parameters
     ----------
     kind : {"mean", "trailing_mean", "first_order", "butterworth_2", "butterworth_4"}
-        A running mean about each row or up to each row, or a low-pass filter.
+        A running mean centred at each row, a running mean that ends at each row, or a low-pass
+        filter.
     size : float
-        Averaging time in s, or corner frequency in Hz.
+        Averaging time in s for a running mean, or corner frequency in Hz for a low-pass filter.
     """
 
     kind: str
@@ -47,7 +48,13 @@ class Filter:
 
     @classmethod
     def parse(cls, text: str) -> Filter | None:
-        """Return the filter that a text such as "mean 1.0" describes; None for an empty text."""
+        """Create a filter from a string such as "mean 1.0".
+
+        Returns
+        -------
+        Filter or None
+            None if the string is empty.
+        """
         if not text:
             return None
         kind, _, size = text.partition(" ")
@@ -59,7 +66,7 @@ class Filter:
         return cls(kind, number)
 
     def sample_times(self, time: np.ndarray) -> np.ndarray:
-        """Return the times, in s, at which unfiltered friction is needed for these rows."""
+        """Return the times, in s, at which unfiltered friction is required."""
         if self.kind in LOW_PASS:
             return self._grid(time)
         return np.unique(time[:, None] + self._offsets(time))
@@ -72,7 +79,7 @@ class Filter:
         time : ndarray, shape (rows,)
             Times of the rows in s.
         samples : ndarray
-            Unfiltered friction at `sample_times(time)`.
+            Unfiltered friction at ``sample_times(time)``.
 
         Returns
         -------
@@ -88,9 +95,10 @@ class Filter:
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
 
     def _offsets(self, time: np.ndarray) -> np.ndarray:
-        """Return the offsets, in s, of the points of a running mean.
+        """Return the offsets of the points of a running mean, in s.
 
-        If rows are closer than the averaging time, the points are as far apart as the rows.
+        If the sampling interval is shorter than the averaging time, the points are one sampling
+        interval apart.
         """
         count = max(round(self.size / float(np.median(np.diff(time)))), 1)
         count *= max(math.ceil(_FEWEST / count), 1) if count < _FEWEST // 2 else 1

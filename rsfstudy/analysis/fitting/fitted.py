@@ -1,4 +1,4 @@
-"""The result of a search: parameters, their covariance, and the noise of the record."""
+"""Result of a fit: parameters, covariance matrix and noise of the record."""
 
 from __future__ import annotations
 
@@ -15,38 +15,43 @@ from rsfstudy.analysis.fitting.noise import Noise
 class Fitted:
     """Result of a fit.
 
+    A coordinate is a parameter, or its logarithm for the parameters in ``LOGARITHMIC``.
+
     Attributes
     ----------
     values : dict
-        All parameters, those that were not free too.
+        Values of all parameters, including fixed parameters.
     free : tuple of str
+        Names of the free parameters.
     covariance : ndarray
-        Of the free parameters, or of their logarithms (see `LOGARITHMIC`).
+        Covariance matrix of the coordinates of the free parameters.
     by_noise : ndarray
-        What noise of friction alone makes of it; the rest is that of load point displacement.
+        Contribution of the noise of friction to the covariance matrix. The remainder is the
+        contribution of the noise of load point displacement.
     errors : dict
         Numerical errors of the free parameters.
     noise : Noise
     noise_sd : float
         Standard deviation of the noise.
     degrees_of_freedom : float
-        Degrees of freedom of the intervals.
+        Degrees of freedom of the confidence intervals.
     curve : ndarray
-        Friction along the rows, without trend.
+        Friction of the model at each row, without the trend.
     residuals : ndarray
-        Recorded friction less the fitted friction with its trend.
+        Recorded friction minus fitted friction, which includes the trend.
     innovations : ndarray
-        Residuals freed of correlation, over their size.
+        Whitened residuals divided by their standard deviation.
     jacobian : ndarray
-        Derivatives of the curve with trend by the free parameters, or their logarithms.
+        Derivatives of the curve and its trend with respect to the coordinates.
     criterion : float
-        Akaike's, of the likelihood of this record with this noise: less is better.
+        Akaike's information criterion of the fit, including the noise model. Smaller values are
+        better.
     unidentified : tuple of str
-        Free parameters that the record does not tell.
+        Free parameters that the record does not constrain.
     white_size : float
         Root mean square of the residuals of the ordinary least-squares fit.
     quantum : float
-        To which friction is rounded; 0 if it is not.
+        Quantum to which friction is rounded, or 0 if friction is not rounded.
     """
 
     values: dict[str, float]
@@ -68,18 +73,18 @@ class Fitted:
 
     @property
     def outliers(self) -> np.ndarray:
-        """Rows that were left out."""
+        """Indices of the rows that were excluded as outliers."""
         kept = self.noise.kept
         return np.zeros(0, dtype=int) if kept is None else np.flatnonzero(~kept)
 
     @property
     def all_innovations(self) -> np.ndarray:
-        """Whitened residuals of all rows; NaN for outliers."""
+        """Whitened residuals of all rows, with NaN for outliers."""
         return np.insert(self.innovations, self.outliers - np.arange(len(self.outliers)), np.nan)
 
     @property
     def slopes(self) -> np.ndarray:
-        """Derivatives of the free parameters by their coordinates."""
+        """Derivatives of the free parameters with respect to their coordinates."""
         return np.array([slope(name, self.values[name]) for name in self.free])
 
     @property
@@ -89,15 +94,17 @@ class Fitted:
 
     @property
     def band(self) -> np.ndarray:
-        """Standard error of the curve with trend along the rows: ``sqrt(J C J')``, C being the
-        covariance of parameters.
+        """Standard error of the fitted curve and its trend at each row.
+
+        The standard error is ``sqrt(J C J')``, where J is the Jacobian and C is the covariance
+        matrix.
         """
         variances = np.einsum("ij,jk,ik->i", self.jacobian, self.covariance, self.jacobian)
-        # below 0 by rounding, where a parameter is not told
+        # rounding errors may cause negative values if a parameter is not constrained
         return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
     def stderr(self, name: str) -> float:
-        """Standard error of a parameter."""
+        """Return the standard error of a parameter."""
         return float((self.spread * self.slopes)[self.free.index(name)])
 
 

@@ -1,5 +1,7 @@
-"""Windows of records in one fit: parameters of the material are shared, and each of several windows
-has friction before its step, trends and the time of its step for itself.
+"""Joint fits of several windows.
+
+The windows share the parameters of the material. If there are several windows, each window has its
+own friction before the step, trend and step time.
 """
 
 from __future__ import annotations
@@ -24,12 +26,16 @@ _OWN = ("mu_star", "step_time", "trend")
 
 
 def is_own(name: str) -> bool:
-    """True for a parameter that each window may have for itself."""
+    """Return True if each window has its own value of a parameter."""
     return name.startswith(_OWN)
 
 
 def numbered(names: Sequence[str], windows: int) -> tuple[str, ...]:
-    """Names of the parameters of so many windows: ``mu_star_1``, ``mu_star_2`` and so on."""
+    """Return the names of the parameters of a number of windows.
+
+    If there are several windows, the parameters of each window are numbered: ``mu_star_1``,
+    ``mu_star_2`` and so on.
+    """
     if windows == 1:
         return tuple(names)
     own = [name for name in names if is_own(name)]
@@ -38,32 +44,36 @@ def numbered(names: Sequence[str], windows: int) -> tuple[str, ...]:
 
 
 def parted(name: str) -> tuple[str, int]:
-    """A parameter without the number of its window, and that number; 0 where all share it."""
+    """Split the name of a parameter into its plain name and its window number.
+
+    The number is 0 if all windows share the parameter.
+    """
     before, _, number = name.rpartition("_")
     return (before, int(number)) if number.isdecimal() and is_own(name) else (name, 0)
 
 
 def plain(name: str) -> str:
-    """A parameter without the number of its window."""
+    """Return the name of a parameter without its window number."""
     return parted(name)[0]
 
 
 def of_window(values: Mapping[str, T], number: int) -> dict[str, T]:
-    """Values for the parameters of one window, by their plain names."""
+    """Return the values for one window, with plain parameter names as keys."""
     names = {name: parted(name) for name in values}
     return {own: values[name] for name, (own, of) in names.items() if of in (0, number)}
 
 
 @dataclass(frozen=True)
 class Joint:
-    """The models of one or several windows, with the interface of a model.
+    """Combined model of one or several windows, used in the same way as a ``Model``.
 
     Attributes
     ----------
     parts : tuple of Model
+        Models of the windows.
     stiffness_factors : tuple of float
-        Stiffness over normal stress of each window, relative to the first window. Empty if all
-        windows have the same value.
+        Ratio of stiffness to normal stress in each window, relative to the first window. Empty if
+        the ratio is the same in all windows.
     """
 
     parts: tuple[Model, ...]
@@ -71,7 +81,7 @@ class Joint:
 
     @cached_property
     def time(self) -> np.ndarray:
-        """Times of all rows: a clock that begins again is that of another window."""
+        """Times of all rows. The clock restarts at the first row of each window."""
         return np.concatenate([part.time - part.time[0] for part in self.parts])
 
     @cached_property
@@ -81,30 +91,33 @@ class Joint:
 
     @property
     def averaging(self) -> float:
-        """Averaging time of friction in s; 0 if it was not averaged."""
+        """Averaging time of friction in s, or 0 if friction was not averaged."""
         passed = self.parts[0].filter
         return passed.size if passed is not None and passed.kind not in LOW_PASS else 0.0
 
     @property
     def frictions(self) -> list[np.ndarray]:
-        """Friction of the rows of each window."""
+        """Friction of the rows, as one array per window."""
         return [part.friction for part in self.parts]
 
     @cached_property
     def displacement(self) -> np.ndarray:
-        """Displacements of all rows, in um from the step of each window."""
+        """Displacements of all rows, in um, relative to the step of each window."""
         return np.concatenate([part.displacement for part in self.parts])
 
     def is_linear(self, name: str) -> bool:
-        """True for a parameter in which friction is linear, whatever the others."""
+        """Return True if friction is a linear function of a parameter.
+
+        Friction must be linear for all values of the other parameters.
+        """
         return all(part.is_linear(plain(name)) for part in self.parts)
 
     def latest(self, name: str) -> float:
-        """Time in s by which the loading of a window may come late."""
+        """Return the largest delay in s of the loading of a window."""
         return self.parts[max(parted(name)[1] - 1, 0)].latest
 
     def check(self, values: Values) -> None:
-        """Raise Halt if a scene cannot have these parameters."""
+        """Raise ``Halt`` if the parameters are invalid for the scene."""
         try:
             for part, own in self._each(values):
                 part.scene_of(own)
@@ -113,18 +126,24 @@ class Joint:
             raise Halt(Status.NOT_APPLICABLE, text) from wrong
 
     def curve(self, values: Values, *, refined: bool = False, checked: bool = False) -> np.ndarray:
-        """Friction along the rows of all windows, without trends (see `Model.curve`)."""
+        """Compute friction of the rows of all windows, without trends.
+
+        See ``Model.curve`` for the parameters.
+        """
         told = {"refined": refined, "checked": checked}
         return np.concatenate([part.curve(own, **told) for part, own in self._each(values)])
 
     def trend(self, values: Values) -> np.ndarray:
-        """The trends along the rows of all windows."""
+        """Compute the trends of the rows of all windows."""
         return np.concatenate([part.trend(own) for part, own in self._each(values)])
 
     def jacobian(
         self, values: Values, free: Sequence[str], differences: Differences = FINE
     ) -> np.ndarray:
-        """Derivatives along the rows of all windows (see `Model.jacobian`)."""
+        """Compute the derivatives of friction in all windows.
+
+        See ``Model.jacobian`` for the parameters.
+        """
         blocks = []
         places = {name: place for place, name in enumerate(free)}
         for number, (part, own) in enumerate(self._each(values), start=1):
@@ -135,11 +154,11 @@ class Joint:
         return np.concatenate(blocks)
 
     def by_loading(self, values: Values) -> np.ndarray:
-        """By how much friction is off by errors of the loading of each window."""
+        """Compute the change of friction due to errors of the loading of each window."""
         return np.asarray(block_diag(*(part.by_loading(own) for part, own in self._each(values))))
 
     def _each(self, values: Values) -> Iterator[tuple[Model, dict[str, float]]]:
-        """Iterate over the models, each with the parameters of its window."""
+        """Iterate over the models and the parameters of their windows."""
         factors = self.stiffness_factors or (1.0,) * len(self.parts)
         for number, (part, factor) in enumerate(zip(self.parts, factors, strict=True), start=1):
             own = of_window(values, number)

@@ -1,8 +1,9 @@
-"""What noise of load point displacement leaves open of the times and velocities of steps.
+"""Errors of step times and velocities due to noise of load point displacement.
 
-Displacement is ``x_0 + V_0 t`` up to the first step and goes on with the velocity of each piece.
-Its derivatives by times, velocities and x_0, and the noise of what straight pieces leave (see
-`noise`), tell their covariance, as in a fit of friction.
+The displacement is ``x_0 + V_0 t`` before the first step, and each segment that follows has its own
+velocity. The errors follow as in a fit of friction. The covariance matrix of the times and
+velocities is computed from the derivatives of displacement with respect to times, velocities and
+x_0, and from the noise of the residuals (see ``noise``).
 """
 
 from __future__ import annotations
@@ -23,24 +24,28 @@ from rsfstudy.analysis.fitting.steps import Step
 _MEANS = 1000
 #: Part of the displacement of a record that noise exceeds.
 _CLEAN = 1e-7
-#: Standard deviation of residuals of displacement, over its quantum, below which there is no noise
-#: that would make rounding errors random; and draws of their phases.
+#: Ratio of the standard deviation of displacement residuals to the quantum below which rounding
+#: errors are not random; and the number of random phases that are drawn.
 _DITHERED, _DRAWS = 0.4, 200
 
 
 def moved_steps(record: Record, steps: Sequence[Step]) -> list[list[Step]]:
-    """Steps of a record moved by a hundredth of errors that are independent and add up to those of
-    their times and velocities; none where steps are stated or displacement is without noise.
+    """Return copies of the steps that are shifted by their errors.
+
+    Each copy is shifted by a hundredth of one error. The errors are independent, and together they
+    have the covariance matrix of the times and velocities.
 
     Parameters
     ----------
     record : Record
     steps : sequence of Step
-        Some of those of the record, one after the other.
+        Successive steps of the record.
 
     Returns
     -------
     list of list of Step
+        One copy of the steps for each independent error. The list is empty if the user specified
+        the steps, or if displacement has no noise.
     """
     if record.stated is not None or not steps:
         return []
@@ -59,15 +64,17 @@ def moved_steps(record: Record, steps: Sequence[Step]) -> list[list[Step]]:
 
 
 def integrated_displacement(loading: np.ndarray, time: np.ndarray, origin: float) -> np.ndarray:
-    """Compute the load point displacement of a loading history, relative to that at one time.
+    """Integrate the load point velocity to obtain the displacement.
 
-    Unlike the recorded displacement, that of the model has no noise. A regressor with noise would
-    bias the trend under generalised least squares, because the noise dominates its short lags.
+    The integrated displacement has no noise, in contrast to the recorded displacement. Noise of a
+    regressor would bias the trend in generalised least squares, because the noise dominates at
+    short lags.
 
     Parameters
     ----------
-    loading : ndarray, shape (pieces, 4)
-        Pieces as `loading_of` makes them; the first piece also holds for earlier times.
+    loading : ndarray, shape (segments, 4)
+        Segments of constant velocity, as returned by ``loading_of``. The first segment also applies
+        to earlier times.
     time : ndarray, shape (rows,)
         Times in s.
     origin : float
@@ -91,7 +98,13 @@ def integrated_displacement(loading: np.ndarray, time: np.ndarray, origin: float
 def _errors(
     record: Record, steps: Sequence[Step], speeds: np.ndarray
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Independent errors of the times, shape (steps,), and velocities, shape (steps + 1,)."""
+    """Compute independent errors of the times and velocities of steps.
+
+    Returns
+    -------
+    list of (ndarray, ndarray)
+        Errors of the times, shape (steps,), and of the velocities, shape (steps + 1,).
+    """
     found, time = record.found, record.time
     begins = max((s.ends for s in found if s.ends < steps[0].begins), default=time[0])
     ends = min((s.begins for s in found if s.begins > steps[-1].ends), default=time[-1])
@@ -114,7 +127,7 @@ def _errors(
         root = _rounding_root(columns[:, :-1], exact, np.searchsorted(at, t), quantum)
     else:
         root = _noise_root(t, columns)
-    # steps are found where displacement parts best, which need not be where all of it would have it
+    # the detected steps differ from the least-squares solution for all rows
     missed = best[:-1] - np.concatenate([np.zeros(len(at)), speeds[moves]])
     root = np.column_stack([root, missed])
     faster = np.zeros((len(speeds), root.shape[1]))
@@ -123,13 +136,19 @@ def _errors(
 
 
 def _noise_root(t: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Compute a root of the covariance of times and velocities under the noise of displacement.
+    """Compute a root of the covariance matrix under noise of displacement.
 
     Parameters
     ----------
     t : ndarray, shape (rows,)
     columns : ndarray, shape (rows, parameters + 1)
-        Derivatives of displacement, of which the last one is by its origin; and residuals.
+        Derivatives of displacement, followed by the residuals. The last derivative is with respect
+        to x_0.
+
+    Returns
+    -------
+    ndarray
+        A matrix A such that A A' is the covariance matrix of times and velocities.
     """
     every = -(-len(t) // _MEANS)
     table = np.column_stack([t, columns])[: len(t) // every * every]
@@ -146,10 +165,16 @@ def _noise_root(t: np.ndarray, columns: np.ndarray) -> np.ndarray:
 def _rounding_root(
     jacobian: np.ndarray, exact: np.ndarray, pieces: np.ndarray, quantum: float
 ) -> np.ndarray:
-    """Compute a root of the covariance of times and velocities if displacement is only rounded.
+    """Compute a root of the covariance matrix if displacement is only rounded.
 
-    Rounding errors are not random within a record: at a steady velocity they repeat. But their
-    phase is arbitrary in each straight piece, so lines are fitted to errors with random phases.
+    Rounding errors are not random within a record, because they repeat at a constant velocity.
+    However, their phase is arbitrary in each straight segment. The lines are therefore fitted to
+    rounding errors with random phases.
+
+    Returns
+    -------
+    ndarray
+        A matrix A such that A A' is the covariance matrix of times and velocities.
     """
     rng = np.random.default_rng(0)
     phases = quantum * rng.random((_DRAWS, pieces.max() + 1))[:, pieces]

@@ -1,24 +1,26 @@
-"""The noise of a record: white, or an autoregressive process whose coefficients are found with what
-the fit takes up of the noise counted (restricted maximum likelihood, REML).
+"""White and autoregressive models of the noise of a record.
 
-With J the derivatives of the model, R the correlation of the noise up to its size, p parameters and
-n samples, REML minimises
+The autoregressive coefficients are estimated by restricted maximum likelihood (REML), which
+accounts for the noise that the fit absorbs. Let J be the derivatives of the model, R the
+correlation matrix of the noise, p the number of parameters and n the number of rows. REML minimises
 
     (n - p) ln(S/(n - p)) + ln|R| + ln|J' R^-1 J|,
 
-S being the sum of squares that generalised least squares leaves. Samples taken at other intervals
-have noise of their own, of another size and other correlations; where intervals change, the samples
-before still tell of those behind, by their sizes.
+where S is the sum of squared residuals of generalised least squares. Rows with another sampling
+interval have another noise process, with its own standard deviation and correlation. If the
+sampling interval changes, the rows before the change still predict the rows after it, scaled by the
+ratio of the standard deviations.
 
-The process is ``e_i = c_1 e_(i-1) + ... + c_m e_(i-m) + w_i`` with w white. Its partial
-autocorrelations lie between -1 and 1 where it is stationary, and are what is looked for.
+The process is ``e_i = c_1 e_(i-1) + ... + c_m e_(i-m) + w_i`` with white noise w. The process is
+stationary if its partial autocorrelations are between -1 and 1. The search therefore varies the
+partial autocorrelations.
 
 References
 ----------
 Patterson and Thompson (1971), Biometrika 58, 545-554, for REML; Burg (1967), Proc. 37th Meeting of
-the Society of Exploration Geophysicists, for where the search begins; Barndorff-Nielsen and Schou
-(1973), J. Multivar. Anal. 3, 408-419, for partial autocorrelations; Ljung and Box (1978),
-Biometrika 65, 297-303.
+the Society of Exploration Geophysicists, for the initial guess; Barndorff-Nielsen and Schou (1973),
+J. Multivar. Anal. 3, 408-419, for partial autocorrelations; Ljung and Box (1978), Biometrika 65,
+297-303.
 """
 
 from __future__ import annotations
@@ -59,7 +61,7 @@ _WIDEST = 30.0
 
 
 def check_noise(name: str) -> None:
-    """Raise InvalidValue for what names no noise."""
+    """Raise ``InvalidValue`` if the name of a noise model is unknown."""
     if name not in (WHITE, AUTOREGRESSIVE, *(f"ar{order}" for order in range(1, HIGHEST + 1))):
         choices = (WHITE, AUTOREGRESSIVE, f"ar1 to ar{HIGHEST}")
         raise InvalidValue("noise", name, "is unknown", choices=choices)
@@ -67,7 +69,9 @@ def check_noise(name: str) -> None:
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise with an autoregressive process per sampling interval, and levels that may change.
+    """Noise of a record, with an autoregressive process for each sampling interval.
+
+    The standard deviation of the noise (its level) may also change along the record.
 
     Attributes
     ----------
@@ -75,11 +79,11 @@ class Noise:
     partial : ndarray, shape (processes, order)
         Partial autocorrelations of each process.
     sizes : ndarray, shape (levels,)
-        Standard deviations of the levels, relative to the first one.
+        Standard deviation of each level, relative to the first level.
     kept : ndarray of bool, shape (rows,), optional
-        False for outliers, which are left out. All rows are kept by default.
+        False for outliers, which are excluded. By default, all rows are kept.
     overlap : Overlap, optional
-        Correlation by averaging, which is removed before that of the process.
+        Correlation due to averaging, which is removed before the correlation of the process.
     """
 
     runs: tuple[Run, ...]
@@ -90,11 +94,14 @@ class Noise:
 
     @property
     def order(self) -> int:
-        """Order of the processes."""
+        """Order of the autoregressive processes."""
         return int(self.partial.shape[1])
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
-        """Whiten columns: subtract the prediction by earlier rows, and divide by its error.
+        """Remove the correlation of the noise from columns.
+
+        Each row is replaced by its prediction error, divided by the standard error of the
+        prediction from earlier rows.
 
         Parameters
         ----------
@@ -115,17 +122,17 @@ class Noise:
         return found
 
     def kept_rows(self, columns: np.ndarray) -> np.ndarray:
-        """Return columns without the rows of outliers."""
+        """Remove the rows of outliers from columns."""
         return columns if self.kept is None else columns[self.kept]
 
     @cached_property
     def predictors(self) -> list[tuple[list[list[float]], list[float]]]:
-        """Coefficients and variances of each process (see `_predictors`)."""
+        """Coefficients and variances of each process (see ``_predictors``)."""
         return [*map(_predictors, self.partial)]
 
     @property
     def log_determinant(self) -> float:
-        """``ln|R|``."""
+        """Logarithm of the determinant of the correlation matrix R."""
         total = 0.0 if self.overlap is None else self.overlap.log_determinant
         for first, last, number, before, level in self.runs:
             variances = self.predictors[number][1]
@@ -137,9 +144,11 @@ class Noise:
 
     @property
     def effective_samples(self) -> float:
-        """Number of independent samples that tell a mean as well: n over the power at zero
-        frequency, ``(1 - k_1^2)(1 - k_2^2).../(1 - c_1 - ... - c_m)^2`` with k the partial
-        autocorrelations; by AR(1) ``n (1 - rho)/(1 + rho)``.
+        """Effective sample size for a mean.
+
+        The effective sample size is n divided by the power at zero frequency, ``(1 - k_1^2)(1 -
+        k_2^2).../(1 - c_1 - ... - c_m)^2``, where k are the partial autocorrelations. For an AR(1)
+        process, the effective sample size is ``n (1 - rho)/(1 + rho)``.
         """
         power = self._power_at_zero
         lasts = ((run.last - run.first, run.number) for run in self.runs)
@@ -148,14 +157,17 @@ class Noise:
 
     @property
     def _power_at_zero(self) -> list[float]:
-        """Power at zero frequency of each process, over its variance."""
+        """Power at zero frequency of each process, divided by its variance."""
         told = ((c[-1], v[-1]) for c, v in self.predictors)
         return [left / (1.0 - math.fsum(last)) ** 2 for last, left in told]
 
     @property
     def degrees(self) -> float:
-        """Degrees of freedom of the power at zero frequency, on which errors of slow trends depend:
-        2 over the variance of its logarithm, in which coefficients that are found count.
+        """Degrees of freedom of the power at zero frequency.
+
+        This power determines the errors of slow trends. The degrees of freedom are 2 divided by the
+        variance of the logarithm of the power. The variance includes the uncertainty of the
+        estimated coefficients.
         """
         total = 0.0
         rows = np.bincount(index_rows(self.runs, "number")).tolist()
@@ -167,7 +179,7 @@ class Noise:
 
 
 def white(time: np.ndarray) -> Noise:
-    """Return white noise of one level per sampling interval."""
+    """Return white noise with one level for each sampling interval."""
     runs = find_runs(time)
     return Noise(runs, np.zeros((count_processes(runs), 0)), np.ones(count_processes(runs)))
 
@@ -181,27 +193,27 @@ def fitted(
     least: float = 0.0,
     averaging: float = 0.0,
 ) -> Noise:
-    """Estimate the noise from the residuals of a fit by restricted maximum likelihood.
+    """Estimate the noise from the residuals of a fit by REML.
 
     Parameters
     ----------
     name : str
-        "white"; "ar", whose order minimises the AIC; or "ar3" and so on.
+        "white", "ar" for the order that minimises the AIC, or "ar1", "ar2" and so on.
     time : ndarray, shape (rows,)
     residuals : ndarray, shape (rows,)
     jacobian : ndarray, shape (rows, parameters)
         Derivatives of the model.
     kept : ndarray of bool, shape (rows,), optional
-        False for outliers. All rows are kept by default.
+        False for outliers. By default, all rows are kept.
     least : float
-        Smallest standard deviation of a level, for example that of rounding.
+        Lower bound of the standard deviation of a level, such as the rounding error.
     averaging : float
-        Averaging time of friction in s; 0 if it was not averaged.
+        Averaging time of friction in s, or 0 if friction was not averaged.
 
     Returns
     -------
     Noise
-        With a process for each sampling interval, and a level for each segment.
+        Noise with one process for each sampling interval, and one level for each segment.
     """
     begin, least = guess_noise(name, time, residuals, kept, least, averaging)
     shape, order = begin.partial.shape, begin.order
@@ -237,9 +249,15 @@ def guess_noise(
     least: float = 0.0,
     averaging: float = 0.0,
 ) -> tuple[Noise, float]:
-    """Estimate the noise by moments, and the least size of a level relative to the first one.
+    """Estimate the noise by the method of moments.
 
-    The parameters are those of `fitted`.
+    See ``fitted`` for the parameters.
+
+    Returns
+    -------
+    noise : Noise
+    least : float
+        Lower bound of the standard deviation of a level, relative to the first level.
     """
     if kept is not None:
         time, residuals = time[kept], residuals[kept]
@@ -254,7 +272,14 @@ def guess_noise(
 def _first_guess(
     name: str, whole: tuple[Run, ...], residuals: np.ndarray, least: float
 ) -> tuple[Noise, float]:
-    """Estimate the noise by moments, where the search begins, and the size of its first level."""
+    """Compute the initial guess of the noise by the method of moments.
+
+    Returns
+    -------
+    noise : Noise
+    first : float
+        Standard deviation of the first level.
+    """
     stated, count = name.removeprefix(AUTOREGRESSIVE), count_processes(whole)
     runs, knots, innovations = whole, list[int](), residuals
     scale = np.ones(len(residuals))
@@ -278,15 +303,18 @@ def _first_guess(
 
 
 class _Products:
-    """Sums of products of columns, and of these some rows later, of which the squares of whitened
-    columns are made whatever the coefficients: the cost of a search does not grow with samples.
+    """Sums of products of lagged columns.
+
+    The sum of squares of whitened columns follows from these sums for any coefficients. The cost of
+    the search is therefore independent of the number of rows.
 
     Parameters
     ----------
     runs : tuple of Run
-    columns : ndarray, shape (samples, columns)
-        Derivatives, and residuals last.
+    columns : ndarray, shape (rows, columns)
+        Derivatives of the model, followed by the residuals.
     order : int
+        Order of the autoregressive processes.
     """
 
     def __init__(self, runs: Sequence[Run], columns: np.ndarray, order: int) -> None:
@@ -298,8 +326,8 @@ class _Products:
         width = columns.shape[1]
         self.levels = sorted({(run.number, run.level) for run in runs})
         self.sums = np.zeros((len(self.levels), order + 1, order + 1, width, width))
-        #: The first rows of each run with the rows before that predict them, the number of the
-        #: latter, the process of the run, and the levels of all these rows.
+        #: For each run: the first rows and the rows before them that predict them, the number of
+        #: rows before them, the process of the run, and the levels of these rows.
         self.early: list[tuple[np.ndarray, int, int, np.ndarray]] = []
         levels = index_rows(runs, "level")
         for run in runs:
@@ -318,7 +346,13 @@ class _Products:
                         sums[j, i] += found.T
 
     def misfit(self, noise: Noise) -> float:
-        """Number that REML minimises, up to a constant; infinite where nothing is left."""
+        """Compute the objective function of REML, up to a constant.
+
+        Returns
+        -------
+        float
+            Infinity if the residuals vanish.
+        """
         total = np.zeros(self.sums.shape[-2:])
         for (number, level), sums in zip(self.levels, self.sums, strict=True):
             coefficients, variances = noise.predictors[number]
@@ -339,7 +373,7 @@ class _Products:
 
 
 def _order(parts: Sequence[Sequence[np.ndarray]]) -> int:
-    """The order by which Akaike's criterion of what is left is least."""
+    """Return the autoregressive order that minimises Akaike's criterion."""
     shortest = min(max(map(len, part)) for part in parts)
     highest = min(HIGHEST, shortest // _SAMPLES)
     criterion = np.zeros(highest + 1)
@@ -351,7 +385,7 @@ def _order(parts: Sequence[Sequence[np.ndarray]]) -> int:
 
 
 def _partial(part: Sequence[np.ndarray], order: int) -> list[float]:
-    """Partial autocorrelations of residuals up to an order, by the recursion of Burg."""
+    """Estimate partial autocorrelations by Burg's recursion."""
     forward, backward = [[p - p.mean() for p in part] for _ in range(2)]
     found = []
     for _ in range(order):
@@ -367,8 +401,15 @@ def _partial(part: Sequence[np.ndarray], order: int) -> list[float]:
 
 
 def _predictors(partial: Sequence[float] | np.ndarray) -> tuple[list[list[float]], list[float]]:
-    """Coefficients that tell a sample from the 0, 1, 2 and so on before it, the last one first, and
-    the variance that each leaves of 1: the recursion of Levinson and Durbin.
+    """Compute prediction coefficients by the Levinson-Durbin recursion.
+
+    Returns
+    -------
+    coefficients : list of list of float
+        Coefficients that predict a row from the previous 0, 1, 2, ... rows, in order of increasing
+        lag.
+    variances : list of float
+        Variance of each prediction error, relative to the variance of the process.
     """
     coefficients: list[list[float]] = [[]]
     variances = [1.0]
@@ -383,7 +424,7 @@ def _predictors(partial: Sequence[float] | np.ndarray) -> tuple[list[list[float]
 def _innovations(
     columns: np.ndarray, coefficients: list[list[float]], variances: list[float]
 ) -> np.ndarray:
-    """Subtract the prediction by earlier rows from each row, and divide by the standard error."""
+    """Compute prediction errors divided by their standard errors."""
     full = np.append(1.0, -np.array(coefficients[-1]))
     is_plain = len(full) == 1 or not columns.size  # lfilter refuses empty arrays
     found = columns.copy() if is_plain else np.asarray(lfilter(full, [1.0], columns, axis=0))

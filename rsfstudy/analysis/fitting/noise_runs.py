@@ -1,7 +1,7 @@
-"""Runs of rows that share a sampling interval and a noise level.
+"""Segmentation of a record into runs with uniform sampling and noise.
 
-Sampling intervals are classified by their running mean, so that a clock with jitter belongs to
-one class. Changes of the noise level are found by binary segmentation of the whitened residuals.
+Sampling intervals are classified by their running mean, so a clock with jitter belongs to one
+class. Changes of the noise level are detected by binary segmentation of the whitened residuals.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ _LOG_VARIANCE, _LEAST = math.pi**2 / 8.0, 0.01
 
 
 class Run(NamedTuple):
-    """Consecutive rows with one sampling interval and one noise level.
+    """Consecutive rows with the same sampling interval and the same noise level.
 
     Attributes
     ----------
     first, last : int
-        First row, and the row after the last.
+        Index of the first row, and index after the last row.
     number : int
         Index of the noise process.
     before : int
-        Number of earlier rows on the same clock.
+        Number of earlier rows since the clock started.
     level : int
         Index of the noise level.
     """
@@ -51,10 +51,10 @@ class Run(NamedTuple):
 
 
 def find_runs(time: np.ndarray) -> tuple[Run, ...]:
-    """Find the runs of rows with one sampling interval.
+    """Find the runs of rows with the same sampling interval.
 
-    Another run begins if the clock starts again, as it does in joint fits. The noise level of a run
-    has the index of its process.
+    If the clock restarts, as in joint fits, a new run begins. Each noise process has one noise
+    level at this stage, so both have the same index.
     """
     kinds, begins = _classify_intervals(time), np.diff(time) <= 0.0
     bounds = (np.flatnonzero((np.diff(kinds) != 0) | begins) + 1).tolist()
@@ -66,7 +66,10 @@ def find_runs(time: np.ndarray) -> tuple[Run, ...]:
 
 
 def split_runs(runs: Sequence[Run], knots: Sequence[int]) -> tuple[Run, ...]:
-    """Split runs at the rows where the noise level changes; each segment has levels of its own."""
+    """Split runs at the rows at which the noise level changes.
+
+    Each segment of the record has its own noise levels.
+    """
     found: list[Run] = []
     levels: dict[tuple[int, int], int] = {}
     for run in runs:
@@ -84,28 +87,35 @@ def count_processes(runs: Sequence[Run]) -> int:
 
 
 def index_rows(runs: Sequence[Run], field: str) -> np.ndarray:
-    """Return the process (`"number"`) or the noise level (`"level"`) of each row."""
+    """Return the index of the noise process or of the noise level of each row.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    field : {"number", "level"}
+        Return the index of the process or of the level.
+    """
     return np.repeat([getattr(run, field) for run in runs], [run.last - run.first for run in runs])
 
 
 def find_level_changes(innovations: np.ndarray, smallest: float = 0.0) -> list[int]:
-    """Find the rows where the standard deviation of white noise changes.
+    """Find the rows at which the standard deviation of the noise changes.
 
-    The logarithms of absolute differences of successive rows are segmented. A misfit of the model
-    near a step is smooth or short, so it changes few of them; a change of the noise level changes
-    all.
+    The function segments the logarithms of the absolute differences between successive rows. A
+    misfit of the model near a step affects few of these differences, because it is smooth or short.
+    A change of the noise level affects all of them.
 
     Parameters
     ----------
     innovations : ndarray, shape (rows,)
         Whitened residuals.
     smallest : float
-        Differences that are smaller count as this difference.
+        Lower bound of the absolute differences.
 
     Returns
     -------
     list of int
-        First rows of the second and later segments.
+        Index of the first row of each segment except the first segment.
     """
     count, size = len(innovations), np.abs(np.diff(innovations, prepend=0.0))
     shortest = max(_FEWEST, math.ceil(_FRACTION * count))
@@ -128,7 +138,7 @@ def find_level_changes(innovations: np.ndarray, smallest: float = 0.0) -> list[i
 
 
 def _classify_intervals(time: np.ndarray) -> np.ndarray:
-    """Classify the sampling interval of each row: 0, 1 and so on."""
+    """Return the class of the sampling interval of each row: 0, 1 and so on."""
     gaps = np.diff(time)
     gaps[gaps <= 0.0] = np.median(gaps)
     smooth = np.log(uniform_filter1d(gaps, min(_MEAN, len(gaps)), mode="nearest"))
@@ -149,7 +159,7 @@ def _classify_intervals(time: np.ndarray) -> np.ndarray:
 
 
 def _refine_boundary(logs: np.ndarray, row: int) -> int:
-    """Find the row near another one where sampling intervals change, by least squares."""
+    """Refine the row at which the sampling interval changes, by least squares."""
     first, last = max(row - 1 - 2 * _MEAN, 0), min(row - 1 + 2 * _MEAN, len(logs))
     part = logs[first:last]
     costs = [np.var(part[:k]) * k + np.var(part[k:]) * (len(part) - k) for k in range(1, len(part))]

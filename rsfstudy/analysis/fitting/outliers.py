@@ -1,4 +1,4 @@
-"""Outliers of a record, and the quantum to which its values are rounded."""
+"""Detection of outliers and of rounding in a record."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ _GRID = 0.02
 
 
 def find_quantum(values: np.ndarray) -> float:
-    """Find the quantum of which values are multiples, apart from an offset.
+    """Find the quantum to which values are rounded.
+
+    Values are rounded if they are multiples of a quantum, up to a constant offset.
 
     Returns
     -------
     float
-        0 if the values do not lie on a grid.
+        0 if the values are not rounded.
     """
     distinct = np.unique(values)
     gaps = np.diff(distinct)
@@ -37,17 +39,20 @@ def find_quantum(values: np.ndarray) -> float:
 
 
 def find_kept_rows(residuals: np.ndarray, curve: np.ndarray, quantum: float) -> np.ndarray | None:
-    """Find the rows that are no outliers.
+    """Find the rows that are not outliers.
 
-    An outlier is a row whose residual differs from the median of the neighbouring residuals by more
-    than six local standard deviations, and by more than twice what the model differs from its own.
+    Each residual is compared with the median of its neighbours. A row is an outlier if the
+    difference exceeds six local standard deviations. The difference must also exceed twice the
+    corresponding difference of the model, so that a peak of the model is not an outlier.
 
     Parameters
     ----------
-    residuals, curve : ndarray, shape (rows,)
-        Of a fit, and its friction.
+    residuals : ndarray, shape (rows,)
+        Residuals of a fit.
+    curve : ndarray, shape (rows,)
+        Friction of the fit.
     quantum : float
-        To which friction is rounded.
+        Quantum to which friction is rounded.
 
     Returns
     -------
@@ -66,7 +71,7 @@ def find_kept_rows(residuals: np.ndarray, curve: np.ndarray, quantum: float) -> 
 
 
 def _median_of_neighbours(values: np.ndarray) -> np.ndarray:
-    """Compute the median of the neighbours of each row, without the row itself."""
+    """Compute the median of the neighbours of each row, excluding the row."""
     around = np.ones(2 * _REACH + 1, dtype=bool)
     around[_REACH] = False
     lower, upper = (

@@ -1,7 +1,7 @@
-"""Draws from the posterior of the parameters of a fit, by the ensemble sampler of emcee.
+"""Posterior sampling of the parameters of a fit with emcee.
 
-The likelihood is that of the fit, with its noise as it was found. Priors are flat, in the logarithm
-for slip distances and stiffness, between the bounds of the search.
+The likelihood is the likelihood of the fit with the estimated noise. Priors are uniform between the
+bounds of the search. For slip distances and stiffness, the priors are uniform in the logarithm.
 
 References
 ----------
@@ -34,7 +34,10 @@ _TAILS = 5.0
 
 
 def check(draws: int) -> None:
-    """Raise InvalidValue for an invalid number of draws, or if emcee is not installed."""
+    """Raise ``InvalidValue`` if sampling is impossible.
+
+    Sampling requires a valid number of draws and an installation of emcee.
+    """
     if not isinstance(draws, int) or not 0 <= draws <= _MOST:
         raise InvalidValue("posterior", draws, f"must be a whole number from 0 to {_MOST:,}")
     if draws and importlib.util.find_spec("emcee") is None:
@@ -43,24 +46,31 @@ def check(draws: int) -> None:
 
 
 def sample(search: Search, found: Fitted, draws: int, seed: int = 0) -> tuple[np.ndarray, float]:
-    """Draws of the coordinates of the free parameters, shape (draws, parameters), and the longest
-    autocorrelation time of the chain in steps.
+    """Sample the posterior of the free parameters.
 
-    Half of the steps are stretch moves, half are proposed by the errors of the fit. The chain goes
-    on until it is 50 autocorrelation times long and holds as many independent samples as draws.
+    Half of the steps are stretch moves. The other half are proposals from the covariance matrix of
+    the fit. The chain continues until its length exceeds 50 autocorrelation times and the number of
+    independent samples exceeds the number of draws.
 
     Parameters
     ----------
     search : Search
     found : Fitted
-        Of that search, with a covariance that is finite.
+        Result of the search, with a finite covariance matrix.
     draws : int
     seed : int
+
+    Returns
+    -------
+    draws : ndarray, shape (draws, parameters)
+        Draws of the coordinates of the free parameters.
+    autocorrelation_time : float
+        Longest autocorrelation time of the chain in steps.
 
     Raises
     ------
     Halt
-        Where the work budget is spent before: a chain too short tells nothing.
+        If the work budget is exhausted before the chain is long enough.
     """
     import emcee
 
@@ -103,9 +113,14 @@ def sample(search: Search, found: Fitted, draws: int, seed: int = 0) -> tuple[np
 
 
 def draw(search: Search, found: Fitted, draws: int) -> dict[str, Any]:
-    """Return draws of the free parameters, and the autocorrelation time of the chain.
+    """Sample the posterior, and return the draws as parameter values.
 
-    They are NaN if standard errors are infinite.
+    Returns
+    -------
+    dict
+        ``posterior`` contains the draws, with shape (draws, parameters), and
+        ``autocorrelation_time`` the autocorrelation time of the chain. Both are NaN if the standard
+        errors are infinite.
     """
     drawn, time = np.full((draws, len(found.free)), math.nan), math.nan
     if np.isfinite(found.covariance).all():

@@ -1,4 +1,4 @@
-"""A record of a laboratory as fits take it: rows against time, and the loading that it tells."""
+"""Laboratory records for fits: time series, steps and loading history."""
 
 from __future__ import annotations
 
@@ -48,23 +48,23 @@ _RAMP = 16
 @guard_methods
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A record of an experiment.
+    """A laboratory record of an experiment.
 
     Attributes
     ----------
     columns : mapping of str to ndarray
-        ``time`` (s), ``displacement`` of the load point (um), ``friction``, and ``normal_stress``
-        (Pa) where it was recorded; all of one length.
+        ``time`` (s), load point ``displacement`` (um), ``friction``, and ``normal_stress`` (Pa) if
+        it was recorded. All columns have the same length.
     name : str
-        What it is called in results.
+        Name of the record in results.
     stated : tuple of Step or None
-        The steps of its load point, where they are stated.
+        Steps that the user specified. If None, steps are detected.
 
     Raises
     ------
     InvalidValue
-        For columns that are missing, of other lengths or not finite, a clock that stands still or
-        runs back, and steps that are none.
+        If a column is missing, has another length or contains values that are not finite, if time
+        does not increase, or if a step is invalid.
     """
 
     columns: dict[str, np.ndarray]
@@ -100,7 +100,7 @@ class Record:
 
     @cached_property
     def digest(self) -> str:
-        """Digest of columns and stated steps: records with one are the same."""
+        """Hash of the columns and the specified steps. Equal records have equal hashes."""
         told = hashlib.sha256(repr((sorted(self.columns), self.stated)).encode())
         for name in sorted(self.columns):
             told.update(np.ascontiguousarray(self.columns[name]).tobytes())
@@ -116,7 +116,7 @@ class Record:
         return len(self.time)
 
     def window(self, begins: float, ends: float) -> Record:
-        """The part between two times in s."""
+        """Return the part of the record between two times in s."""
         if not begins < ends:
             raise InvalidValue("window", (begins, ends), "must end after it begins")
         rows = (self.time >= begins) & (self.time <= ends)
@@ -126,14 +126,17 @@ class Record:
         return replace(self, columns={n: v[rows] for n, v in self.columns.items()})
 
     def with_steps(self, steps: Sequence[Sequence[float]]) -> Record:
-        """Return the record with stated steps in place of those that are detected.
+        """Return a copy of the record with the given steps.
+
+        The given steps replace the detected steps.
 
         Parameters
         ----------
         steps : sequence of (float, float, float, float) or of six floats
-            Times in s at which the change begins and ends, load point velocities in um/s before
-            and after, and, if normal stress changes, normal stresses in Pa before and after. By
-            default the normal stresses are those of the record.
+            For each step, the times in s at which the change begins and ends, and the load point
+            velocities in um/s before and after the step. If normal stress changes, also the normal
+            stresses in Pa before and after the step. By default, the normal stresses are taken from
+            the record.
 
         Returns
         -------
@@ -143,7 +146,7 @@ class Record:
 
     @cached_property
     def found(self) -> tuple[Step, ...]:
-        """The steps that are stated, or else those of displacement and normal stress."""
+        """The steps that the user specified, or else the detected steps."""
         stress, moved = self.columns.get("normal_stress"), self.columns["displacement"]
         steps = self.stated if self.stated is not None else steps_of(self.time, moved)
         if stress is None:
@@ -155,14 +158,14 @@ class Record:
         return with_levels(steps, changes, self.time, stress)
 
     def steps(self) -> xr.Dataset:
-        """List the steps of load point velocity and normal stress, numbered from 1.
+        """Return a table of the steps of load point velocity and normal stress.
 
         Returns
         -------
         xarray.Dataset
             Along ``step``, numbered from 1: ``begins``, ``ends`` (s), ``velocity_before``,
-            ``velocity_after`` (um/s), and, if normal stress was recorded,
-            ``normal_stress_before`` and ``normal_stress_after`` (Pa).
+            ``velocity_after`` (um/s), and, if normal stress was recorded, ``normal_stress_before``
+            and ``normal_stress_after`` (Pa).
         """
         numbers = [step[: len(_STEP_COLUMNS)] for step in self.found]
         rows = np.array(numbers, dtype=float).reshape(-1, len(_STEP_COLUMNS))
@@ -173,7 +176,7 @@ class Record:
         return with_cf_encoding(xr.Dataset(data, steps, self._attributes("Detected steps")))
 
     def to_dataset(self) -> xr.Dataset:
-        """Return the record as a dataset along ``time``."""
+        """Convert the record to a dataset with the dimension ``time``."""
         about = {column.name: column for column in COLUMNS}
         data = {
             name: ("time", values, {"long_name": about[name].long_name, "units": about[name].units})
@@ -182,12 +185,12 @@ class Record:
         return with_cf_encoding(xr.Dataset(data, attrs=self._attributes("Laboratory record")))
 
     def _attributes(self, title: str) -> dict[str, str]:
-        """Return the attributes of a dataset that was derived from the record."""
+        """Return the global attributes of a dataset created from the record."""
         return {"title": f"{title}: {self.name}", "Conventions": "CF-1.11"}
 
 
 def _stated_step(stated: Sequence[float]) -> Step:
-    """Check the numbers of a step that a user states."""
+    """Validate the numbers of a step, and convert them to a ``Step``."""
     if isinstance(stated, Step):  # from another record
         return stated
     rule = "is no step: begins, ends, velocity before and after, and, if it changes, "
@@ -207,19 +210,24 @@ def _stated_step(stated: Sequence[float]) -> Step:
 
 
 def loading_of(record: Record, begins: float, ends: float, *, recorded: bool) -> np.ndarray:
-    """The loading of a record between two times, by pieces: each with its beginning in s, load
-    point velocity in um/s, normal stress over that at first, and the rate of that in 1/s.
+    """Return the loading history between two times.
 
     Parameters
     ----------
     record : Record
     begins, ends : float
-        In s; before the first piece all slides steadily at its velocity, that before the first
-        step.
+        Times in s. Before the first segment, the slider slides steadily at the load point velocity
+        before the first step.
     recorded : bool
-        Row by row; or by steps, at constant normal stress, those that last at steady acceleration.
-        Where noise moves the load point back it rests: of displacements that never fall the closest
-        ones are taken.
+        If True, each row begins a segment, and the recorded displacement is replaced by the closest
+        displacement that never decreases. If False, the loading consists of steps, and load point
+        velocity and normal stress change at a constant rate during a step.
+
+    Returns
+    -------
+    ndarray, shape (segments, 4)
+        For each segment, its start in s, the load point velocity in um/s, the ratio of normal
+        stress to its initial value, and the rate of this ratio in 1/s.
     """
     steps = steps_between(record, begins, ends)
     if recorded:
@@ -233,12 +241,24 @@ def loading_of(record: Record, begins: float, ends: float, *, recorded: bool) ->
 
 
 def steps_between(record: Record, begins: float, ends: float) -> list[Step]:
-    """The steps of a record between two times."""
+    """Return the steps of a record between two times."""
     return [step for step in record.found if begins < step.begins and step.ends < ends]
 
 
 def by_steps(begins: float, steps: Sequence[Step]) -> np.ndarray:
-    """Make the pieces of loading by steps, from a time on."""
+    """Return the loading history that consists of steps.
+
+    Parameters
+    ----------
+    begins : float
+        Start of the first segment in s.
+    steps : sequence of Step
+
+    Returns
+    -------
+    ndarray, shape (segments, 4)
+        Segments as returned by ``loading_of``.
+    """
     pieces, level = [(begins, steps[0].before if steps else 0.0, 1.0, 0.0)], 1.0
     for step in steps:
         lasts, rises = step.ends - step.begins, level * (step.stress_ratio - 1.0)
@@ -251,7 +271,14 @@ def by_steps(begins: float, steps: Sequence[Step]) -> np.ndarray:
 
 
 def _velocities(step: Step) -> list[tuple[float, float]]:
-    """List the velocities within a step, each with the share of its duration from which it acts."""
+    """Return the velocities within a step.
+
+    Returns
+    -------
+    list of (float, float)
+        The start of each velocity, as a fraction of the duration of the step, and the velocity in
+        um/s.
+    """
     lasts = step.ends - step.begins
     if not lasts > 0.0:
         return []
@@ -263,16 +290,16 @@ def _velocities(step: Step) -> list[tuple[float, float]]:
 
 
 def _by_rows(record: Record, first: float, before: float) -> np.ndarray:
-    """Make the pieces of loading from each row to the next.
+    """Return the loading history with one segment per row.
 
     Parameters
     ----------
     record : Record
     first : float
-        Load point velocity in um/s of the first piece.
+        Load point velocity of the first segment in um/s.
     before : float
-        Normal stress in Pa before the first step, to which normal stress is relative; that of the
-        first row, if it is unknown.
+        Normal stress in Pa before the first step, by which normal stress is divided. If NaN, the
+        normal stress of the first row is used.
     """
     lasts = np.diff(record.time)
     moved = isotonic_regression(record.columns["displacement"]).x

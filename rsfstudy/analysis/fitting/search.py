@@ -1,11 +1,12 @@
-"""The search for the parameters of a record: least squares under the noise that residuals tell.
+"""Search for the parameters of a record by generalised least squares.
 
-Parameters p are those that leave the least of ``|W (y - f(p))|^2``, generalised least squares: y is
-friction, f the model, and W whitens the noise (``W'W`` is the inverse R^-1 of its correlation).
-Noise and parameters are found in turn. Then the covariance of parameters is ``s^2 (J'R^-1 J)^-1``
-with J the derivatives of f, and ``s^2 = |W (y - f)|^2/(n - p)`` of n rows and p parameters. Errors
-of times and velocities of steps (see `load_point`), which move f by the columns of G, add A A' with
-``A = (J'R^-1 J)^-1 J'R^-1 G``.
+The parameters p minimise ``|W (y - f(p))|^2``, where y is recorded friction and f is the model. The
+matrix W whitens the noise: ``W'W`` is the inverse of the correlation matrix R of the noise. The
+noise and the parameters are estimated in turn. The covariance matrix of the parameters is then
+``s^2 (J'R^-1 J)^-1``, where J contains the derivatives of f, and ``s^2 = |W (y - f)|^2/(n - p)``
+for n rows and p parameters. Errors of the times and velocities of steps (see ``load_point``) change
+f by the columns of a matrix G. These errors add A A' to the covariance matrix, where ``A = (J'R^-1
+J)^-1 J'R^-1 G``.
 
 References
 ----------
@@ -73,16 +74,17 @@ _DECIDES = 10.0
 
 
 class Search:
-    """The search for some parameters of a model.
+    """Search for the free parameters of a model.
 
     Parameters
     ----------
     model : Joint
     values : mapping of str to float
-        All parameters; those that are free to begin with.
+        Values of all parameters. The values of free parameters are the initial guess.
     free : sequence of str
+        Names of the free parameters.
     noise : str
-        As `noise.fitted` takes it.
+        Noise model (see ``noise.fitted``).
     """
 
     def __init__(self, model: Joint, values: Values, free: Sequence[str], noise: str) -> None:
@@ -93,7 +95,7 @@ class Search:
         self.low, self.high = np.array([self._bounds(name) for name in free]).T
 
     def _bounds(self, name: str) -> tuple[float, float]:
-        """Ends of the coordinate of a parameter, between which it is looked for."""
+        """Return the bounds of the coordinate of a parameter."""
         if name.startswith("slip_distance"):
             moved = self.model.displacement
             extent = float(np.ptp(moved))
@@ -109,32 +111,39 @@ class Search:
         return _BOUNDS.get(name, (-math.inf, math.inf))
 
     def values(self, x: np.ndarray) -> dict[str, float]:
-        """All parameters, by the coordinates of the free ones."""
+        """Return the values of all parameters for given coordinates."""
         found = zip(self.free, x.tolist(), strict=True)
         return self.first | {name: value_of(name, v) for name, v in found}
 
     def coordinates(self, values: Values) -> np.ndarray:
-        """Coordinates of the free parameters."""
+        """Return the coordinates of the free parameters."""
         return np.array([coordinate(name, values[name]) for name in self.free])
 
     def residuals(self, values: Values, *, checked: bool = False) -> np.ndarray:
-        """Friction of the record less that of the model with its trend, shape (rows,)."""
+        """Compute recorded friction minus model friction and trend, shape (rows,)."""
         curve = self.model.curve(values, checked=checked)
         return np.asarray(self.model.friction - curve - self.model.trend(values))
 
     def _jacobian(self, x: np.ndarray, differences: Differences) -> np.ndarray:
-        """Derivatives of the model; 0, which tells nothing, where motions close by fail."""
+        """Compute the derivatives of the model.
+
+        A derivative is replaced by 0 if the motions for the differences fail.
+        """
         found = self.model.jacobian(self.values(x), self.free, differences)
         return np.where(np.isfinite(found).all(axis=0), found, 0.0)
 
     def run(self) -> Fitted:
-        """The fit.
+        """Run the search.
+
+        Returns
+        -------
+        Fitted
 
         Raises
         ------
         Halt
-            Where no motion fits, the search does not end though the record tells all parameters, or
-            the work budget is spent.
+            If no motion fits the record, if the work budget is exhausted, or if the search does not
+            converge although the record constrains all parameters.
         """
         x, noise = self._initial(), noises.white(self.model.time)
         for number in range(
@@ -161,7 +170,10 @@ class Search:
         return found
 
     def _initial(self) -> np.ndarray:
-        """Coordinates to begin with: those of the slip distance with which the least is left."""
+        """Return the initial coordinates.
+
+        Several slip distances are tried, and the one with the smallest residuals is selected.
+        """
         self.model.check(self.first)  # whatever is wrong with it is said
         scales = _GRID if "slip_distance" in self.free else (1.0,)
         distances = [n for n in ("slip_distance", "slip_distance_2") if n in self.free]
@@ -185,9 +197,25 @@ class Search:
     def least_squares(
         self, x: np.ndarray, noise: Noise, part: float = _FOUND
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates that leave the least under a noise, to a part of it, and the derivatives
-        there, shape (rows, parameters): by the trust region of `scipy.optimize.least_squares`,
-        within the bounds.
+        """Minimise the sum of squares for a given noise.
+
+        The function uses the trust-region method of ``scipy.optimize.least_squares`` within the
+        bounds.
+
+        Parameters
+        ----------
+        x : ndarray
+            Initial coordinates.
+        noise : Noise
+        part : float
+            Relative tolerance of the sum of squares.
+
+        Returns
+        -------
+        x : ndarray
+            Coordinates at the minimum.
+        jacobian : ndarray, shape (rows, parameters)
+            Derivatives at the minimum.
         """
         derivatives = {}
 
@@ -211,12 +239,13 @@ class Search:
         return found.x, derivatives["last"]
 
     def _result(self, x: np.ndarray, noise: Noise) -> Fitted:
-        """All that is told of the parameters with the least left.
+        """Compute the final parameters, their errors and the noise.
 
-        Steps of Newton by fine derivatives come first, ``(J'R^-1 J)^-1 J'R^-1 (y - f)``. Numerical
-        errors of parameters are three times that step of what a tenth of all tolerances changes in
-        f, and the last step; degrees of freedom those of the noise, less the share that p
-        parameters take of n rows.
+        First, Gauss-Newton steps ``(J'R^-1 J)^-1 J'R^-1 (y - f)`` with accurate derivatives refine
+        the parameters. The numerical error of a parameter is the sum of two terms. The first term
+        is three times the change of the parameter if the motion is computed with a tenth of all
+        tolerances. The second term is the last Gauss-Newton step. The degrees of freedom are those
+        of the noise, multiplied by (n - p)/n for p parameters and n rows.
         """
         for number in range(_POLISHED[1]):
             jacobian = self._jacobian(x, FINE)
@@ -270,8 +299,10 @@ class Search:
         )
 
     def _criterion_without_steps(self, jacobian: np.ndarray, noise: Noise) -> float:
-        """The criterion of trends alone (a = b = 0), with the noise of the fit: noise of their own
-        would take the response to a step for noise that can be predicted.
+        """Compute the criterion of the trends without a response (a = b = 0).
+
+        The noise model is the noise of the fit. A noise model fitted to these residuals would
+        describe the response to a step as predictable noise.
         """
         linear = [self.model.is_linear(name) for name in self.free]
         columns = np.column_stack([jacobian[:, linear], self.model.friction])
@@ -284,7 +315,11 @@ class Search:
     def _unidentified(
         self, x: np.ndarray, values: Values, covariance: np.ndarray, steps: bool
     ) -> tuple[str, ...]:
-        """Free parameters that the record does not tell; all but trends where it has no steps."""
+        """Return the free parameters that the record does not constrain.
+
+        If the record shows no response to the steps, a parameter can be constrained only if
+        friction is a linear function of it.
+        """
         spread = dict(zip(self.free, np.sqrt(np.diag(covariance)).tolist(), strict=True))
         bound = (x - self.low < 1e-6) | (self.high - x < 1e-6)
         effects = {"slip_distance": "b" if "b" in values else "b1", "slip_distance_2": "b2"}
@@ -304,7 +339,13 @@ class Search:
         return tuple(found)
 
     def bounds(self, name: str) -> tuple[float, float]:
-        """Bounds within which a parameter was looked for; NaN where there are none."""
+        """Return the bounds of a parameter in the search.
+
+        Returns
+        -------
+        low, high : float
+            NaN for a missing bound.
+        """
         place = self.free.index(name)
         ends = self.low[place], self.high[place]
         low, high = (value_of(name, v) if math.isfinite(v) else math.nan for v in ends)
@@ -312,19 +353,36 @@ class Search:
 
 
 def _linear_solution(columns: np.ndarray) -> np.ndarray:
-    """Least squares: factors of all columns but the last one, which they add up to."""
+    """Solve a linear least-squares problem.
+
+    The last column is the right-hand side. The result contains the coefficients of the other
+    columns.
+    """
     return np.asarray(np.linalg.lstsq(columns[:, :-1], columns[:, -1])[0])
 
 
 def _has_converged(moved: np.ndarray, whitened: np.ndarray, part: float = _STILL) -> bool:
-    """True if parameters have moved by little of their standard errors; residuals come last."""
+    """Return True if the last change is small relative to the standard errors.
+
+    Parameters
+    ----------
+    moved : ndarray, shape (parameters,)
+        Last change of the coordinates.
+    whitened : ndarray, shape (rows, parameters + 1)
+        Whitened derivatives, followed by the whitened residuals.
+    part : float
+        Largest change, as a fraction of the standard error.
+    """
     size = np.linalg.norm(whitened[:, -1]) / math.sqrt(len(whitened))
     spread = size * np.sqrt(np.diag(_inverse(whitened[:, :-1])))
     return bool((np.abs(moved) <= part * spread).all())
 
 
 def _inverse(columns: np.ndarray) -> np.ndarray:
-    """``(J'J)^-1``; infinite where a column tells nothing."""
+    """Compute ``(J'J)^-1``.
+
+    All entries are infinite if a column is zero or not finite.
+    """
     sizes = np.linalg.norm(columns, axis=0)
     if not (np.isfinite(sizes).all() and (sizes > 0.0).all()):
         return np.full((columns.shape[1],) * 2, math.inf)

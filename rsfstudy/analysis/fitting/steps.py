@@ -1,8 +1,10 @@
-"""Steps of load point velocity in a record: where straight pieces of displacement meet.
+"""Detection of load point velocity steps in a record.
 
-Rows i to j are parted at the k that leaves the least, ``S(i, k) + S(k, j)``, S being the sum of
-squares that a line leaves, where this is less than S(i, j) by ``12 ln(j - i)`` variances of the
-noise: by far more than chance does (binary segmentation).
+The displacement is approximated by straight segments, and a step is the boundary between two
+segments. The segments are found by binary segmentation. Let S(i, j) be the sum of squared residuals
+of the line through rows i to j. The rows are split at the row k that minimises ``S(i, k) + S(k,
+j)``. A split is accepted if this sum is smaller than S(i, j) by at least ``12 ln(j - i)`` noise
+variances, which is far more than expected by chance.
 
 References
 ----------
@@ -41,7 +43,7 @@ _LOCAL_ROWS, _LOUDER = 31, 2.0
 _NORMAL = 1.4826
 
 
-#: Sum of squares that remains of rows i to j.
+#: Function that returns the sum of squared residuals of rows i to j.
 Squares = Callable[[np.ndarray | int, np.ndarray | int], np.ndarray]
 #: Displacement at time 0, and velocity.
 _Line = tuple[float, float]
@@ -54,14 +56,15 @@ class Step(NamedTuple):
     Attributes
     ----------
     begins, ends : float
-        Times in s; the same, unless the change takes several samples.
+        Times in s at which the change begins and ends. Both are equal if the change is immediate.
     before, after : float
-        Load point velocities in um/s; 0 if the load point is held.
+        Load point velocities in um/s. The velocity is 0 if the load point is held.
     stress_before, stress_after : float
-        Normal stresses in Pa; NaN if normal stress was not recorded.
+        Normal stresses in Pa, or NaN if normal stress was not recorded.
     through : tuple of (float, float)
-        If the velocity overshoots: times in s from the beginning of the step, and velocities in
-        um/s from each of them on. Otherwise velocity changes at a steady rate.
+        Velocities within a step that overshoots. Each item contains a time in s since the beginning
+        of the step, and the velocity in um/s from this time on. If the tuple is empty, the velocity
+        changes at a constant rate.
     """
 
     begins: float
@@ -79,26 +82,30 @@ class Step(NamedTuple):
 
     @property
     def stress_ratio(self) -> float:
-        """Normal stress after the step over that before; 1 if it does not change."""
+        """Ratio of normal stress after the step to normal stress before the step.
+
+        The ratio is 1 if normal stress was not recorded.
+        """
         ratio = self.stress_after / self.stress_before
         return ratio if math.isfinite(ratio) else 1.0
 
 
 def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
-    """The steps of the load point in a record.
+    """Detect the load point velocity steps in a record.
 
-    Displacement is taken for straight pieces with noise. A piece is parted in two where that lowers
-    the sum of squares by more than chance does, and where both velocities differ by a fifth.
+    The displacement is approximated by straight segments. Neighbouring segments are separate if
+    their velocities differ by at least a fifth, and if the split reduces the sum of squares by more
+    than expected by chance.
 
     Parameters
     ----------
     time, displacement : ndarray, shape (rows,)
-        In s and um.
+        Times in s and displacements in um.
 
     Returns
     -------
     tuple of Step
-        In their order; times in s, velocities in um/s.
+        Steps in order of time.
     """
     every = max(1, math.ceil(len(time) / _ROWS))
     count = len(time) // every * every
@@ -138,37 +145,44 @@ def steps_of(time: np.ndarray, displacement: np.ndarray) -> tuple[Step, ...]:
 
 
 class RunningSums:
-    """Running sums of samples, from which the line through any part of them follows at once."""
+    """Cumulative sums for fitting lines to any range of rows in constant time."""
 
     def __init__(self, t: np.ndarray, x: np.ndarray, weights: np.ndarray) -> None:
         columns = weights * np.array([np.ones(len(t)), t, x, t * t, t * x, x * x])
         self.sums = np.concatenate([np.zeros((1, 6)), np.cumsum(columns.T, axis=0)])
 
     def between(self, i: np.ndarray | int, j: np.ndarray | int) -> tuple[np.ndarray, ...]:
-        """Means of t and x over rows i to j, and sums of squares about them."""
+        """Compute the moments of rows i to j.
+
+        Returns
+        -------
+        tuple of ndarray
+            Means of t and x, and sums of squares and products about the means: tt, tx and xx.
+        """
         n, st, sx, stt, stx, sxx = (self.sums[j] - self.sums[i]).T
         mt, mx = st / n, sx / n
         return mt, mx, stt - st * mt, stx - st * mx, sxx - sx * mx
 
     def residual_squares(self, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
-        """Sum of squares that the line through rows i to j leaves."""
+        """Compute the sum of squared residuals of the line through rows i to j."""
         _mt, _mx, tt, tx, xx = self.between(i, j)
         return np.asarray(np.maximum(xx - tx * tx / tt, 0.0))
 
     def squares_about_mean(self, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
-        """Compute the sum of squares about the mean of rows i to j."""
+        """Compute the sum of squared deviations from the mean of rows i to j."""
         return np.asarray(np.maximum(self.between(i, j)[4], 0.0))
 
     def line(self, i: int, j: int) -> _Line:
-        """Displacement at time 0, and velocity, of the line through rows i to j."""
+        """Compute the intercept and slope of the line through rows i to j."""
         mt, mx, tt, tx, _xx = self.between(i, j)
         return float(mx - tx / tt * mt), float(tx / tt)
 
 
 def _departures(t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Compute the departure of each sample from the line through its neighbours.
+    """Compute the deviation of each sample from a line through its neighbours.
 
-    It is scaled to have the standard deviation of the noise, if noise is white.
+    The deviations are scaled such that their standard deviation equals the standard deviation of
+    white noise.
     """
     share = (t[1:-1] - t[:-2]) / (t[2:] - t[:-2])
     off = x[1:-1] - (1.0 - share) * x[:-2] - share * x[2:]
@@ -177,12 +191,12 @@ def _departures(t: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _relative_noise(t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Estimate the local noise of displacement, relative to that of the whole record.
+    """Estimate the local noise of displacement relative to the whole record.
 
     Returns
     -------
     ndarray, shape (rows,)
-        Ones, unless noise differs by more than a factor of two along the record.
+        1 for each row, except where the local noise is more than twice the typical noise.
     """
     off = np.abs(_departures(t, x))
     typical = float(np.median(off))
@@ -194,14 +208,21 @@ def _relative_noise(t: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _overshoots(speeds: Sequence[float]) -> bool:
-    """Return True if velocity does not go from one value to the other in one direction."""
+    """Return True if the velocity both increases and decreases during a step."""
     changes = np.diff(speeds)
     return bool((changes > 0.0).any() and (changes < 0.0).any())
 
 
 def noise_variance(t: np.ndarray, x: np.ndarray) -> float:
-    """Variance of the noise of samples, in their units squared: of each about the line through its
-    neighbours, by the median, which steps do not move.
+    """Estimate the variance of the noise of samples.
+
+    The estimate uses the deviation of each sample from the line through its neighbours. The median
+    of the deviations is robust against steps.
+
+    Returns
+    -------
+    float
+        Variance in the squared units of the samples.
     """
     spread = _NORMAL * float(np.median(np.abs(_departures(t, x))))
     least = 1e-9 * float(np.ptp(x))  # a record may be without noise
@@ -209,20 +230,24 @@ def noise_variance(t: np.ndarray, x: np.ndarray) -> float:
 
 
 def part_rows(squares: Squares, first: int, last: int, variance: float) -> set[int]:
-    """Part rows by binary segmentation, if parts explain them by far better than chance does.
+    """Split rows into segments by binary segmentation.
+
+    A segment is split if the split reduces the sum of squared residuals by far more than expected
+    by chance.
 
     Parameters
     ----------
     squares : callable
-        Sum of squares that remains of rows i to j.
+        Function that returns the sum of squared residuals of rows i to j.
     first, last : int
+        Range of rows.
     variance : float
         Variance of the noise.
 
     Returns
     -------
     set of int
-        Rows at which parts begin, with `first` and `last`.
+        First row of each segment, and ``last``.
     """
     open_parts, found = [(first, last)], {first, last}
     while open_parts:
@@ -241,7 +266,10 @@ def part_rows(squares: Squares, first: int, last: int, variance: float) -> set[i
 def _merged(
     sums: RunningSums, knots: list[int], t: np.ndarray, variance: float, louder: np.ndarray
 ) -> list[int]:
-    """Remove knots between pieces that differ by too little, that of the least difference first."""
+    """Remove boundaries between segments with similar velocities.
+
+    The boundary with the smallest difference is removed first.
+    """
     while len(knots) > 2:
         pieces = [*itertools.pairwise(knots)]
         speeds = np.array([sums.line(i, j)[1] for i, j in pieces])
@@ -260,8 +288,11 @@ def _merged(
 
 
 def _meeting(one: _Line, other: _Line, between: tuple[float, float], variance: float) -> float:
-    """Time at which two lines meet, near the times of the last sample of one and the first of the
-    other: where samples part best is told by noise to (variance gap/change**2)**(1/3).
+    """Compute the time at which two lines intersect.
+
+    The time is limited to the vicinity of the boundary between the samples of both lines. Because
+    of noise, this boundary is uncertain by about (variance gap/change**2)**(1/3), where ``gap`` is
+    the sampling interval and ``change`` is the change of velocity.
     """
     (last, first), change = between, other[1] - one[1]
     middle, gap = 0.5 * (last + first), first - last
@@ -273,7 +304,7 @@ def _meeting(one: _Line, other: _Line, between: tuple[float, float], variance: f
 def _refined(
     time: np.ndarray, displacement: np.ndarray, at: float, reach: int, variance: float
 ) -> float:
-    """The meeting of two lines found anew among all rows near it."""
+    """Recompute the intersection of two lines from all rows near it."""
     middle = int(np.searchsorted(time, at))
     i, j = max(middle - 20 * reach, 0), min(middle + 20 * reach, len(time))
     t, x = time[i:j] - at, displacement[i:j]
@@ -288,10 +319,15 @@ def _refined(
 def _ramps(
     times: list[float], speeds: list[float], rows: list[int], ends: tuple[float, float]
 ) -> Iterator[tuple[int, int]]:
-    """Find the first and the last change of velocity of each step.
+    """Group changes of velocity into steps.
 
-    Short pieces, or pieces of few rows, on the way from one velocity to another belong to one step:
-    a ramp, or a change that overshoots.
+    A step may contain several changes of velocity, separated by segments that are short or contain
+    few rows. Such a step is a ramp from one velocity to another, or it overshoots.
+
+    Yields
+    ------
+    first, last : int
+        Indices of the first and the last change of velocity of a step.
     """
     changes, n = np.sign(np.diff(speeds)), 0
 
@@ -304,7 +340,7 @@ def _ramps(
         last = n
         while last + 1 < len(times) and changes[last + 1] == changes[n] and is_short(n, last + 1):
             last += 1
-        # beyond its set point and back
+        # overshoot and return
         back = last + 1
         while back < len(times) and changes[back] != changes[n] and _is_back(speeds, n, last, back):
             if not is_short(n, back):
@@ -315,7 +351,7 @@ def _ramps(
 
 
 def _is_back(speeds: list[float], first: int, last: int, back: int) -> bool:
-    """Return True if velocity returns part of the way after it overshot."""
+    """Return True if the velocity returns partially after an overshoot."""
     before, peak, after = speeds[first], speeds[last + 1], speeds[back + 1]
     change = abs(after - before)
     returns = min(before, peak) < after < max(before, peak)
@@ -323,6 +359,9 @@ def _is_back(speeds: list[float], first: int, last: int, back: int) -> bool:
 
 
 def _louder_of(pieces: list[tuple[int, int]], louder: np.ndarray) -> np.ndarray:
-    """Compute the larger relative noise of the pieces on either side of each knot."""
+    """Compute the relative noise at each boundary between segments.
+
+    The value is the larger of the mean noise levels of both segments.
+    """
     local = np.array([louder[i:j].mean() for i, j in pieces])
     return np.asarray(np.maximum(local[1:], local[:-1]))

@@ -1,4 +1,4 @@
-"""The part of a record in which friction before a step is a straight line."""
+"""Selection of the part of a record with linear friction before a step."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ _GAINS = 15.0
 #: standard deviations of the residuals. A step of velocity by a factor of ten changes friction by
 #: 0.02 or so.
 _DEPARTS, _STANDS_OUT = 4e-4, 4.0
-#: Share of friction, next to the step, from which noise is taken.
+#: Fraction of the rows, next to the step, from which the noise is estimated.
 _LAST = 0.4
-#: Largest correlation of successive means that is believed.
+#: Upper bound of the estimated correlation of successive means.
 _CORRELATED = 0.98
 
 
 @lru_cache(maxsize=256)
 def find_straight_start(record: Record, begins: float, ends: float) -> float:
-    """Find the time from which friction is a straight line up to a step.
+    """Find the time from which friction is linear in time up to a step.
 
-    A line that breaks at the best place must explain friction far better than one line, counting
-    the correlation of the residuals, and the earlier part must depart from the later line by an
-    amount that matters. The earlier part is then left out, and the rest is tested again.
+    Two conditions are tested. First, two separate lines must describe friction far better than a
+    single line, after allowing for the correlation of the residuals. Second, the earlier part must
+    deviate significantly from the line through the later part. If both conditions hold, the earlier
+    part is discarded, and the remainder is tested again.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def find_straight_start(record: Record, begins: float, ends: float) -> float:
     Returns
     -------
     float
-        Time in s.
+        Time in s. The result is ``begins`` if friction is linear throughout.
     """
     rows = np.flatnonzero((record.time >= begins) & (record.time < ends))
     time, friction = record.time[rows], record.columns["friction"][rows]
@@ -59,20 +60,26 @@ def find_straight_start(record: Record, begins: float, ends: float) -> float:
 
 
 def _find_break(t: np.ndarray, friction: np.ndarray) -> int:
-    """Find the place at which a broken line parts friction; 0 if one line is as good."""
+    """Find the row at which two separate lines describe friction best.
+
+    Returns
+    -------
+    int
+        0 if a single line describes friction equally well.
+    """
     count = len(t)
     sums = RunningSums(t - t[0], friction - friction[0], np.ones(count))
     places = np.arange(_FEWEST, count - _FEWEST + 1)
     both = sums.residual_squares(0, places) + sums.residual_squares(places, count)
     place = int(places[np.argmin(both)])
     time, moved = t - t[0], friction - friction[0]
-    # noise is that of the last part: what is left of a curved part is no noise
+    # the noise is estimated from the last part, because residuals of a curved part are not noise
     last = count - max(int(_LAST * count), _FEWEST)
     (x0, v0), (x1, v1) = sums.line(last, count), sums.line(place, count)
     left = (moved - x0 - v0 * time)[last:]
     size = float(np.sqrt(left @ left / (len(left) - 2)))
     rho = float(left[1:] @ left[:-1] / max(left @ left, 1e-300))
-    rho += 4.0 * (1.0 + rho) / len(left)  # the line takes up a part of the correlation
+    rho += 4.0 * (1.0 + rho) / len(left)  # the fit of the line reduces the correlation
     rho = min(max(rho, 0.0), _CORRELATED)
     gain = float(sums.residual_squares(0, count)) - float(both.min())
     departs = float(np.abs(moved[:place] - x1 - v1 * time[:place]).max())

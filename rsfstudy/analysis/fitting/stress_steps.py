@@ -1,9 +1,11 @@
-"""Steps of normal stress in a record: changes from one level to another.
+"""Detection of normal stress steps in a record.
 
-The mean of a number of rows is compared with that of as many rows before. A step is where both
-differ by 2 % of normal stress, and by far more than they usually do. The drift of the whole record
-and noise, which may be correlated, are part of the usual difference. A ramp from one level to
-another is a step that lasts; a drift that begins before the record or ends after it is no step.
+A step is a change from one constant level of normal stress to another. The mean normal stress of a
+window of rows is compared with the mean of the previous window of the same length. A step is
+detected if both means differ by at least 2 % and by far more than the typical difference. The
+typical difference includes the drift of the whole record and the noise, which may be correlated. A
+ramp between two levels is a step with a duration. A drift that extends beyond the beginning or the
+end of the record is not a step.
 """
 
 from __future__ import annotations
@@ -21,9 +23,10 @@ from rsfstudy.analysis.fitting.steps import Step
 #: Least change of level, relative to the level before, and relative to the robust standard
 #: deviation of differences.
 CHANGES, _STANDS_OUT = 0.02, 6.0
-#: Share of a change by which levels over longer parts may differ: else it is part of a ramp.
+#: Largest difference of levels over longer windows, as a fraction of the change. A larger
+#: difference indicates that the change is a part of a ramp.
 _LEVEL = 0.25
-#: Share of the least change down to which a change is followed.
+#: Fraction of the smallest change down to which a change extends.
 _FOLLOWED = 0.4
 #: Most rows at once (of a longer record, means of several rows), parts of the record that are
 #: compared, and the fewest rows of a part.
@@ -40,9 +43,10 @@ class StressStep(NamedTuple):
     Attributes
     ----------
     begins, ends : float
-        Times in s. Normal stress changes between them at a steady rate.
+        Times in s at which the change begins and ends. Normal stress changes at a constant rate
+        between these times.
     before, after : float
-        Levels of normal stress in Pa.
+        Normal stresses in Pa before and after the change.
     """
 
     begins: float
@@ -52,17 +56,17 @@ class StressStep(NamedTuple):
 
 
 def find_stress_steps(time: np.ndarray, stress: np.ndarray) -> list[StressStep]:
-    """Find the steps of normal stress in a record.
+    """Detect the steps of normal stress in a record.
 
     Parameters
     ----------
     time, stress : ndarray, shape (rows,)
-        In s and Pa.
+        Times in s and normal stresses in Pa.
 
     Returns
     -------
     list of StressStep
-        In the order of time. Changes of less than 2 % are left out.
+        Steps in order of time, without changes of less than 2 %.
     """
     every = max(1, math.ceil(len(time) / _ROWS))
     count = len(time) // every * every
@@ -83,14 +87,23 @@ def find_stress_steps(time: np.ndarray, stress: np.ndarray) -> list[StressStep]:
 
 
 def _levels(stress: np.ndarray, rows: slice, window: int, reach: int) -> tuple[float, float]:
-    """Compute levels before and after a change, over so many rows outside of it."""
+    """Compute the median normal stress before and after a change.
+
+    Each median is taken over ``reach`` rows outside the change.
+    """
     first, last = rows.start + window, rows.stop - window
     before, after = stress[max(first - reach, 0) : first], stress[last : last + reach]
     return float(np.median(before)), float(np.median(after))
 
 
 def _changes(stress: np.ndarray, window: int) -> list[slice]:
-    """Find the rows around changes of the mean, with a window of level rows on either side."""
+    """Find changes of the mean of normal stress.
+
+    Returns
+    -------
+    list of slice
+        Rows of each change, with one window of nearly constant stress on either side.
+    """
     if len(stress) < 4 * window:
         return []
     sums = np.concatenate([[0.0], np.cumsum(stress - stress.mean())])
@@ -107,7 +120,7 @@ def _changes(stress: np.ndarray, window: int) -> list[slice]:
             elif signed[rows].max() > least:
                 joined.append(rows)
         found += joined
-    # at the ends of the record a change has no level on one side
+    # a change at an end of the record has no constant level on one side
     inside = [rows for rows in found if rows.start > 0 and rows.stop < len(change)]
     return [slice(rows.start, rows.stop - 1 + 2 * window) for rows in inside]
 
@@ -115,20 +128,23 @@ def _changes(stress: np.ndarray, window: int) -> list[slice]:
 def with_stress_steps(
     steps: Sequence[Step], changes: Sequence[StressStep], velocity: float
 ) -> tuple[Step, ...]:
-    """Add steps of normal stress to those of load point velocity.
+    """Merge steps of normal stress into the steps of load point velocity.
+
+    If normal stress changes during a step of load point velocity, the result is one step that
+    includes both changes.
 
     Parameters
     ----------
     steps : sequence of Step
-        Steps of load point velocity. A change of normal stress during a step belongs to it.
+        Steps of load point velocity.
     changes : sequence of StressStep
     velocity : float
-        Load point velocity in um/s, if it has no steps.
+        Load point velocity in um/s if there are no velocity steps.
 
     Returns
     -------
     tuple of Step
-        In the order of time.
+        Steps in order of time.
     """
     found = []
     for step in steps:
@@ -147,16 +163,22 @@ def with_stress_steps(
 def with_levels(
     steps: Sequence[Step], changes: Sequence[StressStep], time: np.ndarray, stress: np.ndarray
 ) -> tuple[Step, ...]:
-    """Add the normal stresses of a record to steps that do not state them.
+    """Set the normal stresses of steps from the record.
+
+    Steps with given normal stresses are not changed.
 
     Parameters
     ----------
     steps : sequence of Step
     changes : sequence of StressStep
-        Detected steps of normal stress. Without one during a step, normal stress is the same before
-        and after.
+        Detected steps of normal stress. If there is no such step during a step of velocity, its
+        normal stresses before and after are equal.
     time, stress : ndarray, shape (rows,)
-        In s and Pa.
+        Times in s and normal stresses in Pa.
+
+    Returns
+    -------
+    tuple of Step
     """
     ends = [-math.inf, *(step.ends for step in steps)]
     begins = [*(step.begins for step in steps[1:]), math.inf]
@@ -169,7 +191,7 @@ def with_levels(
             before, after = (during[0].before, during[-1].after) if during else (level, level)
             step = step._replace(stress_before=before, stress_after=after)
         if step.begins == step.ends and step.stress_ratio != 1.0:
-            # a change of normal stress takes a sample at least
+            # a change of normal stress lasts at least one sampling interval
             row = int(np.clip(np.searchsorted(time, step.begins, "right"), 1, len(time) - 1))
             step = step._replace(begins=float(time[row - 1]), ends=float(time[row]))
         found.append(step)
@@ -177,15 +199,15 @@ def with_levels(
 
 
 def _overlap(step: Step, change: StressStep) -> bool:
-    """Return True if a change of normal stress takes place during a step."""
+    """Return True if normal stress changes during a step."""
     near = change.ends - change.begins
     return step.begins - near <= change.ends and change.begins <= step.ends + near
 
 
 def _step(time: np.ndarray, stress: np.ndarray, before: float, after: float) -> StressStep:
-    """Locate the ramp between two levels, by the line through the rows on its way."""
+    """Locate the ramp between two levels by a linear fit."""
     share = (stress - before) / (after - before)
-    middle = int(np.argmax(np.cumsum(0.5 - share)))  # where rows part best by the half
+    middle = int(np.argmax(np.cumsum(0.5 - share)))  # the best boundary at half of the change
     first = int(np.flatnonzero(share[: middle + 1] <= _RAMP[0]).max(initial=0))
     reached = np.flatnonzero(share[middle:] >= _RAMP[1])
     last = middle + int(reached[0]) if len(reached) else len(share) - 1

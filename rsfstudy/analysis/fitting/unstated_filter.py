@@ -1,8 +1,8 @@
-"""Detection of an averaging of friction that was not stated.
+"""Detection of averaged friction if the user did not specify a filter.
 
-A running mean over m rows leaves notches in the spectrum of the noise, and rounds the peak of a
-velocity step. The record is described once more with both, to first order in the parameters: if the
-criterion improves and a parameter moves, friction was averaged.
+A running mean over m rows causes notches in the spectrum of the noise, and smooths the peak of a
+velocity step. The function tests a model with both effects, linearised in the parameters. If the
+criterion improves and a parameter changes noticeably, friction was probably averaged.
 """
 
 from __future__ import annotations
@@ -23,21 +23,23 @@ _MOST, _PASSES = 20_000, 2
 
 
 def find_averaging(found: Fitted, time: np.ndarray, noise: str) -> tuple[str, ...]:
-    """Find the averaging time that describes a record better than no averaging.
+    """Test whether friction was averaged before it was recorded.
 
     Parameters
     ----------
     found : Fitted
-        A fit without a filter.
+        Result of a fit without a filter.
     time : ndarray, shape (rows,)
         Times in s.
     noise : str
-        As `noise.fitted` takes it.
+        Noise model (see ``noise.fitted``).
 
     Returns
     -------
     tuple of str
-        The reason why standard errors are not valid; empty if there is no such time.
+        The reason why the standard errors are not valid, with the averaging time that describes the
+        record best. Empty if no averaging time describes the record better than unaveraged
+        friction.
     """
     windows = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) <= 0.0) + 1)
     interval = float(np.median(np.diff(time[windows[0]])))

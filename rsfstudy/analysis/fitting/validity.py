@@ -1,7 +1,8 @@
-"""Reasons why the standard errors of a fit are not valid.
+"""Checks of the standard errors of a fit.
 
-The parameter values of such a fit stand, and its status is `errors_not_valid`. Each reason is a
-sentence without its full stop: the condition that is violated, and the remedy.
+If the standard errors are not valid, the status of the fit is ``errors_not_valid``, and its
+parameter values can still be used. Each check returns a reason as a string without a final full
+stop. The reason describes the violated condition and a remedy.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from rsfstudy.wording import counted
 
 #: Parameters that are slip distances.
 DISTANCES = ("slip_distance", "slip_distance_2")
-#: p-value below which whitened residuals are called autocorrelated.
+#: Significance level of the test for autocorrelated whitened residuals.
 SIGNIFICANT = 0.01
 #: Standard deviation of friction below which residuals are numerical, not statistical.
 NEGLIGIBLE = 1e-7
@@ -27,14 +28,14 @@ _LARGEST_RATIO = 2.0
 #: Standard deviation of the noise, over the quantum of friction, below which rounding errors depend
 #: on friction; and the largest fraction of rows that may be outliers.
 _LEAST_NOISE, _MOST_OUTLIERS = 0.4, 0.05
-#: Fewest rows within a slip distance for which intervals were found to cover.
+#: Fewest rows within a slip distance for which confidence intervals are reliable.
 _FEWEST_ROWS = 1.5
 #: Largest number of outliers that a message names.
 _NAMED = 10
 
 
 def find_reasons(found: Fitted, friction: np.ndarray) -> tuple[str, ...]:
-    """Find the reasons why the standard errors of a fit are not valid.
+    """Return the reasons why the standard errors of a fit are not valid.
 
     Parameters
     ----------
@@ -58,7 +59,18 @@ def find_reasons(found: Fitted, friction: np.ndarray) -> tuple[str, ...]:
 
 
 def name_outliers(outliers: np.ndarray) -> str:
-    """Return a remark that names outliers by their rows in the window, from 1; empty if none."""
+    """Return a remark that lists the outliers.
+
+    Parameters
+    ----------
+    outliers : ndarray of int
+        Indices of rows in the window. The remark numbers the rows from 1.
+
+    Returns
+    -------
+    str
+        Empty if there are no outliers.
+    """
     if not len(outliers):
         return ""
     names = ", ".join(str(row + 1) for row in outliers[:_NAMED].tolist())
@@ -69,7 +81,7 @@ def name_outliers(outliers: np.ndarray) -> str:
 
 
 def _misfit(found: Fitted, friction: np.ndarray) -> Iterator[str]:
-    """Yield the reasons that the size of the residuals gives."""
+    """Yield a reason if the residuals are too large."""
     size = float(np.sqrt(np.mean(found.noise.kept_rows(found.residuals) ** 2)))
     if not size < np.std(friction):
         yield (
@@ -85,7 +97,7 @@ def _misfit(found: Fitted, friction: np.ndarray) -> Iterator[str]:
 
 
 def _rounding(found: Fitted) -> Iterator[str]:
-    """Yield a reason if friction is rounded to a quantum that the noise does not cover."""
+    """Yield a reason if the rounding of friction exceeds the noise."""
     if is_rounded(found):
         yield (
             f"friction is rounded to {found.quantum:.2g}, more than 2.5 times the noise, so "
@@ -94,13 +106,17 @@ def _rounding(found: Fitted) -> Iterator[str]:
 
 
 def is_rounded(found: Fitted) -> bool:
-    """Return True if friction is rounded to a quantum that the noise does not cover."""
+    """Return True if the rounding of friction is too coarse.
+
+    Rounding errors are random only if the standard deviation of the noise exceeds 0.4 times the
+    quantum of friction.
+    """
     variance = (found.noise_sd * float(found.noise.sizes.min())) ** 2 - found.quantum**2 / 12.0
     return variance < (_LEAST_NOISE * found.quantum) ** 2
 
 
 def _outliers(found: Fitted) -> Iterator[str]:
-    """Yield a reason if many rows are outliers."""
+    """Yield a reason if too many rows are outliers."""
     count, rows = len(found.outliers), len(found.residuals)
     if count > _MOST_OUTLIERS * rows:
         yield f"{count} of {rows} rows are outliers: remove them from the record, or check the law"
@@ -117,7 +133,13 @@ def _autocorrelation(found: Fitted) -> Iterator[str]:
 
 
 def describe_load_point(found: Fitted, loading: str, noise: float) -> str:
-    """Return a remark if noise of the load point matters for the parameters; empty if not."""
+    """Return a remark on the noise of the load point.
+
+    Returns
+    -------
+    str
+        Empty if the noise of the load point has little effect on the parameters.
+    """
     if loading == "steps":
         moved = np.diag(found.covariance) > 2.0 * np.diag(found.by_noise)
         pairs = zip(found.free, moved.tolist(), strict=True)
@@ -138,13 +160,19 @@ def describe_load_point(found: Fitted, loading: str, noise: float) -> str:
 
 
 def find_unidentified(found: Fitted, rows_apart: float) -> tuple[str, ...]:
-    """Find the parameters that the record does not constrain, also for want of rows.
+    """Return the parameters that the record does not constrain.
+
+    A slip distance is also unconstrained if the record has too few rows per slip distance.
 
     Parameters
     ----------
     found : Fitted
     rows_apart : float
         Load point displacement in um between rows after the step.
+
+    Returns
+    -------
+    tuple of str
     """
     sparse = [n for n in DISTANCES if found.values.get(n, math.inf) < _FEWEST_ROWS * rows_apart]
     return tuple(n for n in found.free if n in (*found.unidentified, *sparse))
@@ -159,10 +187,15 @@ def describe_unidentified(
     ----------
     found : Fitted
     names : tuple of str
+        Names of these parameters.
     rows_apart : float
         Load point displacement in um between rows after the step.
     is_least : bool
         True if the direct effect is at its lower bound.
+
+    Returns
+    -------
+    str
     """
     text = f"{', '.join(names)}: the record does not tell"
     if sparse := set(names) - set(found.unidentified):

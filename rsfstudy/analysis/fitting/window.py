@@ -1,6 +1,4 @@
-"""The window of a step in a record: its rows, the loading along them, and what parameters the
-record shows at a glance.
-"""
+"""Window of a record around a step, its loading, and initial parameters."""
 
 from __future__ import annotations
 
@@ -26,32 +24,33 @@ from rsfstudy.status import Status
 _BACK, _ROWS = 0.5, 3
 #: Part of the time before the first step by which loading may come late.
 _LATE = 0.2
-#: Share of a stated extent below which a window is called cut.
+#: Smallest fraction of a requested extent for which no remark is made.
 _CUT = 0.98
 LOADINGS = ("steps", "recorded")
 #: Rows of the running median by which noise of normal stress is reduced, the quantile of departures
 #: that is compared, and the standard deviations of noise by which it may exceed the limit.
 _SMOOTHED, _MOST_OF, _NOISE_ALLOWED = 5, 0.99, 2.0
-#: Logarithm of the ratio of velocities below which a step shows neither a nor b at a glance.
+#: Logarithm of the ratio of velocities below which the initial a and b are not read from the step.
 _LEAST_RATIO = 0.02
 
 
 @dataclass(frozen=True)
 class Window:
-    """Part of a record that is fitted around a step.
+    """Part of a record around a step that is fitted.
 
     Attributes
     ----------
     record : Record
     number : int
-        That of the step, from 1.
+        Number of the step, from 1.
     before, after : float
-        Load point displacement in um before the step and after it. Zero: half the way back to the
-        step before, and up to the next.
+        Load point displacements in um before and after the step. If ``before`` is 0, the window
+        begins halfway between the previous step and this step. If ``after`` is 0, the window ends
+        at the next step.
     part : float
-        Part of what follows the step that is taken.
+        Fraction of the displacement after the step that is included.
     others : collection of int
-        Numbers of the steps of this record that have windows too: no row is in two of them.
+        Numbers of other steps of the record that are fitted too. Their windows do not overlap.
     """
 
     record: Record
@@ -68,7 +67,7 @@ class Window:
         Raises
         ------
         Halt
-            Where the record has fewer steps.
+            If the record has fewer steps.
         """
         found = self.record.found
         if self.number > len(found):
@@ -78,13 +77,16 @@ class Window:
 
     @property
     def rows(self) -> np.ndarray:
-        """The rows of the record."""
+        """Indices of the rows of the record in the window."""
         time = self.record.time
         return np.flatnonzero((time >= self._opens(self.step)) & (time <= self._closes()))
 
     @property
     def normal_stress(self) -> float:
-        """Mean normal stress in Pa before the step; NaN if it was not recorded."""
+        """Mean normal stress in Pa in the window before the step.
+
+        The mean is NaN if normal stress was not recorded.
+        """
         time, stress = self.record.time, self.record.columns.get("normal_stress")
         if stress is None:
             return math.nan
@@ -93,7 +95,7 @@ class Window:
 
     @property
     def about(self) -> dict[str, float]:
-        """Velocities of the step, ends of the window, normal stress and noise of the load point."""
+        """Properties of the window: velocities, ends, normal stress and noise."""
         record, rows = self.record, self.rows
         moved, time = record.columns["displacement"][rows], record.time[rows]
         return {
@@ -106,21 +108,24 @@ class Window:
         }
 
     def scene(self, scene: Scene, machine_stiffness: float) -> Scene:
-        """Return a scene with the stiffness of a machine over the normal stress before the step.
+        """Return a scene with the stiffness of a machine.
+
+        The stiffness of the scene is the stiffness of the machine divided by the normal stress
+        before the step.
 
         Parameters
         ----------
         scene : Scene
         machine_stiffness : float
-            In Pa, for a displacement of the slip distance of the scene. Zero: the stiffness of the
-            scene stays as it is.
+            Stress in Pa for a displacement of one slip distance. If 0, the scene is returned
+            unchanged.
         """
         if not machine_stiffness:
             return scene
         return scene.with_(stiffness=machine_stiffness / self.normal_stress)
 
     def _closes(self) -> float:
-        """Time in s at which it ends."""
+        """Return the time in s at which the window ends."""
         record, step = self.record, self.step
         # a hold is fitted with the sliding that ends it
         later = [s for s in record.found if s.begins > step.ends and (step.after or s.before)]
@@ -131,7 +136,10 @@ class Window:
         at = np.interp(step.begins, record.time, moved)
 
         def reached(distance: float) -> float:
-            """Time at which the load point has moved so far from the step, or the last one."""
+            """Return the time at which the load point reaches a distance from the step.
+
+            If the load point does not reach the distance, return the last time.
+            """
             beyond = (moved > at + distance) & (record.time > step.begins)
             return float(record.time[np.argmax(beyond)] if beyond.any() else last)
 
@@ -147,7 +155,7 @@ class Window:
 
     @property
     def cuts(self) -> list[str]:
-        """Remarks on parts that the window lacks, although they were asked for."""
+        """Remarks on parts of the requested window that are not included."""
         record, step, moved = self.record, self.step, self.record.columns["displacement"]
         nominal, begins, at, ends = np.interp(
             [self._earliest(step), self._opens(step), step.begins, self._closes()],
@@ -171,7 +179,10 @@ class Window:
         return found
 
     def _earliest(self, step: Step) -> float:
-        """Return the time in s at which a window begins if friction is straight before the step."""
+        """Return the earliest time in s at which the window of a step may begin.
+
+        The window begins later if friction before the step is not linear.
+        """
         record = self.record
         earlier = [s.ends for s in record.found if s.ends < step.begins]
         first = max(earlier, default=record.time[0])
@@ -185,24 +196,29 @@ class Window:
     def model(
         self, scene: Scene, free: Collection[str], loading: str, accuracy: Accuracy, meter: Meter
     ) -> Model:
-        """The model of its rows, with displacement from the step.
+        """Create the model of the window. Displacement is relative to the step.
 
         Parameters
         ----------
         scene : Scene
-            The law and what is not looked for.
+            Scene with the friction law and the fixed parameters.
         free : collection of str
+            Names of the free parameters.
         loading : {"steps", "recorded"}
-            The load point as its steps say, or row by row.
+            Loading by steps, or by the recorded rows.
         accuracy : Accuracy
         meter : Meter
-            Charged with its motions.
+            Counter of the work of the motions.
+
+        Returns
+        -------
+        Model
 
         Raises
         ------
         Halt
-            For too few rows, friction that is not positive, a window that begins in a hold, and
-            a normal stress that varies by more than the loading of the model does.
+            If the window has too few rows or begins in a hold, if mean friction before the step is
+            not positive, or if normal stress varies by more than the loading of the model.
         """
         record, step, rows = self.record, self.step, self.rows
         time = record.time[rows]
@@ -235,14 +251,14 @@ class Window:
         return Model(scene, time, moved, friction, pieces, accuracy, meter, moves)
 
     def _moves(self, begins: float, ends: float) -> list[np.ndarray]:
-        """Make the loading with steps that are moved by errors of displacement."""
+        """Return loading histories with steps that are shifted by their errors."""
         steps = steps_between(self.record, begins, ends)
         others = [step for step in steps if not step.changes_velocity]
         moved = moved_steps(self.record, [step for step in steps if step.changes_velocity])
         return [by_steps(begins, sorted([*each, *others])) for each in moved]
 
     def _check_normal_stress(self, rows: np.ndarray, pieces: np.ndarray) -> None:
-        """Raise Halt if the recorded normal stress departs from that of the loading."""
+        """Raise ``Halt`` if recorded normal stress differs from the model loading."""
         record = self.record
         if "normal_stress" not in record.columns:
             return
@@ -267,7 +283,9 @@ class Window:
 
 
 def stiffness_factors(windows: Sequence[Window]) -> tuple[float, ...]:
-    """Compute stiffness over normal stress in windows of one machine, relative to the first.
+    """Compute the ratio of stiffness to normal stress in each window.
+
+    All windows belong to one machine, and the ratios are relative to the first window.
 
     Returns
     -------
@@ -282,20 +300,25 @@ def stiffness_factors(windows: Sequence[Window]) -> tuple[float, ...]:
 def first_guess(
     model: Model, step: Step, free: Sequence[str], distances: tuple[float, float]
 ) -> dict[str, float]:
-    """All parameters to begin with: what a record shows at a glance, else those of the scene.
+    """Estimate the initial parameters directly from a record.
 
-    With friction mu_0 before the step, by a factor r, mu_p at its extreme after it and mu_1 at the
-    end: ``a = (mu_p - mu_0)/ln r`` and ``b = (mu_p - mu_1)/ln r``.
+    Parameters that cannot be estimated keep the values of the scene. Let mu_0 be friction before a
+    step by a factor r, mu_p its extreme after the step, and mu_1 friction at the end. The estimates
+    are ``a = (mu_p - mu_0)/ln r`` and ``b = (mu_p - mu_1)/ln r``.
 
     Parameters
     ----------
     model : Model
     step : Step
     free : sequence of str
-        What is looked for: the others are those of the scene.
+        Names of the free parameters. The other parameters have the values of the scene.
     distances : (float, float)
-        Slip distances in um, of the first state and of the second; the former is the unit of slip
-        of the scene.
+        Slip distances in um of the first and the second state. The first slip distance is the unit
+        of slip in the scene.
+
+    Returns
+    -------
+    dict
     """
     scene, friction = model.scene, model.friction
     before, later = friction[model.time < step.begins], friction[model.time >= step.ends]
