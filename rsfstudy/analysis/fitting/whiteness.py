@@ -15,15 +15,22 @@ LAGS = 20
 
 
 def whiteness(innovations: np.ndarray, order: int) -> float:
-    """Chance that white noise looks as correlated as residuals freed of correlation: of chi^2
-    as large as ``n (n + 2) sum r_k^2/(n - k)``, r_k being their autocorrelation at lag k (Ljung and
-    Box, 1978).
+    """Compute the p-value of the Ljung-Box test for autocorrelation.
+
+    The test statistic is ``n (n + 2) sum r_k^2/(n - k)``, where r_k is the autocorrelation of the
+    whitened residuals at lag k (Ljung and Box, 1978). The statistic is compared with a chi-squared
+    distribution.
 
     Parameters
     ----------
-    innovations : ndarray, shape (samples,)
+    innovations : ndarray, shape (rows,)
+        Whitened residuals.
     order : int
-        Coefficients that were found; by so many there are fewer degrees of freedom.
+        Number of estimated coefficients, which is subtracted from the degrees of freedom.
+
+    Returns
+    -------
+    float
     """
     count, seen = len(innovations), innovations - innovations.mean()
     lags = np.arange(1, min(LAGS + order, count // 4) + 1)
