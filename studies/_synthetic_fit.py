@@ -152,7 +152,7 @@ class SyntheticFit(Measure):
 
     @property
     def outputs(self) -> Sequence[Output]:
-        """Deviations and errors by parameter, and quantities to compare laws."""
+        """Outputs: errors of each parameter, and how well each law fits."""
         by = [
             Output(name, "", "1", text, dims=("parameter",), error=name == self.headline)
             for name, text in _OF_PARAMETER

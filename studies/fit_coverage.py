@@ -138,7 +138,7 @@ def covers(series: str, words: str, **where: str) -> list[Claim]:
 
 
 def is_flagged(process: str, law: str, least: float) -> Claim:
-    """Return the claim that the fit detects noise that it cannot model."""
+    """Declare that the fit detects noise that the noise model cannot describe."""
     return Claim.above(
         id="F6",
         statement=f"{process} record, {law} law: the fit reports that errors are not valid",

@@ -1,9 +1,10 @@
 """Convergence of a motion to its limit cycle.
 
 If a scene has one state, the spring stress at a rise of V through V_0 determines the motion that
-follows. The map from one rise to the next forgets one direction, because a departure along the
-motion only shifts the time. Two successive cycles therefore determine the derivative of the map. If
-the cycles converge slowly, the motion leaps to the fixed point that this derivative implies.
+follows. The map from one rise to the next has one dimension less than the motion, because a
+perturbation along the motion only shifts the time. Two successive cycles therefore determine the
+derivative of the map. If the cycles converge slowly, the motion leaps to the fixed point that this
+derivative implies.
 
 The section of a motion at a rise of V through V_0 is s = (f, Psi), the spring stress and the state.
 The image P(s) holds the section one cycle later, followed by the headline numbers of that cycle.

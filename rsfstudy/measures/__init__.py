@@ -256,7 +256,7 @@ class Measure(CheckedKeywords):
         return outcome
 
     def metered(self, scene: Scene, accuracy: Accuracy) -> tuple[Outcome, Meter]:
-        """Compute the results for one scene, and return the meter of the work."""
+        """Compute the results for one scene, and count the right-hand side evaluations."""
         meter = Meter(accuracy.budget, dict(accuracy.methods), accuracy.engine)
         try:
             outcome = self._checked(self.find(scene, accuracy, meter))

@@ -165,7 +165,7 @@ def since(begin: Event, path: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]
 class Recorded(Measure):
     """Base class of measures that keep a record along ``phase``.
 
-    The field ``phases`` is the number of points of the record.
+    The field ``phases`` sets the number of points of the record.
     """
 
     def __post_init__(self) -> None:

@@ -10,8 +10,8 @@ each with its time, slip and point. A measure can request the following events:
                                 in the last segment of loading, unless normal stress still changes
                                 or steady sliding is unstable.
 
-Each requested event may end the motion. The quantities are the attributes of a ``Point`` and the
-observed friction coefficient, ``reading`` (see ``readings``). Extrema are available for
+Each requested event may end the motion. The available quantities are the attributes of a ``Point``.
+The attribute ``reading`` is the friction coefficient that a rig measures. Extrema are available for
 ``log_slip_rate``, ``spring_stress`` and ``reading``.
 
 In addition to the requested events, the table lists the start of the motion, each change of regime,

@@ -94,9 +94,9 @@ class Part:
         """Return the values that the functions of the part read from ``p``.
 
         The first value is stored at the place of the slot. A law can have any number of values. The
-        number of values of other parts is limited (see ``places``). Fields that a subclass declares
-        with ``number`` are appended in the order of their declaration. Override this method only if
-        the functions read values other than these fields.
+        other kinds of part have room for a few values only (see ``places``). Fields that a subclass
+        declares with ``number`` are appended in the order of their declaration. Override this
+        method only if the functions read values other than these fields.
         """
         return ()
 

@@ -1,7 +1,8 @@
 """Posterior sampling of the parameters of a fit with emcee.
 
-The likelihood is the likelihood of the fit with the estimated noise. Priors are uniform between the
-bounds of the search. For slip distances and stiffness, the priors are uniform in the logarithm.
+The likelihood is the likelihood that the fit maximises, evaluated with the estimated noise. Priors
+are uniform between the bounds of the search. For slip distances and stiffness, the priors are
+uniform in the logarithm.
 
 References
 ----------

@@ -127,7 +127,7 @@ class Search:
     def _jacobian(self, x: np.ndarray, differences: Differences) -> np.ndarray:
         """Compute the derivatives of the model.
 
-        A derivative is replaced by 0 if the motions for the differences fail.
+        A derivative is set to 0 if one of the simulations of its finite difference fails.
         """
         found = self.model.jacobian(self.values(x), self.free, differences)
         return np.where(np.isfinite(found).all(axis=0), found, 0.0)
