@@ -42,10 +42,16 @@ def test_every_cell_is_answered(result):
 
 
 def test_every_verdict_is_the_expected_one(result):
-    table = rsfstudy.check(result[0])
+    dataset = result[0]
+    table = rsfstudy.check(dataset)
     assert len(table) == len(catalogue.load(result[1].stem).claims)
     assert not table.moved.any(), table.to_string()
-    assert not (table.verdict == "not applicable").any()
+    # a claim about a point that `ENOUGH` leaves out does not apply
+    left_out = [
+        any(np.isin(place, dataset[name], invert=True) for name, place in claim.where.items())
+        for claim in catalogue.load(result[1].stem).claims
+    ]
+    assert not ((table.verdict == "not applicable") & ~np.array(left_out, dtype=bool)).any()
 
 
 #: Claims that are given more room than `called_for`, and why.
