@@ -12,6 +12,7 @@ import pytest
 from rsfstudy.named_studies import effects
 
 import rsfstudy
+from rsfstudy import measures
 from rsfstudy.compute import code_digest, provenance
 from rsfstudy.declare import catalogue, names
 from rsfstudy.declare.names import PACKAGE
@@ -325,3 +326,19 @@ def test_the_digest_of_the_physics_is_that_of_its_files():
     moved = {**files, "slider/moved.py": files["slider/friction.py"]}
     digests = [code_digest.of_sources(each) for each in (files, moved)]
     assert digests[0] == provenance.code()["physics"] != digests[1]
+
+
+@pytest.mark.parametrize("name", ["triggering", "hard_cases"])
+def test_cached_properties_of_a_study_do_not_change_its_digest(name):
+    """One process may have used the measures and scenes of a study, and another may not."""
+    study = catalogue.load(name)
+    fresh = code_digest.with_measures("", study.measure.classes)
+    values = [
+        value
+        for kind in study.measure.classes
+        for value in vars(sys.modules[kind.__module__]).values()
+    ]
+    values += [part for value in values if isinstance(value, dict) for part in value.values()]
+    used = [value.variables for value in values if isinstance(value, measures.Measure)]
+    assert used
+    assert code_digest.with_measures("", study.measure.classes) == fresh

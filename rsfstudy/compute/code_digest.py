@@ -12,9 +12,11 @@ search ends at Python, installed packages and the rest of rsfstudy, which have v
 
 from __future__ import annotations
 
+import copy
 import functools
 import hashlib
 import inspect
+import io
 import pickle
 import site
 import sys
@@ -161,18 +163,43 @@ class _Walk:
 
     def _state(self, value: Any, names: Iterable[str]) -> Iterator[str]:
         if _is_followed(type(value).__module__):
-            kept = {
-                name: part
-                for name, part in getattr(value, "__dict__", {}).items()
-                # what a property has once made of the others
-                if not isinstance(getattr(type(value), name, None), functools.cached_property)
-            }
-            yield from self.parts(kept, names)
+            yield from self.parts(_own_state(value), names)
             return
+        content = io.BytesIO()
         try:
-            yield pickle.dumps(value, protocol=4).hex()
+            _Pickler(content, protocol=4).dump(value)
         except Exception:  # a lock or a file decides no number
             yield type(value).__qualname__
+        else:
+            yield content.getvalue().hex()
+
+
+class _Pickler(pickle.Pickler):
+    """Pickler that leaves out the cached properties of all objects.
+
+    Whether a property has been computed differs between processes, and decides no number.
+    """
+
+    def reducer_override(self, value: Any) -> Any:
+        state = _own_state(value)
+        if isinstance(value, type) or len(state) == len(getattr(value, "__dict__", ())):
+            return NotImplemented
+        bare = copy.copy(value)
+        vars(bare).clear()
+        vars(bare).update(state)
+        return bare.__reduce_ex__(4)
+
+
+def _own_state(value: Any) -> dict[str, Any]:
+    """Return the attributes of an object without its cached properties."""
+    return {
+        name: part
+        for name, part in getattr(value, "__dict__", {}).items()
+        if not any(
+            isinstance(vars(kind).get(name), functools.cached_property)
+            for kind in type(value).__mro__
+        )
+    }
 
 
 def _is_documented(code: CodeType) -> bool:
