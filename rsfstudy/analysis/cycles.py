@@ -43,7 +43,7 @@ _LOG_RATE, _SPRING = attrgetter("log_slip_rate"), attrgetter("spring_stress")
 
 #: Swings of ln V below this are steady sliding; those that shrink this often may be on their way to
 #: it.
-_STEADY, _SHRINKING = 1e-3, 30
+SMALLEST_SWING, _SHRINKING = 1e-3, 30
 #: Part of the farthest distance from steady sliding at which a motion has settled to it.
 _AT_REST = 1e-6
 
@@ -152,7 +152,7 @@ def cycles(
         if begin is not None:
             cycle = _cycle(begin, begun, seen)
             swings.append(cycle.swing)
-            if (swings[-1] < _STEADY or _dies_down(swings)) and is_attracted(scene):
+            if (swings[-1] < SMALLEST_SWING or _dies_down(swings)) and is_attracted(scene):
                 yield None
                 return
             yield cycle

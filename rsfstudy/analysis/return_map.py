@@ -33,7 +33,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
-from rsfstudy.analysis.cycles import NUMBERS, Cycle, cycles
+from rsfstudy.analysis.cycles import NUMBERS, SMALLEST_SWING, Cycle, cycles
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.handover import limits, weight_of_mass
 from rsfstudy.motion.meter import Halt, Meter
@@ -222,13 +222,14 @@ class ReturnMap:
         Returns
         -------
         list of Cycle
-            The list is shorter than ``count`` if the motion settles or cannot continue.
+            The list is shorter than ``count`` if the motion settles, stays close to unstable
+            steady sliding, which is a fixed point of the map but not a cycle, or cannot continue.
         """
         seen = list[Cycle]()
         try:
             moving = cycles(self.scene, self.accuracy, self._meter, self.point(start), recording)
             for cycle in moving:
-                if cycle is None:
+                if cycle is None or cycle.swing < SMALLEST_SWING:
                     break
                 seen.append(cycle)
                 if len(seen) == count:
