@@ -105,7 +105,7 @@ def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
                 number - 0.5 * (dataset.sizes["process"] - 1)
             )
             style = {"color": look(number)["color"], "linestyle": "", "fillstyle": fill}
-            text = f"{process}{', naive' * bool(prefix)}"
+            text = f"{str(process).replace('_', ' ')}{', naive' * bool(prefix)}"
             axes.plot(places + beside, share, marker=marker(number), label=text, **style)
     axes.axhline(100.0 * ONE, color="0.4", linestyle="--", linewidth=0.8)
     names = [MODEL[str(name)].symbol or str(name) for name in dataset["parameter"].values]

@@ -195,11 +195,14 @@ LEFT_TO_COMPILED = (
 
 
 def enough(name: str) -> Study:
-    """The study, or enough of it: fewer points, but the study as declared, with all its claims."""
-    study = catalogue.load(name)
+    """Return a study, or a part of it with fewer points and the claims about these points."""
+    study, points = catalogue.load(name), ENOUGH.get(name, {})
     if name in LEFT_TO_COMPILED:
         study = replace(study, accuracy=replace(study.accuracy, engine=COMPILED))
-    return replace(study.with_(**ENOUGH.get(name, {})), overrides=study.overrides)
+    if kinds := points.get("process"):
+        claims = [claim for claim in study.claims if claim.where["process"] in kinds]
+        study = replace(study, claims=claims)
+    return replace(study.with_(**points), overrides=study.overrides)
 
 
 def named_results(name: str, tmp_path_factory) -> tuple[xr.Dataset, Path]:

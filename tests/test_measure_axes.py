@@ -93,7 +93,7 @@ def test_a_point_of_a_zipped_axis_sets_both():
     assert found.total.values.tolist() == [[2.0, 3.0], [4.0, 6.0]]
     assert found["factor"].values.tolist() == [1.0, 2.0]
     assert found["a"].values.tolist() == [0.01, 0.02]
-    assert run(scaled(case).with_(factor=[2.0, 4.0])).total.sel(case="factor = 4.0")[0] == 8.0
+    assert run(scaled(case).with_(factor=[2.0, 4.0])).total.sel(case="factor = 4")[0] == 8.0
 
 
 def test_the_same_on_workers_and_in_pieces(tmp_path, cluster):

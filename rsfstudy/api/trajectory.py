@@ -109,7 +109,7 @@ def simulate(
         time and what it then is a few floating-point numbers later, as are the points of a rupture
         too short for its times to differ. A motion that cannot go on ends early, with its
         ``status`` and ``message`` in the attributes. With radiation damping, ``shear_stress`` is
-        the spring stress less the damping stress at V_*, :math:`\\eta V_*`, so that it equals the
+        the spring stress less the damping stress at V_*, ``eta V_*``, so that it equals the
         frictional stress in steady sliding at V_*. Beyond the instability norm a motion with
         neither mass nor radiation damping is no physics: from when on, say ``instability_time`` and
         the attribute ``beyond_instability_norm``. (Where the load point itself is beyond the norm:

@@ -12,7 +12,7 @@ from rsfstudy.errors import RunError, brief, spelt
 #: Most characters of a text that is printed: what a file says may be without end.
 _LONGEST = 5000
 #: Bounds of the width: the environment may state any.
-_NARROWEST, _WIDEST = 20, 1000
+_NARROWEST, _WIDEST = 16, 1000
 
 
 class Plain(Console):
