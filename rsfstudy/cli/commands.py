@@ -122,7 +122,7 @@ def rerun(given: Given) -> int:
     if given.place:
         place = dict(map(assignments.place, given.place))
         try:
-            with warnings.catch_warnings(record=True) as caught:
+            with warnings.catch_warnings(record=True, action="always") as caught:
                 scene, outcome = runs.cell(given.file, place, study=given.study)
         except RsfStudyError:
             raise
