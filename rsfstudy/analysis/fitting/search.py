@@ -59,9 +59,10 @@ _APART = 1e-6
 #: Slip distances to begin with, over the first guess.
 _GRID = (0.1, 0.3, 1.0, 3.0, 10.0)
 #: Passes in which noise and parameters are found in turn, until those move by this part of their
-#: standard errors; most curves of a pass, and where it ends; and the fewest and most steps of
-#: Newton at the end, of which the last one moves by less than a part of standard errors.
-_PASSES, _STILL, _CURVES, _FOUND, _POLISHED = 4, 0.05, 200, 1e-8, (2, 24)
+#: standard errors; most curves of a pass, and where it ends; and the number of Newton steps at the
+#: end: at least, at most, and at most if each step is shorter than the last one by this factor. The
+#: last step is shorter than a fraction of the standard errors.
+_PASSES, _STILL, _CURVES, _FOUND, _POLISHED, _SHRINKS = 4, 0.05, 200, 1e-8, (2, 8, 24), 0.9
 _TRUST_REGION = {"x_scale": "jac", "xtol": _FOUND, "gtol": 1e-12, "max_nfev": _CURVES}
 _DONE = 1e-3
 #: Fewest degrees of freedom of intervals.
@@ -247,7 +248,8 @@ class Search:
         tolerances. The second term is the last Gauss-Newton step. The degrees of freedom are those
         of the noise, multiplied by (n - p)/n for p parameters and n rows.
         """
-        for number in range(_POLISHED[1]):
+        change = math.inf
+        for number in range(_POLISHED[2]):
             jacobian = self._jacobian(x, FINE)
             left = self.residuals(self.values(x))
             whitened = noise.whitened(np.column_stack([jacobian, left]))
@@ -255,9 +257,13 @@ class Search:
                 raise Halt(Status.INTEGRATION_FAILED, "the best motion cannot be followed")
             beyond = np.clip(x + _linear_solution(whitened), self.low, self.high)
             moved = beyond - x
+            before, change = change, float(np.linalg.norm(whitened[:, :-1] @ moved))
             if np.isfinite(self.residuals(self.values(beyond), checked=True)).all():
                 x = beyond
             if number + 1 >= _POLISHED[0] and _has_converged(moved, whitened, _DONE):
+                break
+            # rounding errors no longer shrink, but steps with large residuals do
+            if number + 1 >= _POLISHED[1] and not change < _SHRINKS * before:
                 break
         values = self.values(x)
         curve = self.model.curve(values)
