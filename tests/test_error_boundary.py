@@ -143,6 +143,11 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         (lambda r: study_of("s", LinearStability(), Axis("a", [0.1])).scene(-1), "number = -1: is"),
         (lambda r: rsfstudy.read_record({"time": np.datetime64("2020")}), "time = .*one dim"),
         (lambda r: rsfstudy.Accuracy().at(np.timedelta64(1)), "rtol = .*must be a number"),
+        (lambda r: Scene(a=np.timedelta64(1, "s")), "a = .*must be a number"),
+        (
+            lambda r: rsfstudy.run("rate_step_boundary", alpha=[{}], output=None, workers=0),
+            "alpha = {}: must be a number, a string",
+        ),
     ],
 )
 def test_the_argument_is_named(call, message, record):

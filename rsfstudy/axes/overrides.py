@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from functools import partial
 from typing import Any
 
@@ -57,6 +57,10 @@ def with_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
             raise InvalidValue(name, values, rule, remedy="Give one value.")
         return axis.with_rows([{**row, name: values[0]} for row in axis.rows], axis.units)
     assert axis.labels is not None
+    for value in values:
+        if not isinstance(value, Hashable):
+            rule = "must be a number, a string, True, False or a part"
+            raise InvalidValue(name, value, rule, remedy=f"Write {name}=[first, second].")
     existing = {point_key(row): label for label, row in zip(axis.labels, axis.rows, strict=True)}
     others = {point_key({**row, name: None}) for row in axis.rows if name in row}
     points: dict[str, Row] = {}

@@ -252,6 +252,8 @@ def checked(part: type[Part], name: str, value: Any) -> Any:
         plain = float(value)
     except OverflowError:
         plain = math.inf
+    except TypeError as error:  # NumPy counts intervals of time among its integers
+        raise InvalidValue(name, value, "must be a number") from error
     if not math.isfinite(plain):
         raise InvalidValue(name, plain, "must be finite")
     if not RULES[rule](plain):
