@@ -101,8 +101,8 @@ def called_for(claim, study, dataset) -> float:
 
 
 def test_claims_could_fail(result):
-    """Who gives a claim more room than is called for says why, beside the others."""
-    study = catalogue.load(result[1].stem)
+    """A claim with a tolerance larger than necessary must give the reason in `WIDE`."""
+    study = enough(result[1].stem)
     for claim in study.claims:
         named = f"{study.name} {claim.id}"
         most = called_for(claim, study, result[0])
