@@ -37,7 +37,7 @@ COVARIANCE = np.array(
 
 SAMPLES = 256
 #: d ln(interval in s)/d ln p at the estimates, all others held: by the measure `Elasticities`.
-ELASTICITIES = {"a": -6.76, "b": 7.91, "slip_distance": -0.109}
+ELASTICITIES = {"a": -7.54, "b": 8.69, "slip_distance": -0.113}
 #: To first order, the spread of ln(interval) by the covariance, and by the variances alone.
 SLOPES = np.array([ELASTICITIES[name] / value for name, value in ESTIMATES.items()])
 FIRST_ORDER = math.sqrt(SLOPES @ COVARIANCE @ SLOPES)

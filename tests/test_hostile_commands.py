@@ -131,7 +131,7 @@ def test_a_full_disk_is_named_whatever_prints(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("columns", "width"), [("0", 20), ("1", 20), ("120", 120), ("9" * 11, 1000)]
+    ("columns", "width"), [("0", 16), ("1", 16), ("120", 120), ("9" * 11, 1000)]
 )
 def test_any_width_of_the_environment_is_bounded(columns, width):
     printed = Plain(file=io.StringIO(), _environ={"COLUMNS": columns})
