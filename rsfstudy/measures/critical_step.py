@@ -40,7 +40,7 @@ KINDS: Mapping[str, type[Steps]] = {
     "normal_stress_step": NormalStressSteps,
 }
 DIRECTIONS = ("up", "down")
-#: Other names of what is stepped; fields of scenes have the names of `KINDS`.
+#: Aliases of the quantities in `KINDS`, which are names of scene fields.
 SYNONYMS: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
 #: Accuracy of a boundary that is a limit cycle, whatever is asked for.

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import chi2
 
-#: Lags at which residuals freed of correlation are tested for what is left of it.
+#: Number of lags in the test of whitened residuals.
 LAGS = 20
 
 
