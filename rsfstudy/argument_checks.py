@@ -10,6 +10,7 @@ import inspect
 import itertools
 import math
 import os
+import re
 import sys
 import types
 import typing
@@ -27,6 +28,8 @@ MOST_ITEMS = 2**20
 _ITEMS, _LEVELS = 1000, 4
 #: Modules that annotations name by an alias.
 _ALIASES = {"xr": "xarray", "pd": "pandas", "np": "numpy"}
+#: Messages of xarray about a dimension that an array does not have.
+_LACKING = re.compile(r"'(.+?)' (?:not found in array dimensions|is not a valid dimension)")
 #: Names of plain types in messages.
 _WORDS: Mapping[Any, str] = {
     str: "a text",
@@ -119,6 +122,9 @@ def find_unusable(
                 return InvalidValue(name, value, "is too large a number", remedy=remedy)
             if isinstance(part, str) and not _is_encodable(part):
                 return InvalidValue(name, value, "must be a text that UTF-8 can hold")
+        if (dimension := _lacking_dimension(value, error)) is not None:
+            rule, dims = f"has no dimension {brief(dimension)!r}", map(str, value.dims)
+            return InvalidValue(name, value, rule, choices=dims, remedy=remedy)
         if isinstance(error, OSError) and _is_part(value, error.filename):
             rule = f"cannot be the name of a file: {error.strerror}"
             return InvalidValue(name, value, rule, remedy=remedy)
@@ -131,6 +137,12 @@ def find_unusable(
             rule = f"fails when it is called ({type(error).__name__}: {brief(error)})"
             return InvalidValue(name, value, rule, remedy=remedy)
     return None
+
+
+def _lacking_dimension(value: Any, error: Exception) -> str | None:
+    """Return the dimension that an exception of xarray reports as missing in an array."""
+    found = _LACKING.search(str(error)) if hasattr(type(value), "to_dataset") else None
+    return found[1] if found and found[1] not in value.dims else None
 
 
 def _is_part(value: object, path: object) -> bool:
@@ -253,8 +265,9 @@ def _is_container(value: object, origin: Any, arguments: tuple[Any, ...], levels
 def _is_listed(value: object, origin: type) -> bool:
     if isinstance(value, str | bytes):
         return False
-    if hasattr(value, "ndim"):  # an array, or a series of pandas
-        return bool(value.ndim)
+    dimensions = getattr(value, "ndim", None)
+    if isinstance(dimensions, Integral):  # an array or a series; the module numpy has a function
+        return dimensions > 0
     if issubclass(origin, Sequence | tuple):
         return isinstance(value, Sequence)
     return isinstance(value, Collection if issubclass(origin, Collection) else Iterable)

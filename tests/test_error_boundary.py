@@ -22,10 +22,12 @@ from rsfstudy.errors import CallError, DataError, Incomplete, InvalidValue, RsfS
 from rsfstudy.measures import Measure
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.quantity import table
-from rsfstudy.reduce import LinearFit, OverClosedForm, Range
+from rsfstudy.reduce import LinearFit, OverClosedForm, PowerLaw, Range
 
 RIG = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
 ENDLESS = range(10**12)
+#: An array with another dimension than the reductions below expect.
+ARRAY = xr.DataArray([1.0, 2.0], dims="x")
 
 
 @pytest.fixture(scope="module")
@@ -144,6 +146,11 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         (lambda r: rsfstudy.read_record({"time": np.datetime64("2020")}), "time = .*one dim"),
         (lambda r: rsfstudy.Accuracy().at(np.timedelta64(1)), "rtol = .*must be a number"),
         (lambda r: Scene(a=np.timedelta64(1, "s")), "a = .*must be a number"),
+        (lambda r: Axis("a", [0.1]).with_rows(np, {}), "rows = <module 'numpy'.*must be a list"),
+        (lambda r: Figure(panels=np.ndarray), "panels = <class.*must be a list"),
+        (lambda r: reduce.Mean("z", of="x").values(ARRAY), "of = .*has no dimension 'sample'. Ch"),
+        (lambda r: PowerLaw("z", of="x", on="y").centred(ARRAY, "y"), "has no dimension 'y'"),
+        (lambda r: reduce.Difference("z", of="x", along="y").draws_on(ARRAY), "no dimension 'y'"),
         (
             lambda r: rsfstudy.run("rate_step_boundary", alpha=[{}], output=None, workers=0),
             "alpha = {}: must be a number, a string",

@@ -58,7 +58,7 @@ class Reduction(CheckedKeywords):
     """
 
     #: Name of the kind in declarations; by default that of the class.
-    kind: ClassVar[str]
+    kind: ClassVar[str] = "Reduction"
     #: Long names of its results that are pure numbers, by what follows `name` in theirs; "{name}"
     #: in them is `name` in words.
     long_names: ClassVar[Mapping[str, str]] = {}
