@@ -266,7 +266,7 @@ def _is_listed(value: object, origin: type) -> bool:
     if isinstance(value, str | bytes):
         return False
     dimensions = getattr(value, "ndim", None)
-    if isinstance(dimensions, Integral):  # an array or a series; the module numpy has a function
+    if isinstance(dimensions, int):  # an array or a series; the module numpy has a function
         return dimensions > 0
     if issubclass(origin, Sequence | tuple):
         return isinstance(value, Sequence)
