@@ -174,6 +174,13 @@ def _has_failed(function: Callable[..., Any], error: Exception) -> bool:
     return isinstance(error, TypeError)
 
 
+def python_number(value: Any) -> Any:
+    """Return a NumPy number or Boolean as a Python object, and any other value unchanged."""
+    kind = type(value)
+    is_scalar = kind.__module__ == "numpy" and hasattr(kind, "item") and kind.__name__ != "ndarray"
+    return value.item() if is_scalar and value.dtype.kind in "biuf" else value
+
+
 def is_match(value: object, annotation: Any, levels: int = _LEVELS) -> bool:
     """Return True if a value has the annotated type or behaves like this type.
 
@@ -243,7 +250,8 @@ def _is_container(value: object, origin: Any, arguments: tuple[Any, ...], levels
     if origin in (Callable, typing.get_origin(Callable[..., Any])):
         return callable(value)
     if issubclass(origin, Mapping):
-        if not isinstance(value, Mapping):
+        # a dataset is a mapping, but not one that a caller means
+        if not isinstance(value, Mapping) or hasattr(type(value), "data_vars"):
             return False
         pairs = itertools.islice(value.items(), _ITEMS)
         return not arguments or all(

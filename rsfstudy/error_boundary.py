@@ -21,6 +21,7 @@ from rsfstudy.argument_checks import (
     find_mismatch,
     find_text_for_list,
     find_unusable,
+    python_number,
 )
 from rsfstudy.errors import CallError, DataError, InvalidValue, RsfStudyError, brief
 
@@ -135,8 +136,9 @@ def _enclose(
 ) -> Callable[P, T]:
     """Wrap a function in the error boundary.
 
-    If ``is_strict`` is True, the arguments are also checked against their annotations. The check
-    follows the call, because the errors that the function itself raises are more specific.
+    If ``is_strict`` is True, NumPy numbers are converted to Python numbers, which files can hold,
+    and the arguments are also checked against their annotations. The check follows the call,
+    because the errors that the function itself raises are more specific.
     """
     signature = inspect.signature(inspect.unwrap(function))
     name = function.__qualname__.removesuffix(".__init__").removesuffix(".__new__")
@@ -155,6 +157,9 @@ def _enclose(
 
     @functools.wraps(function)
     def answer(*args: P.args, **options: P.kwargs) -> T:
+        if is_strict:
+            args = tuple(map(python_number, args))  # type: ignore[assignment]
+            options = {key: python_number(value) for key, value in options.items()}  # type: ignore[assignment]
         if not is_inner and _is_internal():
             try:
                 return function(*args, **options)

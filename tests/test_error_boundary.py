@@ -8,6 +8,7 @@ import importlib
 import inspect
 import pickle
 import pkgutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,11 +22,15 @@ from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import CallError, DataError, Incomplete, InvalidValue, RsfStudyError
 from rsfstudy.measures import Measure
 from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.quantity import table
 from rsfstudy.reduce import LinearFit, OverClosedForm, PowerLaw, Range
 
+ROOT = Path(__file__).resolve().parents[1]
+
 RIG = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
 ENDLESS = range(10**12)
+STEP = ROOT / "studies/pages/step.csv"
 #: An array with another dimension than the reductions below expect.
 ARRAY = xr.DataArray([1.0, 2.0], dims="x")
 
@@ -148,6 +153,13 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         (lambda r: Scene(a=np.timedelta64(1, "s")), "a = .*must be a number"),
         (lambda r: Axis("a", [0.1]).with_rows(np, {}), "rows = <module 'numpy'.*must be a list"),
         (lambda r: Figure(panels=np.ndarray), "panels = <class.*must be a list"),
+        (lambda r: rsfstudy.read_table(STEP, {"time": 5}), "column = 5: must be a heading, or"),
+        (
+            lambda r: rsfstudy.read_table(STEP, {"time": []}),
+            r"column = \[\]: must be a heading, or",
+        ),
+        (lambda r: rsfstudy.read_table(STEP, {"time": ("a", "s", "x")}), "must be a heading, or"),
+        (lambda r: rsfstudy.read_table(STEP, xr.Dataset({"time": 1.0})), "column = <xarray.Data"),
         (lambda r: reduce.Mean("z", of="x").values(ARRAY), "of = .*has no dimension 'sample'. Ch"),
         (lambda r: PowerLaw("z", of="x", on="y").centred(ARRAY, "y"), "has no dimension 'y'"),
         (lambda r: reduce.Difference("z", of="x", along="y").draws_on(ARRAY), "no dimension 'y'"),
@@ -216,6 +228,15 @@ def test_numbers_and_lists_of_numpy_match():
         ([1.0], tuple[float, float]), ({1: 2}, Mapping[str, int]), (None, str | int), (int, int),
     ]:  # fmt: skip
         assert not is_match(value, annotation), annotation
+    assert not is_match(xr.Dataset({"a": 1.0}), Mapping[str, object])
+
+
+def test_constructors_convert_numpy_numbers():
+    measure = VelocityStep(phases=np.int8(3), record=np.float32(2.5))
+    assert measure.plain_fields == {"step_number": 1, "record": 2.5, "phases": 3}
+    assert {type(value) for value in measure.plain_fields.values()} == {int, float}
+    assert type(LinearFit("z", of="x", on="y", within=(0.0, 1.0)).within) is tuple
+    assert type(Panel(points=np.True_).points) is bool
 
 
 def test_types_are_described_in_words():

@@ -7,7 +7,7 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -64,6 +64,25 @@ def check_headings(headings: Iterable[str], place: str) -> None:
             raise error.at(f"{place}, column {column}") from error
 
 
+def _listed(told: Any) -> Selected:
+    """Return the choice of a column that is a list of its heading, units, scale and offset."""
+    rule = "must be a heading, or a list of a heading, its units, a scale and an offset"
+    remedy = "Write ('Time (s)', 's', 0.001), for example."
+    wrong = InvalidValue("column", told, rule, remedy=remedy)
+    told = told.tolist() if isinstance(told, np.ndarray) else told
+    if not isinstance(told, Sequence) or not 1 <= len(told) <= len(Selected._fields):
+        raise wrong
+    heading, units, *numbers = (*told, "")[: max(2, len(told))]
+    # columns of an xlook file have numbers
+    if not isinstance(heading, str | int) or not isinstance(units, str):
+        raise wrong
+    check_heading(str(heading))
+    try:
+        return Selected(str(heading), units, *map(float, numbers))
+    except (TypeError, ValueError, OverflowError) as error:
+        raise wrong from error
+
+
 def selected(told: Any, headings: Collection[str]) -> Selected:
     """Parse the choice of a column.
 
@@ -74,11 +93,14 @@ def selected(told: Any, headings: Collection[str]) -> Selected:
         units in brackets, whether or not the heading in the file contains them.
     headings : collection of str
         The headings of the file.
+
+    Raises
+    ------
+    InvalidValue
+        If the choice is neither, or if the heading is too long.
     """
     if not isinstance(told, str):
-        heading, units, *numbers = (*told, "")[: max(2, len(told))]
-        check_heading(str(heading))
-        return Selected(str(heading), str(units), *map(float, numbers))
+        return _listed(told)
     check_heading(told)
     raw = None if told in headings else _RAW.fullmatch(told)
     scale, offset = 1.0, 0.0
