@@ -26,8 +26,9 @@ from rsfstudy.plots import _style, _text
 from rsfstudy.quantity import Quantity
 
 MM = 25.4
-#: Inches by which neighbours may seem to touch: extents are those of the highest letters.
-SLACK = 0.01
+#: Inches by which neighbours may seem to overlap. Extents are those of the highest letters, rounded
+#: up to pixels of 0.01 inches, and those of formulas depend on the version of matplotlib.
+SLACK = 0.015
 
 
 @pytest.fixture(scope="module", params=names.names())

@@ -339,8 +339,8 @@ def commands() -> str:
 
 
 def _command(name: str, command: click.Command) -> str:
-    taken = " ".join(p.make_metavar(click.Context(command)) for p in command.params
-                     if isinstance(p, click.Argument))  # fmt: skip
+    # without "[OPTIONS]", which the table lists
+    taken = " ".join(command.collect_usage_pieces(click.Context(command))[1:])
     rows = (
         (", ".join(f"`{text}`" for text in (*option.opts, *option.secondary_opts)), _given(option),
          plain(option.help or ""))
