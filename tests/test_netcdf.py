@@ -194,6 +194,14 @@ def test_every_public_function_that_returns_a_dataset_is_tried():
     assert len(returning) > 12
 
 
+def test_no_encoding_of_a_store_prevents_netcdf(tmp_path):
+    """Older versions of xarray cannot write the string dtype of Zarr stores."""
+    pytest.importorskip("zarr")
+    stored = run(STABILITY, output=tmp_path, format="zarr")
+    dtypes = [variable.encoding.get("dtype") for variable in stored.variables.values()]
+    assert "T" not in [dtype.kind for dtype in dtypes if dtype is not None]
+
+
 def test_xarray_opens_a_store_without_warnings(tmp_path):
     """The metadata are consolidated, as xarray expects."""
     pytest.importorskip("zarr")

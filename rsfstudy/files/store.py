@@ -109,10 +109,13 @@ def open_store(path: Path) -> xr.Dataset:
     """Open a Zarr store lazily.
 
     Zarr stores attributes as JSON, which does not distinguish numeric types. The function therefore
-    converts flag values to the dtype of their variable.
+    converts flag values to the dtype of their variable. It also removes the dtype of strings from
+    the encoding, because older versions of xarray cannot write that dtype to a NetCDF file.
     """
     dataset = xr.open_dataset(path, **ZARR)
     for variable in dataset.variables.values():
+        if getattr(variable.encoding.get("dtype"), "kind", "") == "T":
+            del variable.encoding["dtype"]
         if "flag_values" in variable.attrs:
             flags = np.asarray(variable.attrs["flag_values"], dtype=variable.dtype)
             variable.attrs["flag_values"] = flags
