@@ -23,7 +23,7 @@ from rsfstudy.analysis.fitting.model import (
 from rsfstudy.analysis.fitting.noise import WHITE, check_noise, whiteness
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
-from rsfstudy.analysis.fitting.unstated_filter import find_averaging
+from rsfstudy.analysis.fitting.unstated_filter import find_filter
 from rsfstudy.analysis.fitting.validity import (
     NEGLIGIBLE,
     describe_load_point,
@@ -362,7 +362,7 @@ class Fit(Measure):
         is_exact = found.noise_sd < NEGLIGIBLE
         if self.filter or is_recorded or is_exact or self.noise == WHITE or is_rounded(found):
             return reasons
-        return (*find_averaging(found, search.model.time, self.noise), *reasons)
+        return (*find_filter(found, search.model.time, self.noise), *reasons)
 
     def _widened(self, outcome: Outcome) -> Outcome:
         """Insert NaN into the matrices for parameters that the law does not have."""
