@@ -50,7 +50,9 @@ def find_filter(found: Fitted, time: np.ndarray, noise: str) -> tuple[str, ...]:
     """
     windows = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) <= 0.0) + 1)
     least = found.quantum / math.sqrt(12.0)
-    columns = np.column_stack([found.jacobian, found.curve])
+    # a filter delays friction, as an error of the time of a step does
+    columns = np.column_stack([found.jacobian, found.by_loading, found.curve])
+    free = len(found.spread)
 
     def describe(kind: str, size: float) -> tuple[float, float]:
         """Return the criterion and the largest change of a parameter, in standard errors."""
@@ -67,7 +69,7 @@ def find_filter(found: Fitted, time: np.ndarray, noise: str) -> tuple[str, ...]:
             moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
         innovations = whitened[:, -1] - whitened[:, :-1] @ moved
         criterion = compute_criterion(innovations, there, len(moved), len(time))
-        return criterion, float(np.max(np.abs(moved) / found.spread))
+        return criterion, float(np.max(np.abs(moved[:free]) / found.spread))
 
     if len(time) > _MOST or not np.isfinite(columns).all():
         return ()
