@@ -39,7 +39,7 @@ class Status(IntEnum):
         "the motion repeats itself after none of up to 16 events, or 4 periods of forcing",
     )
 
-    NOT_IDENTIFIED = 18, "the record does not tell a parameter, whose number means nothing"
+    NOT_IDENTIFIED = 18, "the record does not constrain a parameter, whose value is not meaningful"
     ERRORS_NOT_VALID = 19, "the values stand, but their standard errors are not valid"
 
     # failures, from here on

@@ -146,11 +146,12 @@ def record(
     seed: int = 0,
     count: int = 400,
     size: float = 3e-4,
+    truth: Mapping[str, float] = TRUTH,
 ) -> Record:
-    """A record with noise correlated by .5, and a trend from its first step."""
+    """Return a record with a noise correlation of 0.5, and a trend from its first step."""
     times = rows(loading, end(loading), count)
     moved = load_point(loading, times)
-    friction = motion(law, times, loading)[0] + trend * (moved - 40.0)
+    friction = motion(law, times, loading, truth)[0] + trend * (moved - 40.0)
     friction += correlated(count, 0.5, size, seed)
     arrays = {"time": times, "displacement": moved, "friction": friction}
     steps = [(t, t, one, other) for (_, one), (t, other) in itertools.pairwise(loading)]

@@ -154,3 +154,16 @@ def test_coarse_sampling_is_fitted_as_far_as_intervals_cover(rows: float, status
         assert abs(synthetic.off(found, name, TRUTH[name])) < 3.5, name
     if status is Status.NOT_IDENTIFIED:
         assert "1.5 are needed: sample faster" in found.message.item()
+
+
+def test_a_stiffness_that_is_bounded_from_below_only_is_reported() -> None:
+    """A machine so stiff that friction reaches its peak between two rows."""
+    found = rsfstudy.fit(
+        synthetic.record(truth=TRUTH | {"stiffness": 0.5}, seed=6, size=1e-4),
+        laws=["slowness"],
+        stiffness=0.3,
+        free=["a", "b", "slip_distance", "mu_star", "trend1", "stiffness"],
+    ).squeeze()
+    assert found.status.item() == Status.ERRORS_NOT_VALID
+    assert "interval of stiffness is asymmetric" in found.message.item()
+    assert found.stiffness_low < 0.5 < found.stiffness_high

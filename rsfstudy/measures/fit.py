@@ -23,9 +23,10 @@ from rsfstudy.analysis.fitting.model import (
 from rsfstudy.analysis.fitting.noise import WHITE, check_noise, whiteness
 from rsfstudy.analysis.fitting.record import COLUMNS, Record
 from rsfstudy.analysis.fitting.search import Fitted, Search
-from rsfstudy.analysis.fitting.unstated_filter import find_averaging
+from rsfstudy.analysis.fitting.unstated_filter import find_filter
 from rsfstudy.analysis.fitting.validity import (
     NEGLIGIBLE,
+    describe_asymmetry,
     describe_load_point,
     describe_unidentified,
     find_reasons,
@@ -295,10 +296,12 @@ class Fit(Measure):
         if len(windows) > 1:
             stresses = enumerate(windows, start=1)
             values |= {f"normal_stress_before_{n}": w.normal_stress for n, w in stresses}
-        for name in self.parameters:
-            told = name not in unidentified
-            ends = interval(search, found, name) if told else search.bounds(name)
-            values[f"{name}_low"], values[f"{name}_high"] = ends
+        ends = {
+            name: search.bounds(name) if name in unidentified else interval(search, found, name)
+            for name in self.parameters
+        }
+        for name, (low, high) in ends.items():
+            values[f"{name}_low"], values[f"{name}_high"] = low, high
         if self.posterior:
             values |= posterior.draw(search, found, self.posterior)
         if unidentified:
@@ -309,7 +312,7 @@ class Fit(Measure):
             name_outliers(found.outliers),
             describe_load_point(found, self.loading, place["load_point_noise"]),
         )
-        reasons = self.find_reasons(search, found)
+        reasons = (*self.find_reasons(search, found), *describe_asymmetry(found, ends))
         status = Status.ERRORS_NOT_VALID if reasons else Status.OK
         cuts = [cut for window in windows for cut in window.cuts]
         return Outcome(status, values, "; ".join(filter(None, (*reasons, *cuts, *remarks))))
@@ -362,7 +365,7 @@ class Fit(Measure):
         is_exact = found.noise_sd < NEGLIGIBLE
         if self.filter or is_recorded or is_exact or self.noise == WHITE or is_rounded(found):
             return reasons
-        return (*find_averaging(found, search.model.time, self.noise), *reasons)
+        return (*find_filter(found, search.model.time, self.noise), *reasons)
 
     def _widened(self, outcome: Outcome) -> Outcome:
         """Insert NaN into the matrices for parameters that the law does not have."""

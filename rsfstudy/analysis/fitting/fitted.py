@@ -43,6 +43,8 @@ class Fitted:
         Whitened residuals divided by their standard deviation.
     jacobian : ndarray
         Derivatives of the curve and its trend with respect to the coordinates.
+    by_loading : ndarray, shape (rows, errors)
+        Changes of friction by one standard error of the times and velocities of the steps.
     criterion : float
         Akaike's information criterion of the fit, including the noise model. Smaller values are
         better.
@@ -66,6 +68,7 @@ class Fitted:
     residuals: np.ndarray
     innovations: np.ndarray
     jacobian: np.ndarray
+    by_loading: np.ndarray
     criterion: float
     unidentified: tuple[str, ...]
     white_size: float

@@ -274,7 +274,8 @@ class Search:
         size = math.sqrt(float(innovations @ innovations) / free_of)
         inverse = _inverse(whitened[:, :-1])
         by_noise = covariance = size**2 * inverse
-        if (moved_by := self.model.by_loading(values)).size and np.isfinite(inverse).all():
+        moved_by = self.model.by_loading(values)
+        if moved_by.size and np.isfinite(inverse).all():
             shifts = inverse @ whitened[:, :-1].T @ noise.whitened(moved_by)
             covariance = by_noise + shifts @ shifts.T
         degrees = max(noise.degrees * free_of / count, _FEWEST)
@@ -298,6 +299,7 @@ class Search:
             residuals=left,
             innovations=innovations / size,
             jacobian=jacobian,
+            by_loading=moved_by,
             criterion=criterion,
             unidentified=self._unidentified(x, values, covariance, steps),
             white_size=float(np.sqrt(np.mean(np.square(noise.kept_rows(self.white_residuals))))),

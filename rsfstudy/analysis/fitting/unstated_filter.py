@@ -1,29 +1,37 @@
-"""Detection of averaged friction if the user did not specify a filter.
+"""Detection of filtered friction if the user did not specify a filter.
 
-A running mean over m rows causes notches in the spectrum of the noise, and smooths the peak of a
-velocity step. The function tests a model with both effects, linearised in the parameters. If the
-criterion improves and a parameter changes noticeably, friction was probably averaged.
+A filter smooths the peak of a velocity step and correlates the noise. A running mean over m rows
+also causes notches in the spectrum of the noise. The function tests models with these effects,
+linearised in the parameters. If the criterion improves and a parameter changes noticeably, friction
+was probably filtered.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
 from rsfstudy.analysis.fitting import noise as noises
 from rsfstudy.analysis.fitting.averaging import average
+from rsfstudy.analysis.fitting.filters import LOW_PASS, Filter
 from rsfstudy.analysis.fitting.fitted import Fitted, compute_criterion
 
-#: Rows of the averages that are tried, improvement of the criterion that decides, and change of a
+#: Rows of the averages that are tested, improvement of the criterion that decides, and change of a
 #: parameter, in standard errors, that matters.
 _ROWS, _DECIDES, _MATTERS = range(2, 21), 20.0, 0.5
+#: Corner frequencies of the low-pass filters that are tested, relative to the sampling rate.
+_CORNERS = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.025, 0.015)
 #: Largest number of rows that are tested, and passes in which noise and parameters are found.
 _MOST, _PASSES = 20_000, 2
 
 
-def find_averaging(found: Fitted, time: np.ndarray, noise: str) -> tuple[str, ...]:
-    """Test whether friction was averaged before it was recorded.
+def find_filter(found: Fitted, time: np.ndarray, noise: str) -> tuple[str, ...]:
+    """Test whether friction was filtered before it was recorded.
+
+    Running means are tested on all records. Low-pass filters are tested if the noise is correlated,
+    because a low-pass filter correlates white noise.
 
     Parameters
     ----------
@@ -37,22 +45,22 @@ def find_averaging(found: Fitted, time: np.ndarray, noise: str) -> tuple[str, ..
     Returns
     -------
     tuple of str
-        The reason why the standard errors are not valid, with the averaging time that describes the
-        record best. Empty if no averaging time describes the record better than unaveraged
-        friction.
+        The reason why the standard errors are not valid, with the filter that describes the record
+        best. Empty if no filter describes the record better than unfiltered friction.
     """
     windows = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) <= 0.0) + 1)
-    interval = float(np.median(np.diff(time[windows[0]])))
     least = found.quantum / math.sqrt(12.0)
-    columns = np.column_stack([found.jacobian, found.curve])
+    # a filter delays friction, as an error of the time of a step does
+    columns = np.column_stack([found.jacobian, found.by_loading, found.curve])
+    free = len(found.spread)
 
-    def describe(averaging: float) -> tuple[float, float]:
-        averaged = columns
-        if averaging:
-            parts = [average(time[rows], columns[rows], averaging) for rows in windows]
-            averaged = np.concatenate(parts)
-        left = found.residuals + columns[:, -1] - averaged[:, -1]
-        jacobian, kept = averaged[:, :-1], found.noise.kept
+    def describe(kind: str, size: float) -> tuple[float, float]:
+        """Return the criterion and the largest change of a parameter, in standard errors."""
+        parts = [_filtered(kind, size, time[rows], columns[rows]) for rows in windows]
+        filtered = np.concatenate(parts)
+        left = found.residuals + columns[:, -1] - filtered[:, -1]
+        jacobian, kept = filtered[:, :-1], found.noise.kept
+        averaging = size if kind == "mean" else 0.0
         moved = np.zeros(jacobian.shape[1])
         for _ in range(_PASSES):
             guessed = left - jacobian @ moved
@@ -61,16 +69,42 @@ def find_averaging(found: Fitted, time: np.ndarray, noise: str) -> tuple[str, ..
             moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
         innovations = whitened[:, -1] - whitened[:, :-1] @ moved
         criterion = compute_criterion(innovations, there, len(moved), len(time))
-        return criterion, float(np.max(np.abs(moved) / found.spread))
+        return criterion, float(np.max(np.abs(moved[:free]) / found.spread))
 
     if len(time) > _MOST or not np.isfinite(columns).all():
         return ()
-    plain = describe(0.0)[0]
-    tried = [(*describe(rows * interval), rows * interval) for rows in _ROWS]
-    best, change, averaging = min(tried)
+    plain = describe("", 0.0)[0]
+    interval = float(np.median(np.diff(time[windows[0]])))
+    tried = [(*describe(kind, size), kind, size) for kind, size in _candidates(found, interval)]
+    best, change, kind, size = min(tried)
     if not (plain - best > _DECIDES and change > _MATTERS):
         return ()
+    if kind == "mean":
+        seems, remedy = f"averaged over about {size:.3g} s", "`averaging=` (`--averaging`)"
+    else:
+        seems, remedy = f"low-pass filtered at about {size:.3g} Hz", "`low_pass=` (`--low-pass`)"
     return (
-        f"friction looks averaged over about {averaging:.3g} s, which changes a parameter by "
-        f"{change:.1f} standard errors: pass `averaging=` (`--averaging`) or `low_pass=`",
+        f"friction looks {seems}, which changes a parameter by {change:.1f} standard errors: "
+        f"pass {remedy}",
     )
+
+
+def _candidates(found: Fitted, interval: float) -> Iterator[tuple[str, float]]:
+    """Yield the kinds and sizes of the filters that are tested."""
+    for rows in _ROWS:
+        yield "mean", rows * interval
+    if found.noise.order:
+        for kind in LOW_PASS:
+            for corner in _CORNERS:
+                yield kind, corner / interval
+
+
+def _filtered(kind: str, size: float, time: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Filter columns of a window, shape (rows, columns)."""
+    if not kind:
+        return columns
+    if kind == "mean":
+        return average(time, columns, size)
+    one = Filter(kind, size)
+    at = one.sample_times(time)
+    return np.column_stack([one.apply(time, np.interp(at, time, each)) for each in columns.T])

@@ -8,12 +8,13 @@ stop. The reason describes the violated condition and a remedy.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from rsfstudy.analysis.fitting.fitted import Fitted
 from rsfstudy.analysis.fitting.joint import plain
+from rsfstudy.analysis.fitting.model import LOGARITHMIC
 from rsfstudy.analysis.fitting.noise import whiteness
 from rsfstudy.wording import counted
 
@@ -30,6 +31,8 @@ _LARGEST_RATIO = 2.0
 _LEAST_NOISE, _MOST_OUTLIERS = 0.4, 0.05
 #: Fewest rows within a slip distance for which confidence intervals are reliable.
 _FEWEST_ROWS = 1.5
+#: Largest ratio of the two sides of a 95 % interval, in the logarithm of a parameter.
+_MOST_ASYMMETRIC = 3.0
 #: Largest number of outliers that a message names.
 _NAMED = 10
 
@@ -56,6 +59,35 @@ def find_reasons(found: Fitted, friction: np.ndarray) -> tuple[str, ...]:
         *_outliers(found),
         *_autocorrelation(found),
     )
+
+
+def describe_asymmetry(found: Fitted, ends: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
+    """Return the parameters whose 95 % intervals are too asymmetric for standard errors.
+
+    If the record constrains a parameter from one side only, such as the stiffness of a very stiff
+    machine, the standard errors of all correlated parameters are too small.
+
+    Parameters
+    ----------
+    found : Fitted
+    ends : mapping of str to (float, float)
+        Ends of the 95 % intervals, from the likelihood.
+
+    Returns
+    -------
+    tuple of str
+        Reasons why the standard errors are not valid.
+    """
+    reasons = []
+    for name in (n for n in found.free if plain(n) in LOGARITHMIC and min(ends[n]) > 0.0):
+        below, above = (abs(math.log(end / found.values[name])) for end in ends[name])
+        if max(below, above) > _MOST_ASYMMETRIC * min(below, above):
+            low, high = ends[name]
+            reasons.append(
+                f"the 95 % interval of {name} is asymmetric ({low:.3g} to {high:.3g}), so standard "
+                f"errors do not describe it: specify {name} instead of fitting it, or sample faster"
+            )
+    return tuple(reasons)
 
 
 def name_outliers(outliers: np.ndarray) -> str:
@@ -197,7 +229,7 @@ def describe_unidentified(
     -------
     str
     """
-    text = f"{', '.join(names)}: the record does not tell"
+    text = f"the record does not constrain {', '.join(names)}"
     if sparse := set(names) - set(found.unidentified):
         rows = min(found.values[name] for name in sparse) / rows_apart
         text += f"; the record has {rows:.1f} rows per slip distance, and {_FEWEST_ROWS:g} are "
