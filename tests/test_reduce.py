@@ -1,5 +1,7 @@
 """Reductions and claims on made-up datasets, where the right answer is known."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -22,6 +24,7 @@ from rsfstudy.reduce import (
     PowerLaw,
     ProportionalFit,
     Range,
+    Reduction,
     RelativeDifference,
     reduced,
 )
@@ -491,3 +494,19 @@ def test_cells_on_the_wrong_side_of_the_linear_boundary_are_counted(row, crossin
     assert int(result.edge_misplaced) == expected > 0
     assert (result.edge_crossings == crossings).all()
     assert result.edge.isnull().all() == (crossings > 1)
+
+
+@dataclass(frozen=True)
+class Bare(Reduction):
+    """A user-defined reduction whose result lacks all attributes."""
+
+    def __call__(self, dataset):
+        return xr.Dataset({self.name: (2.0 * dataset[self.of]).drop_attrs()})
+
+
+def test_a_reduction_keeps_the_attributes_of_coordinates():
+    dataset = lattice([1.0, 2.0, 3.0, 4.0, 5.0])
+    dataset["b_over_a"].attrs = {"long_name": "ratio of a user", "units": "1"}
+    found = reduced(dataset, (Bare("doubled", of="critical_velocity_ratio"),))
+    assert found["b_over_a"].attrs == {"long_name": "ratio of a user", "units": "1"}
+    assert found["doubled"].dims == ("b_over_a",)

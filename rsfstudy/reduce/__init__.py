@@ -107,7 +107,11 @@ def reduced(
             if beside := [n for end in _BESIDE if (n := f"{name}_{end}") in made]:
                 about["ancillary_variables"] = " ".join(beside)
             values.attrs = {**about, **despite}
+            before = {key: along.attrs for key, along in dataset.coords.items()}
             dataset = dataset.assign({name: values})
+            for coordinate, attributes in before.items():
+                # results may lack the attributes of coordinates: older versions of xarray drop them
+                dataset[coordinate].attrs = attributes
             for coordinate in values.dims:
                 if coordinate in dataset.coords and not dataset[coordinate].attrs:
                     along = quantity(str(coordinate), stated)
