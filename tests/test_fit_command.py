@@ -181,7 +181,11 @@ NUMBER = re.compile(r"\(?(-?[\d.]+) \+- ([\d.]+)\)?(?:e[+-]\d+)?")
 
 
 def test_the_page_prints_what_the_command_does(tmp_path, monkeypatch):
-    """Numbers to a tenth of their errors: another machine may round the last digit otherwise."""
+    """Compare numbers to a tenth of their errors, and text without the widths of columns.
+
+    Another machine may round the last digit differently, and other versions of rich choose other
+    widths.
+    """
     text = (PAGES / "fits.md").read_text()
     block = text.split("<!-- fit command -->")[1]
     command, told = re.findall(r"```(?:sh|text)\n(.*?)```", block, re.DOTALL)[:2]
@@ -194,7 +198,7 @@ def test_the_page_prints_what_the_command_does(tmp_path, monkeypatch):
     )
     assert len(ours) == len(theirs)
     for one, other in zip(ours, theirs, strict=True):
-        assert re.sub(r"[\d.]+", "", one) == re.sub(r"[\d.]+", "", other)
+        assert re.sub(r"[\d.]+|─", "", one).split() == re.sub(r"[\d.]+|─", "", other).split()
         for (value, error), (said, beside) in zip(
             NUMBER.findall(one), NUMBER.findall(other), strict=True
         ):
