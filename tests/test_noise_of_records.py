@@ -200,6 +200,16 @@ def test_a_steady_level_does_not_change() -> None:
     assert sum(map(bool, changes)) <= 3
 
 
+@pytest.mark.parametrize("ratio", [0.2, 5.0])
+def test_changes_of_the_noise_level_are_located(ratio: float) -> None:
+    rng = np.random.default_rng(15)
+    scale = np.where(np.arange(700) < 500, 1.0, ratio)
+    rows = [find_level_changes(scale * rng.normal(size=700)) for _ in range(50)]
+    assert all(len(found) == 1 for found in rows)
+    # rows are misplaced only while the louder noise is as small as the quieter noise
+    assert max(abs(found[0] - 500) for found in rows) <= 5
+
+
 def test_a_clock_with_jitter_keeps_its_two_sampling_rates() -> None:
     rng = np.random.default_rng(13)
     gaps = np.repeat([0.2, 0.02], [200, 1_000])

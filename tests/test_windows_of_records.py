@@ -53,6 +53,15 @@ def test_correlated_noise_is_straight(rho: float) -> None:
         assert find_straight_start(Record(columns, f"seed_{seed}"), 0.0, 400.0) == 0.0
 
 
+def test_outliers_do_not_cut_the_window() -> None:
+    time = np.arange(400.0)
+    for seed in range(10):
+        friction = 0.6 + 1e-5 * time + synthetic.correlated(len(time), 0.5, 1e-4, seed)
+        friction[[40, 97, 220]] += [0.02, -0.02, 0.02]
+        record = Record({"time": time, "displacement": time, "friction": friction}, f"seed_{seed}")
+        assert find_straight_start(record, 0.0, 400.0) == 0.0
+
+
 def test_stated_extents_that_are_cut_are_reported() -> None:
     record = run_in(depth=0.0)
     fit = rsfstudy.fit(record, **OPTIONS, before="400 um", after="500 um").squeeze()

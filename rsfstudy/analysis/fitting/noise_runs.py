@@ -134,7 +134,28 @@ def find_level_changes(innovations: np.ndarray, smallest: float = 0.0) -> list[i
         if gains[best] > _GAIN * math.log(count):
             found.append((float(gains[best]), int(at[best])))
             segments += [(first, int(at[best])), (int(at[best]), last)]
-    return sorted(row for _gain, row in sorted(found, reverse=True)[:_MOST])
+    rows = sorted(row for _gain, row in sorted(found, reverse=True)[:_MOST])
+    squares = np.square(np.maximum(np.abs(innovations), max(least, smallest)))
+    bounds = [0, *rows, count]
+    return [_refine_change(squares, *bounds[n : n + 3]) for n in range(len(rows))]
+
+
+def _refine_change(squares: np.ndarray, first: int, row: int, last: int) -> int:
+    """Refine the row at which the noise level changes, by the Gaussian likelihood.
+
+    Parameters
+    ----------
+    squares : ndarray, shape (rows,)
+        Squares of the whitened residuals.
+    first, row, last : int
+        First row of the segment before the change, the row that is refined, and the row after the
+        last row of the segment that follows.
+    """
+    reach = min(_SHORT, (row - first) // 2, (last - row) // 2)
+    before, after = squares[first : row - reach].mean(), squares[row + reach : last].mean()
+    near = squares[row - reach : row + reach]
+    costs = near * (1.0 / before - 1.0 / after) + math.log(before / after)
+    return row - reach + int(np.argmin(np.concatenate([[0.0], np.cumsum(costs)])))
 
 
 def _classify_intervals(time: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from rsfstudy.analysis.fitting.outliers import find_kept_rows, find_quantum
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.analysis.fitting.steps import RunningSums
 
@@ -32,7 +33,7 @@ def find_straight_start(record: Record, begins: float, ends: float) -> float:
     Two conditions are tested. First, two separate lines must describe friction far better than a
     single line, after allowing for the correlation of the residuals. Second, the earlier part must
     deviate significantly from the line through the later part. If both conditions hold, the earlier
-    part is discarded, and the remainder is tested again.
+    part is discarded, and the remainder is tested again. Outliers are interpolated first.
 
     Parameters
     ----------
@@ -47,6 +48,9 @@ def find_straight_start(record: Record, begins: float, ends: float) -> float:
     """
     rows = np.flatnonzero((record.time >= begins) & (record.time < ends))
     time, friction = record.time[rows], record.columns["friction"][rows]
+    kept = find_kept_rows(friction, np.zeros(len(friction)), find_quantum(friction))
+    if kept is not None:
+        friction = np.interp(time, time[kept], friction[kept])
     while len(time) >= max(_LEAST_ROWS, 4 * _FEWEST):
         every = max(1, len(time) // _MEANS)
         used = len(time) // every * every

@@ -73,7 +73,8 @@ def find_filter(found: Fitted, time: np.ndarray, noise: str) -> tuple[str, ...]:
 
     if len(time) > _MOST or not np.isfinite(columns).all():
         return ()
-    plain = describe("", 0.0)[0]
+    # the noise of the fit may describe unfiltered friction better than this first estimate
+    plain = min(describe("", 0.0)[0], found.criterion)
     interval = float(np.median(np.diff(time[windows[0]])))
     tried = [(*describe(kind, size), kind, size) for kind, size in _candidates(found, interval)]
     best, change, kind, size = min(tried)
