@@ -19,19 +19,19 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, ForwardRef, Literal, TypeVar, Union
 
-from rsfstudy.errors import InvalidValue, brief
+from rsfstudy.errors import InvalidValue, shorten
 
 #: Largest number of items of a list that is passed as an argument. A `range` and an array that
 #: repeats one value can be longer than anything that fits in memory.
-MOST_ITEMS = 2**20
+MAX_ITEMS = 2**20
 #: Number of items of an argument, and of levels of nesting, that the checks look at.
-_ITEMS, _LEVELS = 1000, 4
+_MAX_CHECKED_ITEMS, _MAX_NESTING = 1000, 4
 #: Modules that annotations name by an alias.
-_ALIASES = {"xr": "xarray", "pd": "pandas", "np": "numpy"}
+_MODULE_ALIASES = {"xr": "xarray", "pd": "pandas", "np": "numpy"}
 #: Messages of xarray about a dimension that an array does not have.
 _LACKING = re.compile(r"'(.+?)' (?:not found in array dimensions|is not a valid dimension)")
 #: Names of plain types in messages.
-_WORDS: Mapping[Any, str] = {
+_TYPE_DESCRIPTIONS: Mapping[Any, str] = {
     str: "a text",
     bool: "True or False",
     int: "a whole number",
@@ -43,8 +43,8 @@ _WORDS: Mapping[Any, str] = {
 }
 
 
-def check_lengths(arguments: Mapping[str, Any]) -> None:
-    """Reject a range or a repeated-value array with more than ``MOST_ITEMS`` items.
+def check_argument_lengths(arguments: Mapping[str, Any]) -> None:
+    """Reject a range or a repeated-value array with more than ``MAX_ITEMS`` items.
 
     The other checks iterate over such arguments and would not finish.
 
@@ -54,13 +54,13 @@ def check_lengths(arguments: Mapping[str, Any]) -> None:
         If an argument is too long. The error names the argument.
     """
     for name, value in arguments.items():
-        for part in _parts(value, _LEVELS):
-            if _is_endless(part):
-                rule = f"has more than {MOST_ITEMS:,} items"
+        for part in _nested_values(value, _MAX_NESTING):
+            if _is_too_long(part):
+                rule = f"has more than {MAX_ITEMS:,} items"
                 raise InvalidValue(name, part, rule, remedy="Pass a shorter list.")
 
 
-def find_text_for_list(
+def string_instead_of_list_error(
     function: Callable[..., Any], arguments: Mapping[str, Any], error: Exception
 ) -> InvalidValue | None:
     """Return an error if a string was passed in place of a list of strings.
@@ -69,17 +69,17 @@ def find_text_for_list(
     refers to a single character. Only the first such argument is reported. The result is None if
     there is no such argument.
     """
-    for name, value, annotation in _annotated(function, arguments):
+    for name, value, annotation in _annotated_arguments(function, arguments):
         blamed = getattr(error, "value", None)
         if not isinstance(value, str) or (isinstance(blamed, str) and blamed == value):
             continue
-        if _is_list_of_texts(annotation) and not is_match(value, annotation):
-            rule, remedy = f"must be {describe_type(annotation)}", f"Write [{brief(value)!r}]."
+        if _allows_list_of_strings(annotation) and not matches_annotation(value, annotation):
+            rule, remedy = f"must be {describe_type(annotation)}", f"Write [{shorten(value)!r}]."
             return InvalidValue(name, value, rule, remedy=remedy)
     return None
 
 
-def find_mismatch(
+def type_mismatch_error(
     function: Callable[..., Any], arguments: Mapping[str, Any], remedy: str
 ) -> InvalidValue | None:
     """Return an error for the first argument that does not match its annotation.
@@ -98,14 +98,14 @@ def find_mismatch(
     InvalidValue or None
         None if all arguments match their annotations.
     """
-    for name, value, annotation in _annotated(function, arguments):
-        if not is_match(value, annotation):
+    for name, value, annotation in _annotated_arguments(function, arguments):
+        if not matches_annotation(value, annotation):
             rule = f"must be {describe_type(annotation)}"
             return InvalidValue(name, value, rule, remedy=remedy)
     return None
 
 
-def find_unusable(
+def unusable_value_error(
     arguments: Mapping[str, Any], error: Exception, remedy: str
 ) -> InvalidValue | None:
     """Return an error for the first argument whose value explains an exception.
@@ -115,7 +115,7 @@ def find_unusable(
     None if no argument explains the exception.
     """
     for name, value in arguments.items():
-        for part in _parts(value, _LEVELS):
+        for part in _nested_values(value, _MAX_NESTING):
             if isinstance(part, float) and not math.isfinite(part):
                 return InvalidValue(name, value, "must be finite", remedy=remedy)
             if isinstance(part, int) and abs(part) >= 2**63:
@@ -123,18 +123,18 @@ def find_unusable(
             if isinstance(part, str) and not _is_encodable(part):
                 return InvalidValue(name, value, "must be a text that UTF-8 can hold")
         if (dimension := _lacking_dimension(value, error)) is not None:
-            rule, dims = f"has no dimension {brief(dimension)!r}", map(str, value.dims)
+            rule, dims = f"has no dimension {shorten(dimension)!r}", map(str, value.dims)
             return InvalidValue(name, value, rule, choices=dims, remedy=remedy)
-        if isinstance(error, OSError) and _is_part(value, error.filename):
+        if isinstance(error, OSError) and _is_part_of_path(value, error.filename):
             rule = f"cannot be the name of a file: {error.strerror}"
             return InvalidValue(name, value, rule, remedy=remedy)
         is_outside = isinstance(error, IndexError) or "out of bounds" in str(error)
         if is_outside and isinstance(value, Integral):
             return InvalidValue(name, value, "is out of range", remedy=remedy)
-        if isinstance(value, str) and value == _missing(error):
+        if isinstance(value, str) and value == _missing_name(error):
             return InvalidValue(name, value, "is unknown", remedy=remedy)
-        if name != "self" and callable(value) and _has_failed(value, error):
-            rule = f"fails when it is called ({type(error).__name__}: {brief(error)})"
+        if name != "self" and callable(value) and _was_raised_by(value, error):
+            rule = f"fails when it is called ({type(error).__name__}: {shorten(error)})"
             return InvalidValue(name, value, rule, remedy=remedy)
     return None
 
@@ -145,13 +145,13 @@ def _lacking_dimension(value: Any, error: Exception) -> str | None:
     return found[1] if found and found[1] not in value.dims else None
 
 
-def _is_part(value: object, path: object) -> bool:
+def _is_part_of_path(value: object, path: object) -> bool:
     """Return True if a string or path is contained in another path."""
     is_path = isinstance(value, str | os.PathLike) and isinstance(path, str | os.PathLike)
     return is_path and str(value) in str(path)
 
 
-def _missing(error: Exception) -> object:
+def _missing_name(error: Exception) -> object:
     """Return the missing name of a KeyError or AttributeError.
 
     The result is None if the exception contains no name.
@@ -161,7 +161,7 @@ def _missing(error: Exception) -> object:
     return getattr(error, "name", None)
 
 
-def _has_failed(function: Callable[..., Any], error: Exception) -> bool:
+def _was_raised_by(function: Callable[..., Any], error: Exception) -> bool:
     """Return True if an exception was raised inside a function or by calling it.
 
     A ``TypeError`` always counts, because the call may not match the signature.
@@ -181,23 +181,23 @@ def python_number(value: Any) -> Any:
     return value.item() if is_scalar and value.dtype.kind in "biuf" else value
 
 
-def is_match(value: object, annotation: Any, levels: int = _LEVELS) -> bool:
+def matches_annotation(value: object, annotation: Any, max_nesting: int = _MAX_NESTING) -> bool:
     """Return True if a value has the annotated type or behaves like this type.
 
     Lists, tuples and arrays are interchangeable, and so are Python and NumPy numbers. A Boolean is
     not a number.
     """
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
-    if annotation is Any or isinstance(annotation, TypeVar | ForwardRef | str) or not levels:
+    if annotation is Any or isinstance(annotation, TypeVar | ForwardRef | str) or not max_nesting:
         return True
     if origin in (Union, types.UnionType):
-        return any(is_match(value, each, levels) for each in arguments)
+        return any(matches_annotation(value, each, max_nesting) for each in arguments)
     if origin is Literal:
         return any(type(value) is type(each) and value == each for each in arguments)
     if origin is not None:
-        return _is_container(value, origin, arguments, levels - 1)
+        return _is_matching_container(value, origin, arguments, max_nesting - 1)
     if annotation in (bool, int, float):
-        return _is_number(value, annotation)
+        return _is_number_of_type(value, annotation)
     if annotation is Path:
         return isinstance(value, str | os.PathLike)
     if annotation is None:
@@ -216,8 +216,8 @@ def describe_type(annotation: Any) -> str:
     if origin is type:
         return "a class"
     kind = origin or annotation
-    if kind in _WORDS:
-        return _WORDS[kind]
+    if kind in _TYPE_DESCRIPTIONS:
+        return _TYPE_DESCRIPTIONS[kind]
     if kind is Callable or not isinstance(kind, type):
         return "a function"
     is_plain = kind.__module__ in ("builtins", "collections", "collections.abc")
@@ -233,7 +233,7 @@ def describe_type(annotation: Any) -> str:
     return f"an {name}" if name[0] in "aeioux" else f"a {name}"
 
 
-def _is_number(value: object, kind: type) -> bool:
+def _is_number_of_type(value: object, kind: type) -> bool:
     name = type(value).__name__
     is_flag = name in ("bool", "bool_")  # of Python or NumPy
     if kind is bool or is_flag:
@@ -243,7 +243,9 @@ def _is_number(value: object, kind: type) -> bool:
     return kind is float or isinstance(value, Integral)
 
 
-def _is_container(value: object, origin: Any, arguments: tuple[Any, ...], levels: int) -> bool:
+def _is_matching_container(
+    value: object, origin: Any, arguments: tuple[Any, ...], levels: int
+) -> bool:
     """Return True if a value is a container of type ``origin`` with matching items."""
     if not isinstance(origin, type) or issubclass(origin, type):
         return isinstance(value, type)
@@ -253,24 +255,26 @@ def _is_container(value: object, origin: Any, arguments: tuple[Any, ...], levels
         # a dataset is a mapping, but not one that a caller means
         if not isinstance(value, Mapping) or hasattr(type(value), "data_vars"):
             return False
-        pairs = itertools.islice(value.items(), _ITEMS)
+        pairs = itertools.islice(value.items(), _MAX_CHECKED_ITEMS)
         return not arguments or all(
-            is_match(key, arguments[0], levels) and is_match(item, arguments[1], levels)
+            matches_annotation(key, arguments[0], levels)
+            and matches_annotation(item, arguments[1], levels)
             for key, item in pairs
         )
     if not issubclass(origin, Iterable):
         return isinstance(value, origin)
-    if not _is_listed(value, origin):
+    if not _is_sequence_like(value, origin):
         return False
-    items = list(itertools.islice(typing.cast(Iterable[Any], value), _ITEMS))
+    items = list(itertools.islice(typing.cast(Iterable[Any], value), _MAX_CHECKED_ITEMS))
     if origin is tuple and arguments and Ellipsis not in arguments:
         return len(items) == len(arguments) and all(
-            is_match(item, each, levels) for item, each in zip(items, arguments, strict=True)
+            matches_annotation(item, each, levels)
+            for item, each in zip(items, arguments, strict=True)
         )
-    return all(is_match(item, arguments[0], levels) for item in items if arguments)
+    return all(matches_annotation(item, arguments[0], levels) for item in items if arguments)
 
 
-def _is_listed(value: object, origin: type) -> bool:
+def _is_sequence_like(value: object, origin: type) -> bool:
     if isinstance(value, str | bytes):
         return False
     dimensions = getattr(value, "ndim", None)
@@ -281,15 +285,17 @@ def _is_listed(value: object, origin: type) -> bool:
     return isinstance(value, Collection if issubclass(origin, Collection) else Iterable)
 
 
-def _is_list_of_texts(annotation: Any) -> bool:
+def _allows_list_of_strings(annotation: Any) -> bool:
     """Return True if an annotation allows a list of strings."""
     origin, items = typing.get_origin(annotation), typing.get_args(annotation)
     if origin in (Union, types.UnionType):
-        return any(map(_is_list_of_texts, items))
-    return origin in (Sequence, Collection, Iterable, list, tuple) and is_match("", items[0])
+        return any(map(_allows_list_of_strings, items))
+    return origin in (Sequence, Collection, Iterable, list, tuple) and matches_annotation(
+        "", items[0]
+    )
 
 
-def _annotated(
+def _annotated_arguments(
     function: Callable[..., Any], arguments: Mapping[str, Any]
 ) -> Iterator[tuple[str, Any, Any]]:
     """Yield the name, value and annotation of each argument.
@@ -299,7 +305,7 @@ def _annotated(
     for name, parameter in inspect.signature(function).parameters.items():
         if name not in arguments or parameter.annotation is parameter.empty or name == "self":
             continue
-        value, annotation = arguments[name], _resolve(function, parameter.annotation)
+        value, annotation = arguments[name], _resolve_annotation(function, parameter.annotation)
         if parameter.kind is parameter.VAR_KEYWORD:
             yield from ((key, each, annotation) for key, each in value.items())
         elif parameter.kind is parameter.VAR_POSITIONAL:
@@ -308,7 +314,7 @@ def _annotated(
             yield name, value, annotation
 
 
-class _Names(dict[str, Any]):
+class _AnnotationNamespace(dict[str, Any]):
     """Namespace in which string annotations are evaluated.
 
     The namespace contains the global names of the module. Missing names are looked up among the
@@ -316,7 +322,7 @@ class _Names(dict[str, Any]):
     """
 
     def __missing__(self, name: str) -> Any:
-        module = sys.modules.get(_ALIASES.get(name, ""))
+        module = sys.modules.get(_MODULE_ALIASES.get(name, ""))
         if module is not None:
             return module
         for home, module in list(sys.modules.items()):
@@ -326,7 +332,7 @@ class _Names(dict[str, Any]):
         raise KeyError(name)
 
 
-def _resolve(function: Callable[..., Any], annotation: Any) -> Any:
+def _resolve_annotation(function: Callable[..., Any], annotation: Any) -> Any:
     """Evaluate an annotation. Return ``Any`` if a name in the annotation is unknown."""
     annotation = getattr(annotation, "__forward_arg__", annotation)
     if not isinstance(annotation, str):
@@ -334,33 +340,33 @@ def _resolve(function: Callable[..., Any], annotation: Any) -> Any:
     known = getattr(inspect.unwrap(function), "__globals__", {})
     names = {name: kind for name, kind in known.items() if kind is not Any or name == "Any"}
     try:
-        return eval(annotation, {}, _Names(names))
+        return eval(annotation, {}, _AnnotationNamespace(names))
     except (NameError, AttributeError, TypeError):
         return Any
 
 
-def _parts(value: object, levels: int) -> Iterator[Any]:
+def _nested_values(value: object, levels: int) -> Iterator[Any]:
     """Yield a value and, recursively, the first items of each list or mapping."""
     yield value
     if not levels or isinstance(value, range):
         return
     if isinstance(value, Mapping):
-        value = list(itertools.islice(value.values(), _ITEMS))
+        value = list(itertools.islice(value.values(), _MAX_CHECKED_ITEMS))
     if isinstance(value, list | tuple | set | frozenset):
-        for item in itertools.islice(value, _ITEMS):
-            yield from _parts(item, levels - 1)
+        for item in itertools.islice(value, _MAX_CHECKED_ITEMS):
+            yield from _nested_values(item, levels - 1)
 
 
-def _is_endless(value: Any) -> bool:
-    """Return True if a lazy or repeated-value sequence exceeds ``MOST_ITEMS`` items.
+def _is_too_long(value: Any) -> bool:
+    """Return True if a lazy or repeated-value sequence exceeds ``MAX_ITEMS`` items.
 
     Such sequences are a ``range`` and an array with a stride of zero. Their memory does not grow
     with the number of items.
     """
     if isinstance(value, range):
-        return bool(value) and (value[-1] - value[0]) // value.step >= MOST_ITEMS
+        return bool(value) and (value[-1] - value[0]) // value.step >= MAX_ITEMS
     is_array = type(value).__module__ == "numpy" and hasattr(value, "strides")
-    return is_array and 0 in value.strides and value.size > MOST_ITEMS
+    return is_array and 0 in value.strides and value.size > MAX_ITEMS
 
 
 def _is_encodable(text: str) -> bool:

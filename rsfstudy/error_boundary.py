@@ -16,32 +16,33 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, ParamSpec, Self, TypeVar
 
+from rsfstudy._deprecation import user_stacklevel as user_stacklevel
 from rsfstudy.argument_checks import (
-    check_lengths,
-    find_mismatch,
-    find_text_for_list,
-    find_unusable,
+    check_argument_lengths,
     python_number,
+    string_instead_of_list_error,
+    type_mismatch_error,
+    unusable_value_error,
 )
-from rsfstudy.errors import CallError, DataError, InvalidValue, RsfStudyError, brief
+from rsfstudy.errors import CallError, DataError, InvalidValue, RsfStudyError, shorten
 
 P = ParamSpec("P")
 T = TypeVar("T")
 C = TypeVar("C", bound=type)
 
 #: Exceptions that leave the boundary as they are.
-_PASSED = (RsfStudyError, Warning, bdb.BdbQuit)
+_UNCONVERTED_EXCEPTIONS = (RsfStudyError, Warning, bdb.BdbQuit)
 #: Special methods that users call, in addition to methods without a leading underscore.
-_SPECIAL = ("__init__", "__new__", "__call__", "__getitem__")
+_GUARDED_SPECIAL_METHODS = ("__init__", "__new__", "__call__", "__getitem__")
 #: Modules that call a function on behalf of their own caller.
-_BETWEEN = ("dataclasses", "functools")
+_TRANSPARENT_MODULES = ("dataclasses", "functools", "rsfstudy._deprecation")
 
 
 def error_boundary(
     function: Callable[P, T],
     *,
     is_inner: bool = False,
-    passed: tuple[type[Exception], ...] = _PASSED,
+    passed: tuple[type[Exception], ...] = _UNCONVERTED_EXCEPTIONS,
 ) -> Callable[P, T]:
     """Wrap a function so that it raises only errors of rsfstudy.
 
@@ -63,7 +64,7 @@ def error_boundary(
         ``InvalidValue``, or to a ``DataError`` if a dataset caused the exception. The original
         exception is the cause of the new exception.
     """
-    return _enclose(function, is_inner=is_inner, passed=passed)
+    return _wrap(function, is_inner=is_inner, passed=passed)
 
 
 def guard_methods(kind: C) -> C:
@@ -74,15 +75,15 @@ def guard_methods(kind: C) -> C:
     wrapped, because the engines compile the static methods of parts.
     """
     for name, member in list(vars(kind).items()):
-        if name.startswith("_") and name not in _SPECIAL:
+        if name.startswith("_") and name not in _GUARDED_SPECIAL_METHODS:
             continue
         is_constructor = name in ("__init__", "__new__")
         is_static = isinstance(member, staticmethod)
         if isinstance(member, classmethod) or (is_static and is_constructor):
-            guarded = _enclose(member.__func__, is_strict=is_constructor)
+            guarded = _wrap(member.__func__, is_strict=is_constructor)
             setattr(kind, name, type(member)(guarded))
         elif inspect.isfunction(member):
-            setattr(kind, name, _enclose(member, is_strict=is_constructor))
+            setattr(kind, name, _wrap(member, is_strict=is_constructor))
     return kind
 
 
@@ -101,15 +102,15 @@ class CheckedKeywords:
     def __new__(cls, *args: Any, **keywords: Any) -> Self:
         """Create an instance after checking the keyword arguments."""
         kind: type = cls
-        valid = _parameters(kind)
+        valid = _constructor_parameters(kind)
         for name in keywords if valid else ():
             if name not in valid:
-                raise _unknown_keyword(cls.__name__, name, valid)
+                raise _unknown_keyword_error(cls.__name__, name, valid)
         return super().__new__(cls)
 
 
 @functools.cache
-def _parameters(cls: type) -> tuple[str, ...]:
+def _constructor_parameters(cls: type) -> tuple[str, ...]:
     """Return the parameter names of the constructor of a class.
 
     The tuple is empty if the constructor accepts arbitrary keywords.
@@ -119,20 +120,12 @@ def _parameters(cls: type) -> tuple[str, ...]:
     return () if takes_any else tuple(parameters)[1:]
 
 
-def user_stacklevel() -> int:
-    """Return the ``stacklevel`` with which a warning refers to the code of the user."""
-    level, frame = 1, sys._getframe(1)
-    while frame.f_back and frame.f_globals.get("__name__", "").startswith("rsfstudy."):
-        level, frame = level + 1, frame.f_back
-    return level
-
-
-def _enclose(
+def _wrap(
     function: Callable[P, T],
     *,
     is_inner: bool = False,
     is_strict: bool = False,
-    passed: tuple[type[Exception], ...] = _PASSED,
+    passed: tuple[type[Exception], ...] = _UNCONVERTED_EXCEPTIONS,
 ) -> Callable[P, T]:
     """Wrap a function in the error boundary.
 
@@ -151,100 +144,100 @@ def _enclose(
             names = [n for n in signature.parameters if n not in ("self", "cls", "_cls")]
             unknown = [keyword for keyword in options if keyword not in names]
             if unknown:
-                raise _unknown_keyword(name, unknown[0], names) from None
-            text = f"{name}() {brief(error)}. It takes {', '.join(names) or 'nothing'}."
+                raise _unknown_keyword_error(name, unknown[0], names) from None
+            text = f"{name}() {shorten(error)}. It takes {', '.join(names) or 'nothing'}."
             raise CallError(text) from None
 
     @functools.wraps(function)
-    def answer(*args: P.args, **options: P.kwargs) -> T:
+    def wrapper(*args: P.args, **options: P.kwargs) -> T:
         if is_strict:
             args = tuple(map(python_number, args))  # type: ignore[assignment]
             options = {key: python_number(value) for key, value in options.items()}  # type: ignore[assignment]
-        if not is_inner and _is_internal():
+        if not is_inner and _is_internal_call():
             try:
                 return function(*args, **options)
             except TypeError:
                 bind(args, options)
                 raise
         arguments = bind(args, options)
-        check_lengths(arguments)
+        check_argument_lengths(arguments)
         try:
             answered = function(*args, **options)
         except InvalidValue as error:
-            if wrong := find_text_for_list(function, arguments, error):
+            if wrong := string_instead_of_list_error(function, arguments, error):
                 raise wrong from error
             raise
         except passed:
             raise
         except Exception as error:
-            wrong = find_mismatch(function, arguments, remedy)
-            wrong = wrong or find_unusable(arguments, error, remedy)
-            raise wrong or _explain(name, arguments, error) from error
+            wrong = type_mismatch_error(function, arguments, remedy)
+            wrong = wrong or unusable_value_error(arguments, error, remedy)
+            raise wrong or _failed_call_error(name, arguments, error) from error
         if is_strict:
             # the constructor may have converted arguments to other types
             made = getattr(arguments.get("self"), "__dict__", {})
             stored = {name: made.get(name, value) for name, value in arguments.items()}
-            if wrong := find_mismatch(function, stored, remedy):
+            if wrong := type_mismatch_error(function, stored, remedy):
                 raise wrong
         return answered
 
-    return answer
+    return wrapper
 
 
-def _unknown_keyword(name: str, keyword: str, valid: Iterable[str]) -> CallError:
+def _unknown_keyword_error(name: str, keyword: str, valid: Iterable[str]) -> CallError:
     """Return the error for an unknown keyword of a function or class."""
     names = list(valid)
-    close = difflib.get_close_matches(brief(keyword), names, n=1)
+    close = difflib.get_close_matches(shorten(keyword), names, n=1)
     hint = "".join(f" Did you mean {each!r}?" for each in close)
     takes = ", ".join(names) or "nothing"
-    return CallError(f"{name}() has no parameter {brief(keyword)!r}.{hint} It takes {takes}.")
+    return CallError(f"{name}() has no parameter {shorten(keyword)!r}.{hint} It takes {takes}.")
 
 
-def _is_internal() -> bool:
+def _is_internal_call() -> bool:
     """Return True if the caller is a module of rsfstudy other than the command line."""
     frame = sys._getframe(2)
-    while frame.f_back and frame.f_globals.get("__name__") in _BETWEEN:
+    while frame.f_back and frame.f_globals.get("__name__") in _TRANSPARENT_MODULES:
         frame = frame.f_back
     module = str(frame.f_globals.get("__name__"))
     return module.startswith("rsfstudy.") and not module.startswith("rsfstudy.cli.")
 
 
-def _explain(name: str, arguments: dict[str, Any], error: Exception) -> RsfStudyError:
+def _failed_call_error(name: str, arguments: dict[str, Any], error: Exception) -> RsfStudyError:
     """Return the error for a failed call whose arguments have the correct types."""
-    reason = in_words(error)
-    if any(map(_is_dataset, arguments.values())):
+    reason = format_exception(error)
+    if any(map(_is_dataset_or_accessor, arguments.values())):
         rule = f"is not as rsfstudy made it ({reason.partition(': ')[2] or reason})"
         if isinstance(error, KeyError) and len(error.args) == 1:
             # xarray lists all variables after the first sentence
             missing = str(error.args[0]).partition(". ")[0].removeprefix("No variable named ")
             if str(error.args[0]).startswith("No variable") or missing.isidentifier():
-                rule = f"has no {brief(missing)}, which datasets of rsfstudy have"
+                rule = f"has no {shorten(missing)}, which datasets of rsfstudy have"
         remedy = "Pass the dataset as it was opened, or run the study again."
         return DataError(f"{name}: the dataset {rule}. {remedy}")
     if isinstance(error, MemoryError):
-        return InvalidValue(name, "...", f"needs more memory than there is ({brief(error)})")
+        return InvalidValue(name, "...", f"needs more memory than there is ({shorten(error)})")
     given = {key: value for key, value in arguments.items() if value is not None}
     remedy = f"See the documentation of {name}."
     return InvalidValue(name, given, f"cannot be answered ({reason})", remedy=remedy)
 
 
-def _is_dataset(value: object) -> bool:
+def _is_dataset_or_accessor(value: object) -> bool:
     """Return True if a value is a dataset or the accessor of a dataset."""
     return hasattr(type(value), "data_vars") or "_dataset" in getattr(value, "__dict__", {})
 
 
-def in_words(error: BaseException) -> str:
+def format_exception(error: BaseException) -> str:
     """Format the type and the message of an exception.
 
     If the message cannot be formatted, only the type is returned.
     """
     try:
-        return f"{type(error).__name__}: {brief(error)}"
+        return f"{type(error).__name__}: {shorten(error)}"
     except Exception:  # its text may raise as well
         return type(error).__name__
 
 
-def check_file(name: str, path: str | Path) -> None:
+def check_regular_file(name: str, path: str | Path) -> None:
     """Raise ``InvalidValue`` if a path exists but is not a regular file.
 
     Reading from a pipe or a device might never return.

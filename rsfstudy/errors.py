@@ -9,16 +9,20 @@ import reprlib
 import signal
 from collections.abc import Iterable
 
+from rsfstudy._deprecation import renamed_members, renamed_names
+
+__getattr__ = renamed_names(__name__)
+
 #: Most characters of a text, and most choices, that a message has room for; and the most that are
 #: listed beside those that look like what was given.
-_MOST_CHARACTERS, _MOST_CHOICES, _FEW = 200, 60, 20
+_MAX_CHARACTERS, _MAX_CHOICES, _MAX_CHOICES_WITH_SUGGESTIONS = 200, 60, 20
 #: Most characters of a message.
-_LONGEST = 5000
+_MAX_MESSAGE_LENGTH = 5000
 #: Number and length of the choices that are compared with a value, which bounds the time.
-_MOST_COMPARED, _LONGEST_COMPARED = 1000, 100
+_MAX_COMPARED_CHOICES, _MAX_COMPARED_LENGTH = 1000, 100
 
 
-class _Values(reprlib.Repr):
+class _ValueRepr(reprlib.Repr):
     """Texts of values, of bounded length; numbers of NumPy are shown as numbers."""
 
     def repr1(self, x: object, level: int) -> str:
@@ -26,9 +30,9 @@ class _Values(reprlib.Repr):
         return super().repr1(x.item() if number and hasattr(x, "item") else x, level)
 
 
-_values = _Values()
-_values.maxstring = _values.maxother = _values.maxlong = 100
-_values.maxlist = _values.maxtuple = _values.maxdict = _values.maxset = 20
+_value_repr = _ValueRepr()
+_value_repr.maxstring = _value_repr.maxother = _value_repr.maxlong = 100
+_value_repr.maxlist = _value_repr.maxtuple = _value_repr.maxdict = _value_repr.maxset = 20
 
 
 class RsfStudyError(Exception):
@@ -37,9 +41,10 @@ class RsfStudyError(Exception):
     """
 
     def __str__(self) -> str:
-        return spelt(brief(super().__str__().replace("\n", " "), _LONGEST))
+        return escape_control(shorten(super().__str__().replace("\n", " "), _MAX_MESSAGE_LENGTH))
 
 
+@renamed_members
 class InvalidValue(RsfStudyError, ValueError):
     """A value that breaks a rule; of what is long, the message leaves the middle out.
 
@@ -68,15 +73,17 @@ class InvalidValue(RsfStudyError, ValueError):
         remedy: str = "",
     ) -> None:
         choices = list(choices)
-        shown = _values.repr(value)
-        text = f"{brief(name)} = {shown}: {rule}."
-        compared = [c for c in choices[:_MOST_COMPARED] if len(c) <= _LONGEST_COMPARED]
+        shown = _value_repr.repr(value)
+        text = f"{shorten(name)} = {shown}: {rule}."
+        compared = [c for c in choices[:_MAX_COMPARED_CHOICES] if len(c) <= _MAX_COMPARED_LENGTH]
         close = difflib.get_close_matches(shown.strip("'\""), compared, n=3, cutoff=0.5)
         if close:
             text += f" Did you mean {' or '.join(map(repr, close))}?"
-        if choices and not (close and (len(choices) > _FEW or len(choices) == len(close))):
-            more = len(choices) - _MOST_CHOICES
-            text += f" Choices: {', '.join(map(brief, choices[:_MOST_CHOICES]))}"
+        if choices and not (
+            close and (len(choices) > _MAX_CHOICES_WITH_SUGGESTIONS or len(choices) == len(close))
+        ):
+            more = len(choices) - _MAX_CHOICES
+            text += f" Choices: {', '.join(map(shorten, choices[:_MAX_CHOICES]))}"
             text += f" and {more:,} more." if more > 0 else "."
         if remedy:
             text += f" {remedy}"
@@ -84,10 +91,10 @@ class InvalidValue(RsfStudyError, ValueError):
         self.name = name
         self.value = value
 
-    def at(self, place: str) -> InvalidValue:
+    def with_location(self, place: str) -> InvalidValue:
         """This error, with the place where it arose."""
         placed = InvalidValue.__new__(InvalidValue)
-        Exception.__init__(placed, f"{brief(place)}: {self}")
+        Exception.__init__(placed, f"{shorten(place)}: {self}")
         placed.name, placed.value = self.name, self.value
         return placed
 
@@ -110,10 +117,10 @@ class Interrupted(RunError):
     @property
     def exit_status(self) -> int:
         """Exit status of the process: 128 and the number of the signal, but 1 after Ctrl-C."""
-        return self.__cause__.exit_status if isinstance(self.__cause__, Signalled) else 1
+        return self.__cause__.exit_status if isinstance(self.__cause__, SignalInterrupt) else 1
 
 
-class Signalled(KeyboardInterrupt):
+class SignalInterrupt(KeyboardInterrupt):
     """A signal that ends the process in order, as Ctrl-C does."""
 
     def __init__(self, number: int) -> None:
@@ -129,26 +136,26 @@ class RsfStudyWarning(UserWarning):
     """
 
     def __str__(self) -> str:
-        return spelt(brief(super().__str__(), _LONGEST))
+        return escape_control(shorten(super().__str__(), _MAX_MESSAGE_LENGTH))
 
 
-class NoAnswer(RsfStudyWarning):
+class NoResultWarning(RsfStudyWarning):
     """What was asked of one scene has no number for an answer, nothing happens in it, or what
     happens is no physics.
     """
 
 
-class Incomplete(RsfStudyWarning):
+class IncompleteWarning(RsfStudyWarning):
     """A motion that ended early, or cells of a run that failed."""
 
 
-def brief(text: object, most: int = _MOST_CHARACTERS) -> str:
+def shorten(text: object, max_length: int = _MAX_CHARACTERS) -> str:
     """A text without its middle where it is too long for a message."""
-    whole, half = str(text), most // 2
-    return whole if len(whole) <= most else f"{whole[:half]}...{whole[-half:]}"
+    whole, half = str(text), max_length // 2
+    return whole if len(whole) <= max_length else f"{whole[:half]}...{whole[-half:]}"
 
 
-def spelt(text: str) -> str:
+def escape_control(text: str) -> str:
     """Text with its control characters spelt out."""
     characters = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
     return "".join(c if isinstance(c, str) else c.decode() for c in characters)

@@ -7,7 +7,7 @@ from pathlib import Path
 from rsfstudy.errors import InvalidValue
 
 #: Most bytes of a file name and of a path on the usual file systems.
-LONGEST_NAME, LONGEST_PATH = 255, 4096
+MAX_NAME_BYTES, MAX_PATH_BYTES = 255, 4096
 
 
 def check_path(name: str, path: str | Path) -> Path:
@@ -40,10 +40,10 @@ def check_path(name: str, path: str | Path) -> Path:
     if "\0" in text:
         raise InvalidValue(name, text, "must be a path, without the null character")
     rule = ""
-    if parts[0] > LONGEST_PATH:
-        rule = f"must have at most {LONGEST_PATH:,} bytes (it has {parts[0]:,})"
-    elif max(parts[1:], default=0) > LONGEST_NAME:
-        rule = f"must have at most {LONGEST_NAME} bytes in each part (got {max(parts[1:]):,})"
+    if parts[0] > MAX_PATH_BYTES:
+        rule = f"must have at most {MAX_PATH_BYTES:,} bytes (it has {parts[0]:,})"
+    elif max(parts[1:], default=0) > MAX_NAME_BYTES:
+        rule = f"must have at most {MAX_NAME_BYTES} bytes in each part (got {max(parts[1:]):,})"
     if rule:
         raise InvalidValue(name, text, rule, remedy="Choose a shorter name.")
     try:

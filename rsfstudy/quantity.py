@@ -13,11 +13,14 @@ from html import escape
 from html.entities import html5
 from typing import Any
 
+from rsfstudy._deprecation import renamed_members, renamed_names
 from rsfstudy.error_boundary import guard_methods
-from rsfstudy.errors import InvalidValue, spelt
+from rsfstudy.errors import InvalidValue, escape_control
+
+__getattr__ = renamed_names(__name__)
 
 #: A heading of a table.
-_HEADING = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
+_HEADING_WITH_UNITS = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
 
 
 @guard_methods
@@ -61,6 +64,7 @@ class Quantity:
         return {"flag_values": values, "flag_meanings": " ".join(self.flags)} if self.flags else {}
 
 
+@renamed_members
 @guard_methods
 @dataclass(frozen=True)
 class Output(Quantity):
@@ -95,63 +99,65 @@ class Output(Quantity):
             raise InvalidValue("long_name", self.long_name, rule)
 
     @property
-    def names(self) -> tuple[str, ...]:
+    def variable_names(self) -> tuple[str, ...]:
         """Its name, and that of its error estimate if there is one."""
         return (self.name, f"{self.name}_error") if self.error else (self.name,)
 
 
-def is_name(name: object) -> bool:
+def is_variable_name(name: object) -> bool:
     """True if a text can name a variable: an identifier, as a file gives it back."""
     return isinstance(name, str) and name.isidentifier() and unicodedata.is_normalized("NFC", name)
 
 
-def quotient(units: Sequence[str]) -> str:
-    """Units, or scales, of a first quantity over others, as in ``s (um s-1)-1``; `factors` are the
-    single ones again.
+def format_unit_quotient(units: Sequence[str]) -> str:
+    """Units, or scales, of a first quantity over others, as in ``s (um s-1)-1``;
+    `split_unit_quotient` gives the single ones again.
     """
     first, *others = units
     return first + "".join(f" ({each})-1" for each in others if each != "1")
 
 
-def factors(units: str) -> list[str]:
+def split_unit_quotient(units: str) -> list[str]:
     """Units, or scales, of which something is in the first over the others."""
     return [each.removesuffix(")-1") for each in units.split(" (")]
 
 
-def units_and_scale(attributes: Mapping[Any, Any]) -> str:
+def units_or_scale(attributes: Mapping[Any, Any]) -> str:
     """What the numbers of a variable are in: units, or what those without units are measured in."""
     units, scale = str(attributes.get("units", "")), str(attributes.get("scale", ""))
-    return quotient([scale, *factors(units)[1:]]) if scale else units
+    return format_unit_quotient([scale, *split_unit_quotient(units)[1:]]) if scale else units
 
 
-def headed(text: str) -> tuple[str, str] | None:
+def parse_heading(text: str) -> tuple[str, str] | None:
     """Name and units that a heading such as ``velocity (um/s)`` states; None of another text."""
-    match = _HEADING.fullmatch(text.strip())
+    match = _HEADING_WITH_UNITS.fullmatch(text.strip())
     return (match[1], match[2].strip()) if match else None
 
 
 # ---- tables, as notebooks show them --------------------------------------------------------------
 
 #: Of a table of quantities.
-HEADINGS = ("field", "symbol", "value", "unit", "meaning")
-_FUNCTIONS = ("ln", "log", "exp")
-_RAISED = {"_": "sub", "^": "sup"}
-_CELL = 'style="text-align: left; vertical-align: top"'
+QUANTITY_TABLE_HEADINGS = ("field", "symbol", "value", "unit", "meaning")
+_FUNCTION_NAMES = ("ln", "log", "exp")
+_SCRIPT_TAGS = {"_": "sub", "^": "sup"}
+_CELL_STYLE = 'style="text-align: left; vertical-align: top"'
 
 
-def as_html(text: object) -> str:
+def escape_html(text: object) -> str:
     """Escape a string for HTML, and make control characters visible."""
-    return escape(spelt(str(text)))
+    return escape(escape_control(str(text)))
 
 
-class Markup(str):
+class HtmlMarkup(str):
     """A text that is HTML already."""
 
     __slots__ = ()
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[object]], caption: str = "") -> Markup:
-    """A table; texts are escaped, unless they are `Markup`.
+def html_table(
+    headings: Sequence[str], rows: Iterable[Sequence[object]], caption: str = ""
+) -> HtmlMarkup:
+    """A table; texts are escaped, unless they are `HtmlMarkup`.
 
     Parameters
     ----------
@@ -161,73 +167,77 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[object]], caption: st
     caption : str
         What stands above it.
     """
-    above = f"<p><b>{_cell(caption)}</b></p>" if caption else ""
-    head = "".join(f"<th {_CELL}>{_cell(text)}</th>" for text in headings)
-    lines = ("".join(f"<td {_CELL}>{_cell(value)}</td>" for value in row) for row in rows)
+    above = f"<p><b>{_format_cell(caption)}</b></p>" if caption else ""
+    head = "".join(f"<th {_CELL_STYLE}>{_format_cell(text)}</th>" for text in headings)
+    lines = (
+        "".join(f"<td {_CELL_STYLE}>{_format_cell(value)}</td>" for value in row) for row in rows
+    )
     body = "".join(f"<tr>{line}</tr>" for line in lines)
-    return Markup(f"{above}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
+    return HtmlMarkup(f"{above}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
 
 
-def quantities_table(rows: Iterable[tuple[Quantity, object]], caption: str = "") -> Markup:
+def html_quantities_table(rows: Iterable[tuple[Quantity, object]], caption: str = "") -> HtmlMarkup:
     """A table of quantities with their values."""
-    return table(HEADINGS, (described(about, value) for about, value in rows), caption)
+    return html_table(
+        QUANTITY_TABLE_HEADINGS, (quantity_row(about, value) for about, value in rows), caption
+    )
 
 
-def described(about: Quantity, value: object) -> tuple[object, ...]:
-    """The row of a quantity, under `HEADINGS`."""
-    return about.name, symbol(about.symbol), value, unit(about), about.long_name
+def quantity_row(about: Quantity, value: object) -> tuple[object, ...]:
+    """The row of a quantity, under `QUANTITY_TABLE_HEADINGS`."""
+    return about.name, html_symbol(about.symbol), value, html_unit(about), about.long_name
 
 
-class ShownAsTable:
+class HtmlTableMixin:
     """Base of what a notebook shows as a table of quantities."""
 
-    def shown(self) -> Iterable[tuple[Quantity, object]]:
+    def quantities_with_values(self) -> Iterable[tuple[Quantity, object]]:
         """The quantities, with their values."""
         raise TypeError(f"{type(self).__name__} shows no quantities")
 
     def _repr_html_(self) -> str:
-        return quantities_table(self.shown(), type(self).__name__)
+        return html_quantities_table(self.quantities_with_values(), type(self).__name__)
 
 
-def folded(caption: str, content: Markup) -> Markup:
+def html_details(caption: str, content: HtmlMarkup) -> HtmlMarkup:
     """Content that is shown once its caption is clicked."""
-    return Markup(f"<details><summary>{as_html(caption)}</summary>{content}</details>")
+    return HtmlMarkup(f"<details><summary>{escape_html(caption)}</summary>{content}</details>")
 
 
-def symbol(formula: str) -> Markup:
+def html_symbol(formula: str) -> HtmlMarkup:
     """A symbol as `Quantity` states it, without the need of MathJax."""
     if "$" not in formula:
-        return Markup(as_html(formula))
-    text = as_html(formula.strip("$"))
-    text = re.sub(r"\\([A-Za-z]+)", lambda found: _command(found[1]), text)
-    text = re.sub(r"([_^])(?:\{([^{}]*)\}|(&\w+;|.))", _raised, text)
+        return HtmlMarkup(escape_html(formula))
+    text = escape_html(formula.strip("$"))
+    text = re.sub(r"\\([A-Za-z]+)", lambda found: _html_character(found[1]), text)
+    text = re.sub(r"([_^])(?:\{([^{}]*)\}|(&\w+;|.))", _script_html, text)
     bare = re.sub(r"[{}]|\\.", "", text)
-    return Markup(f"<i>{bare}</i>")
+    return HtmlMarkup(f"<i>{bare}</i>")
 
 
-def unit(about: Quantity) -> Markup:
+def html_unit(about: Quantity) -> HtmlMarkup:
     """Unit of a quantity, or its scale where it is dimensionless; empty for 1."""
     if about.scale:
         scale = about.scale.replace("sigma", r"\sigma")
-        return symbol(f"${scale}$")
-    return Markup(as_html(about.units if about.units != "1" else ""))
+        return html_symbol(f"${scale}$")
+    return HtmlMarkup(escape_html(about.units if about.units != "1" else ""))
 
 
-def _command(name: str) -> str:
+def _html_character(name: str) -> str:
     """Letters and signs have the same names in HTML."""
-    return name if name in _FUNCTIONS else html5.get(f"{name};", "")
+    return name if name in _FUNCTION_NAMES else html5.get(f"{name};", "")
 
 
-def _raised(found: re.Match[str]) -> str:
-    tag = _RAISED[found[1]]
+def _script_html(found: re.Match[str]) -> str:
+    tag = _SCRIPT_TAGS[found[1]]
     return f"<{tag}>{found[2] if found[2] is not None else found[3]}</{tag}>"
 
 
-def _cell(value: Any) -> str:
-    if isinstance(value, Markup):
+def _format_cell(value: Any) -> str:
+    if isinstance(value, HtmlMarkup):
         return value
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
         return "" if math.isnan(value) else f"{value:.6g}"
-    return as_html(value)
+    return escape_html(value)

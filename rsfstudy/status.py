@@ -69,4 +69,4 @@ class Status(IntEnum):
 
 
 #: Names of the statuses, by what files hold.
-LABELS = {int(status): status.label for status in Status}
+STATUS_LABELS = {int(status): status.label for status in Status}

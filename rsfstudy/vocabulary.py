@@ -14,10 +14,10 @@ from types import MappingProxyType
 from typing import Any
 
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.registry import QUANTITIES as SCENE
+from rsfstudy.slider.registry import FIELD_QUANTITIES as SCENE
 
 
-def _table() -> Iterator[Quantity]:
+def _read_vocabulary() -> Iterator[Quantity]:
     """The quantities beside those of scenes, in the order in which datasets and pages name them:
     of scenes and rigs; of measures, or along motions; of reductions; and of every lattice.
     """
@@ -26,9 +26,9 @@ def _table() -> Iterator[Quantity]:
         yield from (Quantity(**row) for row in rows)
 
 
-QUANTITIES: dict[str, Quantity] = {about.name: about for about in (*SCENE, *_table())}
+QUANTITIES: dict[str, Quantity] = {about.name: about for about in (*SCENE, *_read_vocabulary())}
 
-_SUFFIXES = {
+_SUFFIX_DESCRIPTIONS = {
     "error": "numerical error estimate of",
     "stable": "value verified as stable beside",
     "unstable": "value verified as unstable beside",
@@ -39,10 +39,10 @@ _SUFFIXES = {
     "closed_form": "published closed form beside",
 }
 
-_COUNTS = ("points", "crossings")
+_COUNT_SUFFIXES = ("points", "crossings")
 
 #: Times that were measured: no two runs share them.
-MEASURED_TIMES = (
+TIMING_VARIABLES = (
     "wall_time",
     "run_time",
     "relative_time",
@@ -54,7 +54,7 @@ MEASURED_TIMES = (
 )
 
 #: Coordinates that follow from an axis: name -> (axis, formula).
-DERIVED: dict[str, tuple[str, Callable[[float], float]]] = {
+DERIVED_COORDINATES: dict[str, tuple[str, Callable[[float], float]]] = {
     "log_load_velocity_ratio": (
         "load_velocity_ratio",
         lambda ratio: -math.inf if ratio == 0.0 else math.log(ratio),
@@ -66,34 +66,38 @@ DERIVED: dict[str, tuple[str, Callable[[float], float]]] = {
 }
 
 
-def coverage(name: str) -> str:
+def coverage_content_type(name: str) -> str:
     """Kind of content of a variable, in the words of ISO 19115-1."""
-    if name in ("rhs_evaluations", *MEASURED_TIMES):
+    if name in ("rhs_evaluations", *TIMING_VARIABLES):
         return "auxiliaryInformation"
     if name in ("status", "message") or re.search("_(error|stderr|misfit|points)$", name):
         return "qualityInformation"
     return "modelResult"
 
 
-def quantity(name: str, own: Mapping[str, Quantity] = MappingProxyType({})) -> Quantity:
+def find_quantity(
+    name: str, extra_quantities: Mapping[str, Quantity] = MappingProxyType({})
+) -> Quantity:
     """Look a quantity up, deriving ``<name>_error`` and its like from ``<name>``.
 
-    Names that neither `own` nor the vocabulary holds describe themselves.
+    Names that neither `extra_quantities` nor the vocabulary holds describe themselves.
 
     Parameters
     ----------
     name : str
-    own : mapping of str to Quantity
+    extra_quantities : mapping of str to Quantity
         What a study says of its own numbers.
     """
-    if name in own:
-        return own[name]
+    if name in extra_quantities:
+        return extra_quantities[name]
     if name in QUANTITIES:
         return QUANTITIES[name]
-    match = re.fullmatch(rf"(\w+)_({'|'.join(_SUFFIXES)})", name)
+    match = re.fullmatch(rf"(\w+)_({'|'.join(_SUFFIX_DESCRIPTIONS)})", name)
     if match:
-        of = quantity(match[1], own)
-        units = "1" if match[2] in _COUNTS else of.units
-        scale = "" if match[2] in _COUNTS else of.scale
-        return Quantity(name, of.symbol, units, f"{_SUFFIXES[match[2]]} {of.long_name}", scale)
+        of = find_quantity(match[1], extra_quantities)
+        units = "1" if match[2] in _COUNT_SUFFIXES else of.units
+        scale = "" if match[2] in _COUNT_SUFFIXES else of.scale
+        return Quantity(
+            name, of.symbol, units, f"{_SUFFIX_DESCRIPTIONS[match[2]]} {of.long_name}", scale
+        )
     return Quantity(name, "", "1", name.replace("_", " "))

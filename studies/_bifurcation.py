@@ -8,36 +8,36 @@ from typing import ClassVar
 import numpy as np
 
 from rsfstudy import Scene, Segment
-from rsfstudy.analysis.approach import Course, course
-from rsfstudy.analysis.cycles import LN10, Cycle, more_events
-from rsfstudy.analysis.return_map import STEP, Orbit, ReturnMap, section
+from rsfstudy.analysis.approach import EventSequence, follow_to_orbit
+from rsfstudy.analysis.cycles import LN10, Cycle, more_events_remedy
+from rsfstudy.analysis.return_map import DIFFERENCE_STEP, Orbit, ReturnMap, section_at
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._single_step import check_leaves_alone
+from rsfstudy.measures._single_step import check_steady_loading
 from rsfstudy.measures.limit_cycle import (
-    NUDGE,
-    PEAK,
-    PERIOD,
-    SETTLES,
-    cycle_errors,
-    judged,
-    without_period,
+    PEAK_INDEX,
+    PERIOD_OUTPUT,
+    PERTURBATION_DISPLACEMENT,
+    STEADY_SLIDING_OUTCOME,
+    aperiodic_outcome,
+    check_errors,
+    estimate_cycle_errors,
 )
-from rsfstudy.motion.accuracy import Accuracy, error_between
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.accuracy import Accuracy, estimate_error
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.status import Status
 
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
-_BY_CHANCE = 0.02
+_COINCIDENCE_FLOOR = 0.02
 #: Events along which a departure turns to where it grows, before growth counts: other directions
 #: lag behind by a factor of ten an event and more.
-_TURNING = 16
+_ALIGNMENT_EVENTS = 16
 #: How many guesses there are at a cycle of one event, and how far off the first may be.
-_GUESSES, _AWAY = 3, 0.3
+_MAX_CYCLE_GUESSES, _MAX_GUESS_DISTANCE = 3, 0.3
 
 _OUTPUTS = (
-    replace(PERIOD, error=True),
+    replace(PERIOD_OUTPUT, error=True),
     Output(
         "floquet_multiplier",
         r"$\mathrm{Re}\,\Lambda_1$",
@@ -125,7 +125,7 @@ class Bifurcation(Measure):
     transient: int = 64
     events: int = 32
     name: ClassVar[str] = "bifurcation"
-    headline = "period_events"
+    primary_output = "period_events"
     typical_work = 120_000
     outputs = _OUTPUTS
     dimensions = (Quantity("event", "", "1", "number of the event, of those that are kept"),)
@@ -140,69 +140,73 @@ class Bifurcation(Measure):
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         return {"event": np.arange(1, self.events + 1)}
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Follow the events, and close the cycle of one event at two accuracies."""
-        check_leaves_alone(scene)
-        if scene.log_load_rate == -math.inf:
+        check_steady_loading(scene)
+        if scene.log_load_velocity == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
-        if not scene.is_disturbed:
-            scene = scene.under(Segment(1.0, NUDGE))
-        motion = course(scene, accuracy, meter, self.transient + self.events, to_its_end=True)
+        if not scene.is_perturbed:
+            scene = scene.with_segment(Segment(1.0, PERTURBATION_DISPLACEMENT))
+        motion = follow_to_orbit(
+            scene, accuracy, meter, self.transient + self.events, follow_all=True
+        )
         if motion is None:
-            return SETTLES
-        values = self._of_events(scene, motion.seen[-self.events :])
-        status, why, of_one = _of_one_event(scene, accuracy, motion, meter)
+            return STEADY_SLIDING_OUTCOME
+        values = self._event_outputs(scene, motion.cycles[-self.events :])
+        status, why, of_one = _one_event_cycle_outputs(scene, accuracy, motion, meter)
         values |= of_one
         if motion.orbit is None:
-            growth = _growth(ReturnMap(scene, accuracy, meter), motion.seen, self.events)
+            growth = _mean_growth(ReturnMap(scene, accuracy, meter), motion.cycles, self.events)
             values |= zip(("lyapunov_exponent", "lyapunov_exponent_stderr"), growth, strict=True)
-            remedy = more_events(max(self.transient, self.events), "transient")
-            ended = without_period(scene, motion, remedy)
+            remedy = more_events_remedy(max(self.transient, self.events), "transient")
+            ended = aperiodic_outcome(scene, motion, remedy)
             if status is Status.OK:
                 status, why = ended.status, ended.message
             return Outcome(status, values, why)
-        values["lyapunov_exponent"] = _growth_of_cycle(motion.orbit)
+        values["lyapunov_exponent"] = _lyapunov_exponent(motion.orbit)
         values |= {"period_events": float(motion.orbit.period), "period_events_error": 0.0}
         if status is Status.OK and "one_event_log10_peak" not in values:
             why = "the motion comes close to no cycle of one event"
         return Outcome(status, values, why)
 
-    def _of_events(self, scene: Scene, seen: Sequence[Cycle]) -> dict[str, float | np.ndarray]:
+    def _event_outputs(self, scene: Scene, seen: Sequence[Cycle]) -> dict[str, float | np.ndarray]:
         """Numbers of the events that are kept."""
-        peaks = np.array([cycle.fastest / LN10 for cycle in seen])
+        peaks = np.array([cycle.max_log_slip_rate / LN10 for cycle in seen])
         return {
             "peak_log10_slip_rate": peaks,
-            "event_interval": np.array([cycle.interval for cycle in seen]),
+            "event_interval": np.array([cycle.recurrence_interval for cycle in seen]),
             "peak_spread": float(np.ptp(peaks)),
             "critical_stiffness": scene.critical_stiffness,
         }
 
 
-def _of_one_event(
-    scene: Scene, accuracy: Accuracy, motion: Course, meter: Meter
+def _one_event_cycle_outputs(
+    scene: Scene, accuracy: Accuracy, motion: EventSequence, meter: WorkMeter
 ) -> tuple[Status, str, dict[str, float | np.ndarray]]:
     """The cycle of one event, if the motion comes close to one; and whether it is known."""
-    one = _cycle_of_one_event(ReturnMap(scene, accuracy, meter), motion.seen)
+    one = _find_one_event_cycle(ReturnMap(scene, accuracy, meter), motion.cycles)
     if one is None:
         return Status.OK, "", {}
-    again = ReturnMap(scene, accuracy.refined(), meter).orbit(one.begin, 1, one.cycles[0].swing)
+    again = ReturnMap(scene, accuracy.refined(), meter).find_orbit(
+        one.start_section, 1, one.cycles[0].log_slip_rate_range
+    )
     if again is None:
         return Status.OK, "", {}
     (first, *_), (same, *_) = one.multipliers, again.multipliers
-    chance = _BY_CHANCE * accuracy.rtol
-    errors = cycle_errors(accuracy, one, again)
+    chance = _COINCIDENCE_FLOOR * accuracy.rtol
+    errors = estimate_cycle_errors(accuracy, one, again)
     values: dict[str, float | np.ndarray] = {
         "floquet_multiplier": float(first.real),
-        "floquet_multiplier_error": error_between(first.real, same.real, chance),
+        "floquet_multiplier_error": estimate_error(first.real, same.real, chance),
         "floquet_multiplier_imaginary": float(abs(first.imag)),
         "floquet_multiplier_size": float(abs(first)),
-        "one_event_log10_peak": float(one.numbers[PEAK]),
-        "one_event_log10_peak_error": float(errors[PEAK]),
+        "one_event_log10_peak": float(one.primary_outputs[PEAK_INDEX]),
+        "one_event_log10_peak_error": float(errors[PEAK_INDEX]),
     }
-    return *judged(accuracy, one, errors, slice(PEAK, PEAK + 1)), values
+    return *check_errors(accuracy, one, errors, slice(PEAK_INDEX, PEAK_INDEX + 1)), values
 
 
-def _growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float, float]:
+def _mean_growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float, float]:
     """By how much small departures grow along the last so many events, as a logarithm: mean and
     its standard error, over as many blocks of events as each has; NaN where they lead away from
     the motion.
@@ -210,28 +214,30 @@ def _growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float, flo
     Which way a departure grows it learns along the events before, or the first half where there
     are few.
     """
-    seen = seen[-(kept + _TURNING) :]
-    step = STEP * by.scene.a * max(cycle.swing for cycle in seen)
-    departure, grown = np.ones(len(section(seen[0].begin))), []
+    seen = seen[-(kept + _ALIGNMENT_EVENTS) :]
+    step = DIFFERENCE_STEP * by.scene.a * max(cycle.log_slip_rate_range for cycle in seen)
+    departure, grown = np.ones(len(section_at(seen[0].start_point))), []
     for cycle in seen:
-        start, offset = section(cycle.begin), step * departure / np.linalg.norm(departure)
-        ahead, behind = by.image(start + offset), by.image(start - offset)
+        start, offset = section_at(cycle.start_point), step * departure / np.linalg.norm(departure)
+        ahead, behind = by.compute_image(start + offset), by.compute_image(start - offset)
         if ahead is None or behind is None:
             return math.nan, math.nan
         departure = (ahead - behind)[: len(start)] / (2.0 * step)
         grown.append(math.log(np.linalg.norm(departure)))
-    grown = grown[min(_TURNING, len(grown) // 2) :]
+    grown = grown[min(_ALIGNMENT_EVENTS, len(grown) // 2) :]
     blocks = np.array_split(grown, max(2, math.isqrt(len(grown))))
     means = [block.mean() for block in blocks]
     return float(np.mean(grown)), float(np.std(means, ddof=1) / math.sqrt(len(means)))
 
 
-def _cycle_of_one_event(by: ReturnMap, seen: Sequence[Cycle]) -> Orbit | None:
+def _find_one_event_cycle(by: ReturnMap, seen: Sequence[Cycle]) -> Orbit | None:
     """The cycle of one event that a motion comes close to, whether it attracts or not."""
     for near in _closest_returns(seen):
         # where periods have doubled, events go back and forth around it
-        midpoint = 0.5 * (section(near.begin) + section(near.end))
-        orbit = by.orbit(midpoint, 1, near.swing, reach=_AWAY)
+        midpoint = 0.5 * (section_at(near.start_point) + section_at(near.end_point))
+        orbit = by.find_orbit(
+            midpoint, 1, near.log_slip_rate_range, max_distance=_MAX_GUESS_DISTANCE
+        )
         if orbit is not None:
             return orbit
     return None
@@ -243,13 +249,13 @@ def _closest_returns(seen: Sequence[Cycle]) -> list[Cycle]:
     """
 
     def off(cycle: Cycle) -> float:
-        apart = np.subtract(cycle.end.psis, cycle.begin.psis)
-        return float(np.abs(apart).max()) / cycle.swing
+        apart = np.subtract(cycle.end_point.psis, cycle.start_point.psis)
+        return float(np.abs(apart).max()) / cycle.log_slip_rate_range
 
-    return sorted(seen[len(seen) // 2 :], key=off)[:_GUESSES]
+    return sorted(seen[len(seen) // 2 :], key=off)[:_MAX_CYCLE_GUESSES]
 
 
-def _growth_of_cycle(orbit: Orbit) -> float:
+def _lyapunov_exponent(orbit: Orbit) -> float:
     """The Lyapunov exponent of a cycle."""
     size = float(abs(orbit.multipliers[0]))
     return math.log(size) / orbit.period if size else -math.inf

@@ -11,7 +11,7 @@ from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Reduction
 
 #: What is given, by the ends of the names: units, and what it is.
-_GIVEN = {
+_RESULT_DESCRIPTIONS = {
     "integrator": ("", "integrator with the least right-hand sides"),
     "work": ("1", "its right-hand sides"),
     "default_work": ("1", "right-hand sides of the default integrator"),
@@ -23,7 +23,7 @@ _GIVEN = {
 
 
 @dataclass(frozen=True)
-class Cheapest(Reduction):
+class CheapestIntegrator(Reduction):
     """The integrator that reaches a number of correct digits with the least work.
 
     Work at exactly that many digits is interpolated, in logarithms, between neighbouring runs of
@@ -53,7 +53,9 @@ class Cheapest(Reduction):
     def quantities(self) -> Sequence[Quantity]:
         """Quantities that are given, and the digits that they are given for."""
         digits = Quantity("digits", "", "1", "correct decimal digits wanted")
-        return digits, *(Quantity(f"{self.name}_{n}", "", *about) for n, about in _GIVEN.items())
+        return digits, *(
+            Quantity(f"{self.name}_{n}", "", *about) for n, about in _RESULT_DESCRIPTIONS.items()
+        )
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compare the integrators; nothing where `default` is not among them."""
@@ -66,7 +68,7 @@ class Cheapest(Reduction):
             """Values of each integrator where it reaches the digits."""
             core = [["requested_digits"], ["requested_digits"], ["digits"]]
             return xr.apply_ufunc(
-                _at_digits,
+                _values_at_digits,
                 dataset[self.of],
                 values,
                 digits,
@@ -94,7 +96,7 @@ class Cheapest(Reduction):
         return self.results(note, result)
 
 
-def _at_digits(achieved: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def _values_at_digits(achieved: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """Values at the first run from which on all reach the digits wanted; NaN where none does."""
     known = np.isfinite(achieved) & np.isfinite(values)
     achieved, values = achieved[known], values[known]
@@ -102,10 +104,10 @@ def _at_digits(achieved: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> 
         return np.full(wanted.shape, np.nan)
     # digits that a loose request reaches by luck do not count, only those all tighter ones reach
     kept = np.minimum.accumulate(achieved[::-1])[::-1]
-    return np.array([_first(kept, values, digits) for digits in wanted])
+    return np.array([_first_value_with_digits(kept, values, digits) for digits in wanted])
 
 
-def _first(kept: np.ndarray, values: np.ndarray, digits: float) -> float:
+def _first_value_with_digits(kept: np.ndarray, values: np.ndarray, digits: float) -> float:
     reached = np.flatnonzero(kept >= digits)
     if reached.size == 0:
         return float("nan")

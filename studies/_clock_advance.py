@@ -11,30 +11,30 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from rsfstudy import Scene, Segment
-from rsfstudy.analysis.approach import Approach
+from rsfstudy.analysis.approach import CycleSearch
 from rsfstudy.analysis.return_map import ReturnMap
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion.accuracy import Accuracy, error_between
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.accuracy import Accuracy, estimate_error
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.events import Event, EventSpecification, rise
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.quantity import Output
-from rsfstudy.slider.loading.oscillation import Oscillation
+from rsfstudy.slider.loading.oscillation import NormalStressOscillation
 from rsfstudy.slider.point import Point
 from rsfstudy.status import Status
 
 #: Displacement step in D_c that sets free motion off, and most events until its cycle repeats.
-NUDGE, EVENTS = 0.1, 300
+START_DISPLACEMENT_STEP, MAX_EVENTS = 0.1, 300
 #: Part of the accuracy asked for to which two runs may agree by chance.
-_BY_CHANCE = 0.06
+_COINCIDENCE_FLOOR = 0.06
 #: ln(V/V_*) beyond which what is left of the time to an event is nothing: exp(-9) D_c/V_*.
-FAST = 9.0
+NEGLIGIBLE_TIME_LOG_RATE = 9.0
 #: Times at which Coulomb stress is looked at.
-TIMES = 2001
+COULOMB_STRESS_SAMPLES = 2001
 INTERVAL = "recurrence_interval"
 #: Laws of which there are linear equations here.
-LAWS = ("slip", "slowness")
+LINEARISED_LAWS = ("slip", "slowness")
 
 _OUTPUTS = (
     Output(
@@ -76,7 +76,7 @@ class ClockAdvance(Measure):
 
     cycle_phase: float = 0.5
     name: ClassVar[str] = "clock_advance"
-    headline = "clock_advance"
+    primary_output = "clock_advance"
     typical_work = 60_000
     outputs = _OUTPUTS
 
@@ -84,25 +84,25 @@ class ClockAdvance(Measure):
         if not 0.0 < self.cycle_phase < 1.0:
             raise InvalidValue("cycle_phase", self.cycle_phase, "must lie between 0 and 1")
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """From a free cycle, and once more with smaller tolerances for the errors."""
-        if not isinstance(scene.parts.loading, Oscillation):
+        if not isinstance(scene.parts.loading, NormalStressOscillation):
             return Outcome(Status.NO_STEP, message="normal stress does not oscillate")
-        runs = [self._next(scene, how, meter) for how in (accuracy, accuracy.refined())]
+        runs = [self._find_next_event(scene, how, meter) for how in (accuracy, accuracy.refined())]
         one, again = runs
         if one is None or again is None:
             why = "the motion settles to steady sliding"
             return Outcome(Status.NO_LIMIT_CYCLE, message=why)
-        chance = _BY_CHANCE * accuracy.rtol
+        chance = _COINCIDENCE_FLOOR * accuracy.rtol
         errors = {
-            f"{name}_error": error_between(getattr(one, name), getattr(again, name), chance, scale)
+            f"{name}_error": estimate_error(getattr(one, name), getattr(again, name), chance, scale)
             for name, scale in (("clock_advance", one.recurrence_interval), (INTERVAL, None))
         }
         values = {
             "clock_advance": one.clock_advance,
             INTERVAL: one.recurrence_interval,
-            "linear_clock_advance": _linear(scene, one, meter),
-            "coulomb_clock_advance": _coulomb(scene, one),
+            "linear_clock_advance": _linear_clock_advance(scene, one, meter),
+            "coulomb_clock_advance": _coulomb_clock_advance(scene, one),
         }
         ratios = {
             f"{by}_ratio": one.clock_advance / (values[f"{by}_clock_advance"] or math.nan)
@@ -110,26 +110,30 @@ class ClockAdvance(Measure):
         }
         return Outcome(Status.OK, {**values, **ratios, **errors})
 
-    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+    def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Both are differences of times."""
         return dict.fromkeys(("clock_advance", INTERVAL), 2.0 * values[INTERVAL])
 
-    def _next(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> "_Next | None":
+    def _find_next_event(
+        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
+    ) -> "_NextEvent | None":
         """The next event after a train comes; None where there is no stick-slip."""
-        free = scene.under(Segment(scene.load_velocity))
-        cycle = _cycle(free, accuracy, meter)
+        free = scene.with_segment(Segment(scene.load_velocity))
+        cycle = _find_free_cycle(free, accuracy, meter)
         if cycle is None:
             return None
         start, (first, second) = cycle
         begins = first + self.cycle_phase * (second - first)
-        *_earlier, begin = follow(free, accuracy, meter, start=start, until=begins)
-        forced, watches = scene.with_(oscillation_begin=begins), _watches(scene)
-        (comes,) = _events(follow(forced, accuracy, meter, watches, since=begin), 1)
-        onset = start.coefficient
-        return _Next(second - first, second - comes, second - begins, begin.point, onset)
+        *_earlier, begin = integrate_events(free, accuracy, meter, start=start, until=begins)
+        forced, watches = scene.with_(oscillation_begin=begins), _event_specifications(scene)
+        (comes,) = _event_times(
+            integrate_events(forced, accuracy, meter, watches, resume_from=begin), 1
+        )
+        onset = start.friction_coefficient
+        return _NextEvent(second - first, second - comes, second - begins, begin.point, onset)
 
 
-class _Next(NamedTuple):
+class _NextEvent(NamedTuple):
     """The next event after a train comes.
 
     Attributes
@@ -145,43 +149,49 @@ class _Next(NamedTuple):
 
     recurrence_interval: float
     clock_advance: float
-    left: float
-    begin: Point
-    onset: float
+    remaining_time: float
+    cycle_start: Point
+    train_start: float
 
 
-def _cycle(
-    free: Scene, accuracy: Accuracy, meter: Meter
+def _find_free_cycle(
+    free: Scene, accuracy: Accuracy, meter: WorkMeter
 ) -> tuple[Point, tuple[float, float]] | None:
     """A free cycle: where it begins, with V at V_0, and times of two events from there; None where
     the motion settles to steady sliding.
     """
-    nudged = free.under(Segment(free.load_velocity, NUDGE))
-    approach = Approach(nudged, accuracy, meter)
-    if not approach.follow(EVENTS):
+    nudged = free.with_segment(Segment(free.load_velocity, START_DISPLACEMENT_STEP))
+    approach = CycleSearch(nudged, accuracy, meter)
+    if not approach.run(MAX_EVENTS):
         return None
-    start = ReturnMap(free, accuracy, meter).point(approach.orbit.begin)
-    motion = follow(free, accuracy, meter, _watches(free), start=start, clock=True)
+    start = ReturnMap(free, accuracy, meter).point_at(approach.orbit.start_section)
+    motion = integrate_events(
+        free, accuracy, meter, _event_specifications(free), start=start, with_time=True
+    )
     begin = next(motion).point  # all of it
-    first, second = _events(motion, 2)
+    first, second = _event_times(motion, 2)
     return begin, (first, second)
 
 
-def _watches(scene: Scene) -> list[EventSpecification]:
+def _event_specifications(scene: Scene) -> list[EventSpecification]:
     """An event comes as the slip rate reaches the instability norm."""
-    return [rise("log_slip_rate", scene.log_norm_rate)]
+    return [rise("log_slip_rate", scene.log_instability_rate)]
 
 
-def _events(motion: Iterator[Event], count: int) -> list[float]:
+def _event_times(motion: Iterator[Event], count: int) -> list[float]:
     """Times of the first events of a motion that was asked for nothing else."""
-    return list(islice((event.time for event in motion if event.watch is not None), count))
+    return list(islice((event.time for event in motion if event.specification is not None), count))
 
 
-def _train(scene: Scene) -> Callable[[float], float]:
+def _normal_stress_change(scene: Scene) -> Callable[[float], float]:
     """Change of normal stress over sigma_*, against time since the train begins."""
     loading = scene.parts.loading
-    assert isinstance(loading, Oscillation)
-    amplitude, angle, lasts = loading.oscillation_amplitude, loading.angle, loading.lasts
+    assert isinstance(loading, NormalStressOscillation)
+    amplitude, angle, lasts = (
+        loading.oscillation_amplitude,
+        loading.initial_phase,
+        loading.oscillation_duration,
+    )
     turn = 2.0 * math.pi / loading.oscillation_period
 
     def train(time: float) -> float:
@@ -190,7 +200,7 @@ def _train(scene: Scene) -> Callable[[float], float]:
     return train
 
 
-def _linear(scene: Scene, found: _Next, meter: Meter) -> float:
+def _linear_clock_advance(scene: Scene, found: _NextEvent, meter: WorkMeter) -> float:
     """Clock advance to first order in the amplitude; NaN of scenes with other equations than these.
     Departures of spring stress f and state Psi from the free motion grow along it by
 
@@ -200,11 +210,15 @@ def _linear(scene: Scene, found: _Next, meter: Meter) -> float:
 
     once slip rate grows by itself, the motion is the free one of an earlier time, dx = Dt dx/dt.
     """
-    damps = scene.parts.dynamics.damping(0.0)
-    if scene.law not in LAWS or scene.normal_stress != "imposed" or scene.alpha or damps:
+    damps = scene.parts.dynamics.radiated_stress_slope(0.0)
+    if scene.law not in LINEARISED_LAWS or scene.normal_stress != "imposed" or scene.alpha or damps:
         return math.nan
     a, b, mu_star, stiffness = scene.a, scene.b, scene.mu_star, scene.stiffness
-    amplitude, slip_law, train = scene.oscillation_amplitude, scene.law == "slip", _train(scene)
+    amplitude, slip_law, train = (
+        scene.oscillation_amplitude,
+        scene.law == "slip",
+        _normal_stress_change(scene),
+    )
 
     def along(t: float, y: np.ndarray, pressed: float) -> tuple[float, float, list[float]]:
         f, psi, df, dpsi = y
@@ -224,12 +238,12 @@ def _linear(scene: Scene, found: _Next, meter: Meter) -> float:
         return along(t, y, train(t) / amplitude)[-1]
 
     def fast(t: float, y: np.ndarray) -> float:
-        return float((y[0] - y[1]) / a - FAST)
+        return float((y[0] - y[1]) / a - NEGLIGIBLE_TIME_LOG_RATE)
 
     setattr(fast, "terminal", True)  # noqa: B010  # as SciPy asks for it
-    latest = 2.0 * found.left
+    latest = 2.0 * found.remaining_time
     over = min((scene.oscillation_cycles or math.inf) * scene.oscillation_period, latest)
-    y: Any = [found.begin.spring_stress, found.begin.psis[0], 0.0, 0.0]
+    y: Any = [found.cycle_start.spring_stress, found.cycle_start.psis[0], 0.0, 0.0]
     # no step is longer than part of a wave
     for begin, end, longest in (
         (0.0, over, scene.oscillation_period / 8.0),
@@ -245,18 +259,18 @@ def _linear(scene: Scene, found: _Next, meter: Meter) -> float:
     return float(amplitude * dx / growth)
 
 
-def _coulomb(scene: Scene, found: _Next) -> float:
+def _coulomb_clock_advance(scene: Scene, found: _NextEvent) -> float:
     """Clock advance where the spring is loaded at K V_0, and an event comes as soon as friction is
     what it is at the onset of a free one: K V_0 (t - t_1) = mu dsigma/sigma_*.
     """
     loading = scene.stiffness * scene.load_velocity
-    latest = found.left + found.onset * scene.oscillation_amplitude / loading
+    latest = found.remaining_time + found.train_start * scene.oscillation_amplitude / loading
 
-    train = _train(scene)
+    train = _normal_stress_change(scene)
 
     def missing(time: float) -> float:
-        return found.onset * train(time) - loading * (time - found.left)
+        return found.train_start * train(time) - loading * (time - found.remaining_time)
 
-    times = np.linspace(0.0, 1.01 * latest, TIMES).tolist()
+    times = np.linspace(0.0, 1.01 * latest, COULOMB_STRESS_SAMPLES).tolist()
     first = next(place for place, time in enumerate(times) if missing(time) <= 0.0)
-    return found.left - float(brentq(missing, times[first - 1], times[first]))
+    return found.remaining_time - float(brentq(missing, times[first - 1], times[first]))

@@ -6,6 +6,6 @@ SEGALL_RICE = "Segall and Rice (1995)"
 REFERENCE = f"{SEGALL_RICE}, J. Geophys. Res. 100, 22155-22171"
 
 #: a = 0.01, b = 0.015 and mu_* = 0.5: E = mu_* eps/(beta sigma_*) is half of `dilatancy`.
-FAULT = Scene(
+DILATANT_FAULT = Scene(
     a=0.01, b_over_a=1.5, mu_star=0.5, normal_stress="constant", fluid="dilatant", drainage=1.0
 )

@@ -11,34 +11,42 @@ if TYPE_CHECKING:
     import xarray as xr
 
 #: The family from slip (eps = 0) to slowness (eps = 1), and laws beside it.
-SLIP, MIDDLE, SLOWNESS = "eps = 0 (slip)", "eps = 0.5", "eps = 1 (slowness)"
-PERRIN, COMPOSITE, CUT_OFF = "Perrin-Rice-Zheng", "composite", "cut-off"
+SLIP_END, FAMILY_MIDDLE, SLOWNESS_END = "eps = 0 (slip)", "eps = 0.5", "eps = 1 (slowness)"
+PERRIN_RICE_ZHENG, COMPOSITE, CUT_OFF = "Perrin-Rice-Zheng", "composite", "cut-off"
 NAGATA = "slowness, c = 1"
 #: V_c/V_* of the composite law and of the cut-off.
-HEALS_UP_TO, CUT_AT = 100.0, 1e4
+COMPOSITE_CUTOFF_VELOCITY, CUT_OFF_VELOCITY = 100.0, 1e4
 
 
-def _family(exponent: float) -> dict[str, str | float]:
+def _family_fields(exponent: float) -> dict[str, str | float]:
     return {"law": "family", "law_exponent": exponent}
 
 
 LAWS: dict[str, dict[str, str | float]] = {
-    SLIP: _family(0.0),
-    "eps = 0.25": _family(0.25),
-    MIDDLE: _family(0.5),
-    "eps = 0.75": _family(0.75),
-    SLOWNESS: _family(1.0),
-    PERRIN: {"law": "perrin_rice_zheng"},
-    COMPOSITE: {"law": "composite", "cutoff_velocity_ratio": HEALS_UP_TO},
-    CUT_OFF: {"law": "cut_off", "cutoff_velocity_ratio": CUT_AT},
+    SLIP_END: _family_fields(0.0),
+    "eps = 0.25": _family_fields(0.25),
+    FAMILY_MIDDLE: _family_fields(0.5),
+    "eps = 0.75": _family_fields(0.75),
+    SLOWNESS_END: _family_fields(1.0),
+    PERRIN_RICE_ZHENG: {"law": "perrin_rice_zheng"},
+    COMPOSITE: {"law": "composite", "cutoff_velocity_ratio": COMPOSITE_CUTOFF_VELOCITY},
+    CUT_OFF: {"law": "cut_off", "cutoff_velocity_ratio": CUT_OFF_VELOCITY},
     NAGATA: {"law": "slowness", "stress_dependence": 1.0},
 }
 
 #: Those that are told apart by name: all but the quarters of the family.
-NAMED = (SLIP, MIDDLE, SLOWNESS, PERRIN, COMPOSITE, CUT_OFF, NAGATA)
+LABELLED_LAWS = (
+    SLIP_END,
+    FAMILY_MIDDLE,
+    SLOWNESS_END,
+    PERRIN_RICE_ZHENG,
+    COMPOSITE,
+    CUT_OFF,
+    NAGATA,
+)
 
 #: w exp(w) = exp(-V_*/V_c): the steady state of the composite law at V_*.
-HEALED = 0.56353169695
+COMPOSITE_STEADY_STATE = 0.56353169695
 
 REFERENCES = [
     "Perrin, Rice and Zheng (1995), J. Mech. Phys. Solids 43, 1461-1495",
@@ -52,29 +60,41 @@ REFERENCES = [
 
 #: Colour and line, by their places in the cycle of the style, of laws beside the family; no colour
 #: is one of the family's, and no two lines look alike in grey.
-_BESIDE = {PERRIN: (1, 1), COMPOSITE: (3, 3), CUT_OFF: (6, 2), NAGATA: (5, 4)}
+_STYLES_OUTSIDE_FAMILY = {
+    PERRIN_RICE_ZHENG: (1, 1),
+    COMPOSITE: (3, 3),
+    CUT_OFF: (6, 2),
+    NAGATA: (5, 4),
+}
 
 
-def shade(exponent: float) -> Any:
+def family_colour(exponent: float) -> Any:
     """Colour of a member of the family of laws, from dark to light."""
     from matplotlib import colormaps
 
     return colormaps["viridis"](0.85 * exponent)
 
 
-def line_of_law(row: xr.Dataset) -> dict[str, Any]:
+def law_style(row: xr.Dataset) -> dict[str, Any]:
     """The family solid, from dark to light and with markers; others in other colours and dashed."""
-    from rsfstudy.plots import look, marker
+    from rsfstudy.plots import cycle_marker, cycle_style
 
     name, exponent = str(row["evolution"].item()), float(row.get("law_exponent", math.nan))
     if math.isnan(exponent):
-        colour, dashes = next((at for law, at in _BESIDE.items() if name.startswith(law)), (2, 1))
-        return {**look(dashes), "color": look(colour)["color"], "marker": "", "markersize": 2.8}
-    solid = {"color": shade(exponent), "linestyle": "-", "markersize": 2.8}
-    return solid | {"marker": marker(round(4.0 * exponent))}
+        colour, dashes = next(
+            (at for law, at in _STYLES_OUTSIDE_FAMILY.items() if name.startswith(law)), (2, 1)
+        )
+        return {
+            **cycle_style(dashes),
+            "color": cycle_style(colour)["color"],
+            "marker": "",
+            "markersize": 2.8,
+        }
+    solid = {"color": family_colour(exponent), "linestyle": "-", "markersize": 2.8}
+    return solid | {"marker": cycle_marker(round(4.0 * exponent))}
 
 
-def by_law(x: str, y: str, log: str, **more: Any) -> Panel:
+def panel_by_normal_stress(x: str, y: str, log: str, **more: Any) -> Panel:
     """A panel for each normal stress condition, with a curve a law."""
-    laws: dict[str, Any] = {"by": ["evolution"], "each": ["normal_stress"], "style": line_of_law}
-    return Panel(x=x, y=y, log=log, alike=y, **laws, **more)
+    laws: dict[str, Any] = {"hue": ["evolution"], "facet": ["normal_stress"], "style": law_style}
+    return Panel(x=x, y=y, log=log, y_scale_group=y, **laws, **more)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rsfstudy.analysis.fitting.record import Record
 
 
-class Truth(NamedTuple):
+class ExactResponse(NamedTuple):
     """The exact response to a velocity step.
 
     Attributes
@@ -108,7 +108,7 @@ class NoiseKind:
         """
         return self.displacement_noise > 0.0 or self.displacement_quantum > 0.0
 
-    def draw(self, truth: Truth, rng: np.random.Generator) -> Record:
+    def draw(self, truth: ExactResponse, rng: np.random.Generator) -> Record:
         """Draw a random record."""
         from rsfstudy.analysis.fitting.record import Record  # imports xarray, which is slow
 
@@ -136,7 +136,7 @@ class NoiseKind:
             return record
         return record.with_steps([(truth.step, truth.step, truth.before, truth.after)])
 
-    def _times(self, truth: Truth, rng: np.random.Generator, margin: int) -> np.ndarray:
+    def _times(self, truth: ExactResponse, rng: np.random.Generator, margin: int) -> np.ndarray:
         slow, fast = (1.0 / rate for rate in self.rate)
         first = np.arange(-margin * slow + 0.5 * slow, truth.step, slow)
         second = np.arange(truth.step + 0.3 * fast, truth.ends + margin * fast, fast)
@@ -164,7 +164,7 @@ class NoiseKind:
         return drawn
 
 
-KINDS = {
+NOISE_KINDS = {
     "louder_after": NoiseKind(louder=10.0, noise_factor=0.2),
     "spikes": NoiseKind(spikes=0.01),
     "rounded": NoiseKind(quantum=2.0),

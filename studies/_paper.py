@@ -7,9 +7,13 @@ REFERENCE = (
 )
 GU_ET_AL = "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196"
 
-CONSTANT, WEAK, STRONG = "constant normal stress", "alpha = 0.25", "alpha = 0.56"
-CASES: dict[str, dict[str, str | float]] = {
-    CONSTANT: {"normal_stress": "constant"},
-    WEAK: {"normal_stress": "variable", "alpha": 0.25},
-    STRONG: {"normal_stress": "variable", "alpha": 0.56},
+CONSTANT_NORMAL_STRESS, WEAK_NORMAL_STRESS_EFFECT, STRONG_NORMAL_STRESS_EFFECT = (
+    "constant normal stress",
+    "alpha = 0.25",
+    "alpha = 0.56",
+)
+NORMAL_STRESS_CASES: dict[str, dict[str, str | float]] = {
+    CONSTANT_NORMAL_STRESS: {"normal_stress": "constant"},
+    WEAK_NORMAL_STRESS_EFFECT: {"normal_stress": "variable", "alpha": 0.25},
+    STRONG_NORMAL_STRESS_EFFECT: {"normal_stress": "variable", "alpha": 0.56},
 }

@@ -14,7 +14,7 @@ from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: What is told of a problem that has been solved.
-ERRORS = (
+ERROR_OUTPUTS = (
     Output("measured_error", "", "1", "error against an independent reference", error=True),
     Output("error_estimate", "", "1", "the run's own estimate of its error"),
 )
@@ -53,22 +53,22 @@ class Problem:
     source: str
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "quantity", self.quantity or self.measure.headline)
+        object.__setattr__(self, "quantity", self.quantity or self.measure.primary_output)
 
-    def error_of(self, outcome: Outcome) -> float:
+    def relative_error(self, outcome: Outcome) -> float:
         """Error of an outcome, over the scale."""
         assert self.answer is not None
-        return abs(self._number(outcome) - self.answer) / self._scale
+        return abs(self._output_value(outcome) - self.answer) / self._error_scale
 
-    def estimate_of(self, outcome: Outcome) -> float:
+    def relative_error_estimate(self, outcome: Outcome) -> float:
         """The outcome's own estimate of its error, over the scale."""
-        return float(outcome.values[f"{self.quantity}_error"]) / self._scale
+        return float(outcome.values[f"{self.quantity}_error"]) / self._error_scale
 
-    def _number(self, outcome: Outcome) -> float:
+    def _output_value(self, outcome: Outcome) -> float:
         return float(outcome.values[self.quantity])
 
     @property
-    def _scale(self) -> float:
+    def _error_scale(self) -> float:
         assert self.answer is not None
         return self.scale or abs(self.answer)
 
@@ -80,7 +80,7 @@ class Problem:
             "quantity": self.quantity,
             "answer": self.answer,
             "status": self.status.label,
-            "scale": self._scale if self.answer is not None else None,
+            "scale": self._error_scale if self.answer is not None else None,
             "uncertainty": self.uncertainty,
             "source": self.source,
         }
@@ -89,17 +89,17 @@ class Problem:
 Fields = dict[str, str | float | bool]
 
 #: All problems that the studies pose.
-POSED: list[Problem] = []
+REGISTERED_PROBLEMS: list[Problem] = []
 
 
-def posed(fields: Fields, measure: Measure, **known: Any) -> tuple[Fields, Problem]:
+def register_problem(fields: Fields, measure: Measure, **known: Any) -> tuple[Fields, Problem]:
     """Fields of a scene, and the problem that it poses."""
-    POSED.append(Problem(scene=Scene(**fields), measure=measure, **known))
-    return fields, POSED[-1]
+    REGISTERED_PROBLEMS.append(Problem(scene=Scene(**fields), measure=measure, **known))
+    return fields, REGISTERED_PROBLEMS[-1]
 
 
 @dataclass(frozen=True)
-class Posing(Measure):
+class ProblemMeasure(Measure):
     """Base of measures that solve the problem which a scene poses.
 
     Parameters
@@ -116,20 +116,22 @@ class Posing(Measure):
         return {"name": self.name, "problems": problems, **self.plain_fields}
 
     @classmethod
-    def restored_fields(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
+    def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
         """The problems, taken out of a description: those that are posed, described so."""
         from rsfstudy.files import contents  # which workers do not load
 
         if "problems" not in described:
             return {}
-        known = [json.loads(json.dumps(problem.describe())) for problem in POSED]
-        listed = contents.fit(described.pop("problems"), Sequence[dict[str, Any]], path)
+        known = [json.loads(json.dumps(problem.describe())) for problem in REGISTERED_PROBLEMS]
+        listed = contents.convert_plain(described.pop("problems"), Sequence[dict[str, Any]], path)
         for number, each in enumerate(listed):
             if each not in known:
-                raise contents.refused(f"{path}.problems[{number}]", "is posed by no study")
-        return {"problems": tuple(POSED[known.index(each)] for each in listed)}
+                raise contents.invalid_part_error(
+                    f"{path}.problems[{number}]", "is posed by no study"
+                )
+        return {"problems": tuple(REGISTERED_PROBLEMS[known.index(each)] for each in listed)}
 
-    def posed_by(self, scene: Scene) -> Problem:
+    def problem_of_scene(self, scene: Scene) -> Problem:
         """The problem of this scene.
 
         Raises

@@ -20,21 +20,21 @@ from ._normal_stress_response import NormalStressResponse
 from ._normal_stress_transient import NormalStressTransient
 
 #: What draws a number.
-Draw = Callable[[np.random.Generator], float]
+DrawFunction = Callable[[np.random.Generator], float]
 
 
-def between(low: float, high: float) -> Draw:
+def draw_uniform(low: float, high: float) -> DrawFunction:
     """Any number between two, as likely as another."""
     return lambda draw: float(draw.uniform(low, high))
 
 
-def decades(low: float, high: float) -> Draw:
+def draw_log_uniform(low: float, high: float) -> DrawFunction:
     """Any number between two, each decade as likely as another."""
-    exponent = between(math.log(low), math.log(high))
+    exponent = draw_uniform(math.log(low), math.log(high))
     return lambda draw: math.exp(exponent(draw))
 
 
-def either_way(size: Draw) -> Draw:
+def draw_signed(size: DrawFunction) -> DrawFunction:
     """A size, and a sign."""
     return lambda draw: size(draw) * (1.0 if draw.uniform() < 0.5 else -1.0)
 
@@ -45,58 +45,64 @@ class Question(NamedTuple):
     """
 
     measure: Measure
-    scene: Mapping[str, Draw | float]
+    scene: Mapping[str, DrawFunction | float]
 
 
-_UNSTABLE, _STABLE = between(0.3, 0.97), between(1.0, 2.5)
+_UNSTABLE_STIFFNESS_RATIO, _STABLE_STIFFNESS_RATIO = draw_uniform(0.3, 0.97), draw_uniform(1.0, 2.5)
 #: Rigs from soft to stiff.
-_RIG = decades(1.1, 300.0)
-_FASTER, _ANY_RATE = decades(1.1, 100.0), decades(0.03, 30.0)
+_RIG_STIFFNESS_RATIO = draw_log_uniform(1.1, 300.0)
+_STEP_UP, _STEP_UP_OR_DOWN = draw_log_uniform(1.1, 100.0), draw_log_uniform(0.03, 30.0)
 
-QUESTIONS: Mapping[str, Question] = {
+MOTION_QUESTIONS: Mapping[str, Question] = {
     "limit cycle": Question(
-        LimitCycle(phases=2), {"stiffness_ratio": _UNSTABLE, "load_velocity_ratio": _FASTER}
+        LimitCycle(phases=2),
+        {"stiffness_ratio": _UNSTABLE_STIFFNESS_RATIO, "load_velocity_ratio": _STEP_UP},
     ),
     "step response": Question(
         StepResponse(peaks=3, phases=2),
-        {"stiffness_ratio": _STABLE, "load_velocity_ratio": _FASTER},
+        {"stiffness_ratio": _STABLE_STIFFNESS_RATIO, "load_velocity_ratio": _STEP_UP},
     ),
-    "rate step": Question(CriticalStep(), {"stiffness_ratio": _STABLE}),
+    "rate step": Question(CriticalStep(), {"stiffness_ratio": _STABLE_STIFFNESS_RATIO}),
     "displacement step": Question(
-        CriticalStep(of="displacement_step"), {"stiffness_ratio": _STABLE}
+        CriticalStep(of="displacement_step"), {"stiffness_ratio": _STABLE_STIFFNESS_RATIO}
     ),
 }
 #: The same of the readings of a laboratory.
-READINGS: Mapping[str, Question] = {
+LABORATORY_QUESTIONS: Mapping[str, Question] = {
     "rigid response": Question(
-        RigidResponse(points=2), {"load_velocity_ratio": decades(1e-4, 1e4)}
+        RigidResponse(points=2), {"load_velocity_ratio": draw_log_uniform(1e-4, 1e4)}
     ),
     "velocity step": Question(
-        VelocityStep(phases=2), {"stiffness_ratio": _RIG, "load_velocity_ratio": _ANY_RATE}
+        VelocityStep(phases=2),
+        {"stiffness_ratio": _RIG_STIFFNESS_RATIO, "load_velocity_ratio": _STEP_UP_OR_DOWN},
     ),
     "healing": Question(
         Healing(phases=2),
-        {"stiffness_ratio": _RIG, "load_velocity_ratio": _ANY_RATE, "hold_time": decades(1.0, 1e5)},
+        {
+            "stiffness_ratio": _RIG_STIFFNESS_RATIO,
+            "load_velocity_ratio": _STEP_UP_OR_DOWN,
+            "hold_time": draw_log_uniform(1.0, 1e5),
+        },
     ),
     "normal stress transient": Question(
         NormalStressTransient(phases=2),
         {
-            "stiffness_ratio": _RIG,
+            "stiffness_ratio": _RIG_STIFFNESS_RATIO,
             "load_velocity_ratio": 1.0,
-            "normal_stress_step": either_way(decades(0.003, 0.3)),
+            "normal_stress_step": draw_signed(draw_log_uniform(0.003, 0.3)),
         },
     ),
     "normal stress response": Question(
         NormalStressResponse(),
         {
-            "stiffness_ratio": _RIG,
-            "load_velocity_ratio": _ANY_RATE,
-            "oscillation_amplitude": decades(1e-4, 0.03),
-            "oscillation_period": decades(0.3, 300.0),
+            "stiffness_ratio": _RIG_STIFFNESS_RATIO,
+            "load_velocity_ratio": _STEP_UP_OR_DOWN,
+            "oscillation_amplitude": draw_log_uniform(1e-4, 0.03),
+            "oscillation_period": draw_log_uniform(0.3, 300.0),
         },
     ),
 }
-ALL = {**QUESTIONS, **READINGS}
+ALL_QUESTIONS = {**MOTION_QUESTIONS, **LABORATORY_QUESTIONS}
 
 
 def random_scene(like: Scene, question: str, sample: int) -> Scene:
@@ -110,17 +116,17 @@ def random_scene(like: Scene, question: str, sample: int) -> Scene:
     """
     kind = f"{question} {like.law} {' '.join(like.effects)}"
     draw = np.random.default_rng([sample, zlib.crc32(kind.encode())])
-    ranges: Mapping[str, Draw | float] = {
-        "a": decades(0.003, 0.025),
-        "b_over_a": decades(0.1, 4.5),
-        "mu_star": between(0.5, 0.85),
-        "period": decades(0.1, 1000.0),
-        "reference_rate": decades(1e-10, 1e-6),
-        **ALL[question].scene,
+    ranges: Mapping[str, DrawFunction | float] = {
+        "a": draw_log_uniform(0.003, 0.025),
+        "b_over_a": draw_log_uniform(0.1, 4.5),
+        "mu_star": draw_uniform(0.5, 0.85),
+        "period": draw_log_uniform(0.1, 1000.0),
+        "reference_rate": draw_log_uniform(1e-10, 1e-6),
+        **ALL_QUESTIONS[question].scene,
     }
     fields = {name: by(draw) if callable(by) else by for name, by in ranges.items()}
     fields["b_over_a"] += 1.0
-    angle, alpha = between(0.05, 0.95)(draw), between(0.0, 0.6)(draw)
+    angle, alpha = draw_uniform(0.05, 0.95)(draw), draw_uniform(0.0, 0.6)(draw)
     if like.alpha is not None:
         fields["alpha"] = alpha
     if like.phi is not None:

@@ -12,48 +12,48 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from scipy.linalg import solve_toeplitz, toeplitz
 
-from rsfstudy.analysis.fitting.fitted import Fitted
-from rsfstudy.analysis.fitting.intervals import Profile, half_width
-from rsfstudy.analysis.fitting.joint import Joint, numbered, plain
+from rsfstudy.analysis.fitting.fitted import FitSolution
+from rsfstudy.analysis.fitting.intervals import LikelihoodProfile, stderr_multiplier
+from rsfstudy.analysis.fitting.joint import JointModel, number_parameters, strip_window_number
 from rsfstudy.analysis.fitting.model import (
-    LOGARITHMIC,
-    Model,
+    LOGARITHMIC_PARAMETERS,
     Values,
-    check_free,
+    WindowModel,
+    check_free_parameters,
     check_positive,
-    parameters_of,
+    scene_to_parameters,
 )
-from rsfstudy.analysis.fitting.noise import check_noise
-from rsfstudy.analysis.fitting.search import Search
-from rsfstudy.analysis.fitting.validity import find_reasons
+from rsfstudy.analysis.fitting.noise import check_noise_name
+from rsfstudy.analysis.fitting.search import FitProblem
+from rsfstudy.analysis.fitting.validity import find_validity_problems
 from rsfstudy.axes.axis import Axis
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome, Value
+from rsfstudy.measures import Measure, Outcome, OutputValue
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
-from ._noise_kinds import KINDS, Truth
+from ._noise_kinds import NOISE_KINDS, ExactResponse
 
 #: Correlation of an autoregressive process of order one, and coefficients of moving averages.
-_AR1, _MOVING_AVERAGES = 0.9, {"white": (1.0,), "ma3": (1.0, 0.8, 0.5, 0.2)}
-_PROCESSES = ("ar1", *_MOVING_AVERAGES, *KINDS)
+_AR1_CORRELATION, _MOVING_AVERAGES = 0.9, {"white": (1.0,), "ma3": (1.0, 0.8, 0.5, 0.2)}
+_PROCESSES = ("ar1", *_MOVING_AVERAGES, *NOISE_KINDS)
 #: Shares of records whose parameters lie within one and two standard deviations of Gaussian errors.
-ONE, TWO = 0.6827, 0.9545
+SHARE_WITHIN_ONE_STDERR, SHARE_WITHIN_TWO_STDERRS = 0.6827, 0.9545
 #: The fault and machine of the studies that fit synthetic records, the work that one of those may
 #: take, and steps from 1 to 10 um/s and back.
-RIG = Scene(normal_stress="constant", a=0.01, b_over_a=1.3, stiffness=0.03)
-ACCURACY = Accuracy(budget=50_000_000, engine="compiled")
-UP, BACK = "1:30, 10:270", "10:30, 1:270"
-_NUMBER = r"\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*"
+BASE_SCENE = Scene(normal_stress="constant", a=0.01, b_over_a=1.3, stiffness=0.03)
+FIT_ACCURACY = Accuracy(budget=50_000_000, engine="compiled")
+STEP_UP_PROTOCOL, STEP_BACK_PROTOCOL = "1:30, 10:270", "10:30, 1:270"
+_NUMBER_PATTERN = r"\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*"
 #: Velocity and displacement of a piece, or time where an s follows.
-_PIECE = re.compile(rf"{_NUMBER}:{_NUMBER}(s?)\s*")
+_SEGMENT_PATTERN = re.compile(rf"{_NUMBER_PATTERN}:{_NUMBER_PATTERN}(s?)\s*")
 #: Slip distance that a search begins with, over the true one.
-_OFF = 1.5
+_INITIAL_SLIP_DISTANCE_FACTOR = 1.5
 
-_OF_PARAMETER = (
+_PARAMETER_OUTPUTS = (
     ("estimate", "parameter, or its logarithm"),
     ("deviation", "parameter, or its logarithm, less the true one"),
     ("spread", "standard error of the parameter, or of its logarithm"),
@@ -64,19 +64,21 @@ _OF_PARAMETER = (
     ("naive_inside_two", "the same, residuals taken for white noise"),
     ("told", "whether the record tells the parameter"),
 )
-_FLAGGED = Output("flagged", "", "1", "1 if standard errors are reported as not valid, otherwise 0")
+_FLAGGED_OUTPUT = Output(
+    "flagged", "", "1", "1 if standard errors are reported as not valid, otherwise 0"
+)
 
 
-def designs(protocols: Mapping[str, str]) -> Axis:
+def protocol_axis(protocols: Mapping[str, str]) -> Axis:
     """Return an axis of named protocols."""
     return Axis("design", {name: {"protocol": text} for name, text in protocols.items()})
 
 
-class _Piece(NamedTuple):
+class _ProtocolSegment(NamedTuple):
     """Segment of a protocol: velocity in um/s, duration in s, and number of rows."""
 
     velocity: float
-    lasts: float
+    duration: float
     rows: int
 
 
@@ -104,7 +106,7 @@ class SyntheticFit(Measure):
         Standard deviation of the noise.
     process : str
         Noise process: "white", "ar1" (autoregressive with a correlation of 0.9), "ma3" (a moving
-        average of four rows), or a kind of laboratory record (``_noise_kinds.KINDS``), which
+        average of four rows), or a kind of laboratory record (``_noise_kinds.NOISE_KINDS``), which
         selects its own sample times.
     noise : str
         Noise model of the fit (see ``Fit``).
@@ -114,7 +116,7 @@ class SyntheticFit(Measure):
         Seed of the random noise.
     """
 
-    protocol: str = UP
+    protocol: str = STEP_UP_PROTOCOL
     free: tuple[str, ...] = ("a", "b", "slip_distance", "mu_star", "trend1")
     slip_distance: float = 10.0
     rows: int = 500
@@ -124,7 +126,7 @@ class SyntheticFit(Measure):
     fitted_law: str = ""
     seed: int = 0
     name: ClassVar[str] = "synthetic_fit"
-    headline = "deviation"
+    primary_output = "deviation"
     typical_work = 400_000
     dimensions = (
         Quantity("parameter", "", "", "parameter that is fitted"),
@@ -139,8 +141,8 @@ class SyntheticFit(Measure):
     )
 
     def __post_init__(self) -> None:
-        windows = self._windows()
-        check_free(self.free)
+        windows = self._window_segments()
+        check_free_parameters(self.free)
         if self.process not in _PROCESSES:
             raise InvalidValue("process", self.process, "is unknown", choices=_PROCESSES)
         check_positive(self, "slip_distance", "noise_size")
@@ -148,18 +150,18 @@ class SyntheticFit(Measure):
             raise InvalidValue("rows", self.rows, "must be ten for each piece at least")
         if self.seed < 0:
             raise InvalidValue("seed", self.seed, "must be 0 or more")
-        check_noise(self.noise)
+        check_noise_name(self.noise)
 
     @property
     def outputs(self) -> Sequence[Output]:
         """Outputs: errors of each parameter, and how well each law fits."""
         by = [
-            Output(name, "", "1", text, dims=("parameter",), error=name == self.headline)
-            for name, text in _OF_PARAMETER
+            Output(name, "", "1", text, dims=("parameter",), error=name == self.primary_output)
+            for name, text in _PARAMETER_OUTPUTS
         ]
         text = "Akaike's criterion, in which the noise counts"
         order = Output("noise_order", "", "1", "order of the autoregressive process of the noise")
-        return (*by, Output("criterion", "", "1", text), order, _FLAGGED)
+        return (*by, Output("criterion", "", "1", text), order, _FLAGGED_OUTPUT)
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
@@ -170,37 +172,39 @@ class SyntheticFit(Measure):
         return {"parameter": np.array(self.free, dtype=object)}
 
     @property
-    def _free(self) -> tuple[str, ...]:
-        return numbered(self.free, len(self._windows()))
+    def _free_parameters(self) -> tuple[str, ...]:
+        return number_parameters(self.free, len(self._window_segments()))
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Draw a record and fit it."""
-        if self.process in KINDS:
-            return self._find_in_record(scene, accuracy, meter)
-        true = self._true(scene)
-        truth = self._joint(scene, accuracy, meter)
-        clean = truth.curve(true)
+        if self.process in NOISE_KINDS:
+            return self._fit_noisy_record(scene, accuracy, meter)
+        true = self._exact_parameters(scene)
+        truth = self._joint_model(scene, accuracy, meter)
+        clean = truth.model_friction(true)
         if not np.isfinite(clean).all():
             return Outcome(Status.NOT_APPLICABLE, message="the true motion cannot be followed")
         rng, size = np.random.default_rng(self.seed), self.noise_size
-        root = _root(self.process, self.rows)
-        noise = np.concatenate([root @ rng.standard_normal(self.rows) for _ in truth.parts])
+        root = _noise_factor(self.process, self.rows)
+        noise = np.concatenate([root @ rng.standard_normal(self.rows) for _ in truth.models])
         fitted = scene.with_(law=self.fitted_law) if self.fitted_law else scene
-        model = self._joint(fitted, accuracy, meter, clean + size * noise)
-        search = Search(model, self._first(fitted, true), self._free, self.noise)
-        found = search.run()
-        promised = self._promised(truth, true)
-        reasons = find_reasons(found, model.friction)
-        return Outcome(Status.OK, self._compared(search, found, true, promised, reasons))
+        model = self._joint_model(fitted, accuracy, meter, clean + size * noise)
+        search = FitProblem(
+            model, self._initial_parameters(fitted, true), self._free_parameters, self.noise
+        )
+        found = search.solve()
+        promised = self._expected_stderrs(truth, true)
+        reasons = find_validity_problems(found, model.friction)
+        return Outcome(Status.OK, self._compare_with_exact(search, found, true, promised, reasons))
 
-    def _find_in_record(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def _fit_noisy_record(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Draw a laboratory record and fit it in the same way as ``rsfstudy.fit``."""
         from rsfstudy.measures.fit import Fit  # imports xarray, which is slow
 
-        kind, true = KINDS[self.process], self._true(scene)
+        kind, true = NOISE_KINDS[self.process], self._exact_parameters(scene)
         if "trend1" in true:
             true["trend1"] = kind.trend
-        windows = self._windows()
+        windows = self._window_segments()
         if len(windows) > 1 or len(windows[0]) != 2:
             rule = "is drawn for a protocol with one step"
             raise InvalidValue("process", self.process, rule, choices=_PROCESSES)
@@ -209,77 +213,95 @@ class SyntheticFit(Measure):
 
         def friction(time: np.ndarray) -> np.ndarray:
             begins = min(float(time[0]), 0.0)
-            pieces = [(begins, before.velocity, 1.0, 0.0), (before.lasts, after.velocity, 1.0, 0.0)]
+            pieces = [
+                (begins, before.velocity, 1.0, 0.0),
+                (before.duration, after.velocity, 1.0, 0.0),
+            ]
             zeros = np.zeros(len(time))
-            return Model(scene, time, zeros, zeros, np.array(pieces), smooth, meter).curve(true)
+            return WindowModel(
+                scene, time, zeros, zeros, np.array(pieces), smooth, meter
+            ).model_friction(true)
 
-        ends = before.lasts + after.lasts
-        step = before.lasts, ends, before.velocity, after.velocity
-        rng = np.random.default_rng(self.seed)
-        record = kind.draw(Truth(*step, friction, self.noise_size), rng)
-        guess, stated = _OFF * self.slip_distance, kind.filter
+        ends = before.duration + after.duration
+        step = before.duration, ends, before.velocity, after.velocity
+        # other noise for each kind, so that their coverages are independent
+        rng = np.random.default_rng([self.seed, [*NOISE_KINDS].index(self.process)])
+        record = kind.draw(ExactResponse(*step, friction, self.noise_size), rng)
+        guess, stated = _INITIAL_SLIP_DISTANCE_FACTOR * self.slip_distance, kind.filter
         fit = Fit((record,), self.free, guess, noise=self.noise, filter=stated)
         fitted = scene.with_(law=self.fitted_law) if self.fitted_law else scene
         fitted = fitted.with_(stiffness=fitted.stiffness * guess / self.slip_distance)
         search, found = fit.solve(fitted, accuracy, meter)
         unknown = np.full(len(self.free), math.nan)
-        reasons = fit.find_reasons(search, found)
-        return Outcome(Status.OK, self._compared(search, found, true, unknown, reasons))
+        reasons = fit.find_validity_problems(search, found)
+        return Outcome(Status.OK, self._compare_with_exact(search, found, true, unknown, reasons))
 
-    def _compared(
+    def _compare_with_exact(
         self,
-        search: Search,
-        found: Fitted,
+        search: FitProblem,
+        found: FitSolution,
         true: Values,
         promised: np.ndarray,
         reasons: Sequence[str],
-    ) -> dict[str, Value]:
+    ) -> dict[str, OutputValue]:
         """Compare the result of a fit with the exact parameters."""
         naive = found
         if self.noise != "white":
-            naive = Search(search.model, found.values, self._free, "white").run()
+            naive = FitProblem(search.model, found.values, self._free_parameters, "white").solve()
         exact = search.coordinates(true)
-        profiles = [Profile(search, found, name) for name in self._free]
+        profiles = [LikelihoodProfile(search, found, name) for name in self._free_parameters]
         # noise of the load point widens the intervals in proportion
-        wider = np.array([found.spread[one.place] / one.spread for one in profiles])
-        nearer = profiles[0].best + (exact - profiles[0].best) / wider
+        wider = np.array(
+            [found.coordinate_stderr[one.index] / one.noise_stderr for one in profiles]
+        )
+        nearer = profiles[0].best_coordinates + (exact - profiles[0].best_coordinates) / wider
         each = zip(profiles, nearer.tolist(), strict=True)
         squared = [one.squared_distance(x) for one, x in each]
-        naively = np.square((search.coordinates(naive.values) - exact) / naive.spread)
+        naively = np.square((search.coordinates(naive.values) - exact) / naive.coordinate_stderr)
         by_parameter = {
             "estimate": search.coordinates(found.values),
             "deviation": search.coordinates(found.values) - exact,
-            "deviation_error": np.array([found.errors[n] for n in self._free]) / found.slopes,
-            "spread": found.spread,
+            "deviation_error": np.array([found.numerical_errors[n] for n in self._free_parameters])
+            / found.coordinate_derivatives,
+            "spread": found.coordinate_stderr,
             "promised_spread": promised,
-            "told": np.array([float(n not in found.unidentified) for n in self._free]),
+            "told": np.array([float(n not in found.unidentified) for n in self._free_parameters]),
         }
-        for words, share in (("one", ONE), ("two", TWO)):
+        for words, share in (("one", SHARE_WITHIN_ONE_STDERR), ("two", SHARE_WITHIN_TWO_STDERRS)):
             for prefix, of, far in (("", found, squared), ("naive_", naive, naively)):
-                inside = np.array(far) <= half_width(of, share) ** 2
+                inside = np.array(far) <= stderr_multiplier(of, share) ** 2
                 by_parameter[f"{prefix}inside_{words}"] = inside.astype(float)
         # of those that each window has for itself, that of the first one
-        shown = [self._free.index(n if n in self._free else f"{n}_1") for n in self.free]
-        values: dict[str, Value] = {name: each[shown] for name, each in by_parameter.items()}
-        values |= {"criterion": found.criterion, "noise_order": found.noise.order}
+        shown = [
+            self._free_parameters.index(n if n in self._free_parameters else f"{n}_1")
+            for n in self.free
+        ]
+        values: dict[str, OutputValue] = {name: each[shown] for name, each in by_parameter.items()}
+        values |= {"criterion": found.aic, "noise_order": found.noise.order}
         return values | {"flagged": float(bool(reasons))}
 
-    def _windows(self) -> list[list[_Piece]]:
+    def _window_segments(self) -> list[list[_ProtocolSegment]]:
         """Return the segments of each window."""
-        return [_pieces(text, self.rows) for text in self.protocol.split(";")]
+        return [_parse_segments(text, self.rows) for text in self.protocol.split(";")]
 
-    def _true(self, scene: Scene) -> dict[str, float]:
+    def _exact_parameters(self, scene: Scene) -> dict[str, float]:
         """Return the exact values of all parameters."""
         longer = self.slip_distance * (scene.as_dict().get("length_ratio") or 1.0)
-        plainly = parameters_of(scene, self.slip_distance, longer)
+        plainly = scene_to_parameters(scene, self.slip_distance, longer)
         plainly |= {name: 0.0 for name in self.free if name not in plainly}
-        names = numbered(tuple(plainly), len(self._windows()))
-        return {name: plainly[plain(name)] for name in names}
+        names = number_parameters(tuple(plainly), len(self._window_segments()))
+        return {name: plainly[strip_window_number(name)] for name in names}
 
-    def _first(self, scene: Scene, true: Values) -> dict[str, float]:
+    def _initial_parameters(self, scene: Scene, true: Values) -> dict[str, float]:
         """Return initial parameters that differ slightly from the exact values."""
         first = {
-            n: v * (_OFF if n in LOGARITHMIC and n in self.free else 1.0) for n, v in true.items()
+            n: v
+            * (
+                _INITIAL_SLIP_DISTANCE_FACTOR
+                if n in LOGARITHMIC_PARAMETERS and n in self.free
+                else 1.0
+            )
+            for n, v in true.items()
         }
         if scene.law != "family":
             first.pop("law_exponent", None)
@@ -287,24 +309,24 @@ class SyntheticFit(Measure):
             first["law_exponent"] = 0.5
         return first
 
-    def _joint(
-        self, scene: Scene, accuracy: Accuracy, meter: Meter, friction: np.ndarray | None = None
-    ) -> Joint:
+    def _joint_model(
+        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter, friction: np.ndarray | None = None
+    ) -> JointModel:
         """Return the model of the windows."""
         smooth = replace(accuracy, rtol=min(accuracy.rtol, 1e-9))
         parts = []
-        for number, pieces in enumerate(self._windows()):
-            time, moved, loading = _rows(pieces)
+        for number, pieces in enumerate(self._window_segments()):
+            time, moved, loading = _build_rows(pieces)
             rows = slice(number * self.rows, (number + 1) * self.rows)
             seen = np.zeros(self.rows) if friction is None else friction[rows]
-            parts.append(Model(scene, time, moved, seen, loading, smooth, meter))
-        return Joint(tuple(parts))
+            parts.append(WindowModel(scene, time, moved, seen, loading, smooth, meter))
+        return JointModel(tuple(parts))
 
-    def _promised(self, truth: Joint, true: Values) -> np.ndarray:
+    def _expected_stderrs(self, truth: JointModel, true: Values) -> np.ndarray:
         """Compute standard errors from the Fisher information of the known noise."""
         correlations = _correlations(self.process, self.rows)
-        jacobian = truth.jacobian(true, self._free)
-        information = np.zeros((len(self._free),) * 2)
+        jacobian = truth.jacobian(true, self._free_parameters)
+        information = np.zeros((len(self._free_parameters),) * 2)
         for first in range(0, len(jacobian), self.rows):
             part = jacobian[first : first + self.rows]
             information += part.T @ solve_toeplitz(correlations, part)
@@ -313,11 +335,11 @@ class SyntheticFit(Measure):
         return np.asarray(self.noise_size * np.sqrt(np.diag(inverse)) / scales)
 
 
-def _pieces(text: str, rows: int) -> list[_Piece]:
+def _parse_segments(text: str, rows: int) -> list[_ProtocolSegment]:
     """Return the segments of a window."""
     found: list[tuple[float, float, float]] = []
     for part in text.split(","):
-        stated = _PIECE.fullmatch(part)
+        stated = _SEGMENT_PATTERN.fullmatch(part)
         speed, size = map(float, stated.group(1, 2)) if stated else (0.0, 0.0)
         if not stated or not size > 0.0 or (speed == 0.0) != bool(stated[3]):
             remedy = "Write it as in '1:30, 10:270', or with a hold as in '1:30, 0:100 s, 1:270'."
@@ -331,21 +353,23 @@ def _pieces(text: str, rows: int) -> list[_Piece]:
     sliding = rows - held * each
     counts = [int(sliding * size / moved) if speed else each for speed, _lasts, size in found]
     counts[-1] += rows - sum(counts)
-    return [_Piece(s, lasts, n) for (s, lasts, _size), n in zip(found, counts, strict=True)]
+    return [
+        _ProtocolSegment(s, lasts, n) for (s, lasts, _size), n in zip(found, counts, strict=True)
+    ]
 
 
-def _rows(pieces: Sequence[_Piece]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _build_rows(pieces: Sequence[_ProtocolSegment]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the times, displacements and loading history of a window.
 
     Displacements are relative to the first step.
     """
-    begins = np.cumsum([0.0, *(piece.lasts for piece in pieces)])
-    moved = np.cumsum([0.0, *(piece.lasts * piece.velocity for piece in pieces)])
+    begins = np.cumsum([0.0, *(piece.duration for piece in pieces)])
+    moved = np.cumsum([0.0, *(piece.duration * piece.velocity for piece in pieces)])
     time, displacement = [], []
     for number, piece in enumerate(pieces):
         part = (np.arange(piece.rows) + 0.5) / max(piece.rows, 1)
-        time.append(begins[number] + part * piece.lasts)
-        displacement.append(moved[number] + part * piece.lasts * piece.velocity)
+        time.append(begins[number] + part * piece.duration)
+        displacement.append(moved[number] + part * piece.duration * piece.velocity)
     loading = np.array(
         [(t, p.velocity, 1.0, 0.0) for t, p in zip(begins[:-1], pieces, strict=True)]
     )
@@ -353,7 +377,7 @@ def _rows(pieces: Sequence[_Piece]) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @lru_cache(maxsize=8)
-def _root(process: str, rows: int) -> np.ndarray:
+def _noise_factor(process: str, rows: int) -> np.ndarray:
     """Return the matrix that converts white noise to the noise of a process."""
     return np.asarray(np.linalg.cholesky(toeplitz(_correlations(process, rows))))
 
@@ -361,7 +385,7 @@ def _root(process: str, rows: int) -> np.ndarray:
 def _correlations(process: str, rows: int) -> np.ndarray:
     """Return the autocorrelations of a noise process at each lag."""
     if process == "ar1":
-        return np.asarray(_AR1 ** np.arange(rows))
+        return np.asarray(_AR1_CORRELATION ** np.arange(rows))
     weights = _MOVING_AVERAGES[process]
     found, told = np.zeros(rows), np.correlate(weights, weights, "full")[len(weights) - 1 :]
     found[: len(told)] = told / told[0]

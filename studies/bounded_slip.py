@@ -21,22 +21,22 @@ from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce import Difference
-from rsfstudy.reduce.base import Reduction, failed
+from rsfstudy.reduce.base import Reduction, is_failed
 
 from ._paper import PAPER, REFERENCE
-from ._phase_plane import mark_reversed, mark_steady
+from ._phase_plane import hatch_reversed_stress, plot_steady_line
 
 RANJITH_RICE = "Ranjith and Rice (1999), J. Mech. Phys. Solids 47, 1207-1218"
 
 
 #: Slip rates, evenly spaced in ln V, at which two paths are compared.
-_POINTS = 4000
+_COMPARED_SLIP_RATES = 4000
 #: Part of a branch left out at each end: where a path turns, stress at one slip rate says nothing.
-_ENDS = 0.02
+_EXCLUDED_END_SHARE = 0.02
 
 
 @dataclass(frozen=True)
-class Parting(Reduction):
+class PathSeparation(Reduction):
     """Places where a path with another effect leaves the path without it on the way to its first
     peak of slip rate, and where it joins it again on the way down.
 
@@ -74,7 +74,7 @@ class Parting(Reduction):
         if dataset.sizes.get(self.along, 0) != 2:
             return xr.Dataset()
         dataset = dataset.sortby(self.along)  # without the effect first
-        bad = failed(dataset["status"]).any(self.along)
+        bad = is_failed(dataset["status"]).any(self.along)
         core = [self.along, "phase"]
         parting, merging, offset = xr.apply_ufunc(
             self._compare,
@@ -102,9 +102,9 @@ class Parting(Reduction):
             return np.nan, np.nan, np.nan
         one, other = (_branches(rate, stress) for rate, stress in zip(rates, stresses, strict=True))
         apart = self.tolerance * np.ptp(stresses[1])
-        upward, difference = _difference(one[0], other[0])
+        upward, difference = _stress_difference(one[0], other[0])
         parted = np.abs(difference) > apart
-        downward, difference = _difference(one[1], other[1])
+        downward, difference = _stress_difference(one[1], other[1])
         still = np.abs(difference) > apart
         offset = float(np.median(difference))
         if not parted.any():
@@ -113,12 +113,16 @@ class Parting(Reduction):
         return float(upward[parted][0]), np.nan if still[0] else float(merged), offset
 
 
-def _difference(
+def _stress_difference(
     one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Slip rates the two branches share, ascending, and the second's stress less the first's."""
     low, high = max(one[0][0], other[0][0]), min(one[0][-1], other[0][-1])
-    at = np.linspace(low + _ENDS * (high - low), high - _ENDS * (high - low), _POINTS)
+    at = np.linspace(
+        low + _EXCLUDED_END_SHARE * (high - low),
+        high - _EXCLUDED_END_SHARE * (high - low),
+        _COMPARED_SLIP_RATES,
+    )
     return at, CubicSpline(*other)(at) - CubicSpline(*one)(at)
 
 
@@ -136,17 +140,17 @@ def _branches(
     return (rate[up], stress[up]), (rate[down], stress[down])
 
 
-orbit = Panel(
+orbit_panel = Panel(
     x="log10_slip_rate",
     y="frictional_stress",
-    at={"normal_stress": max, "stiffness_ratio": min},
+    isel={"normal_stress": max, "stiffness_ratio": min},
     style={"marker": "", "linewidth": 0.9},
-    marks=[mark_steady, mark_reversed],
-    columns=3,
+    overlays=[plot_steady_line, hatch_reversed_stress],
+    legend_columns=3,
 )
 
 
-def mark_parting(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_separation(dataset: xr.Dataset, axes: Axes) -> None:
     """Lines where paths with mass and without it part, and where they merge."""
     for name in ("paths_parting", "paths_merging"):
         rates = np.atleast_1d(dataset.get(name, math.nan))
@@ -155,37 +159,49 @@ def mark_parting(dataset: xr.Dataset, axes: Axes) -> None:
             axes.axvline(rate, color="0.5", linewidth=0.8, linestyle="-.", label=text)
 
 
-peaks = Panel(by=["normal_stress", "stiffness_ratio"])
+peaks_panel = Panel(hue=["normal_stress", "stiffness_ratio"])
 
 figure = Figure(
     [
         # Fig. 8
         replace(
-            orbit,
-            by=["load_velocity_ratio"],
-            at={"inertia": min, **orbit.at, "load_velocity_ratio": lambda v: [max(v), min(v)]},
+            orbit_panel,
+            hue=["load_velocity_ratio"],
+            isel={
+                "inertia": min,
+                **orbit_panel.isel,
+                "load_velocity_ratio": lambda v: [max(v), min(v)],
+            },
         ),
         # Fig. 12
         replace(
-            orbit,
-            by=["inertia"],
-            at={"load_velocity_ratio": max, **orbit.at},
-            marks=[mark_parting, *orbit.marks],
-            when=lambda dataset: dataset.sizes["inertia"] > 1,
+            orbit_panel,
+            hue=["inertia"],
+            isel={"load_velocity_ratio": max, **orbit_panel.isel},
+            overlays=[plot_separation, *orbit_panel.overlays],
+            condition=lambda dataset: dataset.sizes["inertia"] > 1,
         ),
-        replace(peaks, x="load_velocity_ratio", y="max_log10_slip_rate", each=["inertia"], log="x"),
         replace(
-            peaks,
+            peaks_panel,
+            x="load_velocity_ratio",
+            y="max_log10_slip_rate",
+            facet=["inertia"],
+            log="x",
+        ),
+        replace(
+            peaks_panel,
             x="peak",
             y="peak_log10_slip_rate",
-            at={"inertia": min, "load_velocity_ratio": min},
+            isel={"inertia": min, "load_velocity_ratio": min},
             x_label="Number of the peak",
         ),
     ]
 )
 
 
-def decays(normal_stress: str, stiffness_ratio: float, rate: float, source: str) -> Claim:
+def decaying_peaks_claim(
+    normal_stress: str, stiffness_ratio: float, rate: float, source: str
+) -> Claim:
     """C11: quasi-static slip stays bounded, its second peak lower than its first."""
     return Claim.below(
         id="C11",
@@ -202,7 +218,7 @@ def decays(normal_stress: str, stiffness_ratio: float, rate: float, source: str)
     )
 
 
-def repeats(rate: float) -> Claim:
+def repeating_peaks_claim(rate: float) -> Claim:
     """C11: the theorem of Ranjith and Rice at k = k_cr."""
     return Claim(
         id="C11",
@@ -221,7 +237,7 @@ def repeats(rate: float) -> Claim:
     )
 
 
-LARGEST = {"normal_stress": "variable", "stiffness_ratio": 1.0, "load_velocity_ratio": 200.0}
+LARGEST_STEP = {"normal_stress": "variable", "stiffness_ratio": 1.0, "load_velocity_ratio": 200.0}
 
 
 study = Study(
@@ -238,21 +254,21 @@ study = Study(
     measure=StepResponse(),
     reductions=[
         Difference(name="peak_lowering", of="max_log10_slip_rate", along="inertia", reference=0),
-        Parting(name="paths", of="frictional_stress", along="inertia", tolerance=2e-3),
+        PathSeparation(name="paths", of="frictional_stress", along="inertia", tolerance=2e-3),
     ],
     claims=[
-        decays("variable", 1.0, 2.0, f"{PAPER}, Fig. 8"),
-        decays("variable", 1.0, 200.0, f"{PAPER}, Fig. 8"),
-        decays("constant", 1.1, 2.0, RANJITH_RICE),
-        decays("constant", 1.1, 200.0, RANJITH_RICE),
-        repeats(2.0),
-        repeats(200.0),
+        decaying_peaks_claim("variable", 1.0, 2.0, f"{PAPER}, Fig. 8"),
+        decaying_peaks_claim("variable", 1.0, 200.0, f"{PAPER}, Fig. 8"),
+        decaying_peaks_claim("constant", 1.1, 2.0, RANJITH_RICE),
+        decaying_peaks_claim("constant", 1.1, 200.0, RANJITH_RICE),
+        repeating_peaks_claim(2.0),
+        repeating_peaks_claim(200.0),
         Claim(
             id="C18",
             statement="V_0 = 200 V_*: mass lowers the peak slip rate by an order of magnitude",
             source=f"{PAPER}, section 4, Fig. 12",
             variable="peak_lowering",
-            where={**LARGEST, "inertia": True},
+            where={**LARGEST_STEP, "inertia": True},
             published=-1.0,
             tolerance=0.5,
             reason="'by one order of magnitude'",
@@ -269,8 +285,8 @@ study = Study(
             statement="V_0 = 200 V_*: the paths merge again, and the next peaks are the same",
             source=f"{PAPER}, section 4, Fig. 12",
             variable="peak_log10_slip_rate",
-            where={**LARGEST, "peak": 2, "inertia": True},
-            minus={**LARGEST, "peak": 2, "inertia": False},
+            where={**LARGEST_STEP, "peak": 2, "inertia": True},
+            minus={**LARGEST_STEP, "peak": 2, "inertia": False},
             published=0.0,
             tolerance=5e-5,
             reason="0.05 of the offset of stress, as with other masses, and paths count as merged "
@@ -281,7 +297,7 @@ study = Study(
             statement="V_0 = 200 V_*: they merge on the segment of constant stress",
             source=f"{PAPER}, section 4, Fig. 12",
             variable="paths_merging",
-            where=LARGEST,
+            where=LARGEST_STEP,
             published=0.0,
             reason="an inequality: the segment leads from there to 10^-6 V_*; NaN if they did not",
         ),
@@ -290,7 +306,7 @@ study = Study(
             statement="V_0 = 200 V_*: with mass the slip is a rupture, beyond the norm 5e-4",
             source=f"{PAPER}, section 4",
             variable="max_log10_slip_rate",
-            where={**LARGEST, "inertia": True},
+            where={**LARGEST_STEP, "inertia": True},
             published=4.73,
             reason="an inequality: the norm V T/(2 pi D_c) = 5e-4 is at 10^4.73 V_*",
         ),

@@ -21,20 +21,22 @@ from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.declare.figure import Axes
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.accuracy import MIN_RTOL, Accuracy
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.reduce.base import Reduction
 from rsfstudy.status import Status
 
-from ._random_scenes import ALL, QUESTIONS, random_scene
+from ._random_scenes import ALL_QUESTIONS, MOTION_QUESTIONS, random_scene
 
-_ESTIMATED = tuple(
-    dict.fromkeys(name for question in ALL.values() for name in question.measure.estimated)
+_ESTIMATED_OUTPUTS = tuple(
+    dict.fromkeys(
+        name for question in ALL_QUESTIONS.values() for name in question.measure.outputs_with_error
+    )
 )
-_TIGHTER = 0.01
+_TIGHTER_RTOL_FACTOR = 0.01
 #: Work the tighter run may cost, over that of the run it judges.
-_PATIENCE = 6
+_MAX_TIGHTER_WORK = 6
 
 
 #: What its numbers are.
@@ -63,7 +65,7 @@ class Coverage(Measure):
     Parameters
     ----------
     question : str
-        What is measured; one of `QUESTIONS` or `READINGS`.
+        What is measured; one of `MOTION_QUESTIONS` or `LABORATORY_QUESTIONS`.
     sample : int
         Number of the draw.
     requested_digits : int
@@ -74,7 +76,7 @@ class Coverage(Measure):
     sample: int = 0
     requested_digits: int = 7
     name: ClassVar[str] = "coverage"
-    headline = "status_kept"
+    primary_output = "status_kept"
     typical_work = 60_000
     outputs = _OUTPUTS
     dimensions = (
@@ -82,11 +84,11 @@ class Coverage(Measure):
         Quantity("sample", "", "1", "number of the random scene"),
         Quantity("number", "", "", "name of the number"),
     )
-    clocks: ClassVar[tuple[bool, ...]] = (False, True)
+    needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
     def __post_init__(self) -> None:
-        if self.question not in ALL:
-            raise InvalidValue("question", self.question, "is unknown", choices=ALL)
+        if self.question not in ALL_QUESTIONS:
+            raise InvalidValue("question", self.question, "is unknown", choices=ALL_QUESTIONS)
         if self.sample < 0:
             raise InvalidValue("sample", self.sample, "must be 0 or greater")
         if not 2 <= self.requested_digits <= 9:
@@ -95,21 +97,24 @@ class Coverage(Measure):
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        return {"number": np.array(_ESTIMATED, dtype=object)}
+        return {"number": np.array(_ESTIMATED_OUTPUTS, dtype=object)}
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Measure twice, and compare each number that both give."""
-        measure = ALL[self.question].measure
+        measure = ALL_QUESTIONS[self.question].measure
         try:
             drawn = random_scene(scene, self.question, self.sample)
         except InvalidValue as error:  # a step of normal stress that is constant
             return Outcome(Status.NOT_APPLICABLE, message=str(error))
         asked = replace(accuracy, rtol=10.0**-self.requested_digits)
-        rtol = max(_TIGHTER * asked.rtol, TIGHTEST_RTOL)
-        tighter = replace(asked, rtol=rtol, budget=_PATIENCE * asked.budget)
-        (outcome, spent), (truth, more) = (measure.metered(drawn, a) for a in (asked, tighter))
-        meter.by_regime["asked"], meter.by_regime["tighter"] = spent.spent, more.spent
-        meter.spent = spent.spent + more.spent
+        rtol = max(_TIGHTER_RTOL_FACTOR * asked.rtol, MIN_RTOL)
+        tighter = replace(asked, rtol=rtol, budget=_MAX_TIGHTER_WORK * asked.budget)
+        (outcome, spent), (truth, more) = (measure.run_metered(drawn, a) for a in (asked, tighter))
+        meter.evaluations_by_regime["asked"], meter.evaluations_by_regime["tighter"] = (
+            spent.evaluations,
+            more.evaluations,
+        )
+        meter.evaluations = spent.evaluations + more.evaluations
         values: dict[str, Any] = {
             "ended_as": float(outcome.status),
             "status_kept_error": 0.0,
@@ -120,27 +125,27 @@ class Coverage(Measure):
             ),
         }
         if outcome.status is truth.status is Status.OK:
-            values |= _compared(outcome.values, truth.values, asked.rtol)
+            values |= _compare_errors(outcome.values, truth.values, asked.rtol)
         return Outcome(Status.OK, values)
 
 
-def _compared(
+def _compare_errors(
     measured: Mapping[str, Any], truth: Mapping[str, Any], rtol: float
 ) -> dict[str, np.ndarray]:
     """Errors beyond what the truth itself is uncertain by, over their estimates, and over the
     accuracy asked for.
     """
-    over_estimate, over_request = (np.full(len(_ESTIMATED), math.nan) for _ in range(2))
-    for i, name in enumerate(_ESTIMATED):
+    over_estimate, over_request = (np.full(len(_ESTIMATED_OUTPUTS), math.nan) for _ in range(2))
+    for i, name in enumerate(_ESTIMATED_OUTPUTS):
         if f"{name}_error" in measured:
             uncertain = truth[f"{name}_error"]
             error = max(abs(measured[name] - truth[name]) - uncertain, 0.0)
-            over_estimate[i] = _over(error, measured[f"{name}_error"])
-            over_request[i] = _over(error, rtol * abs(truth[name]))
+            over_estimate[i] = _error_ratio(error, measured[f"{name}_error"])
+            over_request[i] = _error_ratio(error, rtol * abs(truth[name]))
     return {"error_over_estimate": over_estimate, "error_over_request": over_request}
 
 
-def _over(error: float, allowed: float) -> float:
+def _error_ratio(error: float, allowed: float) -> float:
     if not error:
         return 0.0
     return error / allowed if allowed else math.inf
@@ -156,11 +161,11 @@ DYNAMICS: dict[str, dict[str, bool | float]] = {
     "radiation damping": {"radiation_damping": 1e-9},
     "inertia": {"inertia": True},
 }
-DIGITS = (4, 7)
+REQUESTED_DIGITS = (4, 7)
 
 
 @dataclass(frozen=True)
-class Covered(Reduction):
+class CoverageStatistics(Reduction):
     """Statistics of errors over their estimates, by the points of some dimensions.
 
     Parameters
@@ -208,20 +213,24 @@ class Covered(Reduction):
 
 
 #: Errors this far below and above their estimates are drawn there.
-SHOWN = (1e-3, 10.0)
+PLOTTED_ERROR_RATIOS = (1e-3, 10.0)
 
 
-def mark_histogram(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_error_histogram(dataset: xr.Dataset, axes: Axes) -> None:
     """One outline an accuracy."""
-    from rsfstudy.plots import look
+    from rsfstudy.plots import cycle_style
 
     for number, digits in enumerate(dataset["requested_digits"].values):
         values = dataset["error_over_estimate"].isel(requested_digits=number).values.ravel()
-        values = np.clip(values[np.isfinite(values)], *SHOWN)
+        values = np.clip(values[np.isfinite(values)], *PLOTTED_ERROR_RATIOS)
         covered = f"{(values <= 1.0).sum()} of {values.size} covered"
         label = f"rtol $10^{{-{digits:g}}}$: {covered}"
         axes.hist(
-            values, np.geomspace(*SHOWN, 33).tolist(), histtype="step", label=label, **look(number)
+            values,
+            np.geomspace(*PLOTTED_ERROR_RATIOS, 33).tolist(),
+            histtype="step",
+            label=label,
+            **cycle_style(number),
         )
     axes.axvline(1.0, color="0.3", linestyle="-", linewidth=0.8)
     axes.set_xscale("log")
@@ -231,8 +240,8 @@ def mark_histogram(dataset: xr.Dataset, axes: Axes) -> None:
 figure = Figure(
     [
         Panel(
-            each=["question"],
-            marks=[mark_histogram],
+            facet=["question"],
+            overlays=[plot_error_histogram],
             x_label="Error over its estimate",
             y_label="Numbers",
         )
@@ -241,7 +250,7 @@ figure = Figure(
 
 
 #: What is promised of error estimates at each accuracy: in words, of which number, and how far.
-PROMISES: tuple[tuple[str, str, dict[str, Any]], ...] = (
+COVERAGE_CLAIMS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     (
         "at least 99.5 % of errors lie within their estimates",
         "covered_share",
@@ -278,8 +287,8 @@ CLAIMS = [
         where={"requested_digits": float(digits)},
         **held,
     )
-    for digits in DIGITS
-    for number, (statement, variable, held) in enumerate(PROMISES, start=1)
+    for digits in REQUESTED_DIGITS
+    for number, (statement, variable, held) in enumerate(COVERAGE_CLAIMS, start=1)
 ]
 
 
@@ -289,17 +298,17 @@ study = Study(
     summary=Study.caption(__doc__),
     base=Scene(),
     axes=[
-        Axis("question", list(QUESTIONS)),
+        Axis("question", list(MOTION_QUESTIONS)),
         Axis("law", ["slip", "slowness"]),
         Axis("normal_stress", ["constant", "variable"]),
         Axis("dynamics", DYNAMICS),
         Axis("sample", range(4)),
-        Axis("requested_digits", DIGITS),
+        Axis("requested_digits", REQUESTED_DIGITS),
     ],
     measure=Coverage(),
     reductions=[
-        Covered(name="covered", of="error_over_estimate", by=("requested_digits",)),
-        Covered(
+        CoverageStatistics(name="covered", of="error_over_estimate", by=("requested_digits",)),
+        CoverageStatistics(
             name="covered_by_question",
             of="error_over_estimate",
             by=("question", "requested_digits"),

@@ -14,10 +14,10 @@ from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.linear_stability import LinearStability
 
-from ._fluids import FAULT, REFERENCE, SEGALL_RICE
+from ._fluids import DILATANT_FAULT, REFERENCE, SEGALL_RICE
 
 
-def known(drainage: float, value: float) -> Claim:
+def closed_form_claim(drainage: float, value: float) -> Claim:
     """D1: the closed form at E = 0.002."""
     return Claim(
         id="D1",
@@ -31,7 +31,9 @@ def known(drainage: float, value: float) -> Claim:
     )
 
 
-def limit(drainage: float, value: float, which: str, tolerance: float, reason: str) -> Claim:
+def drainage_limit_claim(
+    drainage: float, value: float, which: str, tolerance: float, reason: str
+) -> Claim:
     """D2: undrained and drained."""
     return Claim(
         id="D2",
@@ -45,7 +47,7 @@ def limit(drainage: float, value: float, which: str, tolerance: float, reason: s
     )
 
 
-def vouched(dilatancy: float, drainage: float) -> Claim:
+def growth_threshold_claim(dilatancy: float, drainage: float) -> Claim:
     """D3: the threshold of the equations as they are assembled."""
     return Claim(
         id="D3",
@@ -59,21 +61,21 @@ def vouched(dilatancy: float, drainage: float) -> Claim:
     )
 
 
-def weakening(dataset: xr.Dataset) -> float:
+def drained_critical_stiffness(dataset: xr.Dataset) -> float:
     """b - a, the critical stiffness of a drained fault."""
     return float(dataset["a"]) * (float(dataset["b_over_a"]) - 1.0)
 
 
-def mark_limits(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_limits(dataset: xr.Dataset, axes: Axes) -> None:
     """The drained limit across, and at the left those without drainage."""
-    from rsfstudy.plots import look
+    from rsfstudy.plots import cycle_style
 
-    drained = weakening(dataset)
+    drained = drained_critical_stiffness(dataset)
     axes.axhline(drained, color="0.75", linewidth=2.2, zorder=1, label="drained, $b-a$")
     for number, dilatancy in enumerate(dataset["dilatancy"].values):
         undrained = drained - float(dataset["mu_star"]) * dilatancy
         if undrained > 0.0:
-            look_of_it = {"color": look(number)["color"], "linewidth": 2.2, "alpha": 0.45}
+            look_of_it = {"color": cycle_style(number)["color"], "linewidth": 2.2, "alpha": 0.45}
             text = r"undrained, $b-a-\mu_*\epsilon/(\beta\sigma_*)$"
             axes.axhline(undrained, xmax=0.16, label=text, **look_of_it)
 
@@ -85,9 +87,9 @@ figure = Figure(
             y=lambda row: row["critical_stiffness_from_growth"].where(
                 np.arange(row["drainage"].size) % 4 == 0
             ),
-            by=["dilatancy"],
-            through=lambda row: (row["drainage"], row["critical_stiffness"]),
-            marks=[mark_limits],
+            hue=["dilatancy"],
+            fit_line=lambda row: (row["drainage"], row["critical_stiffness"]),
+            overlays=[plot_limits],
             title="Stable above; lines: closed form, points: growth",
             y_label=r"Critical stiffness, $k_{cr}D_c/\sigma_*$",
             log="x",
@@ -101,21 +103,25 @@ study = Study(
     name="dilatancy",
     title="Critical stiffness of a dilatant fault against drainage",
     summary=Study.caption(__doc__),
-    base=FAULT,
+    base=DILATANT_FAULT,
     axes=[
         Axis("dilatancy", [0.002, 0.004, 0.008, 0.012]),
         Axis("drainage", 10.0 ** np.linspace(-3.0, 3.0, 49)),
     ],
     measure=LinearStability(),
     claims=[
-        known(0.1, 0.00306725),
-        known(1.0, 0.00444076),
-        known(10.0, 0.00499026),
-        limit(1e-3, 0.003, "undrained", 1e-8, "grows with c squared: 6.7e-5 at c = 0.1 (D1)"),
-        limit(1e3, 0.005, "drained", 2e-9, "falls with c squared: 9.7e-6 at c = 10 (D1)"),
-        vouched(0.002, 1e-3),
-        vouched(0.004, 1.0),
-        vouched(0.012, 1e3),
+        closed_form_claim(0.1, 0.00306725),
+        closed_form_claim(1.0, 0.00444076),
+        closed_form_claim(10.0, 0.00499026),
+        drainage_limit_claim(
+            1e-3, 0.003, "undrained", 1e-8, "grows with c squared: 6.7e-5 at c = 0.1 (D1)"
+        ),
+        drainage_limit_claim(
+            1e3, 0.005, "drained", 2e-9, "falls with c squared: 9.7e-6 at c = 10 (D1)"
+        ),
+        growth_threshold_claim(0.002, 1e-3),
+        growth_threshold_claim(0.004, 1.0),
+        growth_threshold_claim(0.012, 1e3),
         Claim.below(
             id="D4",
             statement="E = 0.006 > b - a: stable almost everywhere undrained",

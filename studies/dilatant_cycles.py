@@ -15,10 +15,12 @@ from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
 from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.limit_cycle import LimitCycle
 
-from ._fluids import FAULT, REFERENCE, SEGALL_RICE
+from ._fluids import DILATANT_FAULT, REFERENCE, SEGALL_RICE
 
 
-def peak(law: str, dilatancy: float, relation: str, log10: float, what: str) -> Claim:
+def peak_slip_rate_claim(
+    law: str, dilatancy: float, relation: str, log10: float, what: str
+) -> Claim:
     """D7: how fast a cycle slips where c* D_c/V_* = 1."""
     return Claim(
         id="D7",
@@ -34,10 +36,10 @@ def peak(law: str, dilatancy: float, relation: str, log10: float, what: str) -> 
 
 #: Time, in D_c/V_*, before and after the fastest slip is on log scales that meet in a linear one of
 #: this width: slip speeds up to a rupture as one over the time that is left.
-LINEAR = 1e-6
+LINEAR_TIME_RANGE = 1e-6
 
 
-def mark_undrained(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_undrained_stiffness(dataset: xr.Dataset, axes: Axes) -> None:
     """Line where the spring is as stiff as the critical one of no drainage."""
     weakening = float(dataset["a"]) * (float(dataset["b_over_a"]) - 1.0)
     critical = (weakening - float(dataset["stiffness"])) / float(dataset["mu_star"])
@@ -45,15 +47,15 @@ def mark_undrained(dataset: xr.Dataset, axes: Axes) -> None:
     axes.axvline(critical, color="0.4", linestyle=":", label=text)
 
 
-def from_fastest_slip(row: xr.Dataset) -> xr.DataArray:
+def time_from_fastest_slip(row: xr.Dataset) -> xr.DataArray:
     """Time from the fastest slip."""
     fastest = int(np.argmax(np.nan_to_num(row["log10_slip_rate"].values, nan=-np.inf)))
     return row["time"] - row["time"][fastest]
 
 
-def scale_of_time(_dataset: xr.Dataset, axes: Axes) -> None:
+def set_symlog_time_scale(_dataset: xr.Dataset, axes: Axes) -> None:
     """Log scales before and after the fastest slip."""
-    axes.set_xscale("symlog", linthresh=LINEAR, linscale=0.5)
+    axes.set_xscale("symlog", linthresh=LINEAR_TIME_RANGE, linscale=0.5)
     axes.set_xticks([-1.0, -1e-3, 0.0, 1e-3, 1.0], ["$-1$", "$-10^{-3}$", "0", "$10^{-3}$", "1"])
     axes.set_xticks([], minor=True)
 
@@ -64,8 +66,8 @@ figure = Figure(
             Panel(
                 x="dilatancy",
                 y=variable,
-                by=["drainage", "law"],
-                marks=[mark_undrained],
+                hue=["drainage", "law"],
+                overlays=[plot_undrained_stiffness],
                 title=title,
             )
             for variable, title in (
@@ -74,17 +76,17 @@ figure = Figure(
             )
         ),
         Panel(
-            x=from_fastest_slip,
+            x=time_from_fastest_slip,
             y=lambda row: row["log10_slip_rate"].where(row["status"] == 0),
-            by=["dilatancy"],
-            each=["law"],
-            at={"drainage": 0, "dilatancy": slice(None, None, 2)},
-            marks=[scale_of_time],
+            hue=["dilatancy"],
+            facet=["law"],
+            isel={"drainage": 0, "dilatancy": slice(None, None, 2)},
+            overlays=[set_symlog_time_scale],
             x_label=r"Time from fastest slip, $t V_*/D_c$",
             y_label=r"Slip rate, $\log_{10}(V/V_*)$",
             x_limits=(-10.0, 400.0),
-            alike="slip rate",
-            columns=3,
+            y_scale_group="slip rate",
+            legend_columns=3,
         ),
     ]
 )
@@ -94,7 +96,7 @@ study = Study(
     name="dilatant_cycles",
     title="Stick-slip of a dilatant fault, k = 0.5 (b-a) sigma_*/D_c, with mass",
     summary=Study.caption(__doc__),
-    base=FAULT.with_(stiffness=0.0025, load_velocity_ratio=1.0, inertia=True),
+    base=DILATANT_FAULT.with_(stiffness=0.0025, load_velocity_ratio=1.0, inertia=True),
     axes=[
         Axis("law", ["slip", "slowness"]),
         Axis("drainage", [1.0, 10.0]),
@@ -106,8 +108,8 @@ study = Study(
         claim
         for law in ("slip", "slowness")
         for claim in (
-            peak(law, 0.0, "above", 9.0, "dynamic rupture"),
-            peak(law, 0.008, "below", 2.5, "slow slip"),
+            peak_slip_rate_claim(law, 0.0, "above", 9.0, "dynamic rupture"),
+            peak_slip_rate_claim(law, 0.008, "below", 2.5, "slow slip"),
             Claim.below(
                 id="D8",
                 statement=f"{law} law: slow cycles drop less than a fifth of the stress",

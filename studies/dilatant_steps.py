@@ -15,7 +15,7 @@ import xarray as xr
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
 from rsfstudy.measures.critical_step import CriticalStep
 
-from ._fluids import FAULT, REFERENCE, SEGALL_RICE
+from ._fluids import DILATANT_FAULT, REFERENCE, SEGALL_RICE
 
 DRAINED = "drained"
 FAULTS: dict[str, dict[str, str | float]] = {
@@ -27,7 +27,7 @@ FAULTS: dict[str, dict[str, str | float]] = {
 }
 
 
-def above_drained(fault: str, drainage: float, by: float) -> Claim:
+def stabilisation_claim(fault: str, drainage: float, by: float) -> Claim:
     """D5: dilatancy stabilises."""
     return Claim.above(
         id="D5",
@@ -40,7 +40,7 @@ def above_drained(fault: str, drainage: float, by: float) -> Claim:
     )
 
 
-def drained_in_grey(row: xr.Dataset) -> dict[str, Any]:
+def fault_style(row: xr.Dataset) -> dict[str, Any]:
     """Style of what no drainage changes, behind the others."""
     grey = {"color": "0.75", "linestyle": "-", "linewidth": 2.2, "marker": "", "zorder": 1}
     return grey if row["fluid"] == "drained" else {}
@@ -51,8 +51,8 @@ figure = Figure(
         Panel(
             x="drainage",
             y="critical_velocity_ratio",
-            by=["fault"],
-            style=drained_in_grey,
+            hue=["fault"],
+            style=fault_style,
             title="Stable below, unstable above",
             log="xy",
         )
@@ -64,7 +64,7 @@ study = Study(
     name="dilatant_steps",
     title="Critical load point velocity step of a dilatant fault, k = 1.2 (b-a) sigma_*/D_c",
     summary=Study.caption(__doc__),
-    base=FAULT.with_(stiffness=0.006, fluid="drained"),
+    base=DILATANT_FAULT.with_(stiffness=0.006, fluid="drained"),
     axes=[
         Axis("fault", FAULTS),
         Axis("drainage", 10.0 ** np.linspace(-1.0, 1.5, 6)),
@@ -72,8 +72,8 @@ study = Study(
     measure=CriticalStep(),
     accuracy=Accuracy(rtol=1e-4),
     claims=[
-        above_drained("dilatancy 0.002", 0.1, 1.0),
-        above_drained("dilatancy 0.004", 1.0, 5.0),
+        stabilisation_claim("dilatancy 0.002", 0.1, 1.0),
+        stabilisation_claim("dilatancy 0.004", 1.0, 5.0),
         Claim.below(
             id="D6",
             statement="dilatancy 0.004: ten times faster drainage lowers the boundary",

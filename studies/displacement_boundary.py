@@ -15,13 +15,21 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import level, reference_line
+from rsfstudy.declare.figure import horizontal_line, reference_line
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import OverClosedForm, ProportionalFit, RelativeDifference
+from rsfstudy.reduce import ClosedFormRatio, ProportionalFit, RelativeDifference
 
-from ._paper import CASES, CONSTANT, GU_ET_AL, PAPER, REFERENCE, STRONG, WEAK
+from ._paper import (
+    CONSTANT_NORMAL_STRESS,
+    GU_ET_AL,
+    NORMAL_STRESS_CASES,
+    PAPER,
+    REFERENCE,
+    STRONG_NORMAL_STRESS_EFFECT,
+    WEAK_NORMAL_STRESS_EFFECT,
+)
 
-CLOSE = "'very close'; 'maximum difference of a few percents'"
+PAPER_WORDS_ON_CLOSENESS = "'very close'; 'maximum difference of a few percents'"
 
 a_over_b_minus_a = np.concatenate([np.arange(5, 20) / 20, np.arange(4, 9) / 4])
 
@@ -30,7 +38,7 @@ LOADS = {"held": {"load_velocity_ratio": 0.0}, "moving at V_*": {"load_velocity_
 SLIP_HELD = {"law": "slip", "load": "held"}
 
 
-def near(case: str, stiffness_ratio: float, tolerance: float, reason: str) -> Claim:
+def closeness_claim(case: str, stiffness_ratio: float, tolerance: float, reason: str) -> Claim:
     """C10: the boundary close to D_c/lambda."""
     return Claim(
         id="C10",
@@ -44,10 +52,10 @@ def near(case: str, stiffness_ratio: float, tolerance: float, reason: str) -> Cl
     )
 
 
-X = "a_over_b_minus_a"
+ABSCISSA = "a_over_b_minus_a"
 
 
-def sizes(row: xr.Dataset) -> dict[str, Any]:
+def marker_style(row: xr.Dataset) -> dict[str, Any]:
     """Points that lie on each other show all the same, the larger behind."""
     alpha = float(np.nan_to_num(row.get("alpha", 0.0)))
     return {
@@ -59,23 +67,25 @@ def sizes(row: xr.Dataset) -> dict[str, Any]:
 figure = Figure(
     [
         Panel(
-            x=X,
+            x=ABSCISSA,
             y="critical_displacement",
-            by=["case"],
-            at={"law": 0, "load": 0, "stiffness_ratio": min},
-            points=True,
-            style=sizes,
-            marks=[reference_line(X, lambda x: x, r"$D_c\,a/(b-a)$ (Gu et al. 1984)", 0.0)],
+            hue=["case"],
+            isel={"law": 0, "load": 0, "stiffness_ratio": min},
+            markers_only=True,
+            style=marker_style,
+            overlays=[
+                reference_line(ABSCISSA, lambda x: x, r"$D_c\,a/(b-a)$ (Gu et al. 1984)", 0.0)
+            ],
             x_limits=(0.0, None),
             y_limits=(0.0, None),
         ),
         Panel(
-            x=X,
-            y=lambda row: row["critical_displacement"] / row[X],
-            by=["case", "stiffness_ratio"],
-            each=["law", "load"],
+            x=ABSCISSA,
+            y=lambda row: row["critical_displacement"] / row[ABSCISSA],
+            hue=["case", "stiffness_ratio"],
+            facet=["law", "load"],
             style={"markersize": 2.5, "linewidth": 0.9},
-            marks=[level(1.0)],
+            overlays=[horizontal_line(1.0)],
             y_label=r"Critical $\Delta\delta_0/D_c$ over $a/(b-a)$",
         ),
     ]
@@ -90,7 +100,7 @@ study = Study(
     axes=[
         Axis("law", ["slip", "slowness"]),
         Axis("load", LOADS),
-        Axis("case", CASES),
+        Axis("case", NORMAL_STRESS_CASES),
         Axis("stiffness_ratio", [1.0, 1.5, 2.0]),
         Axis("b_over_a", 1.0 + 1.0 / a_over_b_minus_a),
     ],
@@ -103,33 +113,54 @@ study = Study(
             within=(0.25, 1.0),
         ),
         RelativeDifference(
-            name="lowering", of="critical_displacement", along="case", reference=CONSTANT
+            name="lowering",
+            of="critical_displacement",
+            along="case",
+            reference=CONSTANT_NORMAL_STRESS,
         ),
-        OverClosedForm(name="over_eq_14", of="critical_displacement", form="displacement_step"),
+        ClosedFormRatio(name="over_eq_14", of="critical_displacement", form="displacement_step"),
     ],
     claims=[
-        near(
-            CONSTANT, 1.0, 2e-5, "eq. 14 holds for an infinite norm: exp(-10.9 (b/a - 1)) is left"
+        closeness_claim(
+            CONSTANT_NORMAL_STRESS,
+            1.0,
+            2e-5,
+            "eq. 14 holds for an infinite norm: exp(-10.9 (b/a - 1)) is left",
         ),
-        near(CONSTANT, 2.0, 2e-3, "an infinite norm is approached more slowly when stiff"),
-        near(WEAK, 1.0, 0.03, CLOSE),
-        near(STRONG, 1.0, 0.03, CLOSE),
+        closeness_claim(
+            CONSTANT_NORMAL_STRESS,
+            2.0,
+            2e-3,
+            "an infinite norm is approached more slowly when stiff",
+        ),
+        closeness_claim(WEAK_NORMAL_STRESS_EFFECT, 1.0, 0.03, PAPER_WORDS_ON_CLOSENESS),
+        closeness_claim(STRONG_NORMAL_STRESS_EFFECT, 1.0, 0.03, PAPER_WORDS_ON_CLOSENESS),
         Claim(
             id="C10",
             statement="alpha = 0.56, k = k_cr, a/(b-a) = 2: step over D_c a/(b-a)",
             source=f"{PAPER}, eq. 14, Fig. 7",
             variable="over_eq_14",
-            where={**SLIP_HELD, "case": STRONG, "stiffness_ratio": 1.0, "b_over_a": 1.5},
+            where={
+                **SLIP_HELD,
+                "case": STRONG_NORMAL_STRESS_EFFECT,
+                "stiffness_ratio": 1.0,
+                "b_over_a": 1.5,
+            },
             published=1.0,
             tolerance=0.03,
-            reason=CLOSE,
+            reason=PAPER_WORDS_ON_CLOSENESS,
         ),
         Claim(
             id="C9",
             statement="alpha = 0.56, b/a = 2: V just after a step of D_c is 2.697 V_*",
             source=f"{PAPER}, eq. 13",
             variable="slip_rate_after_closed_form_step",
-            where={**SLIP_HELD, "case": STRONG, "stiffness_ratio": 1.0, "b_over_a": 2.0},
+            where={
+                **SLIP_HELD,
+                "case": STRONG_NORMAL_STRESS_EFFECT,
+                "stiffness_ratio": 1.0,
+                "b_over_a": 2.0,
+            },
             published=2.697,
             tolerance=6e-4,
             reason="printed to three decimals; ours is 2.6975, and theirs cut rather than rounded",

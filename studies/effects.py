@@ -18,13 +18,13 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, Draw
+from rsfstudy.declare.figure import Axes, DrawFunction
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.quantity import Output
 from rsfstudy.reduce import RelativeDifference
-from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture
+from rsfstudy.slider.equations import Equations, equations_between_ruptures, equations_in_rupture
 
 #: Radiation damping with the impedance of spring and mass, K T V_*/(2 pi D_c), at constant normal
 #: stress.
@@ -40,19 +40,19 @@ DYNAMICS: dict[str, dict[str, bool | float]] = {
     "radiation damping": {"radiation_damping": IMPEDANCE},
     "inertia": {"inertia": True},
 }
-FULL = {"coupling": "inclined driving, alpha", "dynamics": "inertia"}
+FULL_SCENE_PLACE = {"coupling": "inclined driving, alpha", "dynamics": "inertia"}
 
 
 #: Evaluations timed together, and how often: the forms of the equations take short turns, so that
 #: a busy moment of the machine falls on all of them.
-_EVALUATIONS, _TURNS = 100, 25
+_EVALUATIONS_PER_TIMING, _TIMING_REPEATS = 100, 25
 #: Unknowns at which they are evaluated; further states are 0.
-_BETWEEN_RUPTURES, _IN_RUPTURE = (0.01, 0.0), (0.01, 10.0, 0.01)
+_SLOW_UNKNOWNS, _RUPTURE_UNKNOWNS = (0.01, 0.0), (0.01, 10.0, 0.01)
 
-_CYCLE = LimitCycle(phases=2)
+_CYCLE_MEASURE = LimitCycle(phases=2)
 #: Of its numbers, those that are kept.
-_OF_CYCLE = tuple(
-    replace(about, error=about.name == LimitCycle.headline)
+_CYCLE_OUTPUTS = tuple(
+    replace(about, error=about.name == LimitCycle.primary_output)
     for about in LimitCycle.outputs
     if about.error or about.name == "work_per_cycle"
 )
@@ -60,7 +60,7 @@ _OF_CYCLE = tuple(
 
 #: What its numbers are.
 _OUTPUTS = (
-    *_OF_CYCLE,
+    *_CYCLE_OUTPUTS,
     Output("unknowns", "", "1", "unknowns of the equations between ruptures"),
     Output("unknowns_in_rupture", "", "1", "unknowns of the equations where mass acts"),
     Output("share_in_rupture", "", "1", "share of the right-hand sides where mass acts"),
@@ -92,36 +92,42 @@ class EffectCost(Measure):
     """
 
     name: ClassVar[str] = "effect_cost"
-    headline = "recurrence_interval"
+    primary_output = "recurrence_interval"
     typical_work = 20_000
     outputs = _OUTPUTS
-    clocks: ClassVar[tuple[bool, ...]] = (False, True)
+    needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """The cycle under this meter; the forms of the equations on their own."""
-        costs = _costs(scene)
+        costs = _measure_costs(scene)
         try:
-            cycle = _CYCLE.find(scene, accuracy, meter)
-        except Halt as halt:
+            cycle = _CYCLE_MEASURE.compute(scene, accuracy, meter)
+        except MotionStopped as halt:
             return Outcome(halt.status, costs, str(halt))
-        spent = meter.by_regime.get("inertial", 0)
-        costs["share_in_rupture"] = spent / meter.spent if meter.spent else math.nan
-        names = [name for about in _OF_CYCLE for name in about.names]
+        spent = meter.evaluations_by_regime.get("inertial", 0)
+        costs["share_in_rupture"] = spent / meter.evaluations if meter.evaluations else math.nan
+        names = [name for about in _CYCLE_OUTPUTS for name in about.variable_names]
         kept = {name: cycle.values[name] for name in names if name in cycle.values}
         return Outcome(cycle.status, {**kept, **costs}, cycle.message)
 
 
-def _costs(scene: Scene) -> dict[str, float]:
+def _measure_costs(scene: Scene) -> dict[str, float]:
     """Unknowns of the forms of the equations of a scene, and the time of a right-hand side."""
-    slow = between_ruptures(scene, clock=False)
-    forms: dict[str, tuple[Equations, tuple[float, ...]]] = {"": (slow, _BETWEEN_RUPTURES)}
+    slow = equations_between_ruptures(scene, clock=False)
+    forms: dict[str, tuple[Equations, tuple[float, ...]]] = {"": (slow, _SLOW_UNKNOWNS)}
     if scene.inertia:
-        forms["_in_rupture"] = in_rupture(scene), _IN_RUPTURE
+        forms["_in_rupture"] = equations_in_rupture(scene), _RUPTURE_UNKNOWNS
     plainest = scene.with_(
         normal_stress="constant", fluid="drained", inertia=False, radiation_damping=0.0
     )
-    timed = {"plainest": (between_ruptures(plainest, clock=False), _BETWEEN_RUPTURES), **forms}
-    turns = [{where: _seconds(*form) for where, form in timed.items()} for _turn in range(_TURNS)]
+    timed = {
+        "plainest": (equations_between_ruptures(plainest, clock=False), _SLOW_UNKNOWNS),
+        **forms,
+    }
+    turns = [
+        {where: _time_right_hand_side(*form) for where, form in timed.items()}
+        for _turn in range(_TIMING_REPEATS)
+    ]
     costs = {}
     for where, (form, _state) in forms.items():
         ratios = [seconds[where] / seconds["plainest"] for seconds in turns]
@@ -131,27 +137,27 @@ def _costs(scene: Scene) -> dict[str, float]:
     return costs
 
 
-def _seconds(equations: Equations, state: tuple[float, ...]) -> float:
+def _time_right_hand_side(equations: Equations, state: tuple[float, ...]) -> float:
     """Processor time of one right-hand side."""
-    rate, p = equations.rate, equations.p
+    rate, p = equations.rate_function, equations.parameters
     state += (0.0,) * (len(equations.unknowns) - len(state))
     began = time.thread_time()
-    for _ in range(_EVALUATIONS):
+    for _ in range(_EVALUATIONS_PER_TIMING):
         rate(state, p)
-    return (time.thread_time() - began) / _EVALUATIONS
+    return (time.thread_time() - began) / _EVALUATIONS_PER_TIMING
 
 
-def bars(variable: str, digits: int) -> Draw:
+def draw_bars(variable: str, digits: int) -> DrawFunction:
     """Bars of a number: one row a combination, and one bar a law."""
 
     def mark(dataset: xr.Dataset, axes: Axes) -> None:
-        from rsfstudy.plots import look, name_rows
+        from rsfstudy.plots import cycle_style, label_rows
 
         values = dataset[variable].stack(row=("coupling", "dynamics")).transpose("law", "row")
         for number, law in enumerate(values["law"].values):
             at = np.arange(values.sizes["row"]) + 0.4 * (number - 0.5 * (values.sizes["law"] - 1))
             of_law = values.isel(law=number).values
-            look_of_it = {"color": look(number)["color"], "hatch": ("", "/////")[number % 2]}
+            look_of_it = {"color": cycle_style(number)["color"], "hatch": ("", "/////")[number % 2]}
             look_of_it |= {"edgecolor": "white", "linewidth": 0.0, "label": f"{law} law"}
             axes.barh(at, of_law, height=0.36, **look_of_it)
             for y, value in zip(at, of_law, strict=True):
@@ -159,7 +165,7 @@ def bars(variable: str, digits: int) -> Draw:
                 axes.text(
                     value if value > 0.0 else 0.0, y, text, va="center", fontsize=5.5, clip_on=True
                 )
-        name_rows(axes, [", ".join(row) for row in values["row"].values], 20)
+        label_rows(axes, [", ".join(row) for row in values["row"].values], 20)
         axes.tick_params(axis="y", labelsize=6)
         axes.margins(x=0.25)
         axes.grid(axis="y", visible=False)
@@ -170,7 +176,11 @@ def bars(variable: str, digits: int) -> Draw:
 figure = Figure(
     [
         Panel(
-            x=variable, x_label=label, y_label="Effects", marks=[bars(variable, digits)], title=""
+            x=variable,
+            x_label=label,
+            y_label="Effects",
+            overlays=[draw_bars(variable, digits)],
+            title="",
         )
         for variable, digits, label in (
             ("work_per_cycle", 4, "Right-hand sides per cycle"),
@@ -183,7 +193,7 @@ figure = Figure(
 )
 
 
-def loses(law: str, dynamics: str, published: float) -> Claim:
+def static_drop_loss_claim(law: str, dynamics: str, published: float) -> Claim:
     """E1: radiation damping instead of mass loses part of the static drop."""
     return Claim.above(
         id="E1",
@@ -207,7 +217,7 @@ study = Study(
     ],
     measure=EffectCost(),
     reductions=[
-        RelativeDifference(name=name, of=of, along=along, reference=FULL[along])
+        RelativeDifference(name=name, of=of, along=along, reference=FULL_SCENE_PLACE[along])
         for name, of, along in (
             ("drop_lost_without_mass", "static_stress_drop", "dynamics"),
             ("drop_lost_without_coupling", "static_stress_drop", "coupling"),
@@ -215,14 +225,14 @@ study = Study(
         )
     ],
     claims=[
-        loses("slip", "radiation damping", 0.3),
-        loses("slowness", "radiation damping", 0.3),
+        static_drop_loss_claim("slip", "radiation damping", 0.3),
+        static_drop_loss_claim("slowness", "radiation damping", 0.3),
         Claim(
             id="E2",
             statement="full scene: two unknowns between ruptures",
             source="the equations are assembled from the effects of the scene",
             variable="unknowns",
-            where={"law": "slip", **FULL},
+            where={"law": "slip", **FULL_SCENE_PLACE},
             published=2.0,
             reason="spring stress and state; mass adds its unknown in ruptures only",
         ),
@@ -231,7 +241,7 @@ study = Study(
             statement="full scene, slip law: the full equations take part of the work only",
             source="inertia is integrated where it acts",
             variable="share_in_rupture",
-            where={"law": "slip", **FULL},
+            where={"law": "slip", **FULL_SCENE_PLACE},
             published=0.9,
         ),
     ],

@@ -23,22 +23,29 @@ from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
 from rsfstudy.declare.figure import Axes
 from rsfstudy.reduce.base import Reduction
 
-from ._noise_kinds import KINDS
-from ._synthetic_fit import ACCURACY, ONE, RIG, TWO, SyntheticFit
+from ._noise_kinds import NOISE_KINDS
+from ._synthetic_fit import (
+    BASE_SCENE,
+    FIT_ACCURACY,
+    SHARE_WITHIN_ONE_STDERR,
+    SHARE_WITHIN_TWO_STDERRS,
+    SyntheticFit,
+)
 
 RECORDS = 24
-CLASSIC, LAWS = ("white", "ar1", "ma3"), ("slip", "slowness")
+CLASSIC_PROCESSES, LAWS = ("white", "ar1", "ma3"), ("slip", "slowness")
 #: Kinds that cannot be modelled, with the smallest fraction of records that must be flagged.
-FLAGGED = {"coarsely_rounded": 0.95, "unstated_average": 0.8}
-#: Kinds whose coverage is reported without a claim: 1/f noise is not modelled, and rounding to
-#: twice the noise makes 95 % intervals of the slip law cover about 90 % only.
-REPORTED = ("pink", "rounded")
-MODELLED = [kind for kind in KINDS if kind not in (*FLAGGED, *REPORTED)]
-PROCESSES = (*CLASSIC, *KINDS)
+FLAGGED_KINDS = {"coarsely_rounded": 0.95, "unstated_average": 0.8}
+#: Kinds whose coverage is reported without a claim, because 1/f noise is not modelled.
+KINDS_WITHOUT_CLAIM = ("pink",)
+MODELLED_KINDS = [
+    kind for kind in NOISE_KINDS if kind not in (*FLAGGED_KINDS, *KINDS_WITHOUT_CLAIM)
+]
+PROCESSES = (*CLASSIC_PROCESSES, *NOISE_KINDS)
 #: Of which shares of records are told, with what Gaussian errors cover.
-INTERVALS = {"inside_one": ONE, "inside_two": TWO}
+NOMINAL_COVERAGE = {"inside_one": SHARE_WITHIN_ONE_STDERR, "inside_two": SHARE_WITHIN_TWO_STDERRS}
 #: Standard deviations of a binomial share by which ours may be off.
-CHANCE = 3.5
+MAX_BINOMIAL_DEVIATION = 3.5
 
 
 @dataclass(frozen=True)
@@ -56,7 +63,7 @@ class ShareInside(Reduction):
         Nominal coverage of the interval.
     """
 
-    covers: float = ONE
+    covers: float = SHARE_WITHIN_ONE_STDERR
     kind: ClassVar[str] = "share_inside"
     long_names: ClassVar[Mapping[str, str]] = {
         "": "share of records with the truth inside",
@@ -93,36 +100,42 @@ class ShareFlagged(Reduction):
         return xr.Dataset({self.name: dataset[self.of].mean("seed")})
 
 
-def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
-    """Plot the fractions by parameter, for the fit and for the usual formula."""
-    from rsfstudy.plots import look, marker
+def plot_shares(dataset: xr.Dataset, axes: Axes) -> None:
+    """Plot the fractions by kind of noise, for the fit and for the usual formula.
 
-    places = np.arange(dataset.sizes["parameter"])
-    for number, process in enumerate(dataset["process"].values):
-        for prefix, fill in (("", "full"), ("naive_", "none")):
-            share = 100.0 * dataset[f"{prefix}share_one"].isel(process=number)
-            beside = min(0.15, 0.8 / dataset.sizes["process"]) * (
-                number - 0.5 * (dataset.sizes["process"] - 1)
-            )
-            style = {"color": look(number)["color"], "linestyle": "", "fillstyle": fill}
-            text = f"{str(process).replace('_', ' ')}{', naive' * bool(prefix)}"
-            axes.plot(places + beside, share, marker=marker(number), label=text, **style)
-    axes.axhline(100.0 * ONE, color="0.4", linestyle="--", linewidth=0.8)
-    names = [MODEL[str(name)].symbol or str(name) for name in dataset["parameter"].values]
-    axes.set_xticks(places, names)
+    Each parameter has a marker, and full markers are those of the fit.
+    """
+    from rsfstudy.plots import cycle_marker, cycle_style
+
+    places = np.arange(dataset.sizes["process"])[::-1]  # from top to bottom
+    for number, parameter in enumerate(dataset["parameter"].values):
+        style = {"color": cycle_style(number)["color"], "marker": cycle_marker(number)}
+        name = MODEL[str(parameter)].symbol or str(parameter)
+        for prefix, fill, shift in (("", "full", 0.12), ("naive_", "none", -0.2)):
+            share = 100.0 * dataset[f"{prefix}share_one"].isel(parameter=number)
+            label = f"{name}, usual formula" if prefix else name
+            axes.plot(share, places + shift, ls="", fillstyle=fill, label=label, **style)
+    axes.axvline(100.0 * SHARE_WITHIN_ONE_STDERR, color="0.4", linestyle="--", linewidth=0.8)
+    axes.set_yticks(places, [str(name).replace("_", " ") for name in dataset["process"].values])
+    axes.set_ylim(-0.6, len(places) - 0.4)
 
 
-shares = Panel(
-    each=["law"],
-    marks=[mark_shares],
-    x_label="Parameter",
-    y_label="Truth inside 68.3 % interval (%)",
-    y_limits=(0.0, 103.0),
-    alike="share",
+shares_panel = Panel(
+    facet=["law"],
+    overlays=[plot_shares],
+    x_label="Truth inside 68.3 % interval (%)",
+    y_label="Noise",
+    x_limits=(0.0, 103.0),
+    y_scale_group="noise",
 )
 
 
-def covers(series: str, words: str, **where: str) -> list[Claim]:
+def figure_height(dataset: xr.Dataset) -> float:
+    """Return the height of a panel in mm, for the number of kinds of noise."""
+    return 30.0 + 5.0 * dataset.sizes["process"]
+
+
+def coverage_claims(series: str, words: str, **where: str) -> list[Claim]:
     """Return two claims that intervals have their nominal coverage."""
     return [
         Claim.above(
@@ -132,14 +145,14 @@ def covers(series: str, words: str, **where: str) -> list[Claim]:
             variable=f"share_{name.removeprefix('inside_')}_least",
             where=where,
             published=0.0,
-            tolerance=CHANCE,
+            tolerance=MAX_BINOMIAL_DEVIATION,
             reason="binomial standard deviations, of the parameter covered least",
         )
-        for number, (name, share) in enumerate(INTERVALS.items(), start=1)
+        for number, (name, share) in enumerate(NOMINAL_COVERAGE.items(), start=1)
     ]
 
 
-def is_flagged(process: str, law: str, least: float) -> Claim:
+def flagged_claim(process: str, law: str, least: float) -> Claim:
     """Declare that the fit detects noise that the noise model cannot describe."""
     return Claim.above(
         id="F6",
@@ -152,7 +165,7 @@ def is_flagged(process: str, law: str, least: float) -> Claim:
     )
 
 
-def is_seldom_flagged(process: str, law: str) -> Claim:
+def seldom_flagged_claim(process: str, law: str) -> Claim:
     """Return the claim that the fit accepts noise that it can model."""
     return Claim.below(
         id="F7",
@@ -166,7 +179,7 @@ def is_seldom_flagged(process: str, law: str) -> Claim:
     )
 
 
-def naive_fails(process: str, law: str) -> Claim:
+def naive_errors_claim(process: str, law: str) -> Claim:
     """Return the claim that the usual formula underestimates errors."""
     return Claim.below(
         id="F3",
@@ -174,7 +187,7 @@ def naive_fails(process: str, law: str) -> Claim:
         source="of n samples with correlated noise fewer count",
         variable="naive_share_one_least",
         where={"process": process, "law": law},
-        published=-CHANCE,
+        published=-MAX_BINOMIAL_DEVIATION,
         reason="beyond chance",
     )
 
@@ -182,35 +195,41 @@ def naive_fails(process: str, law: str) -> Claim:
 REDUCTIONS = [
     ShareInside(f"{prefix}share_{name.removeprefix('inside_')}", f"{prefix}{name}", share)
     for prefix in ("", "naive_")
-    for name, share in INTERVALS.items()
+    for name, share in NOMINAL_COVERAGE.items()
 ]
-FLAGS = ShareFlagged("flagged_share", "flagged")
+FLAGGED_SHARE_REDUCTION = ShareFlagged("flagged_share", "flagged")
 
 study = Study(
     name="fit_coverage",
     title="Shares of synthetic records whose truth lies within the errors of the fit",
     summary=Study.caption(__doc__),
-    base=RIG,
+    base=BASE_SCENE,
     axes=[
         Axis("process", list(PROCESSES)),
         Axis("law", list(LAWS)),
         Axis("seed", list(range(RECORDS))),
     ],
     measure=SyntheticFit(),
-    reductions=[*REDUCTIONS, FLAGS],
+    reductions=[*REDUCTIONS, FLAGGED_SHARE_REDUCTION],
     claims=[
         *(
             claim
-            for process in (*CLASSIC, *MODELLED)
+            for process in (*CLASSIC_PROCESSES, *MODELLED_KINDS)
             for law in LAWS
-            for claim in covers("F", f"{process} noise, {law} law", process=process, law=law)
+            for claim in coverage_claims(
+                "F", f"{process} noise, {law} law", process=process, law=law
+            )
         ),
-        *(naive_fails(p, law) for p in CLASSIC[1:] for law in LAWS),
-        *(is_flagged(p, law, least) for p, least in FLAGGED.items() for law in LAWS),
-        *(is_seldom_flagged(p, law) for p in (*CLASSIC, *MODELLED) for law in LAWS),
+        *(naive_errors_claim(p, law) for p in CLASSIC_PROCESSES[1:] for law in LAWS),
+        *(flagged_claim(p, law, least) for p, least in FLAGGED_KINDS.items() for law in LAWS),
+        *(
+            seldom_flagged_claim(p, law)
+            for p in (*CLASSIC_PROCESSES, *MODELLED_KINDS)
+            for law in LAWS
+        ),
     ],
-    plot=Figure([shares]),
-    accuracy=ACCURACY,
+    plot=Figure([shares_panel], height=figure_height),
+    accuracy=FIT_ACCURACY,
     references=[
         "Patterson and Thompson (1971), Biometrika 58, 545-554",
         "Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696",

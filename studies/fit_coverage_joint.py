@@ -11,13 +11,16 @@ from dataclasses import replace
 
 from rsfstudy import Axis, Figure, Scene, Study
 
-from ._synthetic_fit import ACCURACY, SyntheticFit, designs
-from .fit_coverage import REDUCTIONS, covers, shares
+from ._synthetic_fit import FIT_ACCURACY, SyntheticFit, protocol_axis
+from .fit_coverage import REDUCTIONS, coverage_claims, figure_height, shares_panel
 
 RECORDS = 6
 PROCESSES = ("white", "ar1")
-UP, BACK = "1:30, 10:300", "10:30, 1:300"
-DESIGNS = {"one step up": UP, "a pair, up and back": f"{UP}; {BACK}"}
+STEP_UP_PROTOCOL, STEP_BACK_PROTOCOL = "1:30, 10:300", "10:30, 1:300"
+DESIGNS = {
+    "one step up": STEP_UP_PROTOCOL,
+    "a pair, up and back": f"{STEP_UP_PROTOCOL}; {STEP_BACK_PROTOCOL}",
+}
 
 study = Study(
     name="fit_coverage_joint",
@@ -34,7 +37,7 @@ study = Study(
     ),
     axes=[
         Axis("process", list(PROCESSES)),
-        designs(DESIGNS),
+        protocol_axis(DESIGNS),
         Axis("seed", list(range(RECORDS))),
     ],
     measure=SyntheticFit(
@@ -44,8 +47,8 @@ study = Study(
     claims=[
         claim
         for design in DESIGNS
-        for claim in covers("J", f"white noise, {design}", process="white", design=design)
+        for claim in coverage_claims("J", f"white noise, {design}", process="white", design=design)
     ],
-    plot=Figure([replace(shares, each=["design"])]),
-    accuracy=ACCURACY,
+    plot=Figure([replace(shares_panel, facet=["design"])], height=figure_height),
+    accuracy=FIT_ACCURACY,
 )

@@ -17,22 +17,28 @@ from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.analysis.fitting.joint import Joint
-from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, Model, Values, parameters_of
-from rsfstudy.analysis.fitting.search import Search
+from rsfstudy.analysis.fitting.joint import JointModel
+from rsfstudy.analysis.fitting.model import (
+    LOGARITHMIC_PARAMETERS,
+    PARAMETERS,
+    Values,
+    WindowModel,
+    scene_to_parameters,
+)
+from rsfstudy.analysis.fitting.search import FitProblem
 from rsfstudy.declare.figure import Axes
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome, Value
-from rsfstudy.motion.meter import Meter
+from rsfstudy.measures import Measure, Outcome, OutputValue
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.status import Status
 
-from ._synthetic_fit import ACCURACY
+from ._synthetic_fit import FIT_ACCURACY
 
 #: Slip distance in um, rows of a record, and the accuracy of its motion.
-DISTANCE, ROWS, SMOOTH = 10.0, 300, 1e-9
+SLIP_DISTANCE, ROWS, MOTION_RTOL = 10.0, 300, 1e-9
 #: How long all slides steadily before the record begins, in s: loading may come as late.
-EARLIER = 5.0
+STEADY_TIME_BEFORE_RECORD = 5.0
 #: Loading by name: times in s, load point velocities in um/s, normal stress over the first and its
 #: rate in 1/s; and when the record ends.
 LOADINGS = {
@@ -49,16 +55,16 @@ LOADINGS = {
     ),
 }
 #: Searches begin so far from the truth: over it, and beside it.
-OFF = {"a": 1.2, "b": 0.8, "slip_distance": 1.5, "stiffness": 1.3}
-BESIDE = {"alpha": 0.1, "law_exponent": 0.2}
+INITIAL_FACTORS = {"a": 1.2, "b": 0.8, "slip_distance": 1.5, "stiffness": 1.3}
+INITIAL_OFFSETS = {"alpha": 0.1, "law_exponent": 0.2}
 #: Where records are from, and by how much parameters may be off: what rounding and the end of the
 #: search leave; and some hundred times 1e-10, the errors of both motions over the 5e-3 by which a
 #: slip distance moves friction.
-LEAVES = {"the model": 1e-8, "other code": 1e-6}
+MAX_DEVIATIONS = {"the model": 1e-8, "other code": 1e-6}
 
 
 @dataclass(frozen=True)
-class Recovered(Measure):
+class RecoveryError(Measure):
     """Deviations of the parameters of a fit from those of the record, which has no noise.
 
     Parameters
@@ -76,7 +82,7 @@ class Recovered(Measure):
     looked_for: str = "a b slip_distance mu_star trend1"
     record_by: str = "the model"
     name: ClassVar[str] = "recovered"
-    headline = "largest_deviation"
+    primary_output = "largest_deviation"
     typical_work = 200_000
     dimensions = (
         Quantity("parameter", "", "", "parameter that is fitted"),
@@ -101,8 +107,8 @@ class Recovered(Measure):
         if self.loading_of_record not in LOADINGS:
             name, value = "loading_of_record", self.loading_of_record
             raise InvalidValue(name, value, "is unknown", choices=LOADINGS)
-        if self.record_by not in LEAVES:
-            raise InvalidValue("record_by", self.record_by, "is unknown", choices=LEAVES)
+        if self.record_by not in MAX_DEVIATIONS:
+            raise InvalidValue("record_by", self.record_by, "is unknown", choices=MAX_DEVIATIONS)
         for name in self.looked_for.split():
             if name not in PARAMETERS:
                 raise InvalidValue("looked_for", name, "is no parameter", choices=PARAMETERS)
@@ -112,32 +118,39 @@ class Recovered(Measure):
         """All parameters."""
         return {"parameter": np.array([*PARAMETERS], dtype=object)}
 
-    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+    def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Sizes of parameters: deviations are told over those."""
         return {"largest_deviation": 1.0}
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Make a record, and fit it."""
-        free, true = self.looked_for.split(), parameters_of(scene, DISTANCE, math.nan)
+        free, true = self.looked_for.split(), scene_to_parameters(scene, SLIP_DISTANCE, math.nan)
         true |= {name: 0.0 for name in free if name not in true}
-        smooth = replace(accuracy, rtol=min(accuracy.rtol, SMOOTH))
-        model = self._model(scene, smooth, meter)
-        made = model.curve(true) if self.record_by == "the model" else _by_scipy(model, true)
+        smooth = replace(accuracy, rtol=min(accuracy.rtol, MOTION_RTOL))
+        model = self._record_model(scene, smooth, meter)
+        made = (
+            model.model_friction(true)
+            if self.record_by == "the model"
+            else _friction_by_scipy(model, true)
+        )
         model = replace(model, friction=made)
         first = {
-            n: v * OFF.get(n, 1.0) + BESIDE.get(n, 0.0) if n in free else v for n, v in true.items()
+            n: v * INITIAL_FACTORS.get(n, 1.0) + INITIAL_OFFSETS.get(n, 0.0) if n in free else v
+            for n, v in true.items()
         }
-        found = Search(Joint((model,)), first, free, "white").run()
-        sizes = {name: _size(name, true) for name in free}
+        found = FitProblem(JointModel((model,)), first, free, "white").solve()
+        sizes = {name: _parameter_scale(name, true) for name in free}
         off = {name: (found.values[name] - true[name]) / sizes[name] for name in free}
-        values: dict[str, Value] = {
+        values: dict[str, OutputValue] = {
             "largest_deviation": max(map(abs, off.values())),
-            "largest_deviation_error": max(found.errors[name] / sizes[name] for name in free),
+            "largest_deviation_error": max(
+                found.numerical_errors[name] / sizes[name] for name in free
+            ),
             "deviation": np.array([off.get(name, math.nan) for name in PARAMETERS]),
         }
         return Outcome(Status.OK, values)
 
-    def _model(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Model:
+    def _record_model(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> WindowModel:
         """The model of the record, rows evenly spaced in displacement."""
         pieces, ends = LOADINGS[self.loading_of_record]
         loading = np.array(pieces)
@@ -146,18 +159,18 @@ class Recovered(Measure):
         at = np.linspace(0.0, moved[-1], ROWS)
         time = np.interp(at, moved, knots)
         step = moved[np.argmax(begins > 0.0)]
-        loading[0, 0] -= EARLIER
-        return Model(scene, time, at - step, np.zeros(ROWS), loading, accuracy, meter)
+        loading[0, 0] -= STEADY_TIME_BEFORE_RECORD
+        return WindowModel(scene, time, at - step, np.zeros(ROWS), loading, accuracy, meter)
 
 
-def _by_scipy(model: Model, true: Values) -> np.ndarray:
+def _friction_by_scipy(model: WindowModel, true: Values) -> np.ndarray:
     """Friction by other code: with w = ln(V/V_0), sigma over its first value, and Psi = ln(theta)
     + (alpha/b) ln(sigma), each over its first value,
 
         (sigma mu)' = k (V_l - V),    Psi' = (V/D_c) h(ln(theta) + w).
     """
     a, b, k, distance = (true[n] for n in ("a", "b", "stiffness", "slip_distance"))
-    law, first, alpha = model.scene.law, model.reference, true.get("alpha", 0.0)
+    law, first, alpha = model.scene.law, model.initial_velocity, true.get("alpha", 0.0)
     cutoff = float(model.scene.as_dict().get("cutoff_velocity_ratio") or 1.0)
     ahead = float(lambertw(math.exp(-1.0 / cutoff)).real)
 
@@ -194,17 +207,17 @@ def _by_scipy(model: Model, true: Values) -> np.ndarray:
     return found
 
 
-def _size(name: str, true: Values) -> float:
+def _parameter_scale(name: str, true: Values) -> float:
     """What deviations are told over: the larger of a and b, a trend that moves the window by 1, and
     numbers of order one.
     """
-    if name in LOGARITHMIC:
+    if name in LOGARITHMIC_PARAMETERS:
         return true[name]
     sizes = dict.fromkeys(("a", "b"), max(true["a"], abs(true["b"])))
-    return (sizes | {"trend1": 1.0 / (15.0 * DISTANCE)}).get(name, 1.0)
+    return (sizes | {"trend1": 1.0 / (15.0 * SLIP_DISTANCE)}).get(name, 1.0)
 
 
-STRESSED = {
+NORMAL_STRESS_STEP_CASE = {
     "normal_stress": "imposed",
     "alpha": 0.3,
     "loading_of_record": "normal stress step",
@@ -227,18 +240,18 @@ CASES = {
     "step down": {"law": "slowness", "loading_of_record": "step down"},
     "b < 0": {"law": "slowness", "b_over_a": -0.4},
     "b < 0, slip": {"law": "slip", "b_over_a": -0.4},
-    "normal stress step": {"law": "slip", **STRESSED},
-    "the same, slowness": {"law": "slowness", **STRESSED},
+    "normal stress step": {"law": "slip", **NORMAL_STRESS_STEP_CASE},
+    "the same, slowness": {"law": "slowness", **NORMAL_STRESS_STEP_CASE},
 }
 
 
-def mark_allowed(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_allowed_deviations(dataset: xr.Dataset, axes: Axes) -> None:
     """What the claims allow, by what made the record."""
-    from rsfstudy.plots import look
+    from rsfstudy.plots import cycle_style
 
     for number, source in enumerate(dataset["record_by"].values):
-        colour = look(number)["color"]
-        axes.axvline(LEAVES[str(source)], color=colour, linestyle="--", linewidth=0.8)
+        colour = cycle_style(number)["color"]
+        axes.axvline(MAX_DEVIATIONS[str(source)], color=colour, linestyle="--", linewidth=0.8)
 
 
 figure = Figure(
@@ -246,8 +259,8 @@ figure = Figure(
         Panel(
             x=lambda row: row["largest_deviation"].clip(min=1e-16),
             y="case",
-            by=["record_by"],
-            marks=[mark_allowed],
+            hue=["record_by"],
+            overlays=[plot_allowed_deviations],
             y_label="Record",
             x_label="Largest deviation of a parameter",
             log="x",
@@ -256,7 +269,7 @@ figure = Figure(
 )
 
 
-def comes_back(case: str, source: str) -> Claim:
+def recovery_claim(case: str, source: str) -> Claim:
     """F4: the parameters of the record are those of the fit."""
     reasons = {
         "the model": "what the end of the search leaves, and rounding",
@@ -269,7 +282,7 @@ def comes_back(case: str, source: str) -> Claim:
         source="identity of model and record",
         variable="largest_deviation",
         where={"case": case, "record_by": source},
-        published=LEAVES[source],
+        published=MAX_DEVIATIONS[source],
         reason=reasons[source],
     )
 
@@ -281,11 +294,11 @@ study = Study(
     base=Scene(normal_stress="constant", a=0.01, b_over_a=1.3, mu_star=0.6, stiffness=0.03),
     axes=[
         Axis("case", CASES),
-        Axis("record_by", list(LEAVES)),
+        Axis("record_by", list(MAX_DEVIATIONS)),
     ],
-    measure=Recovered(),
-    claims=[comes_back(case, source) for case in CASES for source in LEAVES],
+    measure=RecoveryError(),
+    claims=[recovery_claim(case, source) for case in CASES for source in MAX_DEVIATIONS],
     plot=figure,
-    accuracy=ACCURACY,
+    accuracy=FIT_ACCURACY,
     references=["Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696"],
 )

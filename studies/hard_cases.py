@@ -22,17 +22,17 @@ from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.quantity import Output
 from rsfstudy.status import Status
 
 from . import _references as known
-from ._problem import ERRORS, Fields, Posing, Problem, posed
-from ._references import Known
+from ._problem import ERROR_OUTPUTS, Fields, Problem, ProblemMeasure, register_problem
+from ._references import KnownValue
 
 
 @dataclass(frozen=True)
-class HardCase(Posing):
+class HardCase(ProblemMeasure):
     """Solves the problem a scene poses and holds the outcome against the known answer.
 
     ``ok`` where it ends as it must and, if the answer is a number, the error is within the
@@ -40,16 +40,19 @@ class HardCase(Posing):
     """
 
     name: ClassVar[str] = "hard_case"
-    headline = "measured_error"
+    primary_output = "measured_error"
     typical_work = 15_000
-    outputs = (*ERRORS, Output("answer", "", "1", "the known answer"), Output("ended_as"))
-    clocks: ClassVar[tuple[bool, ...]] = (False, True)
+    outputs = (*ERROR_OUTPUTS, Output("answer", "", "1", "the known answer"), Output("ended_as"))
+    needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Measure, and compare."""
-        problem = self.posed_by(scene)
-        outcome, spent = problem.measure.metered(scene, accuracy)
-        meter.by_regime, meter.spent = spent.by_regime, spent.spent
+        problem = self.problem_of_scene(scene)
+        outcome, spent = problem.measure.run_metered(scene, accuracy)
+        meter.evaluations_by_regime, meter.evaluations = (
+            spent.evaluations_by_regime,
+            spent.evaluations,
+        )
         numbers = {"ended_as": float(outcome.status)}
         if outcome.status is not problem.status:
             why = f"ended as {outcome.status.label}, not {problem.status.label}: {outcome.message}"
@@ -57,7 +60,7 @@ class HardCase(Posing):
         if problem.answer is None:
             exact = {"measured_error": 0.0, "measured_error_error": 0.0}
             return Outcome(Status.OK, numbers | exact, outcome.message)
-        error, estimate = problem.error_of(outcome), problem.estimate_of(outcome)
+        error, estimate = problem.relative_error(outcome), problem.relative_error_estimate(outcome)
         numbers |= {
             "measured_error": error,
             "measured_error_error": problem.uncertainty,
@@ -72,105 +75,182 @@ class HardCase(Posing):
 
 CASES: dict[str, tuple[Fields, Problem]] = {}
 
-CONSTANT: Fields = {"normal_stress": "constant"}
-SLIP: Fields = {**CONSTANT, "law": "slip"}
-SLOWNESS: Fields = {**CONSTANT, "law": "slowness"}
-CYCLE: Fields = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
-EXACT, LINEAR = "closed form", "linear theory: every orbit grows below k_cr, and decays above"
+CONSTANT_FIELDS: Fields = {"normal_stress": "constant"}
+SLIP_FIELDS: Fields = {**CONSTANT_FIELDS, "law": "slip"}
+SLOWNESS_FIELDS: Fields = {**CONSTANT_FIELDS, "law": "slowness"}
+CYCLE_FIELDS: Fields = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
+CLOSED_FORM_SOURCE, LINEAR_THEORY_SOURCE = (
+    "closed form",
+    "linear theory: every orbit grows below k_cr, and decays above",
+)
 
-step, triggered, rigid = CriticalStep(), Triggered(), RigidResponse()
-growth = LinearStability()
-cycle, peaks = LimitCycle(phases=2), StepResponse(peaks=2, phases=2)
+step_measure, triggered_measure, rigid_measure = CriticalStep(), Triggered(), RigidResponse()
+growth_measure = LinearStability()
+cycle_measure, peaks_measure = LimitCycle(phases=2), StepResponse(peaks=2, phases=2)
 
 
-def loaded(velocity_ratio: float, **fields: Any) -> Fields:
+def with_load_velocity(velocity_ratio: float, **fields: Any) -> Fields:
     """Fields of a scene with this velocity of its load point."""
     return {**fields, "load_velocity_ratio": velocity_ratio}
 
 
-def near(off: float, **fields: Any) -> Fields:
+def near_critical_stiffness(off: float, **fields: Any) -> Fields:
     """Fields of a scene with a stiffness of (1 + off) k_cr, at constant normal stress."""
-    return {**CONSTANT, "stiffness_ratio": 1.0 + off, **fields}
+    return {**CONSTANT_FIELDS, "stiffness_ratio": 1.0 + off, **fields}
 
 
-def number(label: str, measure: Measure, known: Known, fields: Fields) -> None:
+def add_value_case(label: str, measure: Measure, known: KnownValue, fields: Fields) -> None:
     """A case with a number to come out."""
-    CASES[label] = posed(fields, measure, **known._asdict())
+    CASES[label] = register_problem(fields, measure, **known._asdict())
 
 
-def ends(label: str, measure: Measure, status: Status, fields: Fields) -> None:
+def add_status_case(label: str, measure: Measure, status: Status, fields: Fields) -> None:
     """A case that must end with a status."""
-    CASES[label] = posed(fields, measure, status=status, source="the physics")
+    CASES[label] = register_problem(fields, measure, status=status, source="the physics")
 
 
-def critical(label: str, **fields: Any) -> None:
+def add_critical_step_case(label: str, **fields: Any) -> None:
     """A critical step of the slip law by the independent computation."""
-    number(label, step, known.HARD_STEPS[label], fields)
+    add_value_case(label, step_measure, known.HARD_STEPS[label], fields)
 
 
-def recurs(label: str, name: str, **fields: Any) -> None:
+def add_cycle_case(label: str, name: str, **fields: Any) -> None:
     """A limit cycle of the slip law by the independent computation."""
-    number(name, cycle, known.HARD_CYCLES[label], {**CONSTANT, **CYCLE, **fields})
+    add_value_case(
+        name, cycle_measure, known.HARD_CYCLES[label], {**CONSTANT_FIELDS, **CYCLE_FIELDS, **fields}
+    )
 
 
 # rates and steps beyond what numbers hold
-number("200-fold step, peak at 10^87 V_*", peaks, known.PEAK_AFTER_200, loaded(200.0, **SLOWNESS))
-number("20-fold step, neutral orbit", peaks, known.PEAK_AFTER_20, loaded(20.0, **SLOWNESS))
+add_value_case(
+    "200-fold step, peak at 10^87 V_*",
+    peaks_measure,
+    known.PEAK_AFTER_200,
+    with_load_velocity(200.0, **SLOWNESS_FIELDS),
+)
+add_value_case(
+    "20-fold step, neutral orbit",
+    peaks_measure,
+    known.PEAK_AFTER_20,
+    with_load_velocity(20.0, **SLOWNESS_FIELDS),
+)
 UNBOUNDED = Status.SLIP_RATE_UNBOUNDED
-ends("1000-fold step, peak beyond 10^120 V_*", peaks, UNBOUNDED, loaded(1000.0, **SLOWNESS))
-FAST = Known(math.log((1e12 - 1.0) / (1e12 ** math.exp(-1.0) - 1.0)), EXACT)
-number("rigid, V = 1e12 V_*", RigidResponse(slip=60.0), FAST, loaded(1e12, **SLOWNESS))
-number("rigid, V = 1e-40 V_*", rigid, Known(1.0, EXACT), loaded(1e-40, **SLIP))
-number("rigid, mu_ss = -0.03", rigid, Known(1.0, EXACT), loaded(1e24, **SLIP))
+add_status_case(
+    "1000-fold step, peak beyond 10^120 V_*",
+    peaks_measure,
+    UNBOUNDED,
+    with_load_velocity(1000.0, **SLOWNESS_FIELDS),
+)
+FAST_STEP_DISTANCE = KnownValue(
+    math.log((1e12 - 1.0) / (1e12 ** math.exp(-1.0) - 1.0)), CLOSED_FORM_SOURCE
+)
+add_value_case(
+    "rigid, V = 1e12 V_*",
+    RigidResponse(slip=60.0),
+    FAST_STEP_DISTANCE,
+    with_load_velocity(1e12, **SLOWNESS_FIELDS),
+)
+add_value_case(
+    "rigid, V = 1e-40 V_*",
+    rigid_measure,
+    KnownValue(1.0, CLOSED_FORM_SOURCE),
+    with_load_velocity(1e-40, **SLIP_FIELDS),
+)
+add_value_case(
+    "rigid, mu_ss = -0.03",
+    rigid_measure,
+    KnownValue(1.0, CLOSED_FORM_SOURCE),
+    with_load_velocity(1e24, **SLIP_FIELDS),
+)
 # at and around the critical stiffness
-number("critical step, k = (1 +1e-08) k_cr", step, known.JUST_ABOVE_CRITICAL_STIFFNESS, near(1e-8))
+add_value_case(
+    "critical step, k = (1 +1e-08) k_cr",
+    step_measure,
+    known.JUST_ABOVE_CRITICAL_STIFFNESS,
+    near_critical_stiffness(1e-8),
+)
 for off in (-1e-3, 1e-3):
-    grows = Known(float(off < 0.0), LINEAR, scale=1.0)
-    tiny = near(off, load_velocity_ratio=1.0 + 1e-3)
-    number(f"tiny step, k = (1 {off:+g}) k_cr", triggered, grows, tiny)
+    grows = KnownValue(float(off < 0.0), LINEAR_THEORY_SOURCE, scale=1.0)
+    tiny = near_critical_stiffness(off, load_velocity_ratio=1.0 + 1e-3)
+    add_value_case(f"tiny step, k = (1 {off:+g}) k_cr", triggered_measure, grows, tiny)
 # growth and decay of 1e-8 an orbit cannot be told apart at rtol 1e-7, and the status says so
 for off in (-1e-8, 1e-8):
-    tiny = near(off, load_velocity_ratio=1.0 + 1e-3)
-    ends(f"tiny step, k = (1 {off:+g}) k_cr", triggered, Status.UNVERIFIED, tiny)
+    tiny = near_critical_stiffness(off, load_velocity_ratio=1.0 + 1e-3)
+    add_status_case(f"tiny step, k = (1 {off:+g}) k_cr", triggered_measure, Status.UNVERIFIED, tiny)
 # every step is unstable there, by a growth of 1e-8 an orbit that no motion can show
-ends("critical step, k = (1 -1e-08) k_cr", step, Status.UNVERIFIED, near(-1e-8))
-ends("any step, k = (1 -0.001) k_cr", step, Status.UNSTABLE_AT_ANY_STEP, near(-1e-3))
-recurs("k = 0.99 k_cr", "cycle at 0.99 k_cr", stiffness_ratio=0.99)
-recurs("V_0 = V_*", "cycle from a nudge, V_0 = V_*", load_velocity_ratio=1.0)
+add_status_case(
+    "critical step, k = (1 -1e-08) k_cr",
+    step_measure,
+    Status.UNVERIFIED,
+    near_critical_stiffness(-1e-8),
+)
+add_status_case(
+    "any step, k = (1 -0.001) k_cr",
+    step_measure,
+    Status.UNSTABLE_AT_ANY_STEP,
+    near_critical_stiffness(-1e-3),
+)
+add_cycle_case("k = 0.99 k_cr", "cycle at 0.99 k_cr", stiffness_ratio=0.99)
+add_cycle_case("V_0 = V_*", "cycle from a nudge, V_0 = V_*", load_velocity_ratio=1.0)
 # parameters at the ends of their ranges
-critical("lambda = 0.01", **CONSTANT, b_over_a=1.01)
-critical("lambda = 20", **CONSTANT, b_over_a=21.0)
-critical("a = 1e-4", a=1e-4)
-critical("a = 0.1", a=0.1)
-critical("alpha = 0", alpha=0.0)
-critical("alpha = mu_*", alpha=0.76)
-critical("alpha = 1", alpha=1.0)
-STEEP = {"phi": math.degrees(math.atan(0.76)) + 0.01}
-critical("phi = atan(mu_*) + 0.01", **STEEP)
-critical("T = 1e-6 s", period=1e-6)
-critical("T = 1e4 s", period=1e4)
-recurs("T = 1e-6 s", "cycle, T = 1e-6 s", period=1e-6)
-recurs("T = 1e4 s", "cycle, T = 1e4 s", period=1e4)
+add_critical_step_case("lambda = 0.01", **CONSTANT_FIELDS, b_over_a=1.01)
+add_critical_step_case("lambda = 20", **CONSTANT_FIELDS, b_over_a=21.0)
+add_critical_step_case("a = 1e-4", a=1e-4)
+add_critical_step_case("a = 0.1", a=0.1)
+add_critical_step_case("alpha = 0", alpha=0.0)
+add_critical_step_case("alpha = mu_*", alpha=0.76)
+add_critical_step_case("alpha = 1", alpha=1.0)
+STEEP_FIELDS = {"phi": math.degrees(math.atan(0.76)) + 0.01}
+add_critical_step_case("phi = atan(mu_*) + 0.01", **STEEP_FIELDS)
+add_critical_step_case("T = 1e-6 s", period=1e-6)
+add_critical_step_case("T = 1e4 s", period=1e4)
+add_cycle_case("T = 1e-6 s", "cycle, T = 1e-6 s", period=1e-6)
+add_cycle_case("T = 1e4 s", "cycle, T = 1e4 s", period=1e4)
 # where there is no answer but a name
-ends("no steady state below some V", rigid, Status.NO_STEADY_STATE, loaded(0.9, **STEEP))
-ends("a slider that locks", peaks, Status.LOCKED, loaded(0.5, **STEEP))
-FALLEN = loaded(1000.0, **CYCLE | {"phi": 50.0})
-ends("cycle where k_cr has fallen", cycle, Status.NO_LIMIT_CYCLE, FALLEN)
-BEYOND: Fields = {"inertia": True, "instability_norm": 1e3}
-ends("norm beyond the inertial peak", step, Status.NORM_UNREACHABLE, BEYOND)
-ends("norm below the loading rate", triggered, Status.NORM_BELOW_LOADING_RATE, loaded(1e5))
-ends("slip law without mass", peaks, UNBOUNDED, loaded(20.0))
+add_status_case(
+    "no steady state below some V",
+    rigid_measure,
+    Status.NO_STEADY_STATE,
+    with_load_velocity(0.9, **STEEP_FIELDS),
+)
+add_status_case(
+    "a slider that locks", peaks_measure, Status.LOCKED, with_load_velocity(0.5, **STEEP_FIELDS)
+)
+FALLEN_FIELDS = with_load_velocity(1000.0, **CYCLE_FIELDS | {"phi": 50.0})
+add_status_case("cycle where k_cr has fallen", cycle_measure, Status.NO_LIMIT_CYCLE, FALLEN_FIELDS)
+BEYOND_NORM_FIELDS: Fields = {"inertia": True, "instability_norm": 1e3}
+add_status_case(
+    "norm beyond the inertial peak", step_measure, Status.NORM_UNREACHABLE, BEYOND_NORM_FIELDS
+)
+add_status_case(
+    "norm below the loading rate",
+    triggered_measure,
+    Status.NORM_BELOW_LOADING_RATE,
+    with_load_velocity(1e5),
+)
+add_status_case("slip law without mass", peaks_measure, UNBOUNDED, with_load_velocity(20.0))
 PULLED_BACK: Fields = {"displacement_step": -47.0}
-ends("step past zero shear stress", triggered, Status.SHEAR_STRESS_REVERSED, PULLED_BACK)
-FARTHER: Fields = {"displacement_step": -106.0}
-ends("step past zero normal stress", triggered, Status.NORMAL_STRESS_LOST, FARTHER)
-DECAYS = Known(0.0, "linear theory: it decays", scale=1.0)
-number("step of 1e-14", triggered, DECAYS, loaded(1.0 + 1e-14, stiffness_ratio=1.1))
-SECTION_4: Fields = {"law": "slowness", "b_over_a": math.e, "stiffness_ratio": 1.5}
-number("2361-fold step", step, known.CRITICAL_VELOCITY_OF_SECTION_4, SECTION_4)
-number(
+add_status_case(
+    "step past zero shear stress", triggered_measure, Status.SHEAR_STRESS_REVERSED, PULLED_BACK
+)
+PULLED_FARTHER_BACK: Fields = {"displacement_step": -106.0}
+add_status_case(
+    "step past zero normal stress",
+    triggered_measure,
+    Status.NORMAL_STRESS_LOST,
+    PULLED_FARTHER_BACK,
+)
+DECAY = KnownValue(0.0, "linear theory: it decays", scale=1.0)
+add_value_case(
+    "step of 1e-14", triggered_measure, DECAY, with_load_velocity(1.0 + 1e-14, stiffness_ratio=1.1)
+)
+SECTION_4_FIELDS: Fields = {"law": "slowness", "b_over_a": math.e, "stiffness_ratio": 1.5}
+add_value_case(
+    "2361-fold step", step_measure, known.CRITICAL_VELOCITY_OF_SECTION_4, SECTION_4_FIELDS
+)
+add_value_case(
     "slip law, down to 10^-137 V_*",
-    cycle,
+    cycle_measure,
     known.DOWN_TO_137,
     {
         "law": "slip",
@@ -186,9 +266,9 @@ number(
         "inertia": True,
     },
 )
-number(
+add_value_case(
     "slowness law, down to 10^-1745 V_*",
-    cycle,
+    cycle_measure,
     known.DOWN_TO_1745,
     {
         "law": "slowness",
@@ -204,35 +284,37 @@ number(
         "inertia": True,
     },
 )
-HEAVY: Fields = loaded(100.0, inertia=True, period=1e8)
-ends("mass against every stiffness", growth, Status.UNSTABLE_AT_ANY_STIFFNESS, HEAVY)
+HEAVY_FIELDS: Fields = with_load_velocity(100.0, inertia=True, period=1e8)
+add_status_case(
+    "mass against every stiffness", growth_measure, Status.UNSTABLE_AT_ANY_STIFFNESS, HEAVY_FIELDS
+)
 
 
 def name_cases(dataset: xr.Dataset, axes: Axes) -> None:
     """Rows with the names of cases."""
-    from rsfstudy.plots import name_rows
+    from rsfstudy.plots import label_rows
 
-    name_rows(axes, [str(name) for name in dataset["hard_case"].values])
+    label_rows(axes, [str(name) for name in dataset["hard_case"].values])
     axes.tick_params(axis="y", labelsize=5.5)
     if math.isfinite(axes.dataLim.minposx):
         axes.set_xscale("log")
 
 
-def write(axes: Axes, row: int, text: str, color: str = "0.35") -> None:
+def write_text(axes: Axes, row: int, text: str, color: str = "0.35") -> None:
     """Words in a row."""
     across = {"transform": axes.get_yaxis_transform(), "va": "center", "fontsize": 5.5}
     axes.text(0.02, row, text, color=color, **across)
 
 
-def mark_errors(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_errors(dataset: xr.Dataset, axes: Axes) -> None:
     """Measured errors (filled) and their estimates (open); names of statuses, and "exact" where
     there is no error.
     """
-    from rsfstudy.plots import look
+    from rsfstudy.plots import cycle_style
 
     rows, numbers = np.arange(dataset.sizes["hard_case"]), dataset["answer"].notnull().values
     labels = {int(status): status.label.replace("_", " ") for status in Status}
-    blue, red = look(0)["color"], look(1)["color"]
+    blue, red = cycle_style(0)["color"], cycle_style(1)["color"]
     wrong = dataset["status"].values != int(Status.OK)
     for name, style in (
         ("error_estimate", {"fillstyle": "none", "label": "estimate"}),
@@ -242,27 +324,30 @@ def mark_errors(dataset: xr.Dataset, axes: Axes) -> None:
         axes.plot(values, rows, "o", color=blue, **style)
     for row in rows[~numbers | (dataset["measured_error"].values == 0.0)]:
         ended = labels[int(dataset["ended_as"].values[row])]
-        write(axes, row, "exact" if numbers[row] else ended, red if wrong[row] else "0.35")
+        write_text(axes, row, "exact" if numbers[row] else ended, red if wrong[row] else "0.35")
     if wrong.any():
         axes.plot(np.ones(int(wrong.sum())), rows[wrong], "x", color=red, label="wrong")
     name_cases(dataset, axes)
 
 
-def mark_work(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_work(dataset: xr.Dataset, axes: Axes) -> None:
     """Right-hand sides of each case, none where none was needed."""
     rows, work = np.arange(dataset.sizes["hard_case"]), dataset["rhs_evaluations"].values
     axes.barh(rows[work > 0], work[work > 0], color="0.6", left=0.0)
     for row in rows[work == 0]:
-        write(axes, row, "none")
+        write_text(axes, row, "none")
     name_cases(dataset, axes)
 
 
 figure = Figure(
     [
         Panel(
-            marks=[mark_errors], x_label="Error; in words: what came out", y_label="Case", columns=3
+            overlays=[plot_errors],
+            x_label="Error; in words: what came out",
+            y_label="Case",
+            legend_columns=3,
         ),
-        Panel(marks=[mark_work], x_label="Right-hand sides", y_label="Case"),
+        Panel(overlays=[plot_work], x_label="Right-hand sides", y_label="Case"),
     ],
     height=lambda dataset: max(40.0, 20.0 + 3.25 * dataset.sizes["hard_case"]),
 )
@@ -281,7 +366,7 @@ study = Study(
         Claim.below(
             id="H1",
             statement=f"{label}: error below the 1e-7 asked for, switch between regimes included",
-            source=known.EXTENDED,
+            source=known.EXTENDED_PRECISION_SOURCE,
             variable="measured_error",
             where={"hard_case": label},
             published=1e-7,

@@ -18,28 +18,31 @@ import xarray as xr
 from scipy.optimize import brentq
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, level
+from rsfstudy.declare.figure import Axes, horizontal_line
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion.accuracy import Accuracy, error_between
-from rsfstudy.motion.course import follow
-from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.recording import OBSERVED, Recording
+from rsfstudy.motion.accuracy import Accuracy, estimate_error
+from rsfstudy.motion.course import integrate_events
+from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.recording import MOTION_VARIABLES, Recording
 from rsfstudy.quantity import Output
 from rsfstudy.rig.history import history
-from rsfstudy.slider.history import TIME, History
+from rsfstudy.slider.history import TIME_COLUMN, SampledHistory
 from rsfstudy.status import Status
 
 #: Initial departure of spring stress, over a; samples in D_c/V_*; and part of the record around an
 #: extreme of the size of departures that is looked at for it.
-SMALL, SAMPLING, WINDOW = 1e-5, 0.25, 1.0 / 16.0
+INITIAL_DEPARTURE, SAMPLING_INTERVAL, EXTREMUM_WINDOW = 1e-5, 0.25, 1.0 / 16.0
 
-LOG_RATE = OBSERVED.index("log10_slip_rate")
-ENDS, BEGINS = "end", "begin"
-_WORDS = {ENDS: "stop growing as pressure rises", BEGINS: "begin to grow as it falls"}
+LOG_SLIP_RATE_COLUMN = MOTION_VARIABLES.index("log10_slip_rate")
+GROWTH_ENDS, GROWTH_BEGINS = "end", "begin"
+_GROWTH_DESCRIPTIONS = {
+    GROWTH_ENDS: "stop growing as pressure rises",
+    GROWTH_BEGINS: "begin to grow as it falls",
+}
 _OUTPUTS = (
     *(
         about
-        for at, words in _WORDS.items()
+        for at, words in _GROWTH_DESCRIPTIONS.items()
         for about in (
             Output(
                 f"{at}_pressure",
@@ -88,32 +91,34 @@ def critical_stiffness(scene: Scene, pressure: float, velocity: float) -> float:
 
 
 @dataclass(frozen=True)
-class Stabilisation(Measure):
+class StabilisationPressure(Measure):
     """Pore pressures at which small departures from a motion stop growing while a record of
     pressure rises, up to its middle, and begin to grow again while it falls: where the size of a
     departure has its maximum and its minimum.
     """
 
     name: ClassVar[str] = "stabilisation"
-    headline = "begin_pressure"
+    primary_output = "begin_pressure"
     typical_work = 300_000
     outputs = _OUTPUTS
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """From the motion and one that begins a little beside it; and once more with smaller
         tolerances for the errors.
         """
         loading = scene.parts.loading
-        if not isinstance(loading, History) or not loading.of_pressure:
+        if not isinstance(loading, SampledHistory) or not loading.of_pressure:
             return Outcome(Status.NO_STEP, message="there is no record of pore pressure")
-        if scene.normal_stress != "imposed" or scene.alpha or scene.parts.law.states > 1:
+        if scene.normal_stress != "imposed" or scene.alpha or scene.parts.law.state_count > 1:
             why = "critical stiffness is that of one state and imposed normal stress, alpha = 0"
             return Outcome(Status.NOT_APPLICABLE, message=why)
-        seen, refined = (_Departures.seen(scene, a, meter) for a in (accuracy, accuracy.refined()))
-        values, again = seen.turns(scene), refined.turns(scene)
-        other = seen.turns(scene, degree=5)
+        seen, refined = (
+            _Departures.follow(scene, a, meter) for a in (accuracy, accuracy.refined())
+        )
+        values, again = seen.find_extrema(scene), refined.find_extrema(scene)
+        other = seen.find_extrema(scene, degree=5)
         errors = {
-            f"{name}_error": error_between(value, again[name], accuracy.rtol)
+            f"{name}_error": estimate_error(value, again[name], accuracy.rtol)
             + abs(value - other[name])
             for name, value in values.items()
         }
@@ -139,41 +144,43 @@ class _Departures(NamedTuple):
     log_size: np.ndarray
 
     @classmethod
-    def seen(cls, scene: Scene, accuracy: Accuracy, meter: Meter) -> "_Departures":
+    def follow(cls, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> "_Departures":
         """Departures of a motion that begins a little beside another, along a record."""
         loading = scene.parts.loading
-        assert isinstance(loading, History)
-        time = np.arange(SAMPLING, loading.columns[-1, TIME], SAMPLING)
+        assert isinstance(loading, SampledHistory)
+        time = np.arange(
+            SAMPLING_INTERVAL, loading.sample_table[-1, TIME_COLUMN], SAMPLING_INTERVAL
+        )
         tables = []
-        for departure in (0.0, SMALL * scene.a):
+        for departure in (0.0, INITIAL_DEPARTURE * scene.a):
             beside = scene.with_(initial_stress=scene.initial_stress + departure)
-            recording = Recording(at=time)
-            for _event in follow(
+            recording = Recording(sample_times=time)
+            for _event in integrate_events(
                 beside, accuracy, meter, recording=recording, until=float(time[-1])
             ):
                 pass
-            tables.append(recording.seen(beside))
-        motion, other = (math.log(10.0) * table[:, LOG_RATE] for table in tables)
+            tables.append(recording.table(beside))
+        motion, other = (math.log(10.0) * table[:, LOG_SLIP_RATE_COLUMN] for table in tables)
         size = np.log(np.abs(other - motion))
         # of the largest of three neighbours, the parabola through them
         before, at, after = size[:-2], size[1:-1], size[2:]
         tops = (at > before) & (at >= after)
         before, at, after = before[tops], at[tops], after[tops]
         off = 0.5 * (before - after) / (before - 2.0 * at + after)
-        when = time[1:-1][tops] + SAMPLING * off
+        when = time[1:-1][tops] + SAMPLING_INTERVAL * off
         return cls(time, tables[0][:, -1], motion, when, at - 0.25 * (before - after) * off)
 
-    def turns(self, scene: Scene, degree: int = 3) -> dict[str, float]:
+    def find_extrema(self, scene: Scene, degree: int = 3) -> dict[str, float]:
         """Pore pressures, and stiffness over the critical one there, where the size of departures
         has its maximum in the first half of the record, and its minimum in the second: of a
         polynomial through those around it.
         """
         lasts, values = float(self.time[-1]), {}
-        for at, sign, half in ((ENDS, 1.0, 0.0), (BEGINS, -1.0, 0.5)):
+        for at, sign, half in ((GROWTH_ENDS, 1.0, 0.0), (GROWTH_BEGINS, -1.0, 0.5)):
             within = (self.when > half * lasts) & (self.when < (half + 0.5) * lasts)
             when, size = self.when[within], sign * self.log_size[within]
             top = when[np.argmax(size)]
-            around = np.abs(when - top) < WINDOW * lasts
+            around = np.abs(when - top) < EXTREMUM_WINDOW * lasts
             slopes = np.polyder(np.polyfit(when[around] - top, size[around], degree))
             roots = np.roots(slopes)
             turn = top + float(roots[np.argmin(np.abs(roots))].real)
@@ -197,59 +204,60 @@ def _critical_pressure(scene: Scene) -> float:
 # ---- the study -----------------------------------------------------------------------------------
 
 #: How long records last, in D_c/V_*, and the highest pressure, over sigma_*, in their middle.
-TIMES, HIGHEST = [500.0, 1000.0, 2000.0], 0.04
-SLOWEST = f"{TIMES[-1]:g}"
+RECORD_DURATIONS, MAX_PRESSURE = [500.0, 1000.0, 2000.0], 0.04
+SLOWEST_RECORD = f"{RECORD_DURATIONS[-1]:g}"
 #: Samples of a record.
-SAMPLES = 401
+RECORD_SAMPLES = 401
 LAWS = ("slip", "slowness")
 DRAINAGES = [0.1, 0.3, 1.0, 3.0, 10.0]
 DRAINED = "drained"
 
 
-def _named(drainage: float) -> str:
+def _case_name(drainage: float) -> str:
     return f"dilatant, c* = {drainage:g}"
 
 
 CASES: dict[str, dict[str, str | float]] = {
     DRAINED: {"fluid": "drained"},
-    **{_named(c): {"fluid": "dilatant", "dilatancy": 0.004, "drainage": c} for c in DRAINAGES},
+    **{_case_name(c): {"fluid": "dilatant", "dilatancy": 0.004, "drainage": c} for c in DRAINAGES},
 }
 base = Scene(normal_stress="imposed", alpha=0.0, b_over_a=2.0, stiffness_ratio=0.98)
 
 
-def injected(lasts: float) -> History:
+def pressure_record(lasts: float) -> SampledHistory:
     """A record of pressure that rises and falls as a cosine does."""
-    time = np.linspace(0.0, lasts, SAMPLES)
-    pressure = 0.5 * HIGHEST * (1.0 - np.cos(2.0 * math.pi * time / lasts))
+    time = np.linspace(0.0, lasts, RECORD_SAMPLES)
+    pressure = 0.5 * MAX_PRESSURE * (1.0 - np.cos(2.0 * math.pi * time / lasts))
     return history({"time": time, "pore_pressure": pressure}, name=f"within_{lasts:g}")
 
 
-def fastest(lasts: float) -> float:
+def max_pressure_rate(lasts: float) -> float:
     """The largest rate of pressure, in sigma_* V_*/D_c."""
-    return math.pi * HIGHEST / lasts
+    return math.pi * MAX_PRESSURE / lasts
 
 
-def holds(at: str, law: str, case: str) -> Claim:
+def critical_stiffness_claim(at: str, law: str, case: str) -> Claim:
     """I1: stiffness is critical there."""
     return Claim(
         id="I1",
-        statement=f"{law} law, {case}, slowest record: k/k_cr where small departures {_WORDS[at]}",
+        statement=f"{law} law, {case}, slowest record: k/k_cr where small departures "
+        f"{_GROWTH_DESCRIPTIONS[at]}",
         source="critical stiffness at the pressure and slip rate of the moment",
         variable=f"{at}_stiffness_ratio",
-        where={"law": law, "case": case, "record": SLOWEST},
+        where={"law": law, "case": case, "record": SLOWEST_RECORD},
         published=1.0,
-        tolerance=2.0 * fastest(TIMES[-1]),
+        tolerance=2.0 * max_pressure_rate(RECORD_DURATIONS[-1]),
         reason="by how much pressure changes within 2 D_c/V_*, in which contact and pores evolve",
     )
 
 
-def at_critical_pressure(at: str, law: str, case: str, within: float, reason: str) -> Claim:
+def critical_pressure_claim(at: str, law: str, case: str, within: float, reason: str) -> Claim:
     """I2: the pressure itself."""
-    where = {"law": law, "case": case, "record": SLOWEST}
+    where = {"law": law, "case": case, "record": SLOWEST_RECORD}
     return Claim(
         id="I2",
         statement=f"{law} law, {case}, slowest record: pressure where small departures "
-        f"{_WORDS[at]}, less that at which k is critical at V_0",
+        f"{_GROWTH_DESCRIPTIONS[at]}, less that at which k is critical at V_0",
         source="critical stiffness at the pressure of the moment",
         variable=f"{at}_pressure",
         where=where,
@@ -262,69 +270,81 @@ def at_critical_pressure(at: str, law: str, case: str, within: float, reason: st
 
 
 #: By how much slip is faster where pressure changes fastest, over V_*: shear stress follows mu_* P.
-FASTER = base.mu_star * fastest(TIMES[-1]) / base.stiffness
-PLAIN = "by how much pressure changes within 2 D_c/V_*"
-OF_RATE = (
+MAX_SLIP_RATE_EXCESS = base.mu_star * max_pressure_rate(RECORD_DURATIONS[-1]) / base.stiffness
+CHANGE_REASON = "by how much pressure changes within 2 D_c/V_*"
+RATE_REASON = (
     "slip is faster or slower by mu_* dP/dt over K, which changes c* D_c/V by as much and k_cr by "
     "a fifth of that at most: it falls by 0.21 of itself from drained to undrained"
 )
 
 
-def pressures(at: str) -> Panel:
+def pressure_panel(at: str) -> Panel:
     """Pore pressures at which departures stop or begin to grow, beside closed forms."""
     return Panel(
         x="drainage",
         y=f"{at}_pressure",
-        by=["record"],
-        at={"law": 0},
-        points=True,
+        hue=["record"],
+        isel={"law": 0},
+        markers_only=True,
         log="x",
-        marks=[closed_form],
+        overlays=[plot_critical_pressure],
         y_label=f"Pore pressure where instability {at}s",
         title="",
         legend_title="Length of the record ($D_c/V_*$)",
-        alike="pressure",
+        y_scale_group="pressure",
     )
 
 
-def closed_form(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_critical_pressure(dataset: xr.Dataset, axes: Axes) -> None:
     """Pressure at which stiffness is critical at V_0, against drainage, and drained."""
     drainages = np.geomspace(0.5 * DRAINAGES[0], 2.0 * DRAINAGES[-1], 100)
-    scenes = (base.with_(**CASES[_named(1.0)] | {"drainage": c}) for c in drainages.tolist())
+    scenes = (base.with_(**CASES[_case_name(1.0)] | {"drainage": c}) for c in drainages.tolist())
     found = [_critical_pressure(scene) for scene in scenes]
     axes.plot(drainages, found, color="0.3", linewidth=0.8, label="k critical at $V_0$")
-    level(_critical_pressure(base), color="0.3", linestyle=":", label="drained")(dataset, axes)
+    horizontal_line(_critical_pressure(base), color="0.3", linestyle=":", label="drained")(
+        dataset, axes
+    )
 
 
-def rates(row: xr.Dataset) -> xr.DataArray:
+def pressure_rates(row: xr.Dataset) -> xr.DataArray:
     """Fastest change of pressure of each record."""
-    return xr.DataArray([fastest(float(label)) for label in row["record"].values], dims="record")
+    return xr.DataArray(
+        [max_pressure_rate(float(label)) for label in row["record"].values], dims="record"
+    )
 
 
-def one_to_one(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_one_to_one_line(dataset: xr.Dataset, axes: Axes) -> None:
     """Change of pressure within D_c/V_*."""
-    known = rates(dataset)
+    known = pressure_rates(dataset)
     axes.plot(known, known, color="0.8", linewidth=2.2, label="change within $D_c/V_*$", zorder=1.5)
 
 
-def off(at: str) -> Panel:
+def stiffness_deviation_panel(at: str) -> Panel:
     """How far from critical stiffness is where they do, at pressure and slip rate of the moment."""
     return Panel(
-        x=rates,
+        x=pressure_rates,
         y=lambda row: abs(row[f"{at}_stiffness_ratio"] - 1.0),
-        by=["case"],
-        at={"law": 0},
-        points=True,
+        hue=["case"],
+        isel={"law": 0},
+        markers_only=True,
         log="xy",
-        marks=[one_to_one],
+        overlays=[plot_one_to_one_line],
         x_label=r"Fastest change of pressure ($\sigma_* V_*/D_c$)",
         y_label=rf"$|k/k_{{cr}} - 1|$ where instability {at}s",
         title="",
-        alike="off",
+        y_scale_group="off",
     )
 
 
-figure = Figure([pressures(ENDS), pressures(BEGINS), off(ENDS), off(BEGINS)], height=50.0)
+figure = Figure(
+    [
+        pressure_panel(GROWTH_ENDS),
+        pressure_panel(GROWTH_BEGINS),
+        stiffness_deviation_panel(GROWTH_ENDS),
+        stiffness_deviation_panel(GROWTH_BEGINS),
+    ],
+    height=50.0,
+)
 
 study = Study(
     name="injection",
@@ -334,20 +354,32 @@ study = Study(
     axes=[
         Axis("law", LAWS),
         Axis("case", CASES),
-        Axis("record", {f"{lasts:g}": {"loading": injected(lasts)} for lasts in TIMES}),
+        Axis(
+            "record",
+            {f"{lasts:g}": {"loading": pressure_record(lasts)} for lasts in RECORD_DURATIONS},
+        ),
     ],
-    measure=Stabilisation(),
+    measure=StabilisationPressure(),
     accuracy=Accuracy(rtol=1e-9, budget=4_000_000),
     claims=[
-        *(holds(at, law, case) for at in _WORDS for law in LAWS for case in CASES),
         *(
-            at_critical_pressure(at, law, DRAINED, 2.0 * fastest(TIMES[-1]), PLAIN)
-            for at in _WORDS
+            critical_stiffness_claim(at, law, case)
+            for at in _GROWTH_DESCRIPTIONS
+            for law in LAWS
+            for case in CASES
+        ),
+        *(
+            critical_pressure_claim(
+                at, law, DRAINED, 2.0 * max_pressure_rate(RECORD_DURATIONS[-1]), CHANGE_REASON
+            )
+            for at in _GROWTH_DESCRIPTIONS
             for law in LAWS
         ),
         *(
-            at_critical_pressure(at, law, _named(1.0), 0.2 * FASTER, OF_RATE)
-            for at in _WORDS
+            critical_pressure_claim(
+                at, law, _case_name(1.0), 0.2 * MAX_SLIP_RATE_EXCESS, RATE_REASON
+            )
+            for at in _GROWTH_DESCRIPTIONS
             for law in LAWS
         ),
     ],

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, level
+from rsfstudy.declare.figure import Axes, horizontal_line
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import Inverse
 
@@ -21,16 +21,16 @@ from ._paper import PAPER, REFERENCE
 
 #: The two numbers of section 4 (slowness law, b/a = e, alpha = 0.56), and where the slip law at
 #: constant normal stress feels the norm most: weak net weakening.
-SOFT, STIFF = "slowness at k_cr", "slowness at 1.5 k_cr"
-SLOWNESS: dict[str, str | float] = {
+SOFT_BOUNDARY, STIFF_BOUNDARY = "slowness at k_cr", "slowness at 1.5 k_cr"
+SLOWNESS_FIELDS: dict[str, str | float] = {
     "law": "slowness",
     "normal_stress": "variable",
     "alpha": 0.56,
     "b_over_a": math.e,
 }
 BOUNDARIES: dict[str, dict[str, str | float]] = {
-    SOFT: {**SLOWNESS, "stiffness_ratio": 1.0},
-    STIFF: {**SLOWNESS, "stiffness_ratio": 1.5},
+    SOFT_BOUNDARY: {**SLOWNESS_FIELDS, "stiffness_ratio": 1.0},
+    STIFF_BOUNDARY: {**SLOWNESS_FIELDS, "stiffness_ratio": 1.5},
     **{
         f"slip at a/(b-a) = {inverse:g}": {
             "law": "slip",
@@ -43,15 +43,15 @@ BOUNDARIES: dict[str, dict[str, str | float]] = {
 }
 
 
-def mark_norm(_dataset: xr.Dataset, axes: Axes) -> None:
+def plot_norm(_dataset: xr.Dataset, axes: Axes) -> None:
     """The norm of the other studies."""
     grey = {"color": "0.7", "linewidth": 0.8, "linestyle": ":"}
     axes.axvline(5e-4, label="norm of our studies", **grey)
 
 
-def mark_published(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_published_norms(dataset: xr.Dataset, axes: Axes) -> None:
     """The norms that published values imply."""
-    from rsfstudy.plots import look, marker, number
+    from rsfstudy.plots import cycle_marker, cycle_style, format_number
 
     for place in range(dataset.sizes["boundary"]):
         row = dataset.isel(boundary=place)
@@ -61,36 +61,36 @@ def mark_published(dataset: xr.Dataset, axes: Axes) -> None:
                 norm,
                 float(row["critical_velocity_ratio"].interp(instability_norm=norm)),
                 xerr=float(row["implied_norm_error"]),
-                fmt=marker(place),
-                color=look(place)["color"],
-                label=f"published value: norm {number(norm, 4)}",
+                fmt=cycle_marker(place),
+                color=cycle_style(place)["color"],
+                label=f"published value: norm {format_number(norm, 4)}",
             )
 
 
-def of_law(law: str, values: xr.DataArray) -> xr.DataArray:
+def select_law(law: str, values: xr.DataArray) -> xr.DataArray:
     """Those of one law."""
     return values.where(values["law"] == law)
 
 
 panel = Panel(
-    x="instability_norm", by=["boundary"], style={"marker": ""}, marks=[mark_norm], log="x"
+    x="instability_norm", hue=["boundary"], style={"marker": ""}, overlays=[plot_norm], log="x"
 )
 figure = Figure(
     [
         replace(
             panel,
-            y=lambda row: of_law("slowness", row["critical_velocity_ratio"]),
-            marks=[mark_norm, mark_published],
+            y=lambda row: select_law("slowness", row["critical_velocity_ratio"]),
+            overlays=[plot_norm, plot_published_norms],
             title="Slowness law",
             y_label="Critical load point velocity, $V_0/V_*$",
             log="xy",
         ),
         replace(
             panel,
-            y=lambda row: of_law(
+            y=lambda row: select_law(
                 "slip", (row["critical_velocity_ratio"] - 1.0) * (row["b_over_a"] - 1.0)
             ),
-            marks=[mark_norm, level(1.0)],
+            overlays=[plot_norm, horizontal_line(1.0)],
             title="Slip law, $k = k_{cr}$",
             y_label=r"$(V_0/V_* - 1)\,(b-a)/a$",
         ),
@@ -114,8 +114,8 @@ study = Study(
             of="critical_velocity_ratio",
             on="instability_norm",
             along="boundary",
-            levels={SOFT: 11.8, STIFF: 2361.0},
-            uncertainty={SOFT: 0.05 / 11.8, STIFF: 0.5 / 2361.0},
+            levels={SOFT_BOUNDARY: 11.8, STIFF_BOUNDARY: 2361.0},
+            uncertainty={SOFT_BOUNDARY: 0.05 / 11.8, STIFF_BOUNDARY: 0.5 / 2361.0},
         )
     ],
     claims=[
@@ -124,7 +124,7 @@ study = Study(
             statement="'~2361 V_*' at k = 1.5 k_cr implies our default norm",
             source=f"{PAPER}, section 4, which states no norm",
             variable="implied_norm",
-            where={"boundary": STIFF},
+            where={"boundary": STIFF_BOUNDARY},
             published=5e-4,
             tolerance=1.3e-7,
             reason="half a unit of the printed 2361 is 1.3e-7 in the norm",
@@ -134,8 +134,8 @@ study = Study(
             statement="'~11.8 V_*' at k = k_cr implies the same norm as '~2361 V_*'",
             source=f"{PAPER}, section 4",
             variable="implied_norm",
-            where={"boundary": SOFT},
-            minus={"boundary": STIFF},
+            where={"boundary": SOFT_BOUNDARY},
+            minus={"boundary": STIFF_BOUNDARY},
             published=0.0,
             tolerance=7.9e-6,
             reason="half a unit of each printed number: 7.7e-6 and 1.3e-7 in the norm",

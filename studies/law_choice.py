@@ -16,18 +16,28 @@ from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.declare.figure import Axes
 from rsfstudy.reduce.base import Reduction
 
-from ._synthetic_fit import ACCURACY, BACK, RIG, UP, SyntheticFit, designs
+from ._synthetic_fit import (
+    BASE_SCENE,
+    FIT_ACCURACY,
+    STEP_BACK_PROTOCOL,
+    STEP_UP_PROTOCOL,
+    SyntheticFit,
+    protocol_axis,
+)
 
 RECORDS = 6
 LAWS = ("slip", "slowness")
-DESIGNS = {"one step up": UP, "a pair, up and back": f"{UP}; {BACK}"}
-NOISE = (5e-4, 5e-3)
+DESIGNS = {
+    "one step up": STEP_UP_PROTOCOL,
+    "a pair, up and back": f"{STEP_UP_PROTOCOL}; {STEP_BACK_PROTOCOL}",
+}
+NOISE_SIZES = (5e-4, 5e-3)
 #: Difference of the criterion that decides: the other law is then e^2 times less likely.
-DECIDES = 4.0
+DECISIVE_AIC_DIFFERENCE = 4.0
 
 
 @dataclass(frozen=True)
-class Choice(Reduction):
+class LawChoiceShares(Reduction):
     """Shares of records that tell the law that made them, tell the other one, or tell neither.
 
     Parameters
@@ -56,16 +66,16 @@ class Choice(Reduction):
         )
         return xr.Dataset(
             {
-                f"{self.name}_right": (ahead > DECIDES).mean("seed"),
-                f"{self.name}_wrong": (ahead < -DECIDES).mean("seed"),
-                f"{self.name}_open": (abs(ahead) <= DECIDES).mean("seed"),
+                f"{self.name}_right": (ahead > DECISIVE_AIC_DIFFERENCE).mean("seed"),
+                f"{self.name}_wrong": (ahead < -DECISIVE_AIC_DIFFERENCE).mean("seed"),
+                f"{self.name}_open": (abs(ahead) <= DECISIVE_AIC_DIFFERENCE).mean("seed"),
             }
         )
 
 
-def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_shares(dataset: xr.Dataset, axes: Axes) -> None:
     """Bars of right, open and wrong choices."""
-    from rsfstudy.plots import name_rows
+    from rsfstudy.plots import label_rows
 
     rows = dataset.stack(row=("design", "noise_size"))
     names = [f"{design}, noise = {size:g}" for design, size in rows["row"].values]
@@ -75,15 +85,15 @@ def mark_shares(dataset: xr.Dataset, axes: Axes) -> None:
         shares = 100.0 * rows[f"chosen_{key}"].values
         axes.barh(range(len(names)), shares, left=begin, color=colour, label=key, height=0.6)
         begin = begin + shares
-    name_rows(axes, names, 20)
+    label_rows(axes, names, 20)
     axes.set_xlim(0.0, 100.0)
 
 
 figure = Figure(
     [
         Panel(
-            each=["law"],
-            marks=[mark_shares],
+            facet=["law"],
+            overlays=[plot_shares],
             x_label="Records (%)",
             y_label="Steps that are fitted",
         )
@@ -92,7 +102,7 @@ figure = Figure(
 )
 
 
-def told(law: str, design: str, size: float) -> Claim:
+def all_records_decide_claim(law: str, design: str, size: float) -> Claim:
     """L1: where the exponent is known to a tenth, all records tell the law."""
     return Claim(
         id="L1",
@@ -105,7 +115,7 @@ def told(law: str, design: str, size: float) -> Claim:
     )
 
 
-def seldom_wrong(law: str) -> Claim:
+def seldom_wrong_claim(law: str) -> Claim:
     """L2: where noise hides it, a record is seldom taken for one of the other law."""
     return Claim.below(
         id="L2",
@@ -122,22 +132,26 @@ study = Study(
     name="law_choice",
     title="Records that tell the evolution law, mislead, or leave it open",
     summary=Study.caption(__doc__),
-    base=RIG,
+    base=BASE_SCENE,
     axes=[
         Axis("law", list(LAWS)),
         Axis("fitted_law", list(LAWS)),
-        designs(DESIGNS),
-        Axis("noise_size", list(NOISE)),
+        protocol_axis(DESIGNS),
+        Axis("noise_size", list(NOISE_SIZES)),
         Axis("seed", list(range(RECORDS))),
     ],
     measure=SyntheticFit(noise="white"),
-    reductions=[Choice("chosen", "criterion")],
+    reductions=[LawChoiceShares("chosen", "criterion")],
     claims=[
-        *(told(law, design, NOISE[0]) for law in LAWS for design in DESIGNS),
-        *(told(law, "a pair, up and back", NOISE[1]) for law in LAWS),
-        *(seldom_wrong(law) for law in LAWS),
+        *(
+            all_records_decide_claim(law, design, NOISE_SIZES[0])
+            for law in LAWS
+            for design in DESIGNS
+        ),
+        *(all_records_decide_claim(law, "a pair, up and back", NOISE_SIZES[1]) for law in LAWS),
+        *(seldom_wrong_claim(law) for law in LAWS),
     ],
     plot=figure,
-    accuracy=ACCURACY,
+    accuracy=FIT_ACCURACY,
     references=["Bhattacharya et al. (2015), J. Geophys. Res. 120, 6365-6385"],
 )

@@ -18,24 +18,35 @@ from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.declare.figure import Axes
 from rsfstudy.reduce.base import Derivatives, Reduction
 
-from ._synthetic_fit import ACCURACY, BACK, RIG, UP, SyntheticFit, designs
+from ._synthetic_fit import (
+    BASE_SCENE,
+    FIT_ACCURACY,
+    STEP_BACK_PROTOCOL,
+    STEP_UP_PROTOCOL,
+    SyntheticFit,
+    protocol_axis,
+)
 
 RECORDS = 12
-DESIGNS = {"one step up": UP, "a pair, up and back": f"{UP}; {BACK}", "two steps up": f"{UP}; {UP}"}
+DESIGNS = {
+    "one step up": STEP_UP_PROTOCOL,
+    "a pair, up and back": f"{STEP_UP_PROTOCOL}; {STEP_BACK_PROTOCOL}",
+    "two steps up": f"{STEP_UP_PROTOCOL}; {STEP_UP_PROTOCOL}",
+}
 #: Standard errors of the exponent by Fisher's information.
-PROMISED = {"one step up": 0.087, "a pair, up and back": 0.009, "two steps up": 0.062}
+EXPECTED_STDERRS = {"one step up": 0.087, "a pair, up and back": 0.009, "two steps up": 0.062}
 #: Standard deviations of chance.
-CHANCE = 3.5
+MAX_CHANCE_DEVIATION = 3.5
 #: A law halfway between slip and slowness, whose exponent is fitted.
-EXPONENT = 0.5
-FAMILY = RIG.with_(law="family", law_exponent=EXPONENT)
-EXPONENT_FREE = SyntheticFit(
+TRUE_EXPONENT = 0.5
+FAMILY_SCENE = BASE_SCENE.with_(law="family", law_exponent=TRUE_EXPONENT)
+EXPONENT_FIT = SyntheticFit(
     free=("a", "b", "slip_distance", "law_exponent", "mu_star", "trend1"), noise="white"
 )
 
 
 @dataclass(frozen=True)
-class ScatterOverPromise(Reduction):
+class ScatterRatio(Reduction):
     """Scatter of an estimate over records, over the standard error promised.
 
     Parameters
@@ -60,42 +71,44 @@ class ScatterOverPromise(Reduction):
         """Over records."""
         square = (dataset[self.of] / dataset["promised_spread"]) ** 2
         found = np.sqrt(square.mean(self.over))
-        off = (found - 1.0) * math.sqrt(2.0 * self._records(dataset))
+        off = (found - 1.0) * math.sqrt(2.0 * self._record_dimensions(dataset))
         return xr.Dataset({self.name: found, f"{self.name}_off": off})
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """By each deviation: that over what is promised, over the mean and the number of all."""
         over = dataset[self.of] / dataset["promised_spread"] ** 2
-        return [(over / (self._records(dataset) * self(dataset)[self.name]), {})]
+        return [(over / (self._record_dimensions(dataset) * self(dataset)[self.name]), {})]
 
-    def _records(self, dataset: xr.Dataset) -> int:
+    def _record_dimensions(self, dataset: xr.Dataset) -> int:
         return math.prod(dataset.sizes[name] for name in self.over)
 
 
-def mark_estimates(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_estimates(dataset: xr.Dataset, axes: Axes) -> None:
     """Estimates of the exponent by design, and bars of what is promised."""
-    from rsfstudy.plots import look, marker
+    from rsfstudy.plots import cycle_marker, cycle_style
 
     seen = dataset.sel(parameter="law_exponent")
     for number in range(seen.sizes["design"]):
         one = seen.isel(design=number)
         spread = np.linspace(-0.2, 0.2, one.sizes["seed"])
-        style = {"color": look(number)["color"], "linestyle": ""}
-        axes.plot(number + spread, one["estimate"], marker=marker(number), markersize=4, **style)
+        style = {"color": cycle_style(number)["color"], "linestyle": ""}
+        axes.plot(
+            number + spread, one["estimate"], marker=cycle_marker(number), markersize=4, **style
+        )
         promise = float(one["promised_spread"].isel(seed=0))
-        axes.errorbar(number + 0.35, EXPONENT, promise, color="0.2", capsize=4, marker="_")
+        axes.errorbar(number + 0.35, TRUE_EXPONENT, promise, color="0.2", capsize=4, marker="_")
         text = f"{promise:.3f}"
         above = {"textcoords": "offset points", "ha": "center"}
-        axes.annotate(text, (number + 0.35, EXPONENT + promise), (0, 4), **above)
+        axes.annotate(text, (number + 0.35, TRUE_EXPONENT + promise), (0, 4), **above)
     axes.set_xticks(range(seen.sizes["design"]), [str(name) for name in seen["design"].values])
     axes.set_xlim(-0.4, seen.sizes["design"] - 0.3)
-    axes.axhline(EXPONENT, color="0.6", linewidth=0.8)
+    axes.axhline(TRUE_EXPONENT, color="0.6", linewidth=0.8)
 
 
 figure = Figure(
     [
         Panel(
-            marks=[mark_estimates],
+            overlays=[plot_estimates],
             x_label="Steps that are fitted",
             y_label="Exponent of the law",
             y_limits=(0.0, 1.0),
@@ -105,7 +118,7 @@ figure = Figure(
 )
 
 
-def claims(design: str) -> list[Claim]:
+def design_claims(design: str) -> list[Claim]:
     """I1 and I2: what steps tell, and that fits find as much."""
     where = {"design": design, "parameter": "law_exponent"}
     return [
@@ -115,8 +128,8 @@ def claims(design: str) -> list[Claim]:
             source="augmented equations of the sensitivities, 500 rows a step, white noise of 5e-4",
             variable="promised_spread",
             where={**where, "seed": 0},
-            published=PROMISED[design],
-            tolerance=0.02 * PROMISED[design],
+            published=EXPECTED_STDERRS[design],
+            tolerance=0.02 * EXPECTED_STDERRS[design],
             reason="two digits are told",
         ),
         Claim(
@@ -126,7 +139,7 @@ def claims(design: str) -> list[Claim]:
             variable="scatter_off",
             where=where,
             published=0.0,
-            tolerance=CHANCE,
+            tolerance=MAX_CHANCE_DEVIATION,
             reason="standard deviations of a standard deviation",
         ),
     ]
@@ -136,15 +149,15 @@ study = Study(
     name="law_identification",
     title="Estimates of the exponent of the evolution law by three designs of velocity steps",
     summary=Study.caption(__doc__),
-    base=FAMILY,
+    base=FAMILY_SCENE,
     axes=[
-        designs(DESIGNS),
+        protocol_axis(DESIGNS),
         Axis("seed", list(range(RECORDS))),
     ],
-    measure=EXPONENT_FREE,
-    reductions=[ScatterOverPromise("scatter", "deviation")],
-    claims=[claim for design in DESIGNS for claim in claims(design)],
+    measure=EXPONENT_FIT,
+    reductions=[ScatterRatio("scatter", "deviation")],
+    claims=[claim for design in DESIGNS for claim in design_claims(design)],
     plot=figure,
-    accuracy=ACCURACY,
+    accuracy=FIT_ACCURACY,
     references=["Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696"],
 )

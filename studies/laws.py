@@ -19,44 +19,46 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Scene, Study
 from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import OverClosedForm, RelativeDifference
+from rsfstudy.reduce import ClosedFormRatio, RelativeDifference
 
 from ._laws import (
     COMPOSITE,
-    CUT_AT,
+    COMPOSITE_CUTOFF_VELOCITY,
+    COMPOSITE_STEADY_STATE,
     CUT_OFF,
-    HEALED,
-    HEALS_UP_TO,
+    CUT_OFF_VELOCITY,
+    FAMILY_MIDDLE,
     LAWS,
-    MIDDLE,
     NAGATA,
-    PERRIN,
+    PERRIN_RICE_ZHENG,
     REFERENCES,
-    SLIP,
-    SLOWNESS,
-    by_law,
+    SLIP_END,
+    SLOWNESS_END,
+    panel_by_normal_stress,
 )
 from ._paper import REFERENCE
 
 base = Scene(b_over_a=2.0, instability_norm=1e6)
-CRITICAL = {"normal_stress": "constant", "stiffness_ratio": 1.0}
+CRITICAL_STIFFNESS_FIELDS = {"normal_stress": "constant", "stiffness_ratio": 1.0}
 
 
-def stiffness(law: str, published: float, source: str) -> Claim:
+def critical_stiffness_claim(law: str, published: float, source: str) -> Claim:
     """L1: critical stiffness over (b - a) sigma/D_c."""
     return Claim(
         id="L1",
         statement=f"{law}, constant: k_cr is {published:.6g} (b-a) sigma/D_c",
         source=source,
         variable="critical_stiffness",
-        where={"evolution": law, **CRITICAL},
+        where={"evolution": law, **CRITICAL_STIFFNESS_FIELDS},
         published=published * (base.b - base.a),
         tolerance=1e-12 * base.b,
         reason="exact; slopes of the law are taken by differences of order eight",
     )
 
 
-def displacement(id_: str, law: str, ratio: float, published: float, tolerance: float) -> Claim:
+def critical_displacement_claim(
+    id_: str, law: str, ratio: float, published: float, tolerance: float
+) -> Claim:
     """The critical displacement step in closed form."""
     return Claim(
         id=id_,
@@ -71,7 +73,7 @@ def displacement(id_: str, law: str, ratio: float, published: float, tolerance: 
     )
 
 
-def moved(law: str, published: float) -> Claim:
+def variable_normal_stress_claim(law: str, published: float) -> Claim:
     """L4: variable normal stress."""
     return Claim(
         id="L4",
@@ -85,7 +87,7 @@ def moved(law: str, published: float) -> Claim:
     )
 
 
-def mark_closed_forms(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_closed_forms(dataset: xr.Dataset, axes: Axes) -> None:
     """Open circles at the closed forms that there are."""
     if "over_closed_form_closed_form" in dataset:
         known = dataset["over_closed_form_closed_form"].where(
@@ -98,7 +100,11 @@ def mark_closed_forms(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 figure = Figure(
-    [by_law("stiffness_ratio", "critical_displacement", "y", marks=[mark_closed_forms])],
+    [
+        panel_by_normal_stress(
+            "stiffness_ratio", "critical_displacement", "y", overlays=[plot_closed_forms]
+        )
+    ],
     height=70.0,
 )
 
@@ -118,42 +124,44 @@ study = Study(
         RelativeDifference(
             name="lowering", of="critical_displacement", along="normal_stress", reference="constant"
         ),
-        OverClosedForm(
+        ClosedFormRatio(
             name="over_closed_form",
             of="critical_displacement",
             form="displacement_step_of_the_family",
         ),
     ],
     claims=[
-        stiffness(SLIP, 1.0, "Ruina (1983)"),
-        stiffness(MIDDLE, 1.0, "h(0) = 0 and h'(0) = -1 suffice"),
-        stiffness(PERRIN, 1.0, "h(0) = 0 and h'(0) = -1 suffice"),
-        stiffness(
+        critical_stiffness_claim(SLIP_END, 1.0, "Ruina (1983)"),
+        critical_stiffness_claim(FAMILY_MIDDLE, 1.0, "h(0) = 0 and h'(0) = -1 suffice"),
+        critical_stiffness_claim(PERRIN_RICE_ZHENG, 1.0, "h(0) = 0 and h'(0) = -1 suffice"),
+        critical_stiffness_claim(
             COMPOSITE,
-            1.0 + HEALED + 2.0 * HEALED / HEALS_UP_TO,
+            1.0 + COMPOSITE_STEADY_STATE + 2.0 * COMPOSITE_STEADY_STATE / COMPOSITE_CUTOFF_VELOCITY,
             "[(1 + w)(b-a) + b w V/V_c] sigma/D_c, w exp(w) = exp(-V/V_c)",
         ),
-        stiffness(CUT_OFF, 2.0 / (1.0 + 1.0 / CUT_AT) - 1.0, "[b/(1 + V/V_c) - a] sigma/D_c"),
-        stiffness(NAGATA, 0.5, "(b-a) sigma/[(1 + c) D_c]"),
-        displacement("L2", SLIP, 1.0, 1.0, 5e-9),
-        displacement("L2", SLIP, 2.0, 1.0, 2e-7),
-        displacement("L2", MIDDLE, 1.0, 2.0 * math.log(2.0), 2e-7),
-        displacement("L2", SLOWNESS, 0.5, 2.0 * math.log(2.0), 5e-9),
-        displacement("L2", PERRIN, 1.0, math.asinh(1.0), 5e-9),
-        displacement("L2", PERRIN, 2.0, 0.5 * math.asinh(2.0), 5e-9),
+        critical_stiffness_claim(
+            CUT_OFF, 2.0 / (1.0 + 1.0 / CUT_OFF_VELOCITY) - 1.0, "[b/(1 + V/V_c) - a] sigma/D_c"
+        ),
+        critical_stiffness_claim(NAGATA, 0.5, "(b-a) sigma/[(1 + c) D_c]"),
+        critical_displacement_claim("L2", SLIP_END, 1.0, 1.0, 5e-9),
+        critical_displacement_claim("L2", SLIP_END, 2.0, 1.0, 2e-7),
+        critical_displacement_claim("L2", FAMILY_MIDDLE, 1.0, 2.0 * math.log(2.0), 2e-7),
+        critical_displacement_claim("L2", SLOWNESS_END, 0.5, 2.0 * math.log(2.0), 5e-9),
+        critical_displacement_claim("L2", PERRIN_RICE_ZHENG, 1.0, math.asinh(1.0), 5e-9),
+        critical_displacement_claim("L2", PERRIN_RICE_ZHENG, 2.0, 0.5 * math.asinh(2.0), 5e-9),
         Claim(
             id="L3",
             statement="slowness law, k = 2 k_cr: only a jump to the norm itself is critical",
             source="K >= b/eps: the spring unloads faster than the state falls",
             variable="critical_displacement",
-            where={"evolution": SLOWNESS, "normal_stress": "constant", "stiffness_ratio": 2.0},
-            published=0.5 * base.log_norm_rate,
+            where={"evolution": SLOWNESS_END, "normal_stress": "constant", "stiffness_ratio": 2.0},
+            published=0.5 * base.log_instability_rate,
             tolerance=1e-7,
             reason="exact: a ln(V/V_*)/K at the norm; to a tenth of the accuracy asked for",
         ),
-        moved(SLIP, 0.0),
-        moved(PERRIN, 0.0),
-        moved(COMPOSITE, 0.0),
+        variable_normal_stress_claim(SLIP_END, 0.0),
+        variable_normal_stress_claim(PERRIN_RICE_ZHENG, 0.0),
+        variable_normal_stress_claim(COMPOSITE, 0.0),
     ],
     plot=figure,
     references=[REFERENCE, *REFERENCES],

@@ -11,21 +11,30 @@ V_* keeps slip below 10^5.4 V_*, and drops small.
 
 from rsfstudy import Axis, Claim, Figure, Scene, Study
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.reduce import Difference, LinearFit, OverClosedForm
+from rsfstudy.reduce import ClosedFormRatio, Difference, LinearFit
 
-from ._laws import LAWS, MIDDLE, NAMED, PERRIN, REFERENCES, SLIP, SLOWNESS, by_law
+from ._laws import (
+    FAMILY_MIDDLE,
+    LABELLED_LAWS,
+    LAWS,
+    PERRIN_RICE_ZHENG,
+    REFERENCES,
+    SLIP_END,
+    SLOWNESS_END,
+    panel_by_normal_stress,
+)
 from ._paper import PAPER, REFERENCE
 
 base = Scene(b_over_a=2.0, stiffness_ratio=0.8, inertia=True)
-EXTENDED = "extended precision: other unknowns, another method, 64-bit mantissas"
+EXTENDED_PRECISION_SOURCE = "extended precision: other unknowns, another method, 64-bit mantissas"
 
 
-def known(law: str, variable: str, published: float) -> Claim:
+def known_cycle_claim(law: str, variable: str, published: float) -> Claim:
     """L9: the ends of the family are the laws of the paper, whose cycles are known."""
     return Claim(
         id="L9",
         statement=f"{law}, constant, V_0 = 2 V_*: {variable.replace('_', ' ')}",
-        source=EXTENDED,
+        source=EXTENDED_PRECISION_SOURCE,
         variable=variable,
         where={"evolution": law, "normal_stress": "constant", "load_velocity_ratio": 2.0},
         published=published,
@@ -34,7 +43,7 @@ def known(law: str, variable: str, published: float) -> Claim:
     )
 
 
-def dynamic(law: str) -> Claim:
+def dynamic_drop_claim(law: str) -> Claim:
     """L10: what C15 says of the slip law."""
     return Claim(
         id="L10",
@@ -48,7 +57,7 @@ def dynamic(law: str) -> Claim:
     )
 
 
-def slower(law: str, relation: str, decades: float) -> Claim:
+def slip_rate_claim(law: str, relation: str, decades: float) -> Claim:
     """L11: what C12 says of the slip law."""
     return Claim(
         id="L11",
@@ -63,7 +72,7 @@ def slower(law: str, relation: str, decades: float) -> Claim:
 
 figure = Figure(
     [
-        by_law("load_velocity_ratio", variable, "x")
+        panel_by_normal_stress("load_velocity_ratio", variable, "x")
         for variable in ("static_stress_drop", "min_log10_slip_rate")
     ]
 )
@@ -83,8 +92,8 @@ study = Study(
     reductions=[
         LinearFit(name="static_slope", of="static_stress_drop", on="log_load_velocity_ratio"),
         LinearFit(name="dynamic_slope", of="dynamic_stress_drop", on="log_load_velocity_ratio"),
-        OverClosedForm(name="static_slope_scaled", of="static_slope", form="net_weakening"),
-        OverClosedForm(name="dynamic_slope_scaled", of="dynamic_slope", form="net_weakening"),
+        ClosedFormRatio(name="static_slope_scaled", of="static_slope", form="net_weakening"),
+        ClosedFormRatio(name="dynamic_slope_scaled", of="dynamic_slope", form="net_weakening"),
         Difference(
             name="slowest_moved",
             of="min_log10_slip_rate",
@@ -93,15 +102,15 @@ study = Study(
         ),
     ],
     claims=[
-        known(SLIP, "recurrence_interval", 27.3903182296427),
-        known(SLIP, "static_stress_drop", 40.16070456254199 * base.a),
-        known(SLOWNESS, "recurrence_interval", 23.9399987067),
-        known(SLOWNESS, "static_stress_drop", 37.127939244 * base.a),
-        *map(dynamic, NAMED),
-        slower(SLIP, "below", -9.0),
-        slower(PERRIN, "below", -5.0),
-        slower(MIDDLE, "above", -1.5),
-        slower(SLOWNESS, "above", 0.0),
+        known_cycle_claim(SLIP_END, "recurrence_interval", 27.3903182296427),
+        known_cycle_claim(SLIP_END, "static_stress_drop", 40.16070456254199 * base.a),
+        known_cycle_claim(SLOWNESS_END, "recurrence_interval", 23.9399987067),
+        known_cycle_claim(SLOWNESS_END, "static_stress_drop", 37.127939244 * base.a),
+        *map(dynamic_drop_claim, LABELLED_LAWS),
+        slip_rate_claim(SLIP_END, "below", -9.0),
+        slip_rate_claim(PERRIN_RICE_ZHENG, "below", -5.0),
+        slip_rate_claim(FAMILY_MIDDLE, "above", -1.5),
+        slip_rate_claim(SLOWNESS_END, "above", 0.0),
     ],
     plot=figure,
     references=[REFERENCE, *REFERENCES],

@@ -14,39 +14,51 @@ from rsfstudy import Axis, Claim, Figure, Scene, Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import RelativeDifference
 
-from ._laws import CUT_OFF, LAWS, MIDDLE, NAMED, PERRIN, REFERENCES, SLIP, SLOWNESS, by_law
+from ._laws import (
+    CUT_OFF,
+    FAMILY_MIDDLE,
+    LABELLED_LAWS,
+    LAWS,
+    PERRIN_RICE_ZHENG,
+    REFERENCES,
+    SLIP_END,
+    SLOWNESS_END,
+    panel_by_normal_stress,
+)
 from ._paper import PAPER, REFERENCE
 
-STIFF = {"normal_stress": "constant", "stiffness_ratio": 1.25}
+STIFF_FIELDS = {"normal_stress": "constant", "stiffness_ratio": 1.25}
 
 
-def order(smaller: str, larger: str) -> Claim:
+def law_order_claim(smaller: str, larger: str) -> Claim:
     """L5: the faster the state falls above steady sliding, the smaller the critical step."""
     return Claim.above(
         id="L5",
         statement=f"constant, k = 1.25 k_cr: step by {larger} above that by {smaller}",
         source="the faster the state falls above steady sliding, the smaller the step",
         variable="critical_velocity_ratio",
-        where={"evolution": larger, **STIFF},
-        minus={"evolution": smaller, **STIFF},
+        where={"evolution": larger, **STIFF_FIELDS},
+        minus={"evolution": smaller, **STIFF_FIELDS},
         published=0.0,
     )
 
 
-def lowered(law: str) -> Claim:
+def variable_normal_stress_claim(law: str) -> Claim:
     """L6: what C7 says of the slip law."""
     return Claim.above(
         id="L6",
         statement=f"{law}, k = 1.25 k_cr: variable normal stress lowers the critical step",
         source=f"{PAPER}, section 3.1, for the slip law",
         variable="lowering",
-        where={"evolution": law, **STIFF, "normal_stress": "variable"},
+        where={"evolution": law, **STIFF_FIELDS, "normal_stress": "variable"},
         published=0.1,
         reason="an inequality; ours are 0.12 to 0.48",
     )
 
 
-figure = Figure([by_law("stiffness_ratio", "critical_velocity_ratio", "y")], height=70.0)
+figure = Figure(
+    [panel_by_normal_stress("stiffness_ratio", "critical_velocity_ratio", "y")], height=70.0
+)
 
 
 study = Study(
@@ -69,17 +81,17 @@ study = Study(
         )
     ],
     claims=[
-        order(PERRIN, SLIP),
-        order(SLIP, MIDDLE),
-        order(MIDDLE, SLOWNESS),
-        order(SLOWNESS, CUT_OFF),
-        *map(lowered, NAMED),
+        law_order_claim(PERRIN_RICE_ZHENG, SLIP_END),
+        law_order_claim(SLIP_END, FAMILY_MIDDLE),
+        law_order_claim(FAMILY_MIDDLE, SLOWNESS_END),
+        law_order_claim(SLOWNESS_END, CUT_OFF),
+        *map(variable_normal_stress_claim, LABELLED_LAWS),
         Claim.below(
             id="L6",
             statement="slowness law, k = 1.75 k_cr: variable normal stress does not lower it",
             source="the end of what the paper finds for the slip law",
             variable="lowering",
-            where={"evolution": SLOWNESS, "normal_stress": "variable", "stiffness_ratio": 1.75},
+            where={"evolution": SLOWNESS_END, "normal_stress": "variable", "stiffness_ratio": 1.75},
             published=0.0,
             reason="an inequality; ours is -0.03",
         ),

@@ -13,13 +13,13 @@ import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import OverClosedForm, ProportionalFit
+from rsfstudy.reduce import ClosedFormRatio, ProportionalFit
 
-from ._laws import REFERENCES, shade
+from ._laws import REFERENCES, family_colour
 from ._paper import PAPER, REFERENCE
 
 
-def zeta(exponent: float) -> Claim:
+def zeta_claim(exponent: float) -> Claim:
     """L7: eq. 10 beyond the slip law."""
     return Claim(
         id="L7",
@@ -34,7 +34,7 @@ def zeta(exponent: float) -> Claim:
     )
 
 
-def below(exponent: float) -> Claim:
+def variable_normal_stress_claim(exponent: float) -> Claim:
     """L8: what C7 says of the slip law."""
     return Claim.below(
         id="L8",
@@ -47,7 +47,7 @@ def below(exponent: float) -> Claim:
     )
 
 
-def fit(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+def fit_line(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """The line of a fit."""
     reach = np.array([0.0, 1.04 * float(row["a_over_b_minus_a"].max())])
     return reach, 1.0 + float(row.get("zeta", np.nan)) * reach
@@ -58,10 +58,10 @@ figure = Figure(
         Panel(
             x="a_over_b_minus_a",
             y="critical_velocity_ratio",
-            by=["law_exponent", "normal_stress"],
-            style=lambda row: {"color": shade(2.0 * float(row["law_exponent"]))},
-            through=fit,
-            says="zeta",
+            hue=["law_exponent", "normal_stress"],
+            style=lambda row: {"color": family_colour(2.0 * float(row["law_exponent"]))},
+            fit_line=fit_line,
+            annotation="zeta",
             title="Family of laws, $k = k_{cr}$; by normal stress",
             x_limits=(0.0, None),
             y_limits=(1.0, None),
@@ -86,13 +86,18 @@ study = Study(
         ProportionalFit(
             name="zeta", of="critical_velocity_ratio", minus=1.0, on="a_over_b_minus_a"
         ),
-        OverClosedForm(
+        ClosedFormRatio(
             name="over_closed_form",
             of="critical_velocity_ratio",
             form="velocity_step_of_the_family",
         ),
     ],
-    claims=[zeta(0.0), zeta(0.25), zeta(0.5), *map(below, (0.0, 0.25, 0.5))],
+    claims=[
+        zeta_claim(0.0),
+        zeta_claim(0.25),
+        zeta_claim(0.5),
+        *map(variable_normal_stress_claim, (0.0, 0.25, 0.5)),
+    ],
     plot=figure,
     references=[REFERENCE, *REFERENCES],
 )

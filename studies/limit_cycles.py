@@ -17,75 +17,88 @@ from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.limit_cycle import LimitCycle
 
 from ._paper import PAPER, REFERENCE
-from ._phase_plane import LN10, constant_state_line, coupling, mark_reversed, scene_of, steady_line
+from ._phase_plane import (
+    LN10,
+    constant_state_line,
+    hatch_reversed_stress,
+    scene_from_coordinates,
+    steady_line,
+    steady_line_key,
+)
 
 
-def speaks_of(law: str, normal_stress: str) -> dict[str, str]:
+def cycle_place(law: str, normal_stress: str) -> dict[str, str]:
     """Place of one cycle on the lattice."""
     return {"law": law, "normal_stress": normal_stress}
 
 
 #: Constant-state lines are drawn for -b ln(V/V_*) at these log10(V/V_*), where they cross the
 #: steady state.
-STATES = (-8.0, -4.0, 0.0, 4.0, 8.0)
+CONSTANT_STATE_LOG_RATES = (-8.0, -4.0, 0.0, 4.0, 8.0)
 
 
-def orbits(dataset: xr.Dataset) -> list[tuple[xr.Dataset, str]]:
+def distinct_orbits(dataset: xr.Dataset) -> list[tuple[xr.Dataset, str]]:
     """The cycles that exist and differ, over all axes of the lattice, each with a name."""
-    from rsfstudy.plots import place
+    from rsfstudy.plots import describe_point
 
     found: dict[bytes, tuple[xr.Dataset, str]] = {}
     dims = dataset["status"].dims
     for at in np.ndindex(*dataset["status"].shape):
         cell = dataset.isel(dict(zip(dims, at, strict=True)))
-        constant = coupling(cell)[0] == "constant"  # angles mean nothing there
-        words = [place(cell, str(d)) for d in dims if not (constant and d in ("phi", "alpha"))]
+        constant = steady_line_key(cell)[0] == "constant"  # angles mean nothing there
+        words = [
+            describe_point(cell, str(d)) for d in dims if not (constant and d in ("phi", "alpha"))
+        ]
         if int(cell["status"]) == 0:
             found.setdefault(cell["frictional_stress"].values.tobytes(), (cell, ", ".join(words)))
     return list(found.values())
 
 
-def mark_orbits(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_orbits(dataset: xr.Dataset, axes: Axes) -> None:
     """Stress against slip rate, with lines of steady state and of constant state, for each coupling
     of stress and slip that there is.
     """
-    from rsfstudy.plots import look
+    from rsfstudy.plots import cycle_style
 
-    cells = [cell for cell, _name in orbits(dataset)]
-    for number, (cell, name) in enumerate(orbits(dataset)):
-        style = {"color": look(number)["color"], "linewidth": 1.2 + 0.8 * (number == 0)}
+    cells = [cell for cell, _name in distinct_orbits(dataset)]
+    for number, (cell, name) in enumerate(distinct_orbits(dataset)):
+        style = {"color": cycle_style(number)["color"], "linewidth": 1.2 + 0.8 * (number == 0)}
         axes.plot(cell["log10_slip_rate"], cell["frictional_stress"], "-", label=name, **style)
     axes.set(xlim=axes.get_xlim(), ylim=axes.get_ylim())
     low, high = axes.get_xlim()
     rates = np.linspace(low, high, 400)
-    taken = [_on(axes, cell["log10_slip_rate"], cell["frictional_stress"]) for cell in cells]
+    taken = [
+        _axes_fractions(axes, cell["log10_slip_rate"], cell["frictional_stress"]) for cell in cells
+    ]
     drawn: set[tuple[str | float, ...]] = set()
     for number, cell in enumerate(cells):
-        if coupling(cell) in drawn:
+        if steady_line_key(cell) in drawn:
             continue
-        drawn.add(coupling(cell))
-        colour, steady = look(number)["color"], steady_line(cell, rates)
+        drawn.add(steady_line_key(cell))
+        colour, steady = cycle_style(number)["color"], steady_line(cell, rates)
         axes.plot(rates, steady, "--", color=colour, linewidth=0.8, label="steady state")
-        taken.append(_on(axes, rates, steady))
-        for state in STATES:
-            theta = -state * LN10 * scene_of(cell).b
+        taken.append(_axes_fractions(axes, rates, steady))
+        for state in CONSTANT_STATE_LOG_RATES:
+            theta = -state * LN10 * scene_from_coordinates(cell).b
             line, text = (
                 constant_state_line(cell, theta, rates),
                 r"constant state, with its $\Theta$",
             )
             axes.plot(rates, line, ":", color=colour, linewidth=0.7, label=text)
             taken.append(
-                _numbered(axes, _on(axes, rates, line), f"${theta + 0.0:.2g}$", colour, taken)
+                _label_line(
+                    axes, _axes_fractions(axes, rates, line), f"${theta + 0.0:.2g}$", colour, taken
+                )
             )
 
 
-def _on(axes: Axes, x: Any, y: Any) -> np.ndarray:
+def _axes_fractions(axes: Axes, x: Any, y: Any) -> np.ndarray:
     """Places on the axes, as fractions of their sides."""
     panel = axes.transData + axes.transAxes.inverted()
     return np.asarray(panel.transform(np.column_stack([np.asarray(x), np.asarray(y)])))
 
 
-def _numbered(
+def _label_line(
     axes: Axes, line: np.ndarray, number: str, colour: str, taken: Sequence[np.ndarray]
 ) -> np.ndarray:
     """Write a number on what is seen of a line, far from all else; where that is."""
@@ -102,30 +115,34 @@ def _numbered(
     return np.asarray(place + np.outer(np.linspace(-0.07, 0.07, 5), (1.0, 0.0)))
 
 
-def mark_along_slip(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_along_slip(dataset: xr.Dataset, axes: Axes) -> None:
     """Two cycles, one after the other, against slip; what the spring carries in the first."""
-    from rsfstudy.plots import look, marker
+    from rsfstudy.plots import cycle_marker, cycle_style
 
-    for number, (cell, name) in enumerate(orbits(dataset)):
+    for number, (cell, name) in enumerate(distinct_orbits(dataset)):
         slip, stress = cell["slip"].values, cell["frictional_stress"].values
-        colour, fastest = look(number)["color"], int(cell["log10_slip_rate"].values.argmax())
+        colour, fastest = cycle_style(number)["color"], int(cell["log10_slip_rate"].values.argmax())
         both = np.concatenate([slip, slip + slip[-1] - slip[0]])
         axes.plot(both, np.tile(stress, 2), "-", color=colour, linewidth=1.2, label=name)
         thin = {"linewidth": 0.7, "label": "spring"}
         axes.plot(slip, cell["shear_stress"], "--", color=colour, **thin)
-        dot = {"marker": marker(number), "markersize": 4, "label": "fastest slip"}
+        dot = {"marker": cycle_marker(number), "markersize": 4, "label": "fastest slip"}
         axes.plot(slip[fastest], stress[fastest], linestyle="none", color=colour, **dot)
 
 
-panel = Panel(y_label=r"Frictional stress, $\tau_f/\sigma_*$", each=["law"])
+panel = Panel(y_label=r"Frictional stress, $\tau_f/\sigma_*$", facet=["law"])
 figure = Figure(
     [
         replace(
-            panel, marks=[mark_orbits, mark_reversed], x_label=r"Slip rate, $\log_{10}(V/V_*)$"
+            panel,
+            overlays=[plot_orbits, hatch_reversed_stress],
+            x_label=r"Slip rate, $\log_{10}(V/V_*)$",
         ),
-        replace(panel, marks=[mark_along_slip, mark_reversed], x_label=r"Slip, $\delta/D_c$"),
+        replace(
+            panel, overlays=[plot_along_slip, hatch_reversed_stress], x_label=r"Slip, $\delta/D_c$"
+        ),
     ],
-    more_axes=True,
+    allow_extra_dims=True,
 )
 
 
@@ -147,8 +164,8 @@ study = Study(
             statement="slip law: variable normal stress lowers the slowest V by 10 decades",
             source=f"{PAPER}, Fig. 9",
             variable="min_log10_slip_rate",
-            where=speaks_of("slip", "variable"),
-            minus=speaks_of("slip", "constant"),
+            where=cycle_place("slip", "variable"),
+            minus=cycle_place("slip", "constant"),
             published=-10.0,
             tolerance=0.5,
             reason="'by 10 orders of magnitude'",
@@ -158,8 +175,8 @@ study = Study(
             statement="slip law: larger stress drop with variable normal stress",
             source=f"{PAPER}, Fig. 9",
             variable="static_stress_drop",
-            where=speaks_of("slip", "variable"),
-            minus=speaks_of("slip", "constant"),
+            where=cycle_place("slip", "variable"),
+            minus=cycle_place("slip", "constant"),
             published=0.0,
         ),
         Claim(
@@ -167,8 +184,8 @@ study = Study(
             statement="slowness law: similar range of slip rate, constant and variable",
             source=f"{PAPER}, Fig. 10",
             variable="min_log10_slip_rate",
-            where=speaks_of("slowness", "variable"),
-            minus=speaks_of("slowness", "constant"),
+            where=cycle_place("slowness", "variable"),
+            minus=cycle_place("slowness", "constant"),
             published=0.0,
             tolerance=0.5,
             reason="'similar', beside ten decades for the slip law",
@@ -179,7 +196,7 @@ study = Study(
                 statement=f"slowness law, {stress}: theta ~ V^(-a/b) = V^(-1/2) after the rupture",
                 source=f"{PAPER}, section 3.4",
                 variable="healing_exponent",
-                where=speaks_of("slowness", stress),
+                where=cycle_place("slowness", stress),
                 published=-0.5,
                 tolerance=0.05,
                 reason="'approximately': stress is not quite constant, the spring is loaded",
@@ -192,7 +209,7 @@ study = Study(
                 statement=f"slowness law, {stress}: drops in acceleration and deceleration unequal",
                 source=f"{PAPER}, section 3.4, Fig. 11",
                 variable="drop_asymmetry",
-                where=speaks_of("slowness", stress),
+                where=cycle_place("slowness", stress),
                 published=1.5,
                 reason="'strongly asymmetrical'; 1 is symmetrical",
             )
@@ -203,8 +220,8 @@ study = Study(
             statement="constant normal stress: far more so than with the slip law",
             source=f"{PAPER}, section 3.4, Rice and Tse (1986)",
             variable="drop_asymmetry",
-            where=speaks_of("slowness", "constant"),
-            minus=speaks_of("slip", "constant"),
+            where=cycle_place("slowness", "constant"),
+            minus=cycle_place("slip", "constant"),
             published=1.0,
             reason="'different to the slip law', whose two drops are within a quarter of equal",
         ),

@@ -19,20 +19,20 @@ from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import Inverse, LinearFit
 from rsfstudy.slider.stability import critical_stiffness
-from rsfstudy.slider.steady import slowest_steady
+from rsfstudy.slider.steady import min_steady_log_slip_rate
 
 from ._paper import PAPER, REFERENCE
-from ._phase_plane import scene_of
+from ._phase_plane import scene_from_coordinates
 
-MASSLESS, AS_PUBLISHED, HEAVY = "no mass", "T = 5 s", "T = 1e6 s"
-MASSES: dict[str, dict[str, bool | float]] = {
-    MASSLESS: {"inertia": False},
-    AS_PUBLISHED: {"inertia": True, "period": 5.0},
-    HEAVY: {"inertia": True, "period": 1e6},
+NO_MASS, PUBLISHED_PERIOD, LONG_PERIOD = "no mass", "T = 5 s", "T = 1e6 s"
+MASS_CASES: dict[str, dict[str, bool | float]] = {
+    NO_MASS: {"inertia": False},
+    PUBLISHED_PERIOD: {"inertia": True, "period": 5.0},
+    LONG_PERIOD: {"inertia": True, "period": 1e6},
 }
 
 
-def vouched(mass: str, phi: float, rate: float) -> Claim:
+def growth_threshold_claim(mass: str, phi: float, rate: float) -> Claim:
     """C1: the closed form is the threshold of the equations as they are assembled."""
     return Claim(
         id="C1",
@@ -46,23 +46,26 @@ def vouched(mass: str, phi: float, rate: float) -> Claim:
     )
 
 
-def steepness(phi: float, gentler: float) -> Claim:
+def steepness_claim(phi: float, gentler: float) -> Claim:
     """C1: steeper curves for smaller angles."""
     return Claim.below(
         id="C1",
         statement=f"k_cr falls with V more steeply at {phi:g} than at {gentler:g} degrees",
         source=f"{PAPER}, section 2.2, Fig. 2",
         variable="stiffness_slope",
-        where={"mass": MASSLESS, "phi": phi},
-        minus={"mass": MASSLESS, "phi": gentler},
+        where={"mass": NO_MASS, "phi": phi},
+        minus={"mass": NO_MASS, "phi": gentler},
         published=0.0,
     )
 
 
-def curve(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+def critical_stiffness_curve(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Slip rates and the critical stiffness there, closely where it grows without bound."""
-    scene, rates = scene_of(row.isel(load_velocity_ratio=-1)), row["load_velocity_ratio"].values
-    slowest = max(slowest_steady(scene), math.log(rates.min()))
+    scene, rates = (
+        scene_from_coordinates(row.isel(load_velocity_ratio=-1)),
+        row["load_velocity_ratio"].values,
+    )
+    slowest = max(min_steady_log_slip_rate(scene), math.log(rates.min()))
     if slowest > math.log(rates.max()) - 0.05:
         return np.full(1, math.nan), np.full(1, math.nan)
     logs = slowest + np.geomspace(0.05, math.log(rates.max()) - slowest, 200)
@@ -70,64 +73,64 @@ def curve(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return np.exp(logs), np.where(stiffnesses > 0.0, stiffnesses, math.nan)
 
 
-def mark_slowest(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_slowest_steady_rate(dataset: xr.Dataset, axes: Axes) -> None:
     """Dotted lines where slower sliding has no steady state."""
-    from rsfstudy.plots import look
+    from rsfstudy.plots import cycle_style
 
     for number in range(dataset.sizes["phi"]):
         row = dataset.isel(phi=number, load_velocity_ratio=-1)
-        slowest = math.exp(slowest_steady(scene_of(row)))
+        slowest = math.exp(min_steady_log_slip_rate(scene_from_coordinates(row)))
         if slowest > float(dataset["load_velocity_ratio"].min()):
-            axes.axvline(slowest, color=look(number)["color"], linestyle=":", linewidth=0.8)
+            axes.axvline(slowest, color=cycle_style(number)["color"], linestyle=":", linewidth=0.8)
             soon = slowest < 1e3 * float(dataset["load_velocity_ratio"].min())
             side = "left" if soon or dataset.sizes["phi"] == 1 else "right"
             above = {"transform": axes.get_xaxis_transform(), "ha": side, "va": "top"}
             axes.text(slowest, 0.98, r" $\phi = \tan^{-1}\mu_{ss}$ ", fontsize=7, **above)
 
 
-def angle(row: xr.Dataset) -> str:
+def angle_label(row: xr.Dataset) -> str:
     """The angle, and from which slip rate on a spring of 0.8 k_cr(V_*) is stable."""
-    from rsfstudy.plots import number
+    from rsfstudy.plots import format_number
 
     text = rf"$\phi = {float(row['phi']):g}°$"
     velocity = float(row.get("stabilising_velocity", math.nan))
-    stable = rf"{text}: $0.8\,k_{{cr}}(V_*)$ stable from {number(velocity)} $V_*$"
+    stable = rf"{text}: $0.8\,k_{{cr}}(V_*)$ stable from {format_number(velocity)} $V_*$"
     return stable if math.isfinite(velocity) else text
 
 
-def seen_rise(row: xr.Dataset) -> xr.DataArray:
+def stiffness_rise_claim(row: xr.Dataset) -> xr.DataArray:
     """Rise of the stiffness at which perturbations neither grow nor decay, where it is one."""
     massless = row["critical_stiffness"] / (1.0 + row["rise_by_dynamics"])
     rise = row["critical_stiffness_from_growth"] / massless - 1.0
     return rise.where((rise > 1e-8) & (row["rise_by_dynamics"] > 0.0))
 
 
-panel = Panel(x="load_velocity_ratio", by=["phi"], x_label="Slip rate, $V/V_*$", log="xy")
+panel = Panel(x="load_velocity_ratio", hue=["phi"], x_label="Slip rate, $V/V_*$", log="xy")
 figure = Figure(
     [
         replace(
             panel,
             y="critical_stiffness_from_growth",
-            at={"mass": 0},
+            isel={"mass": 0},
             style={"markersize": 2},
-            through=curve,
-            name=angle,
-            marks=[mark_slowest],
+            fit_line=critical_stiffness_curve,
+            curve_label=angle_label,
+            overlays=[plot_slowest_steady_rate],
             y_label=r"Critical stiffness, $k_{cr}D_c/\sigma_*$",
             title="Stable above; lines: closed form, points: growth",
         ),
         replace(
             panel,
-            y=seen_rise,
-            by=["mass", "phi"],
+            y=stiffness_rise_claim,
+            hue=["mass", "phi"],
             style={"markersize": 2, "fillstyle": "full"},
-            through=lambda row: (
+            fit_line=lambda row: (
                 row["load_velocity_ratio"],
                 row["rise_by_dynamics"].where(row["rise_by_dynamics"] > 0.0),
             ),
-            name=lambda row: str(row["mass"].item()),
+            curve_label=lambda row: str(row["mass"].item()),
             title="Rise by mass, at all angles",
-            when=lambda dataset: bool((dataset["rise_by_dynamics"] > 0.0).any()),
+            condition=lambda dataset: bool((dataset["rise_by_dynamics"] > 0.0).any()),
             y_label=r"Rise of $k_{cr}$ by mass (fraction)",
         ),
     ]
@@ -140,7 +143,7 @@ study = Study(
     summary=Study.caption(__doc__),
     base=Scene(b_over_a=2.0, alpha=0.56),
     axes=[
-        Axis("mass", MASSES),
+        Axis("mass", MASS_CASES),
         Axis("phi", [40.0, 45.0, 50.0, 60.0, 75.0]),
         Axis("load_velocity_ratio", 10.0 ** np.linspace(-6.0, 6.0, 49)),
     ],
@@ -165,33 +168,33 @@ study = Study(
             statement="phi = 60 degrees: k_cr falls with V",
             source=f"{PAPER}, section 2.2, Fig. 2",
             variable="stiffness_slope",
-            where={"mass": MASSLESS, "phi": 60.0},
+            where={"mass": NO_MASS, "phi": 60.0},
             published=0.0,
         ),
-        steepness(50.0, 60.0),
-        steepness(40.0, 50.0),
+        steepness_claim(50.0, 60.0),
+        steepness_claim(40.0, 50.0),
         Claim(
             id="C1",
             statement="phi = 50, 100 V_*: eq. 7 equals eq. 8",
             source=f"{PAPER}, eqs. 7 and 8",
             variable="critical_stiffness",
-            where={"mass": MASSLESS, "phi": 50.0, "load_velocity_ratio": 100.0},
+            where={"mass": NO_MASS, "phi": 50.0, "load_velocity_ratio": 100.0},
             minus_variable="critical_stiffness_explicit",
-            minus={"mass": MASSLESS, "phi": 50.0, "load_velocity_ratio": 100.0},
+            minus={"mass": NO_MASS, "phi": 50.0, "load_velocity_ratio": 100.0},
             published=0.0,
             tolerance=1e-15,
             reason="an identity; rounding",
         ),
-        vouched(MASSLESS, 60.0, 1.0),
-        vouched(AS_PUBLISHED, 60.0, 1e6),
-        vouched(HEAVY, 60.0, 1.0),
-        vouched(HEAVY, 40.0, 100.0),
+        growth_threshold_claim(NO_MASS, 60.0, 1.0),
+        growth_threshold_claim(PUBLISHED_PERIOD, 60.0, 1e6),
+        growth_threshold_claim(LONG_PERIOD, 60.0, 1.0),
+        growth_threshold_claim(LONG_PERIOD, 40.0, 100.0),
         Claim.above(
             id="C2",
             statement="phi = 40 degrees, V = 1e-4 V_*: mu_ss exceeds tan(phi) = 0.8391",
             source=f"{PAPER}, eq. 9",
             variable="steady_friction",
-            where={"mass": MASSLESS, "phi": 40.0, "load_velocity_ratio": 1e-4},
+            where={"mass": NO_MASS, "phi": 40.0, "load_velocity_ratio": 1e-4},
             published=0.8391,
             reason="an inequality: no steady state there, while faster sliding has one",
         ),
@@ -200,7 +203,7 @@ study = Study(
             statement="phi = 50: a spring of 0.8 k_cr(V_*) slides stably from below 1000 V_* on",
             source=f"{PAPER}, section 2.2, Fig. 2",
             variable="stabilising_velocity",
-            where={"mass": MASSLESS, "phi": 50.0},
+            where={"mass": NO_MASS, "phi": 50.0},
             published=1000.0,
             reason="an inequality; the limit cycles of that spring end there too",
         ),
@@ -209,7 +212,7 @@ study = Study(
             statement="phi = 60: it takes more than ten times the velocity at phi = 50",
             source=f"{PAPER}, section 2.2, Fig. 2",
             variable="stabilising_velocity",
-            where={"mass": MASSLESS, "phi": 60.0},
+            where={"mass": NO_MASS, "phi": 60.0},
             published=1000.0,
             reason="'the curve is very flat'",
         ),

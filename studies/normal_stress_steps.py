@@ -16,30 +16,30 @@ import xarray as xr
 from scipy.integrate import quad
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, level
+from rsfstudy.declare.figure import Axes, horizontal_line
 
 from ._normal_stress_transient import NormalStressTransient
-from ._phase_plane import scene_of
+from ._phase_plane import scene_from_coordinates
 
 #: Stiffness over critical stiffness, compliant to stiff.
 RATIOS = [10.0, 20.0, 50.0, 100.0]
 STEPS = [-0.2, -0.05, 0.05, 0.2]
-STIFF = RATIOS[-1]
+STIFFEST = RATIOS[-1]
 LAWS = ("slip", "slowness")
 
 base = Scene(normal_stress="imposed", alpha=0.25, b_over_a=2.0, load_velocity_ratio=1.0)
 a, b, mu, alpha = base.a, base.b, base.mu_star, base.alpha
-MEASURE = NormalStressTransient(record=20.0)
-FORM = "closed form at constant slip rate, and its first order in a/K"
+TRANSIENT_MEASURE = NormalStressTransient(record=20.0)
+CLOSED_FORM_SOURCE = "closed form at constant slip rate, and its first order in a/K"
 
 
-def first_rate(step: float) -> float:
+def initial_log_rate(step: float) -> float:
     """ln V just after the step."""
     r = 1.0 + step
     return float((mu * (1.0 / r - 1.0) + alpha * math.log(r)) / a)
 
 
-def left(law: str, step: float, ratio: float, slip: float) -> float:
+def remaining_transient(law: str, step: float, ratio: float, slip: float) -> float:
     """Transient of friction that is left after so much slip, to first order in a/K.
 
     With r = 1 + step, a rigid slider shows -alpha ln r exp(-slip) by the slip law, and b ln(1 + y)
@@ -49,7 +49,7 @@ def left(law: str, step: float, ratio: float, slip: float) -> float:
     """
     r = 1.0 + step
     short = r / (ratio * (b - a))
-    x = first_rate(step)
+    x = initial_log_rate(step)
     if law == "slip":
         size = -alpha * math.log(r)
         late = -a * b * short * quad(lambda y: y / math.expm1(-y) if y else -1.0, x, 0.0)[0]
@@ -61,48 +61,51 @@ def left(law: str, step: float, ratio: float, slip: float) -> float:
     return b * math.log1p(now) + a * b * short * rigid / (1.0 + rigid)
 
 
-def reads(law: str, step: float, ratio: float = math.inf) -> tuple[float, float]:
+def expected_readings(law: str, step: float, ratio: float = math.inf) -> tuple[float, float]:
     """alpha and D_c that the measure reads off that."""
-    first, last = (left(law, step, ratio, slip) for slip in (MEASURE.fit_from, MEASURE.fit_to))
-    distance = (MEASURE.fit_to - MEASURE.fit_from) / math.log(first / last)
-    return -first * math.exp(MEASURE.fit_from / distance) / math.log(1.0 + step), distance
+    first, last = (
+        remaining_transient(law, step, ratio, slip)
+        for slip in (TRANSIENT_MEASURE.fit_from, TRANSIENT_MEASURE.fit_to)
+    )
+    distance = (TRANSIENT_MEASURE.fit_to - TRANSIENT_MEASURE.fit_from) / math.log(first / last)
+    return -first * math.exp(TRANSIENT_MEASURE.fit_from / distance) / math.log(1.0 + step), distance
 
 
-def follows(law: str, step: float) -> Claim:
+def rigid_limit_claim(law: str, step: float) -> Claim:
     """R5: a stiff slider."""
-    read, rigid = reads(law, step, STIFF)[0], reads(law, step)[0]
+    read, rigid = expected_readings(law, step, STIFFEST)[0], expected_readings(law, step)[0]
     return Claim(
         id="R5",
-        statement=f"{law} law, step of {step:+g} sigma_*, k = {STIFF:g} k_cr: alpha as read off is "
-        f"that of a rigid slider, {rigid:.4f}, but for O(a/K)",
-        source=FORM,
+        statement=f"{law} law, step of {step:+g} sigma_*, k = {STIFFEST:g} k_cr: alpha as "
+        f"read off is that of a rigid slider, {rigid:.4f}, but for O(a/K)",
+        source=CLOSED_FORM_SOURCE,
         variable="apparent_alpha",
-        where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFF},
+        where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFFEST},
         published=read,
         tolerance=0.2 * abs(read - rigid) + 1e-3 * alpha,
         reason="second order in a/K: a fifth of the first; and 1e-3 of alpha",
     )
 
 
-def falls_over(law: str, step: float) -> Claim:
+def slip_distance_claim(law: str, step: float) -> Claim:
     """R6: the slip distance on a stiff machine."""
-    read, rigid = reads(law, step, STIFF)[1], reads(law, step)[1]
-    quicker = first_rate(step) if law == "slip" else -first_rate(step)
+    read, rigid = expected_readings(law, step, STIFFEST)[1], expected_readings(law, step)[1]
+    quicker = initial_log_rate(step) if law == "slip" else -initial_log_rate(step)
     return Claim(
         id="R6",
-        statement=f"{law} law, step of {step:+g} sigma_*, k = {STIFF:g} k_cr: D_c as read off is "
-        f"that of a rigid slider, {rigid:.4f} D_c, but for O(a/K)",
-        source=FORM,
+        statement=f"{law} law, step of {step:+g} sigma_*, k = {STIFFEST:g} k_cr: D_c as read "
+        f"off is that of a rigid slider, {rigid:.4f} D_c, but for O(a/K)",
+        source=CLOSED_FORM_SOURCE,
         variable="apparent_slip_distance",
-        where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFF},
+        where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFFEST},
         published=read,
-        tolerance=(0.1 * max(quicker, 0.0) + 0.06) * b / (STIFF * (b - a)),
+        tolerance=(0.1 * max(quicker, 0.0) + 0.06) * b / (STIFFEST * (b - a)),
         reason="second order, over b/K: 0.06, and 0.1 for each e-fold by which the slider is first "
         "faster (slip law) or slower (slowness law) and its state evolves otherwise",
     )
 
 
-def is_direct(law: str, step: float) -> Claim:
+def direct_change_claim(law: str, step: float) -> Claim:
     """R7: at once."""
     return Claim(
         id="R7",
@@ -117,20 +120,20 @@ def is_direct(law: str, step: float) -> Claim:
 
 
 #: Slip that is shown of the records, in D_c.
-SHOWN = 4.0
+PLOTTED_SLIP = 4.0
 
 
-def change(row: xr.Dataset) -> xr.DataArray:
+def friction_change(row: xr.Dataset) -> xr.DataArray:
     """Change of friction, as far as it is shown."""
-    return (row["friction_coefficient"] - row["mu_star"]).where(row["slip"] <= SHOWN)
+    return (row["friction_coefficient"] - row["mu_star"]).where(row["slip"] <= PLOTTED_SLIP)
 
 
-def mark_rigid(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_rigid_transients(dataset: xr.Dataset, axes: Axes) -> None:
     """The transients of a rigid slider, by the closed form of its law."""
-    slip, highest = np.linspace(0.0, SHOWN, 100), 0.0
+    slip, highest = np.linspace(0.0, PLOTTED_SLIP, 100), 0.0
     for place in range(dataset.sizes["normal_stress_step"]):
         row = dataset.isel(normal_stress_step=place, stiffness_ratio=0)
-        scene = scene_of(row)
+        scene = scene_from_coordinates(row)
         if form := scene.parts.law.relaxation:
             away = -scene.alpha / scene.b * math.log1p(float(row["normal_stress_step"]))
             left = scene.b * np.array([form(away, at) for at in slip.tolist()])
@@ -140,35 +143,35 @@ def mark_rigid(dataset: xr.Dataset, axes: Axes) -> None:
         axes.set_ylim(-1.4 * highest, 1.4 * highest)
 
 
-read = Panel(
+readings_panel = Panel(
     x="stiffness_ratio",
-    by=["normal_stress_step", "law"],
+    hue=["normal_stress_step", "law"],
     style={"linewidth": 0.9},
-    marks=[level(1.0)],
+    overlays=[horizontal_line(1.0)],
     log="x",
 )
 figure = Figure(
     [
         Panel(
             x="slip",
-            y=change,
-            by=["stiffness_ratio", "normal_stress_step"],
-            each=["law"],
-            at={"normal_stress_step": lambda steps: sorted({min(steps), max(steps)})},
+            y=friction_change,
+            hue=["stiffness_ratio", "normal_stress_step"],
+            facet=["law"],
+            isel={"normal_stress_step": lambda steps: sorted({min(steps), max(steps)})},
             style={"marker": ""},
-            marks=[mark_rigid],
+            overlays=[plot_rigid_transients],
             x_label=r"Slip since the step, $\delta/D_c$",
             y_label=r"Change of friction, $\Delta\mu$",
-            x_limits=(0.0, SHOWN),
+            x_limits=(0.0, PLOTTED_SLIP),
         ),
         replace(
-            read,
+            readings_panel,
             y=lambda row: row["apparent_alpha"] / row["alpha"],
             title=r"$\alpha$ as read off",
             y_label=r"$\alpha_{read}/\alpha$",
         ),
         replace(
-            read,
+            readings_panel,
             y="apparent_slip_distance",
             title="Slip distance as read off",
             y_label="$D_{read}/D_c$",
@@ -188,12 +191,12 @@ study = Study(
         Axis("normal_stress_step", STEPS),
         Axis("stiffness_ratio", RATIOS),
     ],
-    measure=MEASURE,
+    measure=TRANSIENT_MEASURE,
     accuracy=Accuracy(rtol=1e-5),
     claims=[
-        *(follows(law, step) for law in LAWS for step in STEPS),
-        *(falls_over(law, step) for law in LAWS for step in STEPS),
-        *(is_direct(law, step) for law in LAWS for step in (STEPS[0], STEPS[-1])),
+        *(rigid_limit_claim(law, step) for law in LAWS for step in STEPS),
+        *(slip_distance_claim(law, step) for law in LAWS for step in STEPS),
+        *(direct_change_claim(law, step) for law in LAWS for step in (STEPS[0], STEPS[-1])),
     ],
     plot=figure,
     references=[

@@ -16,25 +16,33 @@ from rsfstudy.declare.figure import Axes, reference_line
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.reduce import ProportionalFit, RelativeDifference
 
-from ._paper import CASES, CONSTANT, GU_ET_AL, PAPER, REFERENCE, STRONG, WEAK
+from ._paper import (
+    CONSTANT_NORMAL_STRESS,
+    GU_ET_AL,
+    NORMAL_STRESS_CASES,
+    PAPER,
+    REFERENCE,
+    STRONG_NORMAL_STRESS_EFFECT,
+    WEAK_NORMAL_STRESS_EFFECT,
+)
 
 #: a/(b-a): densely over the paper's range, which is fitted, and on to where the finite norm bends
 #: the curves.
 a_over_b_minus_a = np.concatenate([np.arange(5, 20) / 20, np.arange(4, 17) / 4])
 
 
-FITTED = (0.25, 1.0)
+FITTED_RANGE = (0.25, 1.0)
 
 
-def fit(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+def fit_line(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """The line of a fit."""
     reach = np.array([0.0, 1.03 * float(row["a_over_b_minus_a"].max())])
     return reach, 1.0 + float(row.get("zeta", np.nan)) * reach
 
 
-def mark_fitted(_dataset: xr.Dataset, axes: Axes) -> None:
+def plot_fitted_range(_dataset: xr.Dataset, axes: Axes) -> None:
     """The range of the fit."""
-    axes.axvspan(*FITTED, color="0.94", zorder=0)
+    axes.axvspan(*FITTED_RANGE, color="0.94", zorder=0)
     axes.text(0.27, 0.97, "fitted", transform=axes.get_xaxis_transform(), va="top", color="0.45")
 
 
@@ -43,32 +51,32 @@ figure = Figure(
         Panel(
             x="a_over_b_minus_a",
             y="critical_velocity_ratio",
-            by=["case"],
-            through=fit,
-            says="zeta",
-            marks=[
+            hue=["case"],
+            fit_line=fit_line,
+            annotation="zeta",
+            overlays=[
                 reference_line(
                     "a_over_b_minus_a", lambda x: 1.0 + x, "$1 + a/(b-a)$ (Gu et al. 1984)", 0.0
                 ),
-                mark_fitted,
+                plot_fitted_range,
             ],
-            at={"law": 0, "stiffness_ratio": 0},
+            isel={"law": 0, "stiffness_ratio": 0},
             x_limits=(0.0, None),
             y_limits=(1.0, None),
-            columns=1,
+            legend_columns=1,
         )
     ]
 )
 
 
-def lower(inverse: float, published: float) -> Claim:
+def variable_normal_stress_claim(inverse: float, published: float) -> Claim:
     """C7: by how much the boundary is lower at a value of a/(b-a)."""
     return Claim(
         id="C7",
         statement=f"alpha = 0.56, a/(b-a) = {inverse:g}: lower by {100.0 * published:g} %",
         source=f"{PAPER}, section 3.1",
         variable="lowering",
-        where={"case": STRONG, "b_over_a": 1.0 + 1.0 / inverse},
+        where={"case": STRONG_NORMAL_STRESS_EFFECT, "b_over_a": 1.0 + 1.0 / inverse},
         published=published,
         tolerance=0.013,
         reason="whole per cent (0.5), and the paper's error of 0.4 % in each of two velocities",
@@ -81,7 +89,7 @@ study = Study(
     summary=Study.caption(__doc__),
     base=Scene(law="slip", stiffness_ratio=1.0),
     axes=[
-        Axis("case", CASES),
+        Axis("case", NORMAL_STRESS_CASES),
         Axis("b_over_a", 1.0 + 1.0 / a_over_b_minus_a),
     ],
     measure=CriticalStep(of="load_velocity_ratio", direction="up"),
@@ -94,7 +102,10 @@ study = Study(
             within=(0.25, 1.0),
         ),
         RelativeDifference(
-            name="lowering", of="critical_velocity_ratio", along="case", reference=CONSTANT
+            name="lowering",
+            of="critical_velocity_ratio",
+            along="case",
+            reference=CONSTANT_NORMAL_STRESS,
         ),
     ],
     claims=[
@@ -103,7 +114,7 @@ study = Study(
             statement="constant normal stress: zeta = 1",
             source=f"{PAPER}, eq. 10, Fig. 5",
             variable="zeta",
-            where={"case": CONSTANT},
+            where={"case": CONSTANT_NORMAL_STRESS},
             published=1.0,
             tolerance=1e-4,
             reason="eq. 10 holds for an infinite norm; at 5e-4 it is missed by 5e-5 at a/(b-a) = 1",
@@ -113,7 +124,7 @@ study = Study(
             statement="constant normal stress, b/a = 2: V_0/V_* = 2",
             source=f"{PAPER}, eq. 10",
             variable="critical_velocity_ratio",
-            where={"case": CONSTANT, "b_over_a": 2.0},
+            where={"case": CONSTANT_NORMAL_STRESS, "b_over_a": 2.0},
             published=2.0,
             tolerance=1e-4,
             reason="the finite norm lowers it by 5e-5",
@@ -123,7 +134,7 @@ study = Study(
             statement="alpha = 0.56: zeta < 1",
             source=f"{PAPER}, Fig. 5",
             variable="zeta",
-            where={"case": STRONG},
+            where={"case": STRONG_NORMAL_STRESS_EFFECT},
             published=1.0,
         ),
         Claim.below(
@@ -131,12 +142,12 @@ study = Study(
             statement="zeta falls with alpha (0.56 less 0.25)",
             source=f"{PAPER}, Fig. 5",
             variable="zeta",
-            where={"case": STRONG},
-            minus={"case": WEAK},
+            where={"case": STRONG_NORMAL_STRESS_EFFECT},
+            minus={"case": WEAK_NORMAL_STRESS_EFFECT},
             published=0.0,
         ),
-        lower(0.25, 0.07),
-        lower(1.0, 0.16),
+        variable_normal_stress_claim(0.25, 0.07),
+        variable_normal_stress_claim(1.0, 0.16),
     ],
     plot=figure,
     references=[REFERENCE, GU_ET_AL],

@@ -15,10 +15,10 @@ from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.reduce import Boundary
 
-from ._paper import CASES, CONSTANT, PAPER, REFERENCE
+from ._paper import CONSTANT_NORMAL_STRESS, NORMAL_STRESS_CASES, PAPER, REFERENCE
 
 
-def mark_cells(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_cells(dataset: xr.Dataset, axes: Axes) -> None:
     """Stable cells open, and unstable ones filled; and the boundary, where they have one."""
     if "lattice_boundary" in dataset:
         boundary, half = dataset["lattice_boundary"], dataset["lattice_boundary_error"]
@@ -36,10 +36,10 @@ figure = Figure(
     [
         Panel(
             x="stiffness_ratio",
-            each=["case"],
-            marks=[mark_cells],
+            facet=["case"],
+            overlays=[plot_cells],
             y_label="Load point velocity, $V_0/V_*$",
-            columns=3,
+            legend_columns=3,
         )
     ],
     columns=3,
@@ -52,7 +52,7 @@ study = Study(
     summary=Study.caption(__doc__),
     base=Scene(law="slip", b_over_a=math.e),
     axes=[
-        Axis("case", CASES),
+        Axis("case", NORMAL_STRESS_CASES),
         Axis("stiffness_ratio", [1.0, 1.25, 1.5, 1.75, 2.0]),
         Axis("load_velocity_ratio", np.geomspace(1.1, 5.0, 40)),
     ],
@@ -64,7 +64,7 @@ study = Study(
             statement="constant normal stress, k = k_cr: V_0/V_* = 1 + 1/(e - 1)",
             source=f"{PAPER}, eqs. 10 and 11",
             variable="lattice_boundary",
-            where={"case": CONSTANT, "stiffness_ratio": 1.0},
+            where={"case": CONSTANT_NORMAL_STRESS, "stiffness_ratio": 1.0},
             published=1.0 + 1.0 / (math.e - 1.0),
             tolerance=0.0309,
             reason="half of the spacing of the lattice there",

@@ -15,60 +15,76 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.declare.figure import Axes, reference_line
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import OverClosedForm, RelativeDifference
+from rsfstudy.reduce import ClosedFormRatio, RelativeDifference
 
-from ._paper import CASES, CONSTANT, GU_ET_AL, PAPER, REFERENCE, STRONG, WEAK
+from ._paper import (
+    CONSTANT_NORMAL_STRESS,
+    GU_ET_AL,
+    NORMAL_STRESS_CASES,
+    PAPER,
+    REFERENCE,
+    STRONG_NORMAL_STRESS_EFFECT,
+    WEAK_NORMAL_STRESS_EFFECT,
+)
 
 
-def slowness(stiffness_ratio: float, published: float, tolerance: float, digits: str) -> Claim:
+def section_4_claim(
+    stiffness_ratio: float, published: float, tolerance: float, digits: str
+) -> Claim:
     """C17: the numbers of section 4."""
     return Claim(
         id="C17",
         statement=f"slowness, alpha = 0.56, k = {stiffness_ratio:g} k_cr: {published:g} V_*",
         source=f"{PAPER}, section 4",
         variable="critical_velocity_ratio",
-        where={"law": "slowness", "case": STRONG, "stiffness_ratio": stiffness_ratio},
+        where={
+            "law": "slowness",
+            "case": STRONG_NORMAL_STRESS_EFFECT,
+            "stiffness_ratio": stiffness_ratio,
+        },
         published=published,
         tolerance=tolerance,
         reason=f"printed to {digits}; our norm is inferred from it, see instability_norm",
     )
 
 
-def eq_11(stiffness_ratio: float, published: float, tolerance: float, reason: str) -> Claim:
+def eq_11_claim(stiffness_ratio: float, published: float, tolerance: float, reason: str) -> Claim:
     """C8: eq. 11 at constant normal stress, and its own error away from k = k_cr."""
     return Claim(
         id="C8",
         statement=f"slip law, constant, k = {stiffness_ratio:g} k_cr: V_0 over that of eq. 11",
         source=f"{PAPER}, eq. 11, section 3.1",
         variable="over_eq_11",
-        where={"law": "slip", "case": CONSTANT, "stiffness_ratio": stiffness_ratio},
+        where={"law": "slip", "case": CONSTANT_NORMAL_STRESS, "stiffness_ratio": stiffness_ratio},
         published=published,
         tolerance=tolerance,
         reason=reason,
     )
 
 
-UNDERESTIMATED = "'underestimates by 1-2 %', which the paper takes for its procedure's error"
+PAPER_WORDS_ON_UNDERESTIMATE = (
+    "'underestimates by 1-2 %', which the paper takes for its procedure's error"
+)
 
 
-def mark_eq_11(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_eq_11(dataset: xr.Dataset, axes: Axes) -> None:
     """The approximation that is published for the slip law."""
     weakening, text = float(dataset["b_over_a"]) - 1.0, r"$\exp(k/k_{cr})/\lambda$ (eq. 11)"
     if dataset["law"] == "slip":
         reference_line("stiffness_ratio", lambda x: np.exp(x) / weakening, text)(dataset, axes)
 
 
-curves = Panel(x="stiffness_ratio", y="critical_velocity_ratio", by=["case"])
+boundary_panel = Panel(x="stiffness_ratio", y="critical_velocity_ratio", hue=["case"])
 
 figure = Figure(
     [
-        replace(curves, at={"law": 0, "b_over_a": 0}, marks=[mark_eq_11]),
+        replace(boundary_panel, isel={"law": 0, "b_over_a": 0}, overlays=[plot_eq_11]),
         replace(
-            curves,
-            by=["case", "law"],
+            boundary_panel,
+            hue=["case", "law"],
             log="y",
-            when=lambda dataset: dataset.sizes["law"] > 1,
-            at={"b_over_a": 0},
+            condition=lambda dataset: dataset.sizes["law"] > 1,
+            isel={"b_over_a": 0},
         ),
     ]
 )
@@ -81,15 +97,18 @@ study = Study(
     base=Scene(b_over_a=math.e),
     axes=[
         Axis("law", ["slip", "slowness"]),
-        Axis("case", CASES),
+        Axis("case", NORMAL_STRESS_CASES),
         Axis("stiffness_ratio", np.linspace(1.0, 2.0, 21)),
     ],
     measure=CriticalStep(of="load_velocity_ratio", direction="up"),
     reductions=[
         RelativeDifference(
-            name="lowering", of="critical_velocity_ratio", along="case", reference=CONSTANT
+            name="lowering",
+            of="critical_velocity_ratio",
+            along="case",
+            reference=CONSTANT_NORMAL_STRESS,
         ),
-        OverClosedForm(
+        ClosedFormRatio(
             name="over_eq_11", of="critical_velocity_ratio", form="velocity_step_for_b_over_a_of_e"
         ),
     ],
@@ -99,7 +118,7 @@ study = Study(
             statement="slip law, alpha = 0.56, k = k_cr: lower by 12 %",
             source=f"{PAPER}, section 3.1, Fig. 6",
             variable="lowering",
-            where={"law": "slip", "case": STRONG, "stiffness_ratio": 1.0},
+            where={"law": "slip", "case": STRONG_NORMAL_STRESS_EFFECT, "stiffness_ratio": 1.0},
             published=0.12,
             tolerance=0.01,
             reason="'~12 %'",
@@ -109,18 +128,20 @@ study = Study(
             statement="slip law, alpha = 0.25, k = k_cr: very close to constant normal stress",
             source=f"{PAPER}, section 3.1, Fig. 6",
             variable="lowering",
-            where={"law": "slip", "case": WEAK, "stiffness_ratio": 1.0},
+            where={"law": "slip", "case": WEAK_NORMAL_STRESS_EFFECT, "stiffness_ratio": 1.0},
             published=0.0,
             tolerance=0.02,
             reason="'very close'; about the width of the symbols of the figure",
             expected="differs",
             because="it is lower by 5.7 %, half of that at alpha = 0.56; by 6 % above k_cr",
         ),
-        eq_11(1.0, 1.0, 1e-7, "exact; a finite norm leaves exp[-10.9 (b/a - 1)] = 7e-9 of it"),
-        eq_11(1.1, 0.99, 0.006, UNDERESTIMATED),
-        eq_11(1.5, 0.98, 0.006, UNDERESTIMATED),
-        slowness(1.0, 11.8, 0.05, "one decimal"),
-        slowness(1.5, 2361.0, 0.5, "the unit"),
+        eq_11_claim(
+            1.0, 1.0, 1e-7, "exact; a finite norm leaves exp[-10.9 (b/a - 1)] = 7e-9 of it"
+        ),
+        eq_11_claim(1.1, 0.99, 0.006, PAPER_WORDS_ON_UNDERESTIMATE),
+        eq_11_claim(1.5, 0.98, 0.006, PAPER_WORDS_ON_UNDERESTIMATE),
+        section_4_claim(1.0, 11.8, 0.05, "one decimal"),
+        section_4_claim(1.5, 2361.0, 0.5, "the unit"),
     ],
     plot=figure,
     references=[REFERENCE, GU_ET_AL],

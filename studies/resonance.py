@@ -16,76 +16,82 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, level
+from rsfstudy.declare.figure import Axes, horizontal_line
 from rsfstudy.reduce import Inverse
 from rsfstudy.slider.stability import response_to_normal_stress
 
 from ._normal_stress_response import NormalStressResponse
-from ._phase_plane import scene_of
+from ._phase_plane import scene_from_coordinates
 
 base = Scene(normal_stress="imposed", alpha=0.25, b_over_a=2.0)
 a, b = base.a, base.b
 #: Period of resonance as k falls to k_cr, 2 pi over sqrt((b - a)/a), and others over it.
-RESONANT = 2.0 * math.pi * math.sqrt(a / (b - a))
-PERIODS = [factor * RESONANT for factor in (0.75, 1.0, 1.5)]
-RATIOS = [1.2, 1.5, 4.0]
-SMALL, LARGE = 1e-4, 1e-2
-AMPLITUDES = [SMALL, 3e-4, 1e-3, 3e-3, LARGE, 5e-2]
+RESONANCE_PERIOD = 2.0 * math.pi * math.sqrt(a / (b - a))
+PERIODS = [factor * RESONANCE_PERIOD for factor in (0.75, 1.0, 1.5)]
+STIFFNESS_RATIOS = [1.2, 1.5, 4.0]
+SMALL_AMPLITUDE, LARGE_AMPLITUDE = 1e-4, 1e-2
+AMPLITUDES = [SMALL_AMPLITUDE, 3e-4, 1e-3, 3e-3, LARGE_AMPLITUDE, 5e-2]
 LAWS = ("slip", "slowness")
 #: Departure of the response from that of small oscillations beyond which linear theory has failed.
-FAILED = 0.1
-LINEAR = "linear theory of steady sliding: K [mu + (mu - alpha) z]/[a z^2 + (K - b + a) z + K]"
+MAX_LINEAR_DEVIATION = 0.1
+LINEAR_THEORY_SOURCE = (
+    "linear theory of steady sliding: K [mu + (mu - alpha) z]/[a z^2 + (K - b + a) z + K]"
+)
 
 
-def linear(ratio: float, period: float) -> float:
+def linear_gain(ratio: float, period: float) -> float:
     """Gain of small oscillations, in units with stress over sigma and z = i omega D_c/V."""
     stiffness, z = ratio * (b - a), 2j * math.pi / period
     above = stiffness * (base.mu_star + (base.mu_star - base.alpha) * z)
     return float(abs(above / (a * z * z + (stiffness - b + a) * z + stiffness)))
 
 
-def swing(ratio: float, period: float, amplitude: float) -> float:
+def log_rate_amplitude(ratio: float, period: float, amplitude: float) -> float:
     """Amplitude of ln V in small oscillations: V - V_0 is -d(spring stress)/dt over K."""
-    return 2.0 * math.pi / period * linear(ratio, period) * amplitude / (ratio * (b - a))
+    return 2.0 * math.pi / period * linear_gain(ratio, period) * amplitude / (ratio * (b - a))
 
 
-def is_linear(law: str, ratio: float, period: float) -> Claim:
+def linear_limit_claim(law: str, ratio: float, period: float) -> Claim:
     """R1: the limit of small amplitude."""
-    gain = linear(ratio, period)
+    gain = linear_gain(ratio, period)
     return Claim(
         id="R1",
-        statement=f"{law} law, k = {ratio:g} k_cr, {period / RESONANT:g} times the resonant "
-        "period: gain of small oscillations",
-        source=LINEAR,
+        statement=f"{law} law, k = {ratio:g} k_cr, {period / RESONANCE_PERIOD:g} times the "
+        "resonant period: gain of small oscillations",
+        source=LINEAR_THEORY_SOURCE,
         variable="gain",
         where={
             "law": law,
             "stiffness_ratio": ratio,
             "oscillation_period": period,
-            "oscillation_amplitude": SMALL,
+            "oscillation_amplitude": SMALL_AMPLITUDE,
         },
         published=gain,
-        tolerance=gain * (swing(ratio, period, SMALL) ** 2 + 1e-6),
+        tolerance=gain * (log_rate_amplitude(ratio, period, SMALL_AMPLITUDE) ** 2 + 1e-6),
         reason="linear theory leaves out the square of the amplitude of ln V, up to 5e-4; and 1e-6",
     )
 
 
-def resounds(law: str, period: float) -> Claim:
+def resonance_claim(law: str, period: float) -> Claim:
     """R2: the period of resonance."""
-    at = {"law": law, "stiffness_ratio": RATIOS[0], "oscillation_amplitude": SMALL}
+    at = {
+        "law": law,
+        "stiffness_ratio": STIFFNESS_RATIOS[0],
+        "oscillation_amplitude": SMALL_AMPLITUDE,
+    }
     return Claim.above(
         id="R2",
-        statement=f"{law} law, k = {RATIOS[0]:g} k_cr: gain is larger than at "
-        f"{period / RESONANT:g} times the period",
+        statement=f"{law} law, k = {STIFFNESS_RATIOS[0]:g} k_cr: gain is larger than at "
+        f"{period / RESONANCE_PERIOD:g} times the period",
         source="linear theory: resonance at omega D_c/V = sqrt((b - a)/a) as k falls to k_cr",
         variable="gain",
-        where={**at, "oscillation_period": RESONANT},
+        where={**at, "oscillation_period": RESONANCE_PERIOD},
         minus={**at, "oscillation_period": period},
         published=0.0,
     )
 
 
-def holds(law: str, ratio: float, amplitude: float, *, still: bool = True) -> Claim:
+def linear_range_claim(law: str, ratio: float, amplitude: float, *, still: bool = True) -> Claim:
     """R3: up to which amplitude, near critical stiffness and far from it."""
     return Claim(
         id="R3",
@@ -96,17 +102,17 @@ def holds(law: str, ratio: float, amplitude: float, *, still: bool = True) -> Cl
         where={
             "law": law,
             "stiffness_ratio": ratio,
-            "oscillation_period": RESONANT,
+            "oscillation_period": RESONANCE_PERIOD,
             "oscillation_amplitude": amplitude,
         },
         relation="below" if still else "above",
-        published=FAILED,
+        published=MAX_LINEAR_DEVIATION,
     )
 
 
-def fails_earlier(softer: float, stiffer: float) -> Claim:
+def failure_order_claim(softer: float, stiffer: float) -> Claim:
     """R4: the amplitude at which linear theory fails."""
-    at = {"law": "slowness", "oscillation_period": RESONANT}
+    at = {"law": "slowness", "oscillation_period": RESONANCE_PERIOD}
     return Claim.below(
         id="R4",
         statement=f"slowness law: linear theory fails at a smaller amplitude at {softer:g} k_cr "
@@ -119,64 +125,84 @@ def fails_earlier(softer: float, stiffer: float) -> Claim:
     )
 
 
-def theory(part: Callable[[np.ndarray], Any], row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+def linear_theory_line(
+    part: Callable[[np.ndarray], Any], row: xr.Dataset
+) -> tuple[np.ndarray, np.ndarray]:
     """Periods, to twice as far as those of the motions, and what linear theory says of them."""
-    scene, known = scene_of(row.isel(oscillation_period=0)), row["oscillation_period"]
+    scene, known = scene_from_coordinates(row.isel(oscillation_period=0)), row["oscillation_period"]
     periods = np.geomspace(0.5 * float(known.min()), 2.0 * float(known.max()), 300)
     frequencies = 2.0 * math.pi / periods
-    found = [response_to_normal_stress(scene, scene.log_load_rate, f) for f in frequencies]
+    found = [response_to_normal_stress(scene, scene.log_load_velocity, f) for f in frequencies]
     return periods, np.asarray(part(np.array(found)))
 
 
-def leads(responses: np.ndarray) -> Any:
+def phase_lead(responses: np.ndarray) -> Any:
     """Lead of spring stress in degrees."""
     return np.degrees(np.angle(responses))
 
 
-def settled(variable: str, row: xr.Dataset) -> xr.DataArray:
+def settled_values(variable: str, row: xr.Dataset) -> xr.DataArray:
     """Values of a variable where the motion repeats itself; NaN elsewhere."""
     return row[variable].where(row["settled"] == 1.0)
 
 
-def mark_theory(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_linear_theory(dataset: xr.Dataset, axes: Axes) -> None:
     """Gains of linear theory."""
-    from rsfstudy.plots import look
+    from rsfstudy.plots import cycle_style
 
     for number in range(dataset.sizes["stiffness_ratio"]):
         gain = float(dataset["linear_gain"].isel(stiffness_ratio=number).max())
-        level(gain, color=look(number)["color"], linewidth=0.6, linestyle=":")(dataset, axes)
+        horizontal_line(gain, color=cycle_style(number)["color"], linewidth=0.6, linestyle=":")(
+            dataset, axes
+        )
 
 
 def closest_to_resonance(periods: list[float]) -> float:
     """The period that linear theory has the largest gain near, on the softest machine."""
-    return min(periods, key=lambda period: abs(period - RESONANT))
+    return min(periods, key=lambda period: abs(period - RESONANCE_PERIOD))
 
 
-small = Panel(
+small_amplitude_panel = Panel(
     x="oscillation_period",
-    by=["stiffness_ratio", "law"],
+    hue=["stiffness_ratio", "law"],
     style=lambda row: {"markersize": 3.0 if row["law"] == LAWS[0] else 5.5},
-    at={"oscillation_amplitude": 0},
+    isel={"oscillation_amplitude": 0},
     log="x",
-    columns=3,
+    legend_columns=3,
 )
-large = Panel(
+large_amplitude_panel = Panel(
     x="oscillation_amplitude",
-    by=["stiffness_ratio", "law"],
-    at={"oscillation_period": closest_to_resonance},
+    hue=["stiffness_ratio", "law"],
+    isel={"oscillation_period": closest_to_resonance},
     style={"linewidth": 0.9},
     log="xy",
 )
-GAIN = r"Gain, $|\hat\tau/\hat\sigma|$"
+GAIN_LABEL = r"Gain, $|\hat\tau/\hat\sigma|$"
 figure = Figure(
     [
-        replace(small, y="gain", through=partial(theory, np.abs), y_label=GAIN, log="xy"),
-        replace(small, y="phase_lead", through=partial(theory, leads), y_label="Lead (degree)"),
-        replace(large, y=partial(settled, "gain"), marks=[mark_theory], y_label=GAIN),
         replace(
-            large,
-            y=partial(settled, "departure_from_linear"),
-            marks=[level(FAILED)],
+            small_amplitude_panel,
+            y="gain",
+            fit_line=partial(linear_theory_line, np.abs),
+            y_label=GAIN_LABEL,
+            log="xy",
+        ),
+        replace(
+            small_amplitude_panel,
+            y="phase_lead",
+            fit_line=partial(linear_theory_line, phase_lead),
+            y_label="Lead (degree)",
+        ),
+        replace(
+            large_amplitude_panel,
+            y=partial(settled_values, "gain"),
+            overlays=[plot_linear_theory],
+            y_label=GAIN_LABEL,
+        ),
+        replace(
+            large_amplitude_panel,
+            y=partial(settled_values, "departure_from_linear"),
+            overlays=[horizontal_line(MAX_LINEAR_DEVIATION)],
             y_label="Relative departure from linear theory",
         ),
     ],
@@ -191,7 +217,7 @@ study = Study(
     base=base,
     axes=[
         Axis("law", LAWS),
-        Axis("stiffness_ratio", RATIOS),
+        Axis("stiffness_ratio", STIFFNESS_RATIOS),
         Axis("oscillation_period", PERIODS),
         Axis("oscillation_amplitude", AMPLITUDES),
     ],
@@ -202,17 +228,21 @@ study = Study(
             name="failing_amplitude",
             of="departure_from_linear",
             on="oscillation_amplitude",
-            levels=FAILED,
+            levels=MAX_LINEAR_DEVIATION,
         )
     ],
     claims=[
-        *(is_linear("slip", ratio, period) for ratio in RATIOS for period in PERIODS),
-        *(is_linear("slowness", ratio, RESONANT) for ratio in RATIOS),
-        *(resounds(law, period) for law in LAWS for period in (PERIODS[0], PERIODS[-1])),
-        holds("slip", RATIOS[0], 3e-3, still=False),
-        holds("slowness", RATIOS[0], LARGE, still=False),
-        *(holds(law, RATIOS[-1], LARGE) for law in LAWS),
-        fails_earlier(RATIOS[0], RATIOS[1]),
+        *(
+            linear_limit_claim("slip", ratio, period)
+            for ratio in STIFFNESS_RATIOS
+            for period in PERIODS
+        ),
+        *(linear_limit_claim("slowness", ratio, RESONANCE_PERIOD) for ratio in STIFFNESS_RATIOS),
+        *(resonance_claim(law, period) for law in LAWS for period in (PERIODS[0], PERIODS[-1])),
+        linear_range_claim("slip", STIFFNESS_RATIOS[0], 3e-3, still=False),
+        linear_range_claim("slowness", STIFFNESS_RATIOS[0], LARGE_AMPLITUDE, still=False),
+        *(linear_range_claim(law, STIFFNESS_RATIOS[-1], LARGE_AMPLITUDE) for law in LAWS),
+        failure_order_claim(STIFFNESS_RATIOS[0], STIFFNESS_RATIOS[1]),
     ],
     plot=figure,
     references=[

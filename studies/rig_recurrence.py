@@ -11,16 +11,16 @@ from dataclasses import replace
 
 import xarray as xr
 
-from rsfstudy import Axis, Claim, Figure, Laboratory, Panel, Study
+from rsfstudy import Axis, Claim, Figure, Panel, Rig, Study
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import LinearFit
 
 #: Normal stresses in MPa.
-STRESSES = (5.0, 10.0, 20.0)
+NORMAL_STRESSES = (5.0, 10.0, 20.0)
 #: By how much of (b-a) sigma each drop falls as ln V_0 grows by 1.
-DROPS = {"dynamic": 1.0, "static": 2.0}
+DROP_MULTIPLES = {"dynamic": 1.0, "static": 2.0}
 
-rig = Laboratory(
+rig = Rig(
     normal_stress="5 MPa",
     slip_distance="10 um",
     reference_velocity="1 um/s",
@@ -30,29 +30,29 @@ rig = Laboratory(
 base = rig.scene(a=0.01, b_over_a=1.5, normal_stress="constant")
 weakening = base.b - base.a
 
-FORMS = "steady friction at the load point velocity and at the fastest slip rate"
-LEFT_OUT = (
+CLOSED_FORM_SOURCE = "steady friction at the load point velocity and at the fastest slip rate"
+TOLERANCE_REASON = (
     "the fastest slip rate goes with the drop, which makes the slope steeper by (b-a) sigma over "
     "the dynamic drop, 6 to 9 % to first order"
 )
 
 
-def falls(stress: float, drop: str, multiple: float) -> Claim:
+def slip_law_drop_claim(stress: float, drop: str, multiple: float) -> Claim:
     """S1: stress drops with the slip law fall by whole multiples of (b-a) sigma."""
     return Claim(
         id="S1",
         statement=f"slip law, {stress:g} MPa: {drop} drop falls by {multiple:g} (b-a) sigma with "
         "ln V_0",
-        source=f"{FORMS}" + ", and an overshoot as large" * (drop == "static"),
+        source=f"{CLOSED_FORM_SOURCE}" + ", and an overshoot as large" * (drop == "static"),
         variable=f"{drop}_slope",
         where={"law": "slip", "sigma_star": stress},
         published=-multiple * weakening,
         tolerance=0.12 * multiple * weakening,
-        reason=LEFT_OUT,
+        reason=TOLERANCE_REASON,
     )
 
 
-def falls_faster(stress: float) -> Claim:
+def slowness_law_drop_claim(stress: float) -> Claim:
     """S2: with the slowness law contact heals all the while."""
     return Claim.below(
         id="S2",
@@ -64,24 +64,24 @@ def falls_faster(stress: float) -> Claim:
     )
 
 
-def loaded(row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
+def loading_time_line(row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
     """The time in which the spring is loaded by the static drop while nothing slips."""
     stress_rate = row["stiffness"] * row["load_velocity"]
     return row["load_velocity"], row["static_stress_drop"] / stress_rate
 
 
-panel = Panel(x="load_velocity", by=["sigma_star"], each=["law"])
+panel = Panel(x="load_velocity", hue=["sigma_star"], facet=["law"])
 figure = Figure(
     [
         replace(
             panel,
             y="recurrence_interval",
             log="xy",
-            through=loaded,
-            alike="interval",
+            fit_line=loading_time_line,
+            y_scale_group="interval",
             y_label="Recurrence interval (s)",
         ),
-        replace(panel, y="static_stress_drop", log="x", y_limits=(0.0, None), alike="drop"),
+        replace(panel, y="static_stress_drop", log="x", y_limits=(0.0, None), y_scale_group="drop"),
     ]
 )
 
@@ -89,11 +89,11 @@ study = Study(
     name="rig_recurrence",
     title="Stick-slip of a rig, k = 0.001 MPa/um, at three normal stresses",
     summary=Study.caption(__doc__),
-    laboratory=rig,
+    rig=rig,
     base=base,
     axes=[
         Axis("law", ["slip", "slowness"]),
-        rig.axis("normal_stress", [f"{stress:g} MPa" for stress in STRESSES]),
+        rig.axis("normal_stress", [f"{stress:g} MPa" for stress in NORMAL_STRESSES]),
         rig.axis("load_velocity", "1:100:9:log um/s"),
     ],
     measure=LimitCycle(),
@@ -102,8 +102,12 @@ study = Study(
         for drop in ("static", "dynamic")
     ],
     claims=[
-        *(falls(stress, drop, n) for stress in STRESSES for drop, n in DROPS.items()),
-        *(falls_faster(stress) for stress in STRESSES),
+        *(
+            slip_law_drop_claim(stress, drop, n)
+            for stress in NORMAL_STRESSES
+            for drop, n in DROP_MULTIPLES.items()
+        ),
+        *(slowness_law_drop_claim(stress) for stress in NORMAL_STRESSES),
     ],
     plot=figure,
     references=["Gu and Wong (1991), J. Geophys. Res. 96, 21677-21691"],

@@ -11,7 +11,7 @@ from typing import Any
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import level
+from rsfstudy.declare.figure import horizontal_line
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.reduce import Range, RelativeDifference
 
@@ -21,7 +21,7 @@ from ._paper import PAPER, REFERENCE
 STEPS = [1e-4, 1e-3, 1e-2, 1e-1, 1.05, 1e1, 1e2, 200.0, 1e3, 1e4]
 
 
-def slower(law: str, rate: float, figure: str, claim: str) -> Claim:
+def slower_evolution_claim(law: str, rate: float, figure: str, claim: str) -> Claim:
     """C3, C4: variable normal stress slows the evolution."""
     return Claim.below(
         id=claim,
@@ -34,25 +34,25 @@ def slower(law: str, rate: float, figure: str, claim: str) -> Claim:
     )
 
 
-def stress_left(row: xr.Dataset) -> xr.DataArray:
+def remaining_stress(row: xr.Dataset) -> xr.DataArray:
     """Stress less its future steady value; steps between decades are there for their numbers."""
     future = row["mu_star"] + row["steady_stress_change"]
-    return ((row["shear_stress"] - future) / row["a"]).where(decade(row) is not None)
+    return ((row["shear_stress"] - future) / row["a"]).where(step_in_decades(row) is not None)
 
 
-def decade(row: xr.Dataset) -> int | None:
+def step_in_decades(row: xr.Dataset) -> int | None:
     """Decades of the step, if it is of whole ones."""
     decades = math.log10(row["load_velocity_ratio"]) if row["load_velocity_ratio"] > 0.0 else 0.0
     whole = round(decades)
     return whole if whole and abs(decades - whole) < 1e-9 else None
 
 
-def line(row: xr.Dataset) -> dict[str, Any]:
+def curve_style(row: xr.Dataset) -> dict[str, Any]:
     """Steps up solid, and steps down dashed."""
-    from rsfstudy.plots import look
+    from rsfstudy.plots import cycle_style
 
-    decades = decade(row) or 1
-    colour = look(abs(decades) - 1)["color"]
+    decades = step_in_decades(row) or 1
+    colour = cycle_style(abs(decades) - 1)["color"]
     return {"color": colour, "linestyle": "-" if decades > 0 else "--", "linewidth": 1.0}
 
 
@@ -60,14 +60,14 @@ figure = Figure(
     [
         Panel(
             x="slip",
-            y=stress_left,
-            by=["load_velocity_ratio"],
-            each=["law", "normal_stress"],
-            style=line,
-            name=lambda row: f"$10^{{{decade(row)}}}$",
-            marks=[level(0.0)],
+            y=remaining_stress,
+            hue=["load_velocity_ratio"],
+            facet=["law", "normal_stress"],
+            style=curve_style,
+            curve_label=lambda row: f"$10^{{{step_in_decades(row)}}}$",
+            overlays=[horizontal_line(0.0)],
             y_label=r"Stress left, $(\tau - \tau_{ss})/(a\,\sigma_*)$",
-            columns=4,
+            legend_columns=4,
             legend_title="Slip rate after the step, $V(0^+)/V_*$",
         )
     ]
@@ -97,8 +97,8 @@ study = Study(
         ),
     ],
     claims=[
-        *(slower("slip", rate, "Fig. 3", "C3") for rate in (1e-4, 1e-2)),
-        *(slower("slowness", rate, "Fig. 4", "C4") for rate in (1e-4, 1e-2)),
+        *(slower_evolution_claim("slip", rate, "Fig. 3", "C3") for rate in (1e-4, 1e-2)),
+        *(slower_evolution_claim("slowness", rate, "Fig. 4", "C4") for rate in (1e-4, 1e-2)),
         Claim.above(
             id="C3",
             statement="slip law, 4 decades down: more stress evolves than upward",

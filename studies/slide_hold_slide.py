@@ -14,7 +14,7 @@ import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures.healing import Healing
-from rsfstudy.reduce import DecadeFit
+from rsfstudy.reduce import SemilogFit
 
 SLIP, SLOWNESS, STRENGTHENING = "slip law", "slowness law", "slowness law, b < a"
 CASES: dict[str, dict[str, str | float]] = {
@@ -23,52 +23,52 @@ CASES: dict[str, dict[str, str | float]] = {
     STRENGTHENING: {"law": "slowness", "b_over_a": 0.2},
 }
 #: Stiffness over a; with b/a = 2 over critical stiffness.
-RATIOS = (1.5, 3.0, 10.0, 30.0)
+STIFFNESS_OVER_A = (1.5, 3.0, 10.0, 30.0)
 #: Hold times over which slopes are fitted, and the longest.
-LONG, LONGEST = (1e4, 1e8), 1e8
+FITTED_HOLD_TIMES, LONGEST_HOLD_TIME = (1e4, 1e8), 1e8
 
 base = Scene(normal_stress="constant", b_over_a=2.0, stiffness=0.0145)
 a, b = base.a, base.b
-FORMS = "stationary contact in closed form: slowness law, quasi-static"
+CLOSED_FORM_SOURCE = "stationary contact in closed form: slowness law, quasi-static"
 
 
-def relaxes(ratio: float) -> Claim:
+def relaxation_claim(ratio: float) -> Claim:
     """P1: the limit of relaxation."""
     return Claim(
         id="P1",
         statement=f"slowness law, b > a, k = {ratio:g} k_cr: relaxation ends",
-        source=f"{FORMS}: -a k^ ln(k^)/(k^ - 1), k^ = k/k_cr",
+        source=f"{CLOSED_FORM_SOURCE}: -a k^ ln(k^)/(k^ - 1), k^ = k/k_cr",
         variable="relaxation",
-        where={"case": SLOWNESS, "stiffness": ratio * a, "hold_time": LONGEST},
+        where={"case": SLOWNESS, "stiffness": ratio * a, "hold_time": LONGEST_HOLD_TIME},
         published=-a * ratio * math.log(ratio) / (ratio - 1.0),
         tolerance=1e-7 * a,
         reason="the accuracy asked for; what is left of it goes as 1/t",
     )
 
 
-def peaks(ratio: float) -> Claim:
+def reloading_peak_claim(ratio: float) -> Claim:
     """P3: the peak on reloading after a long hold."""
     stiffness = ratio * a
     late = a * b * math.log(stiffness / b) / (stiffness - b)
     return Claim(
         id="P3",
         statement=f"slowness law, k = {ratio:g} k_cr: peak after 1e8 D_c/V_*",
-        source=f"{FORMS}: b ln t - a b ln(K/b)/(K - b)",
+        source=f"{CLOSED_FORM_SOURCE}: b ln t - a b ln(K/b)/(K - b)",
         variable="healing",
-        where={"case": SLOWNESS, "stiffness": stiffness, "hold_time": LONGEST},
-        published=b * math.log(LONGEST) - late,
+        where={"case": SLOWNESS, "stiffness": stiffness, "hold_time": LONGEST_HOLD_TIME},
+        published=b * math.log(LONGEST_HOLD_TIME) - late,
         tolerance=2e-5 * b,
         reason="2e-5 of b: most peaks come within 2e-7, and 3 of 100 neighbours in the last bit, "
         "whose steps to the peak fall otherwise, within 1.2e-5, as their errors say",
     )
 
 
-def heals(ratio: float) -> Claim:
+def healing_claim(ratio: float) -> Claim:
     """P4: healing per decade."""
     return Claim(
         id="P4",
         statement=f"slowness law, k = {ratio:g} k_cr: heals by b ln 10 a decade",
-        source=f"{FORMS}: b ln 10 at every stiffness",
+        source=f"{CLOSED_FORM_SOURCE}: b ln 10 at every stiffness",
         variable="healing_per_decade",
         where={"case": SLOWNESS, "stiffness": ratio * a},
         published=b * math.log(10.0),
@@ -78,7 +78,7 @@ def heals(ratio: float) -> Claim:
     )
 
 
-def change(row: xr.Dataset) -> xr.DataArray:
+def friction_change(row: xr.Dataset) -> xr.DataArray:
     """Change of friction since steady sliding."""
     return row["friction_coefficient"] - row["mu_star"]
 
@@ -89,19 +89,19 @@ figure = Figure(
             Panel(
                 x="hold_time",
                 y=variable,
-                by=["stiffness"],
-                each=["case"],
+                hue=["stiffness"],
+                facet=["case"],
                 style={"markersize": 2.5},
                 log="x",
-                alike=variable,
+                y_scale_group=variable,
             )
             for variable in ("healing", "relaxation")
         ),
         Panel(
             x="load_point_displacement",
-            y=change,
-            by=["hold_time"],
-            at={
+            y=friction_change,
+            hue=["hold_time"],
+            isel={
                 "hold_time": slice(None, None, 4),
                 "case": lambda cases: cases[min(1, len(cases) - 1)],
                 "stiffness": lambda points: points[len(points) // 2],
@@ -112,12 +112,12 @@ figure = Figure(
         Panel(
             x="stiffness",
             y="healing_per_decade",
-            by=["case"],
-            error="healing_per_decade_stderr",
+            hue=["case"],
+            error_bars="healing_per_decade_stderr",
             title="Healing per decade, from $10^4$ on",
             y_label=r"Healing per decade, $\beta$",
             log="x",
-            columns=1,
+            legend_columns=1,
         ),
     ],
     columns=3,
@@ -132,21 +132,25 @@ study = Study(
     base=base,
     axes=[
         Axis("case", CASES),
-        Axis("stiffness", [ratio * a for ratio in RATIOS]),
+        Axis("stiffness", [ratio * a for ratio in STIFFNESS_OVER_A]),
         Axis("hold_time", 10.0 ** np.linspace(0.0, 8.0, 17)),
     ],
     measure=Healing(),
     reductions=[
-        DecadeFit(name="healing_per_decade", of="healing", on="hold_time", within=LONG),
-        DecadeFit(name="relaxation_per_decade", of="relaxation", on="hold_time", within=LONG),
+        SemilogFit(
+            name="healing_per_decade", of="healing", on="hold_time", within=FITTED_HOLD_TIMES
+        ),
+        SemilogFit(
+            name="relaxation_per_decade", of="relaxation", on="hold_time", within=FITTED_HOLD_TIMES
+        ),
     ],
     claims=[
-        *(relaxes(ratio) for ratio in RATIOS),
+        *(relaxation_claim(ratio) for ratio in STIFFNESS_OVER_A),
         *(
             Claim(
                 id="P2",
                 statement=f"slowness law, b < a, k = {ratio:g} a sigma_*/D_c: relaxation goes on",
-                source=f"{FORMS}: slope -(a - b) against ln t",
+                source=f"{CLOSED_FORM_SOURCE}: slope -(a - b) against ln t",
                 variable="relaxation_per_decade",
                 where={"case": STRENGTHENING, "stiffness": ratio * a},
                 published=-0.8 * a * math.log(10.0),
@@ -154,10 +158,10 @@ study = Study(
                 reason="what the form leaves out is a t^(b/a - 1): 6e-4 of a at the first of the "
                 "points, which weighs a fifth",
             )
-            for ratio in RATIOS
+            for ratio in STIFFNESS_OVER_A
         ),
-        *(peaks(ratio) for ratio in RATIOS),
-        *(heals(ratio) for ratio in RATIOS),
+        *(reloading_peak_claim(ratio) for ratio in STIFFNESS_OVER_A),
+        *(healing_claim(ratio) for ratio in STIFFNESS_OVER_A),
         *(
             Claim.below(
                 id="P5",
@@ -175,7 +179,7 @@ study = Study(
             statement="slip law, k = 3 k_cr: relaxation goes on from 1e6 to 1e8 D_c/V_*",
             source="with the slip law relaxation never ends",
             variable="relaxation",
-            where={"case": SLIP, "stiffness": 3.0 * a, "hold_time": LONGEST},
+            where={"case": SLIP, "stiffness": 3.0 * a, "hold_time": LONGEST_HOLD_TIME},
             minus={"case": SLIP, "stiffness": 3.0 * a, "hold_time": 1e6},
             published=0.0,
         ),

@@ -26,12 +26,12 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import SLIP_MODES, LimitCycle
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce import Boundary
-from rsfstudy.reduce.base import Reduction, dimension_of, failed, refused
+from rsfstudy.reduce.base import Reduction, dimension_of_coordinate, is_failed, is_refused
 from rsfstudy.slider.stability import critical_stiffness
 from rsfstudy.status import Status
 
 from ._paper import GU_ET_AL, PAPER, REFERENCE
-from ._phase_plane import scene_of
+from ._phase_plane import scene_from_coordinates
 
 CASES = [(law, stress) for law in ("slip", "slowness") for stress in ("constant", "variable")]
 
@@ -40,7 +40,7 @@ _STIFFNESS = "stiffness_ratio"
 
 
 @dataclass(frozen=True)
-class CyclingEdge(Reduction):
+class CycleRegionEdge(Reduction):
     """Stiffness between cells with a limit cycle and cells that settle to steady sliding, beside
     the critical stiffness at V_0 that follows from the eigenvalues of steady sliding, with mass.
 
@@ -92,9 +92,9 @@ class CyclingEdge(Reduction):
         InvalidValue
             Where stiffness_ratio is no coordinate along one dimension.
         """
-        dimension = dimension_of(dataset, _STIFFNESS)
+        dimension = dimension_of_coordinate(dataset, _STIFFNESS)
         cycles, settles = dataset[self.of].notnull(), dataset["status"] == Status.NO_LIMIT_CYCLE
-        lost = refused(dataset, self.of, dimension)
+        lost = is_refused(dataset, self.of, dimension)
         answers = cycles.astype(float).where((cycles | settles) & ~lost)
         linear = _linear_boundary(answers.isel({dimension: 0}, drop=True), dataset)
         if linear is None:
@@ -102,7 +102,7 @@ class CyclingEdge(Reduction):
         stiffness = dataset[_STIFFNESS].astype(float)
         # the change at the stiffest cells counts, and a boundary tells of the first one
         softening = answers.assign_coords({_STIFFNESS: -stiffness})
-        found = Boundary(self.name, self.of, on=_STIFFNESS).bracketed(softening)
+        found = Boundary(self.name, self.of, on=_STIFFNESS).bracket(softening)
         stable, unstable, crossings = abs(found[0]), abs(found[1]), found[2]
         edge, width = (0.5 * (stable + unstable)).where(crossings == 1), abs(stable - unstable)
         misplaced = ((answers == 1.0) & (stiffness > linear)) | (
@@ -121,7 +121,7 @@ class CyclingEdge(Reduction):
             "_misplaced": misplaced.sum([dimension, *along]).where(whole),
         }
         note = f"between cells with a number and without one in {self.of}, along {_STIFFNESS}"
-        if bool(failed(dataset["status"]).any()):
+        if bool(is_failed(dataset["status"]).any()):
             note += "; cells along it failed or are missing"
         return self.results(note, made)
 
@@ -134,36 +134,38 @@ def _linear_boundary(places: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray 
     cells = cells.isel({d: 0 for d in cells.dims if d not in places.dims})
     for place in np.ndindex(places.shape):
         try:
-            scene = scene_of(cells.isel(dict(zip(places.dims, place, strict=True))))
+            scene = scene_from_coordinates(cells.isel(dict(zip(places.dims, place, strict=True))))
         except InvalidValue:
             return None
-        values[place] = critical_stiffness(scene, scene.log_load_rate) / scene.critical_stiffness
+        values[place] = (
+            critical_stiffness(scene, scene.log_load_velocity) / scene.critical_stiffness
+        )
     return places.copy(data=values)
 
 
-PLANE = ("stiffness_ratio", "load_velocity_ratio")
+MAP_AXES = ("stiffness_ratio", "load_velocity_ratio")
 PEAK = "max_log10_slip_rate"
 #: Stiffness ratios between which the edge is shown enlarged.
-CLOSE, CLOSE_BELOW = 0.8, 1.1
+CLOSE_STIFFNESS_MIN, CLOSE_STIFFNESS_MAX = 0.8, 1.1
 #: Springs on both sides of where oscillation about steady sliding ends: at constant normal stress,
 #: where (k - k_cr)^2 = 4 a k, 5.83 k_cr for b = 2a.
-STIFF = (1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
+STIFF_SPRINGS = (1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
 
 
-def is_beyond(softest: float, dataset: xr.Dataset) -> bool:
+def spans_stiffness(softest: float, dataset: xr.Dataset) -> bool:
     """True if some springs are softer than that, and some stiffer."""
     ratio = dataset["stiffness_ratio"]
     return not softest or bool(ratio.min() < softest < ratio.max())
 
 
-def mark_map(softest: float, dataset: xr.Dataset, axes: Axes) -> None:
+def plot_map(softest: float, dataset: xr.Dataset, axes: Axes) -> None:
     """Peak slip rate from a stiffness on, with the linear boundary of steady sliding."""
     from rsfstudy.plots.maps import draw_map
 
     ratio = dataset["stiffness_ratio"]
-    shown = (ratio > softest) & (ratio < CLOSE_BELOW) if softest else ratio > softest
-    case = dataset.isel(stiffness_ratio=np.flatnonzero(shown)).transpose(*PLANE, ...)
-    draw_map(PEAK, PLANE, None, case, axes)
+    shown = (ratio > softest) & (ratio < CLOSE_STIFFNESS_MAX) if softest else ratio > softest
+    case = dataset.isel(stiffness_ratio=np.flatnonzero(shown)).transpose(*MAP_AXES, ...)
+    draw_map(PEAK, MAP_AXES, None, case, axes)
     if not softest:  # the outermost cells may reach below zero
         axes.set_ylim(float(ratio.min()), float(ratio.max()))
         axes.set_yscale("log")
@@ -171,10 +173,10 @@ def mark_map(softest: float, dataset: xr.Dataset, axes: Axes) -> None:
     if "cycling_edge_linear" in case:
         orange = {"color": "#D55E00", "linewidth": 1.3, "label": "linear boundary"}
         axes.plot(case["load_velocity_ratio"], case["cycling_edge_linear"], "-", **orange)
-    name_modes(case, axes)
+    label_slip_modes(case, axes)
 
 
-def name_modes(case: xr.Dataset, axes: Axes) -> None:
+def label_slip_modes(case: xr.Dataset, axes: Axes) -> None:
     """The bounds of the slip modes, and their names."""
     x, y = case["load_velocity_ratio"].values, case["stiffness_ratio"].values
     # heights in parts of the panel, on any scale
@@ -198,7 +200,7 @@ def name_modes(case: xr.Dataset, axes: Axes) -> None:
             )
 
 
-def title(softest: float, case: xr.Dataset) -> str:
+def map_title(softest: float, case: xr.Dataset) -> str:
     """Law and normal stress, and which springs."""
     text = f"{case['law'].item()} law, {case['normal_stress'].item()} normal stress".capitalize()
     return f"{text}, magnified" if softest else text
@@ -208,14 +210,14 @@ figure = Figure(
     [
         Panel(
             x="load_velocity_ratio",
-            each=["law", "normal_stress"],
-            marks=[partial(mark_map, softest)],
+            facet=["law", "normal_stress"],
+            overlays=[partial(plot_map, softest)],
             y_label="Stiffness, $k/k_{cr}(V_*)$",
-            alike=f"from {softest}",
-            when=partial(is_beyond, softest),
-            title=partial(title, softest),
+            y_scale_group=f"from {softest}",
+            condition=partial(spans_stiffness, softest),
+            title=partial(map_title, softest),
         )
-        for softest in (0.0, CLOSE)
+        for softest in (0.0, CLOSE_STIFFNESS_MIN)
     ],
     height=52.0,
 )
@@ -223,13 +225,13 @@ figure = Figure(
 
 #: What is claimed of each case: its edge, and that no stick-slip lies above it, nor steady sliding
 #: below.
-LINEAR: dict[str, Any] = {
+EDGE_CLAIM: dict[str, Any] = {
     "says": "limit cycles end where the eigenvalues say",
     "variable": "cycling_edge_farthest",
     "tolerance": 0.5,
     "reason": "half a spacing of the cells in stiffness: the boundary is within the bracket",
 }
-NONE_MISPLACED: dict[str, Any] = {
+MISPLACED_CELLS_CLAIM: dict[str, Any] = {
     "says": "no cell cycles above it or settles below it",
     "variable": "cycling_edge_misplaced",
     "tolerance": 0.0,
@@ -237,7 +239,7 @@ NONE_MISPLACED: dict[str, Any] = {
 }
 
 
-def edge(law: str, normal_stress: str, says: str, **held: Any) -> Claim:
+def edge_claim(law: str, normal_stress: str, says: str, **held: Any) -> Claim:
     """C1: the edge of the computed region is where the eigenvalues say."""
     return Claim(
         id="C1",
@@ -257,15 +259,15 @@ study = Study(
     axes=[
         Axis("law", ["slip", "slowness"]),
         Axis("normal_stress", ["constant", "variable"]),
-        Axis("stiffness_ratio", [*np.linspace(0.05, 1.05, 100), *STIFF]),
+        Axis("stiffness_ratio", [*np.linspace(0.05, 1.05, 100), *STIFF_SPRINGS]),
         Axis("load_velocity_ratio", np.geomspace(1.01, 1000.0, 100)),
     ],
     measure=LimitCycle(phases=2, events=20_000),
     accuracy=Accuracy(rtol=1e-3, budget=20_000_000, engine="compiled", refinement=0.003),
-    reductions=[CyclingEdge(name="cycling_edge", of="recurrence_interval")],
+    reductions=[CycleRegionEdge(name="cycling_edge", of="recurrence_interval")],
     claims=[
-        *(edge(*case, **LINEAR) for case in CASES),
-        *(edge(*case, **NONE_MISPLACED) for case in CASES),
+        *(edge_claim(*case, **EDGE_CLAIM) for case in CASES),
+        *(edge_claim(*case, **MISPLACED_CELLS_CLAIM) for case in CASES),
     ],
     plot=figure,
     references=[REFERENCE, GU_ET_AL],

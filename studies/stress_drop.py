@@ -18,7 +18,7 @@ import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.reduce import LinearFit, OverClosedForm, Reduction
+from rsfstudy.reduce import ClosedFormRatio, LinearFit, Reduction
 from rsfstudy.status import Status
 
 from ._paper import PAPER, REFERENCE
@@ -28,26 +28,26 @@ weakening = base.b - base.a
 enhancement = 1.0 / (1.0 - base.mu_star / math.tan(math.radians(base.phi)))
 
 
-CONSTANT, VARIABLE, STEEP = "constant", "phi = 60", "phi = 50"
+CONSTANT_CASE, VARIABLE_CASE, STEEP_CASE = "constant", "phi = 60", "phi = 50"
 CASES: dict[str, dict[str, str | float]] = {
-    CONSTANT: {"normal_stress": "constant"},
-    VARIABLE: {"normal_stress": "variable", "phi": 60.0},
-    STEEP: {"normal_stress": "variable", "phi": 50.0},
+    CONSTANT_CASE: {"normal_stress": "constant"},
+    VARIABLE_CASE: {"normal_stress": "variable", "phi": 60.0},
+    STEEP_CASE: {"normal_stress": "variable", "phi": 50.0},
 }
 
 #: ln V_0 over V_* at the slow and the fast end of the three decades.
-SLOW, FAST = (0.0, math.log(10.0)), (math.log(100.0), math.log(1000.0))
+SLOW_RANGE, FAST_RANGE = (0.0, math.log(10.0)), (math.log(100.0), math.log(1000.0))
 
 
-def _stress(case: str) -> str:
-    return case if case == CONSTANT else f"variable, {case}"
+def _normal_stress_term(case: str) -> str:
+    return case if case == CONSTANT_CASE else f"variable, {case}"
 
 
-def slope(drop: str, case: str, multiple: float, unit: float, law: str) -> Claim:
+def slip_law_slope_claim(drop: str, case: str, multiple: float, unit: float, law: str) -> Claim:
     """C15: slip law slopes at 0.8 k_cr."""
     return Claim(
         id="C15",
-        statement=f"slip law, {_stress(case)}: {drop} drop against ln V_0, {law}",
+        statement=f"slip law, {_normal_stress_term(case)}: {drop} drop against ln V_0, {law}",
         source=f"{PAPER}, section 3.5",
         variable=f"{drop}_slope",
         where={"law": "slip", "case": case, "stiffness_ratio": 0.8},
@@ -57,7 +57,7 @@ def slope(drop: str, case: str, multiple: float, unit: float, law: str) -> Claim
     )
 
 
-def falls(case: str) -> Claim:
+def slowness_law_drop_claim(case: str) -> Claim:
     """C16: slowness law drops fall with ln V_0."""
     return Claim.below(
         id="C16",
@@ -69,53 +69,53 @@ def falls(case: str) -> Claim:
     )
 
 
-def fits(drop: str) -> list[Reduction]:
+def slope_reductions(drop: str) -> list[Reduction]:
     """The slope over three decades, over (a-b) sigma_*, and at either end of the range."""
     of, on = f"{drop}_stress_drop", "log_load_velocity_ratio"
     return [
         LinearFit(name=f"{drop}_slope", of=of, on=on),
-        LinearFit(name=f"{drop}_slope_slow", of=of, on=on, within=SLOW),
-        LinearFit(name=f"{drop}_slope_fast", of=of, on=on, within=FAST),
-        OverClosedForm(name=f"{drop}_slope_scaled", of=f"{drop}_slope", form="net_weakening"),
+        LinearFit(name=f"{drop}_slope_slow", of=of, on=on, within=SLOW_RANGE),
+        LinearFit(name=f"{drop}_slope_fast", of=of, on=on, within=FAST_RANGE),
+        ClosedFormRatio(name=f"{drop}_slope_scaled", of=f"{drop}_slope", form="net_weakening"),
     ]
 
 
-X = "log_load_velocity_ratio"
+ABSCISSA = "log_load_velocity_ratio"
 #: Where a line misses by more than this part of what it spans, no line fits.
-CURVED = 0.05
+MAX_MISFIT_SHARE = 0.05
 DROPS = ("static", "dynamic")
 
 
-def is_straight(drop: str, row: xr.Dataset) -> bool:
+def is_fitted_by_line(drop: str, row: xr.Dataset) -> bool:
     """True if a line in ln V_0 fits a stress drop."""
     values, misfit = row[f"{drop}_stress_drop"], float(row.get(f"{drop}_slope_misfit", math.nan))
-    return misfit <= CURVED * float(values.max() - values.min())
+    return misfit <= MAX_MISFIT_SHARE * float(values.max() - values.min())
 
 
-def fit(drop: str, row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
+def fit_line(drop: str, row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
     """The line of a fit, if one fits."""
     known = row[f"{drop}_stress_drop"]
-    x = row[X].where(known.notnull() & is_straight(drop, row))
+    x = row[ABSCISSA].where(known.notnull() & is_fitted_by_line(drop, row))
     slope = float(row.get(f"{drop}_slope", math.nan))
     return x, float(known.mean()) + slope * (x - x.mean())
 
 
-def name(drop: str, row: xr.Dataset) -> str:
+def curve_name(drop: str, row: xr.Dataset) -> str:
     """The case, and its slope if a line fits."""
-    from rsfstudy.plots import slope_with_error
+    from rsfstudy.plots import format_slope
 
     text, slope = str(row["case"].item()), row.get(f"{drop}_slope", xr.DataArray(math.nan))
     if not bool(np.isfinite(slope)):
         return text
     return f"{text}: " + (
-        slope_with_error(row, f"{drop}_slope") if is_straight(drop, row) else "no line fits"
+        format_slope(row, f"{drop}_slope") if is_fitted_by_line(drop, row) else "no line fits"
     )
 
 
 def scaled_slope(row: xr.Dataset) -> xr.DataArray:
     """f(k), where a line fits."""
     places = range(row.sizes["stiffness_ratio"])
-    straight = [is_straight("static", row.isel(stiffness_ratio=place)) for place in places]
+    straight = [is_fitted_by_line("static", row.isel(stiffness_ratio=place)) for place in places]
     return row["static_slope_scaled"].where(xr.DataArray(straight, dims="stiffness_ratio"))
 
 
@@ -123,20 +123,20 @@ def local_slope(row: xr.Dataset) -> xr.DataArray:
     """Slope at each load point velocity, from its neighbours."""
     values = row["static_stress_drop"]
     several = values.size > 1
-    return values.copy(data=np.gradient(values, row[X])) if several else values * math.nan
+    return values.copy(data=np.gradient(values, row[ABSCISSA])) if several else values * math.nan
 
 
 figure = Figure(
     [
         *(
             Panel(
-                x=X,
+                x=ABSCISSA,
                 y=f"{drop}_stress_drop",
-                by=["case"],
-                each=["law"],
-                at={"stiffness_ratio": max},
-                through=partial(fit, drop),
-                name=partial(name, drop),
+                hue=["case"],
+                facet=["law"],
+                isel={"stiffness_ratio": max},
+                fit_line=partial(fit_line, drop),
+                curve_label=partial(curve_name, drop),
                 y_limits=(0.0, None),
                 legend_title="Slopes",
             )
@@ -145,15 +145,15 @@ figure = Figure(
         Panel(
             x="stiffness_ratio",
             y=scaled_slope,
-            by=["case", "law"],
+            hue=["case", "law"],
             title="Slopes of lines that fit, $f(k)$",
             y_label=r"Slope of static drop over $(a-b)\,\sigma_*$",
         ),
         Panel(
-            x=X,
+            x=ABSCISSA,
             y=local_slope,
-            by=["case", "law"],
-            at={"stiffness_ratio": max},
+            hue=["case", "law"],
+            isel={"stiffness_ratio": max},
             title="Local slopes: level where the law holds",
             y_label=r"Local slope of static drop, $\sigma_*$",
         ),
@@ -174,21 +174,25 @@ study = Study(
         Axis("load_velocity_ratio", 10.0 ** np.linspace(0.0, 3.0, 10)),
     ],
     measure=LimitCycle(phases=2),
-    reductions=[*fits("static"), *fits("dynamic")],
+    reductions=[*slope_reductions("static"), *slope_reductions("dynamic")],
     claims=[
-        slope("static", CONSTANT, 2.0, -weakening, "2(a-b)"),
-        slope("dynamic", CONSTANT, 1.0, -weakening, "a-b"),
-        slope("static", VARIABLE, 2.0, -weakening * enhancement, "2(a-b)/(1 - mu_* cot phi)"),
-        slope("dynamic", VARIABLE, 1.0, -weakening * enhancement, "(a-b)/(1 - mu_* cot phi)"),
-        falls(CONSTANT),
-        falls(VARIABLE),
+        slip_law_slope_claim("static", CONSTANT_CASE, 2.0, -weakening, "2(a-b)"),
+        slip_law_slope_claim("dynamic", CONSTANT_CASE, 1.0, -weakening, "a-b"),
+        slip_law_slope_claim(
+            "static", VARIABLE_CASE, 2.0, -weakening * enhancement, "2(a-b)/(1 - mu_* cot phi)"
+        ),
+        slip_law_slope_claim(
+            "dynamic", VARIABLE_CASE, 1.0, -weakening * enhancement, "(a-b)/(1 - mu_* cot phi)"
+        ),
+        slowness_law_drop_claim(CONSTANT_CASE),
+        slowness_law_drop_claim(VARIABLE_CASE),
         Claim.below(
             id="C16",
             statement="slowness law: steeper with variable normal stress",
             source=f"{PAPER}, section 3.5",
             variable="static_slope",
-            where={"law": "slowness", "case": VARIABLE, "stiffness_ratio": 0.8},
-            minus={"law": "slowness", "case": CONSTANT, "stiffness_ratio": 0.8},
+            where={"law": "slowness", "case": VARIABLE_CASE, "stiffness_ratio": 0.8},
+            minus={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.8},
             published=0.0,
         ),
         Claim.above(
@@ -196,8 +200,8 @@ study = Study(
             statement="slowness law, constant: f(k) depends on stiffness (0.4 less 0.8 k_cr)",
             source="He et al. (2003), cited in section 3.5",
             variable="static_slope_scaled",
-            where={"law": "slowness", "case": CONSTANT, "stiffness_ratio": 0.4},
-            minus={"law": "slowness", "case": CONSTANT, "stiffness_ratio": 0.8},
+            where={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.4},
+            minus={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.8},
             published=0.05,
             reason="an inequality, well above the standard errors",
         ),
@@ -208,7 +212,7 @@ study = Study(
             variable="status",
             where={
                 "law": "slip",
-                "case": STEEP,
+                "case": STEEP_CASE,
                 "stiffness_ratio": 0.8,
                 "load_velocity_ratio": 1e3,
             },
@@ -220,7 +224,7 @@ study = Study(
             statement="phi = 50, 0.8 k_cr: the fit says how many of ten points it has",
             source=f"{PAPER}, section 2.2",
             variable="static_slope_points",
-            where={"law": "slip", "case": STEEP, "stiffness_ratio": 0.8},
+            where={"law": "slip", "case": STEEP_CASE, "stiffness_ratio": 0.8},
             published=10.0,
             reason="an inequality: cells without stick-slip are left out",
         ),

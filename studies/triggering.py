@@ -27,49 +27,55 @@ from typing import Any
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, Draw, level, reference_line
+from rsfstudy.declare.figure import Axes, DrawFunction, horizontal_line, reference_line
 from rsfstudy.reduce import LinearFit
-from rsfstudy.slider.closed_forms import effective_friction, normal_stress_step
+from rsfstudy.slider.closed_forms import critical_normal_stress_step, effective_friction
 
 from ._paper import GU_ET_AL, REFERENCE
 from ._triggers import Triggers
 
 base = Scene(b_over_a=2.0)
 
-PLAIN, IMPOSED = "imposed, alpha = 0", "imposed, alpha = 0.56"
-WEAK, STRONG = "inclined, alpha = 0.25", "inclined, alpha = 0.56"
+IMPOSED_WITHOUT_ALPHA, IMPOSED_WITH_ALPHA = "imposed, alpha = 0", "imposed, alpha = 0.56"
+INCLINED_WEAK, INCLINED_STRONG = "inclined, alpha = 0.25", "inclined, alpha = 0.56"
 CASES: dict[str, dict[str, str | float]] = {
-    PLAIN: {"normal_stress": "imposed", "alpha": 0.0},
-    IMPOSED: {"normal_stress": "imposed", "alpha": 0.56},
-    WEAK: {"normal_stress": "variable", "alpha": 0.25, "phi": 60.0},
-    STRONG: {"normal_stress": "variable", "alpha": 0.56, "phi": 60.0},
+    IMPOSED_WITHOUT_ALPHA: {"normal_stress": "imposed", "alpha": 0.0},
+    IMPOSED_WITH_ALPHA: {"normal_stress": "imposed", "alpha": 0.56},
+    INCLINED_WEAK: {"normal_stress": "variable", "alpha": 0.25, "phi": 60.0},
+    INCLINED_STRONG: {"normal_stress": "variable", "alpha": 0.56, "phi": 60.0},
 }
 EXPONENTS = {"slip": 0.0, "slowness": 1.0}
-HELD = "load point held: u begins at mu_* (q-1)/a - alpha (1/a - 1/b) ln q, threshold h(u*) = -q k^"
+HELD_LOAD_POINT_SOURCE = (
+    "load point held: u begins at mu_* (q-1)/a - alpha (1/a - 1/b) ln q, threshold h(u*) = -q k^"
+)
 
 #: alpha = 0.56 at b/a = 2.
-FRICTION = effective_friction(base.mu_star, base.b_over_a, 0.56)
-TAKEN = base.mu_star - FRICTION
+EFFECTIVE_FRICTION = effective_friction(base.mu_star, base.b_over_a, 0.56)
+FRICTION_REDUCTION = base.mu_star - EFFECTIVE_FRICTION
 
 
-def closed_form(law: str, alpha: float, ratio: float, within: float, reason: str) -> Claim:
+def critical_fall_claim(law: str, alpha: float, ratio: float, within: float, reason: str) -> Claim:
     """N1: the critical fall of normal stress."""
-    published = normal_stress_step(
+    published = critical_normal_stress_step(
         base.mu_star, base.a, base.b_over_a, alpha, EXPONENTS[law], ratio
     )
     return Claim(
         id="N1",
         statement=f"{law} law, imposed, alpha = {alpha:g}, k = {ratio:g} k_cr: critical fall",
-        source=f"{HELD}, q = sigma_*/sigma, k^ = k/k_cr",
+        source=f"{HELD_LOAD_POINT_SOURCE}, q = sigma_*/sigma, k^ = k/k_cr",
         variable="critical_normal_stress_step",
-        where={"law": law, "case": IMPOSED if alpha else PLAIN, "stiffness_ratio": ratio},
+        where={
+            "law": law,
+            "case": IMPOSED_WITH_ALPHA if alpha else IMPOSED_WITHOUT_ALPHA,
+            "stiffness_ratio": ratio,
+        },
         published=published,
         tolerance=within * abs(published),
         reason=reason,
     )
 
 
-def limit(law: str, case: str) -> Claim:
+def coulomb_limit_claim(law: str, case: str) -> Claim:
     """N2: the Coulomb limit."""
     return Claim(
         id="N2",
@@ -84,7 +90,7 @@ def limit(law: str, case: str) -> Claim:
     )
 
 
-def weaker(law: str) -> Claim:
+def normal_stress_effect_claim(law: str) -> Claim:
     """N3: what Linker and Dieterich's effect does."""
     where = {"law": law, "stiffness_ratio": 0.5}
     return Claim.below(
@@ -92,24 +98,31 @@ def weaker(law: str) -> Claim:
         statement=f"{law} law, imposed, k = 0.5 k_cr: with alpha = 0.56 a larger fall is needed",
         source="Linker and Dieterich (1992): a fall of normal stress strengthens the state",
         variable="critical_normal_stress_step",
-        where={**where, "case": IMPOSED},
-        minus={**where, "case": PLAIN},
-        published=-0.5 * base.a * (0.5 / FRICTION - 0.5 / base.mu_star),
+        where={**where, "case": IMPOSED_WITH_ALPHA},
+        minus={**where, "case": IMPOSED_WITHOUT_ALPHA},
+        published=-0.5 * base.a * (0.5 / EFFECTIVE_FRICTION - 0.5 / base.mu_star),
         reason="an inequality: by more than half of what the first order says",
     )
 
 
-EXACT = "its error estimate, to 1.2e-9 of it, and what a finite norm leaves, no more than that"
+TOLERANCE_REASON = (
+    "its error estimate, to 1.2e-9 of it, and what a finite norm leaves, no more than that"
+)
 
 
-X = "stiffness_ratio"
-FALL, PULL, FASTER = (
+ABSCISSA = "stiffness_ratio"
+NORMAL_STRESS_FALL, DISPLACEMENT_STEP, VELOCITY_STEP = (
     "coulomb_stress_of_normal_stress",
     "coulomb_stress_of_displacement",
     "direct_stress_of_velocity",
 )
-RUN: dict[str, Any] = {"linestyle": "-", "marker": "x", "markersize": 3.5, "linewidth": 0.5}
-PULLED: dict[str, Any] = {
+DISPLACEMENT_STEP_STYLE: dict[str, Any] = {
+    "linestyle": "-",
+    "marker": "x",
+    "markersize": 3.5,
+    "linewidth": 0.5,
+}
+CONTINUOUS_LINE_STYLE: dict[str, Any] = {
     "linestyle": "none",
     "marker": "o",
     "markersize": 6.0,
@@ -118,51 +131,57 @@ PULLED: dict[str, Any] = {
 }
 
 
-def beside(variable: str, name: str, style: dict[str, Any], over: str | None = None) -> Draw:
+def draw_comparison(
+    variable: str, name: str, style: dict[str, Any], over: str | None = None
+) -> DrawFunction:
     """Curves beside falls of normal stress, in their colours; over a number of the scene."""
 
     def mark(dataset: xr.Dataset, axes: Axes) -> None:
-        from rsfstudy.plots import in_grey, look
+        from rsfstudy.plots import add_grey_legend_entry, cycle_style
 
         values = dataset[variable] / (dataset[over] if over else 1.0)
         for number in range(values.sizes["case"]):
             row = values.isel(case=number)
-            axes.plot(row[X], row, **style | {"color": look(number)["color"]})
+            axes.plot(row[ABSCISSA], row, **style | {"color": cycle_style(number)["color"]})
         if values.notnull().any():
-            in_grey(axes, name, style)
+            add_grey_legend_entry(axes, name, style)
 
     return mark
 
 
 panel = Panel(
-    x=X,
-    by=["case"],
-    each=["law"],
+    x=ABSCISSA,
+    hue=["case"],
+    facet=["law"],
     style={"markersize": 2.6},
     x_limits=(0.0, None),
     legend_title="Filled markers: fall of normal stress, case by case",
 )
-FASTER_NAME = r"velocity step, $a\,\ln(V_0/V_*)$"
+VELOCITY_STEP_LABEL = r"velocity step, $a\,\ln(V_0/V_*)$"
 figure = Figure(
     [
         replace(
             panel,
-            y=lambda row: row[FALL] / row["a"],
-            marks=[
-                reference_line(X, lambda x: x, "Coulomb, first order, imposed"),
-                beside(PULL, "displacement step", PULLED, over="a"),
-                beside(FASTER, FASTER_NAME, RUN, over="a"),
+            y=lambda row: row[NORMAL_STRESS_FALL] / row["a"],
+            overlays=[
+                reference_line(ABSCISSA, lambda x: x, "Coulomb, first order, imposed"),
+                draw_comparison(
+                    DISPLACEMENT_STEP, "displacement step", CONTINUOUS_LINE_STYLE, over="a"
+                ),
+                draw_comparison(
+                    VELOCITY_STEP, VELOCITY_STEP_LABEL, DISPLACEMENT_STEP_STYLE, over="a"
+                ),
             ],
             y_label=r"Critical stress change over $a\sigma_*$",
             log="y",
-            alike="stress",
+            y_scale_group="stress",
         ),
         replace(
             panel,
             y="coulomb_ratio",
-            marks=[
-                level(1.0, color="0.82", linewidth=2.5),
-                beside("direct_ratio", FASTER_NAME, RUN),
+            overlays=[
+                horizontal_line(1.0, color="0.82", linewidth=2.5),
+                draw_comparison("direct_ratio", VELOCITY_STEP_LABEL, DISPLACEMENT_STEP_STYLE),
             ],
             y_label="Stress change over that by a displacement step",
         ),
@@ -186,31 +205,35 @@ study = Study(
         LinearFit(name="coulomb_slope", of="coulomb_ratio", on="stiffness_ratio", within=(0.0, 0.5))
     ],
     claims=[
-        closed_form("slip", 0.0, 0.5, 2e-9, EXACT),
-        closed_form("slip", 0.56, 0.25, 2e-9, EXACT),
-        closed_form("slip", 0.56, 0.5, 2e-9, EXACT),
-        closed_form(
+        critical_fall_claim("slip", 0.0, 0.5, 2e-9, TOLERANCE_REASON),
+        critical_fall_claim("slip", 0.56, 0.25, 2e-9, TOLERANCE_REASON),
+        critical_fall_claim("slip", 0.56, 0.5, 2e-9, TOLERANCE_REASON),
+        critical_fall_claim(
             "slip", 0.56, 1.0, 3e-5, "a finite norm leaves exp(-10.9 (b/a - 1)/(q k^)) = 3e-5 of it"
         ),
-        closed_form("slowness", 0.56, 0.25, 2e-9, EXACT),
-        *(limit(law, case) for law in EXPONENTS for case in (IMPOSED, STRONG)),
+        critical_fall_claim("slowness", 0.56, 0.25, 2e-9, TOLERANCE_REASON),
+        *(
+            coulomb_limit_claim(law, case)
+            for law in EXPONENTS
+            for case in (IMPOSED_WITH_ALPHA, INCLINED_STRONG)
+        ),
         Claim(
             id="N2",
             statement="slip law, imposed, alpha = 0.56: how that limit is left, by k/k_cr",
             source="second order of the closed form: -alpha (1 - a/b) a/(2 mu'^2)",
             variable="coulomb_slope",
-            where={"law": "slip", "case": IMPOSED},
-            published=-TAKEN * base.a / (2.0 * FRICTION**2),
-            tolerance=0.02 * TAKEN * base.a / (2.0 * FRICTION**2),
+            where={"law": "slip", "case": IMPOSED_WITH_ALPHA},
+            published=-FRICTION_REDUCTION * base.a / (2.0 * EFFECTIVE_FRICTION**2),
+            tolerance=0.02 * FRICTION_REDUCTION * base.a / (2.0 * EFFECTIVE_FRICTION**2),
             reason="the third order, over stiffnesses up to 0.5 k_cr",
         ),
-        *map(weaker, EXPONENTS),
+        *map(normal_stress_effect_claim, EXPONENTS),
         Claim(
             id="N4",
             statement="slip law, imposed, alpha = 0, k = k_cr: Coulomb stress is exact, mu' = mu_*",
             source="mu_* (1 - 1/q) = a k^: that of a displacement, at any stiffness",
             variable="coulomb_ratio",
-            where={"law": "slip", "case": PLAIN, "stiffness_ratio": 1.0},
+            where={"law": "slip", "case": IMPOSED_WITHOUT_ALPHA, "stiffness_ratio": 1.0},
             published=1.0,
             tolerance=1e-5,
             reason="a finite norm takes 2e-5 of either, and about the same",
@@ -220,7 +243,7 @@ study = Study(
             statement="slip law, inclined, alpha = 0.56, k = 2 k_cr: it predicts to 3 %",
             source="what is left of the first order where it is worst",
             variable="coulomb_ratio",
-            where={"law": "slip", "case": STRONG, "stiffness_ratio": 2.0},
+            where={"law": "slip", "case": INCLINED_STRONG, "stiffness_ratio": 2.0},
             published=0.97,
             reason="an inequality; ours is 0.974",
         ),
@@ -229,7 +252,7 @@ study = Study(
             statement="slowness law, inclined, alpha = 0.56, k = 1.25 k_cr: it misleads",
             source="a fall also lowers the critical stiffness: h(u*) = -q k^",
             variable="coulomb_ratio",
-            where={"law": "slowness", "case": STRONG, "stiffness_ratio": 1.25},
+            where={"law": "slowness", "case": INCLINED_STRONG, "stiffness_ratio": 1.25},
             published=2.0,
             reason="an inequality; ours is 2.40",
         ),

@@ -15,20 +15,20 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, Draw, level
+from rsfstudy.declare.figure import Axes, DrawFunction, horizontal_line
 from rsfstudy.reduce import Boundary, Inverse
 from rsfstudy.status import Status
 
 from ._bifurcation import Bifurcation
 
-GU = "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196"
+GU_ET_AL = "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196"
 BECKER = "Becker (2000), in AGU Geophys. Monogr. 120, 5-26"
-SLIP = {"law": "two_slip_states"}
+LAW_SELECTION = {"law": "two_slip_states"}
 
 
-def at(ratio: float) -> dict[str, str | float]:
+def spring_place(ratio: float) -> dict[str, str | float]:
     """Place of one spring."""
-    return {**SLIP, "stiffness_ratio": ratio}
+    return {**LAW_SELECTION, "stiffness_ratio": ratio}
 
 
 #: Springs too soft for slip to stay bounded without mass; where periods double; and the others.
@@ -48,9 +48,9 @@ SPRINGS = np.round(
 )
 
 
-def mark_peaks(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_peaks(dataset: xr.Dataset, axes: Axes) -> None:
     """Peaks of the events that are kept, and the cycle of one event."""
-    from rsfstudy.plots import look
+    from rsfstudy.plots import cycle_style
 
     ratio, peaks = dataset["stiffness_ratio"], dataset["peak_log10_slip_rate"]
     chaotic = dataset["status"] == int(Status.NOT_PERIODIC)
@@ -60,15 +60,19 @@ def mark_peaks(dataset: xr.Dataset, axes: Axes) -> None:
         at, shown = xr.broadcast(ratio, peaks.where(where))
         small = {"markersize": 2.6 - 0.6 * number, "markeredgewidth": 0.5, "label": label}
         axes.plot(
-            at.values.ravel(), shown.values.ravel(), shape, color=look(number)["color"], **small
+            at.values.ravel(),
+            shown.values.ravel(),
+            shape,
+            color=cycle_style(number)["color"],
+            **small,
         )
     dashed = {"color": "0.4", "linewidth": 0.8, "label": "cycle of one event"}
     axes.plot(ratio, dataset["one_event_log10_peak"], "--", **dashed)
 
 
-def mark_multipliers(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_multipliers(dataset: xr.Dataset, axes: Axes) -> None:
     """Floquet multipliers of the cycle of one event, and growth of departures by each event."""
-    from rsfstudy.plots import look
+    from rsfstudy.plots import cycle_style
 
     imaginary = dataset["floquet_multiplier_imaginary"]
     for number, (values, style, label) in enumerate(
@@ -90,11 +94,11 @@ def mark_multipliers(dataset: xr.Dataset, axes: Axes) -> None:
             dataset["stiffness_ratio"],
             values,
             label=label,
-            **{**look(number), "linewidth": 0.9, "markersize": 2.5, **style},
+            **{**cycle_style(number), "linewidth": 0.9, "markersize": 2.5, **style},
         )
 
 
-def abscissa(magnified: bool) -> Draw:
+def set_abscissa(magnified: bool) -> DrawFunction:
     """The stiffness of all springs, or of those around where periods double; and where they do."""
 
     def mark(dataset: xr.Dataset, axes: Axes) -> None:
@@ -126,32 +130,35 @@ def has_doublings(dataset: xr.Dataset) -> bool:
     return 2 < int((ratio < ratio.min() + 0.019).sum()) < int(ratio.notnull().sum())
 
 
-peaks = Panel(
+peaks_panel = Panel(
     x="stiffness_ratio",
     y_label=r"Peak slip rate, $\log_{10}(V_{peak}/V_*)$",
-    at={"law": 0},
+    isel={"law": 0},
     title="Peaks of slip rate, event by event",
-    marks=[mark_peaks, abscissa(False)],
-    when=lambda dataset: bool(dataset["peak_spread"].notnull().any()),
+    overlays=[plot_peaks, set_abscissa(False)],
+    condition=lambda dataset: bool(dataset["peak_spread"].notnull().any()),
 )
-multipliers = replace(
-    peaks,
+multipliers_panel = replace(
+    peaks_panel,
     y_label=r"$\Lambda_1$ of the cycle of one event; $\lambda$",
     title="Multipliers: beyond $-1$ the cycle repels",
-    marks=[mark_multipliers, level(-1.0), level(1.0), abscissa(False)],
+    overlays=[plot_multipliers, horizontal_line(-1.0), horizontal_line(1.0), set_abscissa(False)],
 )
 figure = Figure(
     [
-        peaks,
+        peaks_panel,
         replace(
-            peaks, title="Peaks, magnified", marks=[mark_peaks, abscissa(True)], when=has_doublings
+            peaks_panel,
+            title="Peaks, magnified",
+            overlays=[plot_peaks, set_abscissa(True)],
+            condition=has_doublings,
         ),
-        multipliers,
+        multipliers_panel,
         replace(
-            multipliers,
+            multipliers_panel,
             title="Multipliers, magnified",
-            marks=[*multipliers.marks[:-1], abscissa(True)],
-            when=has_doublings,
+            overlays=[*multipliers_panel.overlays[:-1], set_abscissa(True)],
+            condition=has_doublings,
         ),
     ]
 )
@@ -185,9 +192,9 @@ study = Study(
         Claim(
             id="S1",
             statement="critical stiffness k_cr L_1/(a sigma) is 0.0802755656",
-            source=f"{GU}, closed form from the cubic of small perturbations",
+            source=f"{GU_ET_AL}, closed form from the cubic of small perturbations",
             variable="critical_stiffness",
-            where=at(0.95),
+            where=spring_place(0.95),
             published=8.02755656e-4,
             tolerance=5e-13,
             reason="the digits given, times a = 0.01",
@@ -197,8 +204,8 @@ study = Study(
             statement="the period doubles where a Floquet multiplier passes -1",
             source="Floquet theory",
             variable="doubling_by_multiplier",
-            where=SLIP,
-            minus=SLIP,
+            where=LAW_SELECTION,
+            minus=LAW_SELECTION,
             minus_variable="doubling_by_motion",
             published=0.0,
             tolerance=2e-4,
@@ -209,7 +216,7 @@ study = Study(
             statement="that is at 0.86626 k_cr",
             source="not known to be published; both ways agree",
             variable="doubling_by_multiplier",
-            where=SLIP,
+            where=LAW_SELECTION,
             published=0.86626,
             tolerance=1e-5,
             reason="digits given; differences of the return map and interpolation leave 1e-6",
@@ -219,7 +226,7 @@ study = Study(
             statement="k = 0.8663 k_cr, next to it: the multiplier is real, and negative",
             source="Floquet theory",
             variable="floquet_multiplier",
-            where=at(0.8663),
+            where=spring_place(0.8663),
             published=-1.0,
             tolerance=4e-3,
             reason="within 1e-4 k_cr of the doubling: a change of the multiplier by 4e-3",
@@ -229,7 +236,7 @@ study = Study(
             statement="k = 0.8531 k_cr: small departures grow, in the mean: chaos",
             source=f"{BECKER}, finds chaos; for this spring not known to be published",
             variable="lyapunov_exponent",
-            where=at(0.8531),
+            where=spring_place(0.8531),
             published=0.1,
             reason="an inequality, well above what 32 events leave uncertain",
         ),
@@ -238,11 +245,11 @@ study = Study(
             statement="k = 0.8567 k_cr: motions repeat themselves after four events",
             source="not known to be published",
             variable="period_events",
-            where=at(0.8567),
+            where=spring_place(0.8567),
             published=4.0,
             reason="a whole number",
         ),
     ],
     plot=figure,
-    references=[GU, BECKER, "Ruina (1983), J. Geophys. Res. 88, 10359-10370"],
+    references=[GU_ET_AL, BECKER, "Ruina (1983), J. Geophys. Res. 88, 10359-10370"],
 )

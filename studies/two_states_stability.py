@@ -14,28 +14,32 @@ from typing import Any
 from rsfstudy import Axis, Claim, Scene, Study
 from rsfstudy.measures.linear_stability import LinearStability
 
-GU = "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196"
+GU_ET_AL = "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196"
 RUINA = "Ruina (1983), J. Geophys. Res. 88, 10359-10370"
-A, FIRST = 0.01, 1.4
+DIRECT_EFFECT, FIRST_EFFECT_OVER_A = 0.01, 1.4
 
 
-def threshold(second: float, longer: float) -> float:
+def cubic_critical_stiffness(second: float, longer: float) -> float:
     """Critical stiffness from the cubic of small perturbations: b_2/a and L_2/L_1 to
     k_cr L_1/sigma.
     """
     rho = 1.0 / longer
-    linear = FIRST - 1.0 + rho * (2.0 * FIRST + (second - 1.0) * (2.0 + rho))
-    net, apart = FIRST + second - 1.0, 1.0 + rho - FIRST - second * rho
+    linear = (
+        FIRST_EFFECT_OVER_A - 1.0 + rho * (2.0 * FIRST_EFFECT_OVER_A + (second - 1.0) * (2.0 + rho))
+    )
+    net, apart = FIRST_EFFECT_OVER_A + second - 1.0, 1.0 + rho - FIRST_EFFECT_OVER_A - second * rho
     root = math.sqrt(linear**2 + 4.0 * rho * (1.0 + rho) * net * apart)
-    return A * (linear + root) / (2.0 + 2.0 * rho)
+    return DIRECT_EFFECT * (linear + root) / (2.0 + 2.0 * rho)
 
 
-def claim(second: float, longer: float, says: str, published: float, **held: Any) -> Claim:
+def critical_stiffness_claim(
+    second: float, longer: float, says: str, published: float, **held: Any
+) -> Claim:
     """One pair of states."""
     return Claim(
         id="S7",
         statement=f"b_2 = {second:g} a, L_2 = {longer:g} D_c: {says}",
-        source=f"{GU}, {RUINA}: closed form from the cubic of small perturbations",
+        source=f"{GU_ET_AL}, {RUINA}: closed form from the cubic of small perturbations",
         variable="critical_stiffness",
         where={"b2_over_a": second, "length_ratio": longer},
         published=published,
@@ -43,8 +47,8 @@ def claim(second: float, longer: float, says: str, published: float, **held: Any
     )
 
 
-DIGITS: dict[str, Any] = {"tolerance": 5e-8, "reason": "the digits given"}
-EXACT: dict[str, Any] = {
+PUBLISHED_DIGITS_TOLERANCE: dict[str, Any] = {"tolerance": 5e-8, "reason": "the digits given"}
+ROUNDING_TOLERANCE: dict[str, Any] = {
     "tolerance": 3e-15,
     "reason": "rounding, of slopes of the law by differences",
 }
@@ -53,19 +57,39 @@ study = Study(
     name="two_states_stability",
     title="Critical stiffness of two states, b_1 = 1.4 a",
     summary=Study.caption(__doc__),
-    base=Scene(law="two_slip_states", normal_stress="constant", a=A, b1_over_a=FIRST, stiffness=A),
+    base=Scene(
+        law="two_slip_states",
+        normal_stress="constant",
+        a=DIRECT_EFFECT,
+        b1_over_a=FIRST_EFFECT_OVER_A,
+        stiffness=DIRECT_EFFECT,
+    ),
     axes=[
         Axis("b2_over_a", [-1.1, -0.9, -0.7, -0.6, -0.5, -0.3, -0.1, 0.1, 0.3, 0.5, 0.7]),
         Axis("length_ratio", [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0]),
     ],
     measure=LinearStability(),
     claims=[
-        claim(-0.6, 50.0, "unstable below, though it strengthens", 0.0038741, **DIGITS),
+        critical_stiffness_claim(
+            -0.6,
+            50.0,
+            "unstable below, though it strengthens",
+            0.0038741,
+            **PUBLISHED_DIGITS_TOLERANCE,
+        ),
         *(
-            claim(*at, "as the closed form", threshold(*at), **EXACT)
+            critical_stiffness_claim(
+                *at, "as the closed form", cubic_critical_stiffness(*at), **ROUNDING_TOLERANCE
+            )
             for at in ((-0.9, 200.0), (0.3, 10.0), (0.7, 0.2))
         ),
-        claim(0.5, 1.0, "as one state, b_1 + b_2 - a", A * (FIRST + 0.5 - 1.0), **EXACT),
+        critical_stiffness_claim(
+            0.5,
+            1.0,
+            "as one state, b_1 + b_2 - a",
+            DIRECT_EFFECT * (FIRST_EFFECT_OVER_A + 0.5 - 1.0),
+            **ROUNDING_TOLERANCE,
+        ),
     ],
-    references=[GU, RUINA],
+    references=[GU_ET_AL, RUINA],
 )

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Laboratory, Panel, Study
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Rig, Study
 from rsfstudy.declare.figure import Axes
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.reduce import Logarithm, Mean, Quantile, StandardDeviation, StatusShares
@@ -24,12 +24,12 @@ from rsfstudy.rig.reductions import InUnits
 #: ``rsfstudy.fit(record, stiffness="0.0013 1/um", laws=["slowness"])``. Estimates, D_c in um, and
 #: their covariance with correlated noise, of the load point too. One step tells b - a far better
 #: than a or b, whose errors are correlated by 0.97.
-ESTIMATES = {"a": 5.684e-3, "b": 6.221e-3, "slip_distance": 7.796}
+ESTIMATES = {"a": 5.683e-3, "b": 6.221e-3, "slip_distance": 7.800}
 COVARIANCE = np.array(
     [
-        [3.016e-7, 2.847e-7, -2.365e-4],
-        [2.847e-7, 2.820e-7, -2.119e-4],
-        [-2.365e-4, -2.119e-4, 1.0578],
+        [3.012e-7, 2.847e-7, -2.375e-4],
+        [2.847e-7, 2.823e-7, -2.117e-4],
+        [-2.375e-4, -2.117e-4, 1.0657],
     ]
 )
 
@@ -39,15 +39,15 @@ SAMPLES = 256
 #: d ln(interval in s)/d ln p at the estimates, all others held: by the measure `Elasticities`.
 ELASTICITIES = {"a": -7.54, "b": 8.69, "slip_distance": -0.113}
 #: To first order, the spread of ln(interval) by the covariance, and by the variances alone.
-SLOPES = np.array([ELASTICITIES[name] / value for name, value in ESTIMATES.items()])
-FIRST_ORDER = math.sqrt(SLOPES @ COVARIANCE @ SLOPES)
-AS_IF_INDEPENDENT = math.sqrt(SLOPES**2 @ np.diag(COVARIANCE))
+LOG_INTERVAL_SLOPES = np.array([ELASTICITIES[name] / value for name, value in ESTIMATES.items()])
+FIRST_ORDER_SPREAD = math.sqrt(LOG_INTERVAL_SLOPES @ COVARIANCE @ LOG_INTERVAL_SLOPES)
+SPREAD_WITHOUT_CORRELATION = math.sqrt(LOG_INTERVAL_SLOPES**2 @ np.diag(COVARIANCE))
 #: Standard error of b - a over b - a.
-OF_NET = math.sqrt(np.array([-1, 1]) @ COVARIANCE[:2, :2] @ np.array([-1, 1])) / (
+NET_WEAKENING_STDERR = math.sqrt(np.array([-1, 1]) @ COVARIANCE[:2, :2] @ np.array([-1, 1])) / (
     ESTIMATES["b"] - ESTIMATES["a"]
 )
 
-rig = Laboratory(
+rig = Rig(
     normal_stress="20 MPa",
     slip_distance=f"{ESTIMATES['slip_distance']} um",
     reference_velocity="1 um/s",
@@ -68,8 +68,8 @@ CLAIMS = (
         source="propagation of errors to first order",
         variable="relative_spread",
         where={},
-        published=FIRST_ORDER,
-        tolerance=0.2 * FIRST_ORDER,
+        published=FIRST_ORDER_SPREAD,
+        tolerance=0.2 * FIRST_ORDER_SPREAD,
         reason=(
             "256 samples tell a spread to 5 %, of which three; and elasticities grow by a tenth "
             "where b - a is a fifth smaller"
@@ -81,7 +81,7 @@ CLAIMS = (
         source="propagation of errors to first order, without covariances",
         variable="relative_spread",
         where={},
-        published=0.25 * AS_IF_INDEPENDENT,
+        published=0.25 * SPREAD_WITHOUT_CORRELATION,
     ),
     Claim.below(
         id="U3",
@@ -89,7 +89,7 @@ CLAIMS = (
         source="contact heals at rest, by b ln t: not all of the drop goes with b - a",
         variable="relative_spread",
         where={},
-        published=OF_NET,
+        published=NET_WEAKENING_STDERR,
     ),
     Claim(
         id="U4",
@@ -103,39 +103,41 @@ CLAIMS = (
 )
 
 
-def net(row: xr.Dataset) -> xr.DataArray:
+def net_weakening(row: xr.Dataset) -> xr.DataArray:
     """b - a."""
     return row["a"] * (row["b_over_a"] - 1.0)
 
 
-def mark_quantiles(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_quantiles(dataset: xr.Dataset, axes: Axes) -> None:
     """The median, and from where to where nine of ten are."""
     axes.axvspan(float(dataset["q05"]), float(dataset["q95"]), color="0.5", alpha=0.2, zorder=0.5)
     axes.axvline(float(dataset["median"]), color="0.2", linewidth=0.9)
 
 
-def mark_histogram(dataset: xr.Dataset, axes: Axes) -> None:
+def plot_histogram(dataset: xr.Dataset, axes: Axes) -> None:
     """How often an interval is met."""
-    from rsfstudy.plots.samples import histogram
+    from rsfstudy.plots.samples import draw_histogram
 
-    histogram("recurrence_interval", [], dataset, axes)
+    draw_histogram("recurrence_interval", [], dataset, axes)
 
 
-INTERVAL = "Recurrence interval (s)"
-DOTS = {"marker": ".", "markersize": 3.0, "markeredgewidth": 0.0}
-scatter = Panel(y="recurrence_interval", points=True, style=DOTS, y_label=INTERVAL, title="")
+INTERVAL_LABEL = "Recurrence interval (s)"
+DOT_STYLE = {"marker": ".", "markersize": 3.0, "markeredgewidth": 0.0}
+scatter_panel = Panel(
+    y="recurrence_interval", markers_only=True, style=DOT_STYLE, y_label=INTERVAL_LABEL, title=""
+)
 figure = Figure(
     [
         Panel(
-            marks=[mark_histogram, mark_quantiles],
-            x_label=INTERVAL,
+            overlays=[plot_histogram, plot_quantiles],
+            x_label=INTERVAL_LABEL,
             y_label="Samples",
             title="Median, and 5 to 95 %",
         ),
-        replace(scatter, x=net, x_label="$b - a$"),
-        replace(scatter, x="slip_distance"),
+        replace(scatter_panel, x=net_weakening, x_label="$b - a$"),
+        replace(scatter_panel, x="slip_distance"),
         replace(
-            scatter,
+            scatter_panel,
             x="a",
             y=lambda row: row["a"] * row["b_over_a"],
             y_label="$b$",
@@ -148,7 +150,7 @@ study = Study(
     name="uncertain_recurrence",
     title="Recurrence interval of a rig by estimates of a, b and D_c with their covariance",
     summary=Study.caption(__doc__),
-    laboratory=rig,
+    rig=rig,
     base=base,
     axes=[
         Axis.samples(

@@ -17,25 +17,25 @@ from scipy.stats import norm
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.declare.figure import Axes
-from rsfstudy.measures import Measure, Outcome, Value
+from rsfstudy.measures import Measure, Outcome, OutputValue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.quantity import Output
 from rsfstudy.reduce import Logarithm, SobolIndices
 from rsfstudy.status import Status
 
 #: Independent quantities, each uncertain by a tenth; the stiffness is that of the cycles.
-INPUTS = {"ln_a": 0.01, "ln_net": 0.02, "ln_stiffness": 0.006}
-UNCERTAIN = 0.1
-POINTS = 128
+INPUT_MEANS = {"ln_a": 0.01, "ln_net": 0.02, "ln_stiffness": 0.006}
+RELATIVE_UNCERTAINTY = 0.1
+SOBOL_POINTS = 128
 #: Names of indices, and what they are of.
-OF = {
+INDEXED_OUTPUTS = {
     "displacement": "critical_displacement",
     "drop": "static_stress_drop",
     "interval": "recurrence_interval",
 }
-_STEP, _CYCLE = CriticalStep("displacement_step"), LimitCycle(phases=2)
+_STEP_MEASURE, _CYCLE_MEASURE = CriticalStep("displacement_step"), LimitCycle(phases=2)
 
 
 @dataclass(frozen=True)
@@ -45,24 +45,24 @@ class Headlines(Measure):
     """
 
     name: ClassVar[str] = "headlines"
-    headline = "critical_displacement"
-    typical_work = _STEP.typical_work + _CYCLE.typical_work
-    outputs = tuple(Output(name, error=True) for name in OF.values())
-    clocks: ClassVar[tuple[bool, ...]] = (False, True)
+    primary_output = "critical_displacement"
+    typical_work = _STEP_MEASURE.typical_work + _CYCLE_MEASURE.typical_work
+    outputs = tuple(Output(name, error=True) for name in INDEXED_OUTPUTS.values())
+    needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Measure both; the first that has no number ends it."""
         at_critical = scene.without_mass().with_(stiffness_ratio=1.0)
-        values: dict[str, Value] = {}
-        for measure, asked in ((_STEP, at_critical), (_CYCLE, scene)):
-            outcome = measure.charged(asked, accuracy, meter)
+        values: dict[str, OutputValue] = {}
+        for measure, asked in ((_STEP_MEASURE, at_critical), (_CYCLE_MEASURE, scene)):
+            outcome = measure.run_nested(asked, accuracy, meter)
             if outcome.status is not Status.OK:
                 return Outcome(outcome.status, values, outcome.message)
             values |= {n: v for n, v in outcome.values.items() if n in self.variables}
         return Outcome(Status.OK, values)
 
 
-def half(name: str, order: str, end: str) -> Claim:
+def interval_claim(name: str, order: str, end: str) -> Claim:
     """W1: the interval of an index of the displacement holds its closed form."""
     where = "begins below" if end == "low" else "ends above"
     return Claim(
@@ -77,7 +77,7 @@ def half(name: str, order: str, end: str) -> Claim:
     )
 
 
-def explains(of: str, name: str, share: float) -> Claim:
+def first_order_claim(of: str, name: str, share: float) -> Claim:
     """W3: indices of cycles, to first order."""
     return Claim(
         id="W3",
@@ -91,18 +91,22 @@ def explains(of: str, name: str, share: float) -> Claim:
     )
 
 
-def mark_indices(of: str, dataset: xr.Dataset, axes: Axes) -> None:
+def plot_indices(of: str, dataset: xr.Dataset, axes: Axes) -> None:
     """Indices of first order and total with their intervals, input by input."""
-    from rsfstudy.plots import look, marker
+    from rsfstudy.plots import cycle_marker, cycle_style
 
     for number, (order, text) in enumerate((("first_order", "first order"), ("total", "total"))):
         found = [dataset[f"{of}_{order}{end}"].values for end in ("", "_low", "_high")]
         at = np.arange(len(found[0])) + 0.2 * number - 0.1
         bars = [np.maximum(found[0] - found[1], 0.0), np.maximum(found[2] - found[0], 0.0)]
-        style = {"color": look(number)["color"], "marker": marker(number), "linestyle": "none"}
+        style = {
+            "color": cycle_style(number)["color"],
+            "marker": cycle_marker(number),
+            "linestyle": "none",
+        }
         axes.errorbar(at, found[0], yerr=bars, label=text, **style)
-    axes.set_xticks(range(len(INPUTS)), ["$a$", "$b-a$", "$k$"])
-    axes.set_xlim(-0.5, len(INPUTS) - 0.5)
+    axes.set_xticks(range(len(INPUT_MEANS)), ["$a$", "$b-a$", "$k$"])
+    axes.set_xlim(-0.5, len(INPUT_MEANS) - 0.5)
 
 
 TITLES = {
@@ -113,7 +117,7 @@ TITLES = {
 figure = Figure(
     [
         Panel(
-            marks=[partial(mark_indices, of)],
+            overlays=[partial(plot_indices, of)],
             title=title,
             x_label="Uncertain by 10 %",
             y_label="Sobol index",
@@ -131,8 +135,11 @@ study = Study(
     base=Scene(normal_stress="constant", inertia=True, stiffness=0.006),
     axes=[
         Axis.samples(
-            {name: norm(math.log(value), UNCERTAIN) for name, value in INPUTS.items()},
-            POINTS,
+            {
+                name: norm(math.log(value), RELATIVE_UNCERTAINTY)
+                for name, value in INPUT_MEANS.items()
+            },
+            SOBOL_POINTS,
             seed=37,
             method="saltelli",
             fields={
@@ -145,12 +152,12 @@ study = Study(
     measure=Headlines(),
     accuracy=Accuracy(rtol=1e-6),
     reductions=[
-        *(Logarithm(name=f"ln_{name}", of=of) for name, of in OF.items()),
-        *(SobolIndices(name=name, of=f"ln_{name}") for name in OF),
+        *(Logarithm(name=f"ln_{name}", of=of) for name, of in INDEXED_OUTPUTS.items()),
+        *(SobolIndices(name=name, of=f"ln_{name}") for name in INDEXED_OUTPUTS),
     ],
     claims=[
         *(
-            half(name, order, end)
+            interval_claim(name, order, end)
             for order in ("first_order", "total")
             for name in ("ln_a", "ln_net")
             for end in ("low", "high")
@@ -165,9 +172,9 @@ study = Study(
             tolerance=1e-15,
             reason="rounding: the boundary is asked at the critical stiffness, whatever k is",
         ),
-        explains("drop", "ln_net", 1.0),
-        explains("interval", "ln_net", 0.5),
-        explains("interval", "ln_stiffness", 0.5),
+        first_order_claim("drop", "ln_net", 1.0),
+        first_order_claim("interval", "ln_net", 0.5),
+        first_order_claim("interval", "ln_stiffness", 0.5),
     ],
     plot=figure,
     references=["Saltelli et al. (2010), Computer Physics Communications 181, 259-270"],

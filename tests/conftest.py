@@ -20,8 +20,16 @@ from rsfstudy.compute import clusters, provenance, workers
 from rsfstudy.motion import course
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.events import Event, EventSpecification, Kind, fall, maximum, rise, settling
-from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.events import (
+    Event,
+    EventKind,
+    EventSpecification,
+    approach_to_steady_state,
+    fall,
+    maximum,
+    rise,
+)
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
 
 settings.register_profile(
     "default", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
@@ -38,7 +46,7 @@ sys.dont_write_bytecode = False
 
 #: Modules that take longest, which begin first: none of them is left for one process alone at the
 #: end. What uses the results of studies comes later, when they are there: it would wait for each.
-DEAR = (
+SLOW_MODULES = (
     "test_studies", "test_resume", "test_public_functions", "test_faults", "test_clusters",
     "test_strangers",
     "test_report", "test_compiled", "test_scale", "test_figures", "test_fits_together",
@@ -48,7 +56,7 @@ DEAR = (
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    order = {name: number for number, name in enumerate(DEAR)}
+    order = {name: number for number, name in enumerate(SLOW_MODULES)}
     items.sort(key=lambda item: order.get(item.path.stem, len(order)))
 
 
@@ -62,43 +70,45 @@ def pytest_collection_finish() -> None:
 
 
 #: Told at the end of each step: no slider is twice as far from steady sliding as it has ever been.
-EACH_STEP = settling(2.0)
+STEP_END_EVENT = approach_to_steady_state(2.0)
 
 
-def follow(
+def follow_until(
     scene: Scene,
     rtol: float,
     until: Callable[[Event], bool],
     budget: int = 2_000_000,
     watches: Sequence[EventSpecification] = (),
-) -> Meter:
+) -> WorkMeter:
     """Follow a scene until the callback says so, which sees its start, the beginning of each regime
     and the end of each step; and what else is watched for.
     """
-    meter, watches = Meter(budget), (*watches, EACH_STEP)
-    for event in course.follow(scene, Accuracy(rtol, budget), meter, watches, clock=True):
+    meter, watches = WorkMeter(budget), (*watches, STEP_END_EVENT)
+    for event in course.integrate_events(
+        scene, Accuracy(rtol, budget), meter, watches, with_time=True
+    ):
         if until(event):
             return meter
     raise AssertionError("a motion never ends by itself")
 
 
-def reaches_the_norm(scene: Scene, rtol: float = 1e-8, peaks: float = math.inf) -> bool:
+def reaches_instability_norm(scene: Scene, rtol: float = 1e-8, peaks: float = math.inf) -> bool:
     """Whether a motion does, or one of so many first peaks, followed without any of what ends it
     early.
     """
-    norm, count = scene.log_norm_rate, 0
+    norm, count = scene.log_instability_rate, 0
     watches = (
         maximum("log_slip_rate"),
-        rise("log_slip_rate", norm, ends=True),
-        fall("spring_stress", -scene.mu_star, ends=True),
+        rise("log_slip_rate", norm, terminal=True),
+        fall("spring_stress", -scene.mu_star, terminal=True),
     )
-    accuracy, meter = Accuracy(rtol, engine=COMPILED), Meter(200_000, engine=COMPILED)
-    with contextlib.suppress(Halt):  # slip that dies out, or that decays for ever
-        for event in course.follow(scene, accuracy, meter, watches):
+    accuracy, meter = Accuracy(rtol, engine=COMPILED), WorkMeter(200_000, engine=COMPILED)
+    with contextlib.suppress(MotionStopped):  # slip that dies out, or that decays for ever
+        for event in course.integrate_events(scene, accuracy, meter, watches):
             # a step may pass the norm and come back
-            if event.kind is Kind.RISE or event.point.log_slip_rate >= norm:
+            if event.kind is EventKind.RISE or event.point.log_slip_rate >= norm:
                 return True
-            count += event.kind is Kind.MAXIMUM
+            count += event.kind is EventKind.MAXIMUM
             if count == peaks:
                 break
     return False
@@ -112,14 +122,14 @@ def cot_phi(scene: Scene) -> float:
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
     """However long workers take to start, no test gives them up."""
-    monkeypatch.setattr(workers, "TELL", math.inf)
-    monkeypatch.setattr(workers, "PATIENCE", math.inf)
+    monkeypatch.setattr(workers, "WARN_AFTER", math.inf)
+    monkeypatch.setattr(workers, "GIVE_UP_AFTER", math.inf)
 
 
 @pytest.fixture(autouse=True, scope="session")
 def the_checkout_stays():
     """Each of hundreds of runs would ask Git three times for the state of the same checkout."""
-    asked, checkout = provenance.git_state, provenance._PACKAGE.parent
+    asked, checkout = provenance.git_state, provenance._PACKAGE_DIRECTORY.parent
     known = functools.cache(asked)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
@@ -151,5 +161,5 @@ def formulas_are_set_once():
 def cluster(tmp_path_factory):
     """A Dask client of two worker processes."""
     log = tmp_path_factory.mktemp("cluster") / "workers.log"
-    with clusters.local_cluster(2, log) as client:
+    with clusters.start_local_cluster(2, log) as client:
         yield client

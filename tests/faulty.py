@@ -32,13 +32,13 @@ def _hang():
         time.sleep(0.01)
 
 
-def _take(seconds: float):
+def _busy_wait(seconds: float):
     end = time.thread_time() + seconds
     while time.thread_time() < end:
         pass
 
 
-def _wait_at(gate: Path):
+def _wait_for_file(gate: Path):
     """The first cell of each process passes, and takes long enough to be handed over by itself; all
     others wait until the gate is open.
     """
@@ -85,21 +85,21 @@ class Faulty(Measure):
     fault: str = ""
     at: tuple[float, ...] = ()
     name: ClassVar[str] = "faulty"
-    headline: ClassVar[str] = "total"
+    primary_output: ClassVar[str] = "total"
     variables: ClassVar = {"total": ()}
     typical_work: ClassVar[int] = 1
 
-    def find(self, scene, accuracy, meter):
-        _take(float(os.environ.get("FAULT_TAKES", "0")))
+    def compute(self, scene, accuracy, meter):
+        _busy_wait(float(os.environ.get("FAULT_TAKES", "0")))
         if "FAULT_GATE" in os.environ:
-            _wait_at(Path(os.environ["FAULT_GATE"]))
+            _wait_for_file(Path(os.environ["FAULT_GATE"]))
         if scene.b_over_a in self.at or (self.fault and not self.at):
             return FAULTS[self.fault](meter)
         meter.charge("any", 7)
         return Outcome(Status.OK, {"total": scene.b_over_a})
 
 
-def declared(fault: str = "", at: tuple[float, ...] = (), cells: int = 4) -> Study:
+def faulty_study(fault: str = "", at: tuple[float, ...] = (), cells: int = 4) -> Study:
     """A lattice of b/a = 2, 2.5, 3 and so on."""
     return Study(
         name="faulty",
@@ -110,7 +110,7 @@ def declared(fault: str = "", at: tuple[float, ...] = (), cells: int = 4) -> Stu
     )
 
 
-study = declared(
+study = faulty_study(
     os.environ.get("FAULT", ""),
     tuple(float(at) for at in os.environ.get("FAULT_AT", "").split()),
     int(os.environ.get("FAULT_CELLS", "4")),

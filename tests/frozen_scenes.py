@@ -15,11 +15,19 @@ import numpy as np
 
 from rsfstudy import Scene, protocol
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import along, follow
-from rsfstudy.motion.events import EventSpecification, Kind, fall, maximum, minimum, rise, settling
-from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.recording import OBSERVED, Recording
-from rsfstudy.slider.equations import between_ruptures, rigid
+from rsfstudy.motion.course import events_along, integrate_events
+from rsfstudy.motion.events import (
+    EventKind,
+    EventSpecification,
+    approach_to_steady_state,
+    fall,
+    maximum,
+    minimum,
+    rise,
+)
+from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.recording import MOTION_VARIABLES, Recording
+from rsfstudy.slider.equations import equations_between_ruptures, equations_of_rigid_slider
 
 #: Rows of a motion that are kept, and what those without end may cost.
 ROWS, BUDGET = 12, 40_000
@@ -32,11 +40,19 @@ EXTREMA = (
     maximum("spring_stress"),
     minimum("spring_stress"),
 )
-USUAL = (*EXTREMA, rise("log_slip_rate", 0.9), fall("log_slip_rate", 0.5))
+USUAL_EVENTS = (*EXTREMA, rise("log_slip_rate", 0.9), fall("log_slip_rate", 0.5))
 #: Where the friction coefficient that is read has extrema of its own.
-READ = maximum("reading"), minimum("reading"), maximum("log_slip_rate"), minimum("log_slip_rate")
-BOTH, SLOWING = (*READ, *EXTREMA[2:]), (*EXTREMA, fall("log_slip_rate", -1.0))
-REVERSING = (*EXTREMA[2:], rise("friction", -0.5), rise("state", 0.01))
+FRICTION_EVENTS = (
+    maximum("apparent_friction"),
+    minimum("apparent_friction"),
+    maximum("log_slip_rate"),
+    minimum("log_slip_rate"),
+)
+ALL_EXTREMA, SLOWING_EVENTS = (
+    (*FRICTION_EVENTS, *EXTREMA[2:]),
+    (*EXTREMA, fall("log_slip_rate", -1.0)),
+)
+REVERSAL_EVENTS = (*EXTREMA[2:], rise("frictional_stress", -0.5), rise("state", 0.01))
 
 
 class Motion(NamedTuple):
@@ -46,7 +62,7 @@ class Motion(NamedTuple):
     ----------
     fields : mapping
         Of the scene.
-    watches : tuple of Watch
+    watches : tuple of EventSpecification
     until : float
         When to end, in D_c/V_*.
     rows : int
@@ -57,7 +73,7 @@ class Motion(NamedTuple):
     """
 
     fields: Mapping[str, Any]
-    watches: tuple[EventSpecification, ...] = USUAL
+    watches: tuple[EventSpecification, ...] = USUAL_EVENTS
     until: float = 40.0
     rows: int = ROWS
     rtol: float = 1e-7
@@ -65,11 +81,13 @@ class Motion(NamedTuple):
 
     def events(self, scene: Scene, engine: str) -> Iterator[Any]:
         """What is told, one event after the other."""
-        accuracy, meter = Accuracy(self.rtol, engine=engine), Meter(self.budget, engine=engine)
-        return follow(scene, accuracy, meter, self.watches, clock=True, until=self.until)
+        accuracy, meter = Accuracy(self.rtol, engine=engine), WorkMeter(self.budget, engine=engine)
+        return integrate_events(
+            scene, accuracy, meter, self.watches, with_time=True, until=self.until
+        )
 
 
-def motion(law: str, *parts: Mapping[str, Any], **stated: Any) -> Motion:
+def frozen_motion(law: str, *parts: Mapping[str, Any], **stated: Any) -> Motion:
     """A motion of a law, with the fields of parts, fields of its own, and what a motion states."""
     own = {name: stated.pop(name) for name in Motion._fields if name in stated}
     fields = {"law": law}
@@ -96,27 +114,29 @@ class Track(NamedTuple):
     def events(self, scene: Scene, engine: str) -> Iterator[Any]:
         """What is told, one event after the other."""
         if self.log_slip_rate is None:
-            equations = between_ruptures(scene, clock=False)
+            equations = equations_between_ruptures(scene, clock=False)
         else:
-            equations = rigid(scene, self.log_slip_rate)
-        meter, how = Meter(self.budget, engine=engine), {"backward": self.backward}
+            equations = equations_of_rigid_slider(scene, self.log_slip_rate)
+        meter, how = WorkMeter(self.budget, engine=engine), {"backward": self.backward}
         asked = (equations, self.state, 0.07 * self.rtol, meter, self.watches)
         if not self.samples:
-            return along(*asked, **how)
-        return self._recorded(scene, *asked, **how)
+            return events_along(*asked, **how)
+        return self._recorded_events(scene, *asked, **how)
 
-    def _recorded(self, scene: Scene, *asked: Any, **how: Any) -> Iterator[Any]:
+    def _recorded_events(self, scene: Scene, *asked: Any, **how: Any) -> Iterator[Any]:
         """The same, and the rows that are recorded of a rigid slider of one state, in their order;
         all told with the last of them.
         """
-        recording, events = Recording(at=np.array(self.samples)), []
-        for event in along(*asked, **how, recording=recording):
-            if event.kind is Kind.SAMPLED:
+        recording, events = Recording(sample_times=np.array(self.samples)), []
+        for event in events_along(*asked, **how, recording=recording):
+            if event.kind is EventKind.SAMPLED:
                 break
             events.append(event)
-        friction = recording.seen(scene)[:, OBSERVED.index("frictional_stress")] - scene.mu_star
+        friction = (
+            recording.table(scene)[:, MOTION_VARIABLES.index("frictional_stress")] - scene.mu_star
+        )
         events += [
-            event._replace(slip=slip, point=asked[0].at((stress,)))
+            event._replace(slip=slip, point=asked[0].evaluate_point((stress,)))
             for slip, stress in zip(self.samples, friction.tolist(), strict=True)
         ]
         return iter(sorted(events, key=lambda event: event.slip))
@@ -127,10 +147,10 @@ CONSTANT = {"normal_stress": "constant", "a": 0.05}
 VARIABLE = {"normal_stress": "variable", "phi": 75.0, "alpha": 0.3, "a": 0.05}
 IMPOSED, DILATANT = {"normal_stress": "imposed", "a": 0.05}, {"fluid": "dilatant"}
 LESS_DILATANT = {**DILATANT, "dilatancy": 1e-3}
-MASS, MORE_MASS = {"inertia": True}, {"inertia": True, "period": 5e3}
+WITH_INERTIA, WITH_LONG_PERIOD = {"inertia": True}, {"inertia": True, "period": 5e3}
 DAMPING = {"radiation_damping": 1e-3}
-UP = {"load_velocity_ratio": 2.0, "stiffness_ratio": 1.3}
-SLIPS = {"load_velocity_ratio": 2.0, "stiffness_ratio": 0.8}
+STEP_UP = {"load_velocity_ratio": 2.0, "stiffness_ratio": 1.3}
+UNSTABLE_STEP_UP = {"load_velocity_ratio": 2.0, "stiffness_ratio": 0.8}
 WAVES = {
     "oscillation_period": 3.0,
     "oscillation_begin": 1.0,
@@ -139,7 +159,7 @@ WAVES = {
 }
 SINE = {"oscillation_amplitude": 0.05, "oscillation_period": 8.0, "load_velocity_ratio": 1.5}
 RAMP = {"normal_stress_ramp": 0.1, "ramp_duration": 4.0, "load_velocity_ratio": 1.5}
-BACK = {
+REVERSED_LOADING = {
     "regularised": True,
     "mu_star": 0.6,
     "b_over_a": 1.5,
@@ -150,7 +170,7 @@ BACK = {
 HOLD = {"hold_time": 30.0, "stiffness_ratio": 3.0}
 STEPS = {"velocity_steps": 4, "velocity_ratio": 5.0, "displacement_between_steps": 1.0}
 STAIRS = {"velocity_ramp": 2.0, "velocity_ramp_duration": 3.0, "velocity_ramp_stairs": 3}
-MOVES = protocol(
+VELOCITY_PROTOCOL = protocol(
     [
         {"velocity": 3.0, "distance": 4.0},
         {"velocity": 0.0, "duration": 5.0},
@@ -159,7 +179,7 @@ MOVES = protocol(
     ],
     name="moves",
 )
-PRESSES = protocol(
+NORMAL_STRESS_PROTOCOL = protocol(
     [
         {"velocity": 1.0, "duration": 2.0, "normal_stress": 1.1},
         {"velocity": 1.5, "duration": 6.0, "normal_stress": 1.05},
@@ -172,97 +192,250 @@ PRESSES = protocol(
 #: been compiled for one serves the other.
 MOTIONS: dict[str, Motion | Track] = {
     # steps of rate: each law
-    "slip": motion("slip", VARIABLE, UP),
-    "slowness, down": motion("slowness", VARIABLE, load_velocity_ratio=0.4, stiffness_ratio=1.3,
-        watches=SLOWING, rtol=3e-8),
-    "family": motion("family", CONSTANT, UP, watches=(*USUAL, settling(0.03, ends=True)), rows=30),
-    "perrin_rice_zheng": motion("perrin_rice_zheng", IMPOSED, UP, rtol=1e-6),
-    "two slip states": motion("two_slip_states", IMPOSED, load_velocity_ratio=2.0,
-        stiffness_ratio=3.0, watches=(*USUAL, settling(0.03, ends=True))),
-    "two slowness states": motion("two_slowness_states", VARIABLE, UP),
-    "composite, dilatant": motion("composite", IMPOSED, DILATANT, UP, rtol=1e-8),
-    "cut_off, dilatant": motion("cut_off", VARIABLE, DILATANT, UP),
-    "slip, dilatant": motion("slip", VARIABLE, DILATANT, UP, watches=(*EXTREMA,
-        fall("normal_stress", 1.01))),
-    "slowness, dilatant, slips": motion("slowness", CONSTANT, LESS_DILATANT, SLIPS, rows=9),
+    "slip": frozen_motion("slip", VARIABLE, STEP_UP),
+    "slowness, down": frozen_motion(
+        "slowness",
+        VARIABLE,
+        load_velocity_ratio=0.4,
+        stiffness_ratio=1.3,
+        watches=SLOWING_EVENTS,
+        rtol=3e-8,
+    ),
+    "family": frozen_motion(
+        "family",
+        CONSTANT,
+        STEP_UP,
+        watches=(*USUAL_EVENTS, approach_to_steady_state(0.03, terminal=True)),
+        rows=30,
+    ),
+    "perrin_rice_zheng": frozen_motion("perrin_rice_zheng", IMPOSED, STEP_UP, rtol=1e-6),
+    "two slip states": frozen_motion(
+        "two_slip_states",
+        IMPOSED,
+        load_velocity_ratio=2.0,
+        stiffness_ratio=3.0,
+        watches=(*USUAL_EVENTS, approach_to_steady_state(0.03, terminal=True)),
+    ),
+    "two slowness states": frozen_motion("two_slowness_states", VARIABLE, STEP_UP),
+    "composite, dilatant": frozen_motion("composite", IMPOSED, DILATANT, STEP_UP, rtol=1e-8),
+    "cut_off, dilatant": frozen_motion("cut_off", VARIABLE, DILATANT, STEP_UP),
+    "slip, dilatant": frozen_motion(
+        "slip", VARIABLE, DILATANT, STEP_UP, watches=(*EXTREMA, fall("normal_stress", 1.01))
+    ),
+    "slowness, dilatant, slips": frozen_motion(
+        "slowness", CONSTANT, LESS_DILATANT, UNSTABLE_STEP_UP, rows=9
+    ),
     # radiation damping: each law
-    "slip, damped": motion("slip", CONSTANT, DAMPING, SLIPS),
-    "slowness, damped, dilatant": motion("slowness", IMPOSED, DILATANT, DAMPING, UP),
-    "family, damped, dilatant": motion("family", IMPOSED, DILATANT, DAMPING, UP),
-    "perrin_rice_zheng, damped": motion("perrin_rice_zheng", VARIABLE, DAMPING, SLIPS),
-    "composite, damped": motion("composite", VARIABLE, DAMPING, SLIPS, rtol=1e-8),
-    "cut_off, damped, dilatant": motion("cut_off", CONSTANT, DILATANT, DAMPING, UP),
-    "two slip states, damped, dilatant": motion("two_slip_states", VARIABLE, DILATANT, DAMPING, UP),
-    "two slowness states, damped": motion("two_slowness_states", CONSTANT, DAMPING, SLIPS),
+    "slip, damped": frozen_motion("slip", CONSTANT, DAMPING, UNSTABLE_STEP_UP),
+    "slowness, damped, dilatant": frozen_motion("slowness", IMPOSED, DILATANT, DAMPING, STEP_UP),
+    "family, damped, dilatant": frozen_motion("family", IMPOSED, DILATANT, DAMPING, STEP_UP),
+    "perrin_rice_zheng, damped": frozen_motion(
+        "perrin_rice_zheng", VARIABLE, DAMPING, UNSTABLE_STEP_UP
+    ),
+    "composite, damped": frozen_motion("composite", VARIABLE, DAMPING, UNSTABLE_STEP_UP, rtol=1e-8),
+    "cut_off, damped, dilatant": frozen_motion("cut_off", CONSTANT, DILATANT, DAMPING, STEP_UP),
+    "two slip states, damped, dilatant": frozen_motion(
+        "two_slip_states", VARIABLE, DILATANT, DAMPING, STEP_UP
+    ),
+    "two slowness states, damped": frozen_motion(
+        "two_slowness_states", CONSTANT, DAMPING, UNSTABLE_STEP_UP
+    ),
     # ruptures with mass: each law
-    "slip, mass, dilatant": motion("slip", IMPOSED, LESS_DILATANT, MORE_MASS, SLIPS),
-    "slowness, mass": motion("slowness", VARIABLE, MASS, SLIPS),
-    "family, mass": motion("family", VARIABLE, MASS, SLIPS, rows=4),
-    "perrin_rice_zheng, mass, dilatant": motion("perrin_rice_zheng", CONSTANT, LESS_DILATANT,
-        MORE_MASS, SLIPS, rows=6),
-    "composite, mass, dilatant": motion("composite", CONSTANT, LESS_DILATANT, MORE_MASS, SLIPS,
-        rtol=1e-6),
-    "cut_off, mass": motion("cut_off", IMPOSED, MASS, SLIPS),
-    "two slip states, mass": motion("two_slip_states", CONSTANT, MORE_MASS, SLIPS, b1_over_a=1.5,
-        b2_over_a=0.5, length_ratio=3.0),
-    "two slowness states, mass, dilatant": motion("two_slowness_states", IMPOSED, LESS_DILATANT,
-        MASS, SLIPS),
-    "slowness, mass that acts throughout": motion("slowness", VARIABLE, MASS, UP, period=1.0,
-        reference_rate=6.0, watches=BOTH, rtol=1e-8),
+    "slip, mass, dilatant": frozen_motion(
+        "slip", IMPOSED, LESS_DILATANT, WITH_LONG_PERIOD, UNSTABLE_STEP_UP
+    ),
+    "slowness, mass": frozen_motion("slowness", VARIABLE, WITH_INERTIA, UNSTABLE_STEP_UP),
+    "family, mass": frozen_motion("family", VARIABLE, WITH_INERTIA, UNSTABLE_STEP_UP, rows=4),
+    "perrin_rice_zheng, mass, dilatant": frozen_motion(
+        "perrin_rice_zheng", CONSTANT, LESS_DILATANT, WITH_LONG_PERIOD, UNSTABLE_STEP_UP, rows=6
+    ),
+    "composite, mass, dilatant": frozen_motion(
+        "composite", CONSTANT, LESS_DILATANT, WITH_LONG_PERIOD, UNSTABLE_STEP_UP, rtol=1e-6
+    ),
+    "cut_off, mass": frozen_motion("cut_off", IMPOSED, WITH_INERTIA, UNSTABLE_STEP_UP),
+    "two slip states, mass": frozen_motion(
+        "two_slip_states",
+        CONSTANT,
+        WITH_LONG_PERIOD,
+        UNSTABLE_STEP_UP,
+        b1_over_a=1.5,
+        b2_over_a=0.5,
+        length_ratio=3.0,
+    ),
+    "two slowness states, mass, dilatant": frozen_motion(
+        "two_slowness_states", IMPOSED, LESS_DILATANT, WITH_INERTIA, UNSTABLE_STEP_UP
+    ),
+    "slowness, mass that acts throughout": frozen_motion(
+        "slowness",
+        VARIABLE,
+        WITH_INERTIA,
+        STEP_UP,
+        period=1.0,
+        reference_rate=6.0,
+        watches=ALL_EXTREMA,
+        rtol=1e-8,
+    ),
     # stress that acts on the state; slip that reverses
-    "slip, stress dependence": motion("slip", CONSTANT, UP, stress_dependence=0.5),
-    "composite, stress dependence": motion("composite", VARIABLE, stress_dependence=2.0,
-        load_velocity_ratio=2.0, stiffness_ratio=2.0, rows=5, rtol=1e-8),
-    "perrin_rice_zheng, stress dependence, mass": motion("perrin_rice_zheng", VARIABLE, MASS, SLIPS,
-        stress_dependence=1.0, period=50000.0, rtol=1e-8),
-    "slip, reversed": motion("slip", CONSTANT, BACK, displacement_step=-30.0, watches=REVERSING),
-    "slowness, reversed": motion("slowness", VARIABLE, BACK, displacement_step=-21.0,
-        watches=REVERSING),
+    "slip, stress dependence": frozen_motion("slip", CONSTANT, STEP_UP, stress_dependence=0.5),
+    "composite, stress dependence": frozen_motion(
+        "composite",
+        VARIABLE,
+        stress_dependence=2.0,
+        load_velocity_ratio=2.0,
+        stiffness_ratio=2.0,
+        rows=5,
+        rtol=1e-8,
+    ),
+    "perrin_rice_zheng, stress dependence, mass": frozen_motion(
+        "perrin_rice_zheng",
+        VARIABLE,
+        WITH_INERTIA,
+        UNSTABLE_STEP_UP,
+        stress_dependence=1.0,
+        period=50000.0,
+        rtol=1e-8,
+    ),
+    "slip, reversed": frozen_motion(
+        "slip", CONSTANT, REVERSED_LOADING, displacement_step=-30.0, watches=REVERSAL_EVENTS
+    ),
+    "slowness, reversed": frozen_motion(
+        "slowness", VARIABLE, REVERSED_LOADING, displacement_step=-21.0, watches=REVERSAL_EVENTS
+    ),
     # other loadings, and another beginning
-    "slip, displacement step": motion("slip", VARIABLE, stiffness_ratio=1.25, displacement_step=0.8,
-        watches=SLOWING),
-    "slowness, displacement step, mass": motion("slowness", VARIABLE, MASS, stiffness_ratio=1.25,
-        displacement_step=2.0, watches=SLOWING, until=100.0),
-    "perrin_rice_zheng, normal stress step": motion("perrin_rice_zheng", IMPOSED,
-        stiffness_ratio=1.2, normal_stress_step=-0.01, watches=SLOWING),
-    "two slowness states, normal stress step": motion("two_slowness_states", VARIABLE,
-        stiffness_ratio=1.5, normal_stress_step=0.05, load_velocity_ratio=1.0, watches=EXTREMA),
-    "slip, hold": motion("slip", VARIABLE, DILATANT, HOLD, watches=EXTREMA, rows=10),
-    "two slip states, hold": motion("two_slip_states", IMPOSED, HOLD, watches=EXTREMA, until=60.0),
-    "family, velocity steps": motion("family", CONSTANT, STEPS, stiffness_ratio=6.0,
-        watches=EXTREMA, until=3.0, rows=20),
-    "slip, velocity ramp, mass": motion("slip", IMPOSED, DILATANT, MASS, STAIRS,
-        stiffness_ratio=1.5),
-    "two slowness states, protocol": motion("two_slowness_states", VARIABLE, stiffness_ratio=2.0,
-        loading=MOVES),
-    "perrin_rice_zheng, protocol": motion("perrin_rice_zheng", IMPOSED, stiffness_ratio=2.0,
-        loading=PRESSES, watches=EXTREMA, rtol=1e-8),
-    "slowness, begins elsewhere": motion("slowness", VARIABLE, stiffness_ratio=1.5,
-        initial_stress=0.02, initial_state=0.01, load_velocity_ratio=1.0, watches=EXTREMA),
-    "slowness, oscillation": motion("slowness", IMPOSED, SINE, stiffness_ratio=1.5, watches=BOTH,
-        rows=4),
-    "slip, oscillation": motion("slip", VARIABLE, SINE, stiffness_ratio=2.5, watches=BOTH, rows=8),
-    "slowness, train": motion("slowness", IMPOSED, WAVES, stiffness_ratio=1.5,
-        oscillation_amplitude=0.05, watches=READ, rows=4),
-    "slip, train of the load point": motion("slip", VARIABLE, WAVES, stiffness_ratio=2.5,
-        velocity_oscillation=0.5, watches=READ, rows=4),
-    "slip, ramp": motion("slip", VARIABLE, RAMP, stiffness_ratio=2.0, watches=READ),
-    "slowness, ramp": motion("slowness", IMPOSED, RAMP, stiffness_ratio=1.5, watches=READ,
-        rtol=1e-6),
+    "slip, displacement step": frozen_motion(
+        "slip", VARIABLE, stiffness_ratio=1.25, displacement_step=0.8, watches=SLOWING_EVENTS
+    ),
+    "slowness, displacement step, mass": frozen_motion(
+        "slowness",
+        VARIABLE,
+        WITH_INERTIA,
+        stiffness_ratio=1.25,
+        displacement_step=2.0,
+        watches=SLOWING_EVENTS,
+        until=100.0,
+    ),
+    "perrin_rice_zheng, normal stress step": frozen_motion(
+        "perrin_rice_zheng",
+        IMPOSED,
+        stiffness_ratio=1.2,
+        normal_stress_step=-0.01,
+        watches=SLOWING_EVENTS,
+    ),
+    "two slowness states, normal stress step": frozen_motion(
+        "two_slowness_states",
+        VARIABLE,
+        stiffness_ratio=1.5,
+        normal_stress_step=0.05,
+        load_velocity_ratio=1.0,
+        watches=EXTREMA,
+    ),
+    "slip, hold": frozen_motion("slip", VARIABLE, DILATANT, HOLD, watches=EXTREMA, rows=10),
+    "two slip states, hold": frozen_motion(
+        "two_slip_states", IMPOSED, HOLD, watches=EXTREMA, until=60.0
+    ),
+    "family, velocity steps": frozen_motion(
+        "family", CONSTANT, STEPS, stiffness_ratio=6.0, watches=EXTREMA, until=3.0, rows=20
+    ),
+    "slip, velocity ramp, mass": frozen_motion(
+        "slip", IMPOSED, DILATANT, WITH_INERTIA, STAIRS, stiffness_ratio=1.5
+    ),
+    "two slowness states, protocol": frozen_motion(
+        "two_slowness_states", VARIABLE, stiffness_ratio=2.0, loading=VELOCITY_PROTOCOL
+    ),
+    "perrin_rice_zheng, protocol": frozen_motion(
+        "perrin_rice_zheng",
+        IMPOSED,
+        stiffness_ratio=2.0,
+        loading=NORMAL_STRESS_PROTOCOL,
+        watches=EXTREMA,
+        rtol=1e-8,
+    ),
+    "slowness, begins elsewhere": frozen_motion(
+        "slowness",
+        VARIABLE,
+        stiffness_ratio=1.5,
+        initial_stress=0.02,
+        initial_state=0.01,
+        load_velocity_ratio=1.0,
+        watches=EXTREMA,
+    ),
+    "slowness, oscillation": frozen_motion(
+        "slowness", IMPOSED, SINE, stiffness_ratio=1.5, watches=ALL_EXTREMA, rows=4
+    ),
+    "slip, oscillation": frozen_motion(
+        "slip", VARIABLE, SINE, stiffness_ratio=2.5, watches=ALL_EXTREMA, rows=8
+    ),
+    "slowness, train": frozen_motion(
+        "slowness",
+        IMPOSED,
+        WAVES,
+        stiffness_ratio=1.5,
+        oscillation_amplitude=0.05,
+        watches=FRICTION_EVENTS,
+        rows=4,
+    ),
+    "slip, train of the load point": frozen_motion(
+        "slip",
+        VARIABLE,
+        WAVES,
+        stiffness_ratio=2.5,
+        velocity_oscillation=0.5,
+        watches=FRICTION_EVENTS,
+        rows=4,
+    ),
+    "slip, ramp": frozen_motion(
+        "slip", VARIABLE, RAMP, stiffness_ratio=2.0, watches=FRICTION_EVENTS
+    ),
+    "slowness, ramp": frozen_motion(
+        "slowness", IMPOSED, RAMP, stiffness_ratio=1.5, watches=FRICTION_EVENTS, rtol=1e-6
+    ),
     # without time
-    "slip, path": Track({"law": "slip", **VARIABLE, "load_velocity_ratio": 3.0,
-        "stiffness_ratio": 1.2}, (0.04, 0.01), (maximum("spring_stress"), rise("log_slip_rate",
-        1.5), fall("friction", 0.02), fall("psi", -0.01)), rows=5),
-    "slip, path backward": Track({"law": "slip", **VARIABLE, "load_velocity_ratio": 3.0,
-        "stiffness_ratio": 1.2}, (0.046, -0.03), (maximum("spring_stress"), fall("log_slip_rate",
-        -1.0), fall("friction", 0.02), rise("psi", -0.01)), rows=5, backward=True),
-    "slip, rigid": Track({"law": "slip", **VARIABLE, "load_velocity_ratio": 10.0}, (0.05,),
-        (fall("friction", 0.03), fall("state", -0.1)), rows=6, samples=(0.0, 0.5, 1.0),
-        log_slip_rate=math.log(10.0)),
+    "slip, path": Track(
+        {"law": "slip", **VARIABLE, "load_velocity_ratio": 3.0, "stiffness_ratio": 1.2},
+        (0.04, 0.01),
+        (
+            maximum("spring_stress"),
+            rise("log_slip_rate", 1.5),
+            fall("frictional_stress", 0.02),
+            fall("psi", -0.01),
+        ),
+        rows=5,
+    ),
+    "slip, path backward": Track(
+        {"law": "slip", **VARIABLE, "load_velocity_ratio": 3.0, "stiffness_ratio": 1.2},
+        (0.046, -0.03),
+        (
+            maximum("spring_stress"),
+            fall("log_slip_rate", -1.0),
+            fall("frictional_stress", 0.02),
+            rise("psi", -0.01),
+        ),
+        rows=5,
+        backward=True,
+    ),
+    "slip, rigid": Track(
+        {"law": "slip", **VARIABLE, "load_velocity_ratio": 10.0},
+        (0.05,),
+        (fall("frictional_stress", 0.03), fall("state", -0.1)),
+        rows=6,
+        samples=(0.0, 0.5, 1.0),
+        log_slip_rate=math.log(10.0),
+    ),
     # motions that cannot go on
-    "slip, unbounded": motion("slip", CONSTANT, SLIPS, stress_dependence=0.5),
-    "family, budget spent": motion("family", CONSTANT, UP, budget=295),
-    "perrin_rice_zheng, normal stress lost": motion("perrin_rice_zheng", MASS, phi=37.13,
-        mu_star=0.664, alpha=0.59, stress_dependence=1.0, period=1.04, a=0.022, b_over_a=1.58,
-        stiffness_ratio=1.618, load_velocity_ratio=1.947, watches=(rise("log_slip_rate", 1.0),)),
-}  # fmt: skip
+    "slip, unbounded": frozen_motion("slip", CONSTANT, UNSTABLE_STEP_UP, stress_dependence=0.5),
+    "family, budget spent": frozen_motion("family", CONSTANT, STEP_UP, budget=295),
+    "perrin_rice_zheng, normal stress lost": frozen_motion(
+        "perrin_rice_zheng",
+        WITH_INERTIA,
+        phi=37.13,
+        mu_star=0.664,
+        alpha=0.59,
+        stress_dependence=1.0,
+        period=1.04,
+        a=0.022,
+        b_over_a=1.58,
+        stiffness_ratio=1.618,
+        load_velocity_ratio=1.947,
+        watches=(rise("log_slip_rate", 1.0),),
+    ),
+}

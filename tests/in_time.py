@@ -25,7 +25,7 @@ from scipy.optimize import brentq
 from rsfstudy import Scene
 
 #: h(u) of d(Theta)/d(slip) = b h(u), by law, the exponent of the family beside it.
-LAWS: Mapping[str, Callable[[float, float], float]] = {
+EVOLUTION_FUNCTIONS: Mapping[str, Callable[[float, float], float]] = {
     "slip": lambda u, _eps: -u,
     "slowness": lambda u, _eps: math.expm1(-u),
     "perrin_rice_zheng": lambda u, _eps: -math.sinh(u),
@@ -33,24 +33,24 @@ LAWS: Mapping[str, Callable[[float, float], float]] = {
 }
 
 #: Trial steps go beyond all numbers; ln V stays below this.
-FASTEST = 300.0
+MAX_LOG_SLIP_RATE = 300.0
 
 
-class Now(NamedTuple):
+class InstantState(NamedTuple):
     """What there is to know at an instant: V with its sign, ln |V| and its rate, spring stress,
     frictional stress, normal stress, and the state variable (the sum, of several).
     """
 
-    v: float
-    x: float
-    growth: float
-    f: float
-    g: float
-    s: float
+    velocity: float
+    log_slip_rate: float
+    log_slip_rate_derivative: float
+    spring_stress: float
+    frictional_stress: float
+    normal_stress: float
     theta: float
 
 
-class InTime:
+class TimeDomainMotion:
     """The motion of a scene in time.
 
     Unknowns are f, the states, porosity and pressure of a dilatant fault, and last ln V where waves
@@ -59,7 +59,7 @@ class InTime:
     Parameters
     ----------
     scene : Scene
-        Of a law in `LAWS`, or of two states of which each evolves by one.
+        Of a law in `EVOLUTION_FUNCTIONS`, or of two states of which each evolves by one.
     velocity_ramp : float, optional
         What the load velocity gains in a time of 4: the limit of stairs.
     """
@@ -79,7 +79,7 @@ class InTime:
             name = name.split("_")[1]
             self.bs = [of["b1_over_a"] * self.a, of["b2_over_a"] * self.a]
             self.lengths = [1.0, of["length_ratio"]]
-        self.h = LAWS[name]
+        self.h = EVOLUTION_FUNCTIONS[name]
         self.wet, self.has_rate = scene.fluid == "dilatant", self.mass or self.damping > 0.0
         stiff = self.has_rate or bool(of["regularised"])
         self.method = "LSODA" if stiff else "DOP853"
@@ -89,13 +89,13 @@ class InTime:
     # ---- loading ---------------------------------------------------------------------------------
 
     @property
-    def breaks(self) -> list[float]:
+    def loading_breaks(self) -> list[float]:
         """Instants at which the load changes other than smoothly."""
         found = [self.of["ramp_duration"]] if self.of["normal_stress_ramp"] else []
         found += [self.of["hold_time"]] if self.of["hold_time"] else []
         return found + ([4.0] if self.velocity_ramp else [])
 
-    def load(self, time: float, middle: float) -> tuple[float, float, float]:
+    def loading_at(self, time: float, middle: float) -> tuple[float, float, float]:
         """Load velocity, imposed change of normal stress and its rate; `middle` is a time between
         the same two breaks.
         """
@@ -115,9 +115,9 @@ class InTime:
             change = of["oscillation_amplitude"] * often * math.cos(often * time)
         return velocity, e, change
 
-    def start(self) -> list[float]:
+    def initial_unknowns(self) -> list[float]:
         """The unknowns after steps at time 0, of which the state feels those of normal stress."""
-        of, (_velocity, e, _change) = self.of, self.load(0.0, 0.0)
+        of, (_velocity, e, _change) = self.of, self.loading_at(0.0, 0.0)
         f, theta = of["initial_stress"], of["initial_state"]
         before = 1.0 + self.cot * f
         x = ((self.mu + f) / before - self.mu - theta) / self.a
@@ -139,15 +139,17 @@ class InTime:
 
     # ---- equations -------------------------------------------------------------------------------
 
-    def both(self, time: float, y: Sequence[float], middle: float) -> tuple[list[float], Now]:
+    def rates_and_state(
+        self, time: float, y: Sequence[float], middle: float
+    ) -> tuple[list[float], InstantState]:
         """The rates of the unknowns, and what follows from them."""
         of, a, mu, cot, count = self.of, self.a, self.mu, self.cot, len(self.bs)
-        velocity, e, change = self.load(time, middle)
+        velocity, e, change = self.loading_at(time, middle)
         f, states, theta = y[0], y[1 : 1 + count], sum(y[1 : 1 + count])
         pores, pressure = y[1 + count : 3 + count] if self.wet else (0.0, 0.0)
         if self.has_rate:
             x = y[-1]
-            v = math.exp(min(x, FASTEST))
+            v = math.exp(min(x, MAX_LOG_SLIP_RATE))
         elif of["regularised"]:
             # V = 2 exp[-(mu_* + Theta)/a] sinh(mu/a)
             coefficient = (mu + f) / (1.0 + e + cot * f) / a
@@ -156,7 +158,7 @@ class InTime:
             x = math.log(max(abs(v), 1e-300))
         else:
             x = ((mu + f) / (1.0 + e + cot * f - pressure) - mu - theta) / a
-            v = math.exp(min(x, FASTEST))
+            v = math.exp(min(x, MAX_LOG_SLIP_RATE))
         friction = mu + a * x + theta
         g = f - self.damping * (v - 1.0)
         if self.mass:
@@ -183,24 +185,24 @@ class InTime:
         evolving[0] -= (self.alpha * ds + nagata * dg) / s
         fluid = [opening, draining] if self.wet else []
         rates = [df, *evolving, *fluid, *([dx] if self.has_rate else [])]
-        return rates, Now(v, x, dx, f, g, s, theta)
+        return rates, InstantState(v, x, dx, f, g, s, theta)
 
-    def solved(
+    def solve(
         self,
         times: Sequence[float],
-        events: Sequence[Callable[[Now], float]] = (),
+        events: Sequence[Callable[[InstantState], float]] = (),
         directions: Sequence[float] = (),
-    ) -> tuple[list[Now], list[list[tuple[float, Now]]]]:
+    ) -> tuple[list[InstantState], list[list[tuple[float, InstantState]]]]:
         """The motion at increasing times up to the last, and where functions vanish in a direction,
         but for the beginning.
         """
-        rows, told, y = [], [[] for _ in events], self.start()
-        cuts = [0.0, *(cut for cut in self.breaks if cut < times[-1]), times[-1]]
+        rows, told, y = [], [[] for _ in events], self.initial_unknowns()
+        cuts = [0.0, *(cut for cut in self.loading_breaks if cut < times[-1]), times[-1]]
         for begin, end in itertools.pairwise(cuts):
             middle = 0.5 * (begin + end)
 
             def known(time, y, middle=middle):
-                return self.both(time, y, middle)[1]
+                return self.rates_and_state(time, y, middle)[1]
 
             asked = []
             for event, direction in zip(events, directions, strict=True):
@@ -208,7 +210,7 @@ class InTime:
                 asked[-1].direction = direction
             within = [t for t in times if begin < t <= end or t == begin == 0.0]
             ran = solve_ivp(
-                lambda t, y, middle=middle: self.both(t, y, middle)[0], (begin, end), y,
+                lambda t, y, middle=middle: self.rates_and_state(t, y, middle)[0], (begin, end), y,
                 self.method, t_eval=sorted({*within, end}),
                 events=asked or None, rtol=1e-12, atol=1e-14,
             )  # fmt: skip
@@ -221,6 +223,6 @@ class InTime:
         return rows, told
 
 
-def columns(rows: Sequence[Now]) -> dict[str, np.ndarray]:
+def rows_to_columns(rows: Sequence[InstantState]) -> dict[str, np.ndarray]:
     """Rows by name."""
-    return dict(zip(Now._fields, np.array(rows).T, strict=True))
+    return dict(zip(InstantState._fields, np.array(rows).T, strict=True))

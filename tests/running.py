@@ -29,15 +29,15 @@ from rsfstudy.compute import cells, plan
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.cell import Cell
 from rsfstudy.declare.claims import Claim
-from rsfstudy.errors import DataError, Incomplete
+from rsfstudy.errors import DataError, IncompleteWarning
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.slider.point import Point
 
-SMALL = Study(
+SMALL_STUDY = Study(
     name="small",
     title="A small lattice",
     base=Scene(),
@@ -48,7 +48,7 @@ SMALL = Study(
     measure=CriticalStep(),
 )
 #: A study file with a measure of its own.
-OWN = """
+USER_MEASURE_SOURCE = """
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -62,11 +62,11 @@ class Power(Measure):
     power: int = 1
     offset: float = 0.0
     name: ClassVar[str] = "power"
-    headline = "total"
+    primary_output = "total"
     variables = {"total": ()}
     typical_work = 1
 
-    def find(self, scene, accuracy, meter):
+    def compute(self, scene, accuracy, meter):
         if self.power == 4:
             raise ZeroDivisionError
         return Outcome(Status.OK, {"total": scene.b_over_a**self.power + self.offset})
@@ -77,12 +77,12 @@ study = Study(
     axes=[Axis("power", [1, 2]), Axis("b_over_a", [2, 3])], measure=Power(),
 )
 """
-FAULTY = Path(__file__).with_name("faulty.py")
+FAULTY_STUDY_FILE = Path(__file__).with_name("faulty.py")
 #: Time in s after which what has not come on any machine never will.
-HANGS = 1200.0
+HANG_TIMEOUT = 1200.0
 
 
-def run(study=SMALL, **options) -> xr.Dataset:
+def run(study=SMALL_STUDY, **options) -> xr.Dataset:
     """In this process and in memory, unless told otherwise."""
     return rsfstudy.run(study, **{"workers": 0, "output": None, "progress": False, **options})
 
@@ -92,7 +92,7 @@ def study_of(name, measure, *axes, base=None, **fields) -> Study:
     return Study(name=name, title=name, base=base or Scene(), axes=axes, measure=measure, **fields)
 
 
-def claimed(**fields) -> Claim:
+def example_claim(**fields) -> Claim:
     """A claim that something is 1, to a tenth."""
     usual = {"id": "C1", "statement": "", "source": "", "where": {}, "published": 1.0}
     return Claim(**usual | {"tolerance": 0.1, "reason": ""} | fields)
@@ -100,36 +100,41 @@ def claimed(**fields) -> Claim:
 
 def cell_key(scene, measure) -> bytes:
     """Name of a cell that is planned alone."""
-    return plan.key(scene, measure)
+    return plan.cell_key(scene, measure)
 
 
 def run_with_failures(*words, **options) -> xr.Dataset:
     """The same, where cells are to fail, which is told."""
-    with pytest.warns(Incomplete, match=r"^\d+ of \d+ cells failed: .*failures\(\) lists them$"):
+    with pytest.warns(
+        IncompleteWarning, match=r"^\d+ of \d+ cells failed: .*failures\(\) lists them$"
+    ):
         return run(*words, **options)
 
 
 @contextlib.contextmanager
-def asked_for() -> Iterator[list[Cell]]:
+def record_computed_cells() -> Iterator[list[Cell]]:
     """The cells that are computed meanwhile, in this process."""
-    asked, computed = list[Cell](), cells.computed
+    asked, computed = list[Cell](), cells.compute_cell
 
     def counted(task, cell, **options):
         asked.append(cell)
         return computed(task, cell, **options)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cells, "computed", counted)
+        patch.setattr(cells, "compute_cell", counted)
         yield asked
 
 
 #: Clusters of Dask whose pages are seen from nowhere.
-QUIET = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
+QUIET_CLUSTER_OPTIONS = {
+    "dashboard_address": "127.0.0.1:0",
+    "scheduler_kwargs": {"dashboard": False},
+}
 
 
 #: What is enough of a dear study for its verdicts and its figure: of a dense axis, the points that
 #: claims speak of, and some between; of costs, the problems and integrators that they turn on.
-ENOUGH = {
+REDUCED_AXES = {
     "accuracy_cost": {
         "problem": [
             "critical step",
@@ -186,7 +191,7 @@ ENOUGH = {
 
 
 #: Studies whose motions are left to the compiled engine, which `test_compiled` holds to SciPy's.
-LEFT_TO_COMPILED = (
+COMPILED_ONLY_STUDIES = (
     "bounded_slip", "coverage", "dilatant_cycles", "dilatant_steps", "displacement_boundary",
     "injection", "normal_stress_steps", "rate_step_lattice", "resonance", "rig_recurrence",
     "slide_hold_slide", "stress_drop", "triggering", "two_states", "uncertain_recurrence",
@@ -194,10 +199,10 @@ LEFT_TO_COMPILED = (
 )  # fmt: skip
 
 
-def enough(name: str) -> Study:
+def reduced_study(name: str) -> Study:
     """Return a study, or a part of it with fewer points and the claims about these points."""
-    study, points = catalogue.load(name), ENOUGH.get(name, {})
-    if name in LEFT_TO_COMPILED:
+    study, points = catalogue.load_study(name), REDUCED_AXES.get(name, {})
+    if name in COMPILED_ONLY_STUDIES:
         study = replace(study, accuracy=replace(study.accuracy, engine=COMPILED))
     if kinds := points.get("process"):
         claims = [claim for claim in study.claims if claim.where["process"] in kinds]
@@ -211,10 +216,10 @@ def named_results(name: str, tmp_path_factory) -> tuple[xr.Dataset, Path]:
     """
     place = tmp_path_factory.getbasetemp()
     output = (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "named"
-    file, end = output / f"{name}.nc", time.monotonic() + HANGS
+    file, end = output / f"{name}.nc", time.monotonic() + HANG_TIMEOUT
     while not file.exists():
         try:
-            return run(enough(name), output=output), file
+            return run(reduced_study(name), output=output), file
         except DataError as error:
             if "another run uses" not in str(error) or time.monotonic() > end:
                 raise
@@ -222,14 +227,14 @@ def named_results(name: str, tmp_path_factory) -> tuple[xr.Dataset, Path]:
     return rsfstudy.open(file), file
 
 
-def same_numbers(ours: xr.Dataset, theirs: xr.Dataset) -> None:
+def have_same_numbers(ours: xr.Dataset, theirs: xr.Dataset) -> None:
     """The same bits, but for the time they took."""
     xr.testing.assert_identical(
         ours.drop_vars("wall_time").drop_attrs(), theirs.drop_vars("wall_time").drop_attrs()
     )
 
 
-def call(*words, encoding: str = "utf-8") -> SimpleNamespace:
+def call_main(*words, encoding: str = "utf-8") -> SimpleNamespace:
     """The command in this process, from its real entry point; what would be a traceback is raised,
     and so is what cannot be encoded.
     """
@@ -247,7 +252,7 @@ def call(*words, encoding: str = "utf-8") -> SimpleNamespace:
 
 #: Signals end it even where the tests run in the background, or without a terminal, where shells
 #: have them ignored.
-_COMMAND = """
+_COMMAND_SOURCE = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
@@ -256,10 +261,10 @@ main()
 """
 
 
-def command(*words, **environment) -> subprocess.Popen:
+def start_command(*words, **environment) -> subprocess.Popen:
     """The command in a process, and a session, of its own."""
     return subprocess.Popen(
-        [sys.executable, "-c", _COMMAND, *map(str, words)],
+        [sys.executable, "-c", _COMMAND_SOURCE, *map(str, words)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -268,9 +273,9 @@ def command(*words, **environment) -> subprocess.Popen:
     )
 
 
-def ended(process: subprocess.Popen) -> tuple[int, str, str]:
+def wait_for_command(process: subprocess.Popen) -> tuple[int, str, str]:
     """Exit status, output, and errors without the lines of progress, once it has ended."""
-    out, said = process.communicate(timeout=HANGS)
+    out, said = process.communicate(timeout=HANG_TIMEOUT)
     assert "Traceback" not in said, said
     return (
         process.returncode,
@@ -279,18 +284,18 @@ def ended(process: subprocess.Popen) -> tuple[int, str, str]:
     )
 
 
-def called(words: Sequence[str]) -> tuple[int, str]:
+def run_command(words: Sequence[str]) -> tuple[int, str]:
     """Exit status and what is said by the command in this process, on one line."""
-    done = call(*words)
+    done = call_main(*words)
     return int(done.returncode or 0), " ".join(f"{done.stdout}{done.stderr}".split())
 
 
-def begun(scene: Scene) -> Point:
+def start_point(scene: Scene) -> Point:
     """Point at which the motion of a scene begins."""
-    return next(follow(scene, Accuracy(), Meter(1_000_000))).point
+    return next(integrate_events(scene, Accuracy(), WorkMeter(1_000_000))).point
 
 
-def cells_in(journal: Path) -> int:
+def count_journal_cells(journal: Path) -> int:
     """Number of cells that a run that has ended has kept; what it left unfinished is rolled back,
     as by the next run.
     """
@@ -298,7 +303,7 @@ def cells_in(journal: Path) -> int:
         return int(db.execute("SELECT count(*) FROM cells").fetchone()[0])
 
 
-def until_kept(journal: Path, process: subprocess.Popen) -> None:
+def wait_for_journal_cells(journal: Path, process: subprocess.Popen) -> None:
     """Wait until a run has kept cells. It lets nobody else read its journal: what is on disk is
     looked at without asking.
     """
@@ -313,12 +318,12 @@ def until_kept(journal: Path, process: subprocess.Popen) -> None:
             return cells > 0 and not unfinished.read_bytes()[:8].strip(b"\0")
         return False
 
-    until(kept, process)
+    wait_until(kept, process)
 
 
-def until(true: Callable[[], bool], process: subprocess.Popen) -> None:
+def wait_until(true: Callable[[], bool], process: subprocess.Popen) -> None:
     """Wait until something is so, while a process goes on."""
-    end = time.monotonic() + HANGS
+    end = time.monotonic() + HANG_TIMEOUT
     while not true():
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < end, "it never came to be"

@@ -21,21 +21,31 @@ import rsfstudy
 from rsfstudy.analysis.fitting.record import Record
 
 #: A velocity step up from 1 to 10 um/s after 40 um: parameters in um and s.
-TRUTH = {"a": 0.010, "b": 0.013, "slip_distance": 10.0, "mu_star": 0.6, "stiffness": 3e-3}
-STEP = ((0.0, 1.0), (40.0, 10.0))
+EXACT_PARAMETERS = {
+    "a": 0.010,
+    "b": 0.013,
+    "slip_distance": 10.0,
+    "mu_star": 0.6,
+    "stiffness": 3e-3,
+}
+STEP_UP = ((0.0, 1.0), (40.0, 10.0))
 #: A step down, and a hold between sliding.
-DOWN = ((0.0, 10.0), (4.0, 1.0))
-HOLD = ((0.0, 1.0), (40.0, 0.0), (140.0, 1.0))
+STEP_DOWN = ((0.0, 10.0), (4.0, 1.0))
+SLIDE_HOLD_SLIDE = ((0.0, 1.0), (40.0, 0.0), (140.0, 1.0))
 #: Up and back: the second step at 180 um.
-PAIR = ((0.0, 1.0), (40.0, 10.0), (54.0, 1.0))
+STEP_UP_AND_BACK = ((0.0, 1.0), (40.0, 10.0), (54.0, 1.0))
 #: Options of their fits.
-OPTIONS: dict[str, Any] = {"stiffness": TRUTH["stiffness"], "noise": "ar1", "engine": "compiled"}
+FIT_OPTIONS: dict[str, Any] = {
+    "stiffness": EXACT_PARAMETERS["stiffness"],
+    "noise": "ar1",
+    "engine": "compiled",
+}
 #: Parameters of which augmented equations tell derivatives; of the last two, by their logarithms.
-SENSITIVE = ("a", "b", "stiffness", "slip_distance")
+SENSITIVITY_PARAMETERS = ("a", "b", "stiffness", "slip_distance")
 
-Law = Callable[[float], tuple[float, float]]
+LawFunction = Callable[[float], tuple[float, float]]
 #: h(u) and dh/du, by names of the package.
-LAWS: dict[str, Law] = {
+LAW_FUNCTIONS: dict[str, LawFunction] = {
     "slip": lambda u: (-u, -1.0),
     "slowness": lambda u: (math.expm1(-u), -math.exp(-u)),
     "perrin_rice_zheng": lambda u: (-math.sinh(u), -math.cosh(u)),
@@ -43,23 +53,25 @@ LAWS: dict[str, Law] = {
 }
 
 
-def rows(loading: Sequence[tuple[float, float]], ends: float, count: int) -> np.ndarray:
+def sample_times(loading: Sequence[tuple[float, float]], ends: float, count: int) -> np.ndarray:
     """Times at which a load point has moved evenly; half of them in its holds, if any."""
     times = np.linspace(loading[0][0], ends, 20 * count + 1)
-    moved = load_point(loading, times)
+    moved = load_point_displacement(loading, times)
     share = moved / moved[-1]
     if any(speed == 0.0 for _begins, speed in loading):
         share = 0.5 * (share + times / times[-1])
     return np.interp(np.linspace(0.0, 1.0, count), share, times)
 
 
-def end(loading: Sequence[tuple[float, float]]) -> float:
+def loading_end_time(loading: Sequence[tuple[float, float]]) -> float:
     """Time at which the load point has moved by 100 um in the last piece of loading."""
     begins, speed = loading[-1]
     return begins + 100.0 / speed
 
 
-def load_point(loading: Sequence[tuple[float, float]], times: np.ndarray) -> np.ndarray:
+def load_point_displacement(
+    loading: Sequence[tuple[float, float]], times: np.ndarray
+) -> np.ndarray:
     """Its displacement at times: pieces of loading are (begins in s, velocity in um/s)."""
     begins, speeds = np.array(loading).T
     knots = np.concatenate([[0.0], np.cumsum(np.diff(begins) * speeds[:-1])])
@@ -67,14 +79,16 @@ def load_point(loading: Sequence[tuple[float, float]], times: np.ndarray) -> np.
     return np.asarray(knots[piece] + speeds[piece] * (times - begins[piece]))
 
 
-def motion(
+def friction_and_sensitivities(
     law: str,
     times: np.ndarray,
-    loading: Sequence[tuple[float, float]] = STEP,
-    truth: Mapping[str, float] = TRUTH,
+    loading: Sequence[tuple[float, float]] = STEP_UP,
+    truth: Mapping[str, float] = EXACT_PARAMETERS,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Friction at times, and its derivatives by `SENSITIVE`, shape (times, parameters)."""
-    h, first = LAWS[law], loading[0][1]
+    """Friction at times, and its derivatives by `SENSITIVITY_PARAMETERS`, shape (times,
+    parameters).
+    """
+    h, first = LAW_FUNCTIONS[law], loading[0][1]
     a, b, distance = truth["a"], truth["b"], truth["slip_distance"]
     k, mu_star = truth["stiffness"], truth["mu_star"]
 
@@ -108,7 +122,7 @@ def motion(
     return found[:, 0], found[:, 2:6]
 
 
-def two_states(
+def two_state_friction(
     times: np.ndarray, loading: Sequence[tuple[float, float]], truth: Mapping[str, float]
 ) -> np.ndarray:
     """Friction by the slip law with two states, at times around one step; Theta_i is the part of
@@ -131,7 +145,7 @@ def two_states(
     return friction
 
 
-def correlated(count: int, rho: float, size: float, seed: int) -> np.ndarray:
+def correlated_noise(count: int, rho: float, size: float, seed: int) -> np.ndarray:
     """Noise of first order, or white noise."""
     drawn = np.random.default_rng(seed).standard_normal(count)
     for row in range(1, count):
@@ -139,25 +153,25 @@ def correlated(count: int, rho: float, size: float, seed: int) -> np.ndarray:
     return size * drawn
 
 
-def record(
-    loading: tuple[tuple[float, float], ...] = STEP,
+def synthetic_record(
+    loading: tuple[tuple[float, float], ...] = STEP_UP,
     law: str = "slowness",
     trend: float = 0.0,
     seed: int = 0,
     count: int = 400,
     size: float = 3e-4,
-    truth: Mapping[str, float] = TRUTH,
+    truth: Mapping[str, float] = EXACT_PARAMETERS,
 ) -> Record:
     """Return a record with a noise correlation of 0.5, and a trend from its first step."""
-    times = rows(loading, end(loading), count)
-    moved = load_point(loading, times)
-    friction = motion(law, times, loading, truth)[0] + trend * (moved - 40.0)
-    friction += correlated(count, 0.5, size, seed)
+    times = sample_times(loading, loading_end_time(loading), count)
+    moved = load_point_displacement(loading, times)
+    friction = friction_and_sensitivities(law, times, loading, truth)[0] + trend * (moved - 40.0)
+    friction += correlated_noise(count, 0.5, size, seed)
     arrays = {"time": times, "displacement": moved, "friction": friction}
     steps = [(t, t, one, other) for (_, one), (t, other) in itertools.pairwise(loading)]
     return rsfstudy.read_record(arrays, name=f"record_{seed}").with_steps(steps)
 
 
-def off(fit: xr.Dataset, name: str, true: float) -> float:
+def deviation_in_stderrs(fit: xr.Dataset, name: str, true: float) -> float:
     """By how many standard errors a parameter is off."""
     return float((fit[name] - true) / fit[f"{name}_stderr"])

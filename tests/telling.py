@@ -18,17 +18,17 @@ from frozen_scenes import MOTIONS, Motion, Track
 
 from rsfstudy import Scene
 from rsfstudy.motion.engines import COMPILED, SCIPY
-from rsfstudy.motion.events import Kind
-from rsfstudy.motion.meter import Halt
+from rsfstudy.motion.events import EventKind
+from rsfstudy.motion.meter import MotionStopped
 from rsfstudy.slider.point import Point
 
-FROZEN = Path(__file__).with_name("frozen_events.json")
+FROZEN_EVENTS_FILE = Path(__file__).with_name("frozen_events.json")
 
 #: Numbers of a point that are no states.
-NUMBERS = tuple(name for name in Point._fields if name != "psis")
+POINT_FIELDS = tuple(name for name in Point._fields if name != "psis")
 
 
-class Told(NamedTuple):
+class EventColumns(NamedTuple):
     """What a motion tells, in columns.
 
     Attributes
@@ -48,37 +48,45 @@ class Told(NamedTuple):
     kinds: list[str]
     numbers: dict[str, list[float]]
     work: list[int]
-    loose: list[int]
+    step_rows: list[int]
 
 
-def told(motion: Motion | Track, engine: str, scene: Scene | None = None) -> Told:
+def record_frozen_motion(
+    motion: Motion | Track, engine: str, scene: Scene | None = None
+) -> EventColumns:
     """What an engine tells of a motion, or of another scene in its place."""
     scene = Scene(**motion.fields) if scene is None else scene
     events, kinds = [], list[str]()
     try:
         for event in itertools.islice(motion.events(scene, engine), motion.rows):
             events.append(event)
-            asked = () if event.watch is None else (event.watch.of, f"{event.watch.level:.6g}")
+            asked = (
+                ()
+                if event.specification is None
+                else (event.specification.quantity, f"{event.specification.level:.6g}")
+            )
             kinds.append(" ".join((event.kind, *asked, event.regime)))
-    except Halt as halt:
+    except MotionStopped as halt:
         kinds.append(halt.status.label)
     numbers = {
         "time": [event.time for event in events],
         "slip": [event.slip for event in events],
-        **{name: [getattr(event.point, name) for event in events] for name in NUMBERS},
+        **{name: [getattr(event.point, name) for event in events] for name in POINT_FIELDS},
     }
     for i in range(max((len(event.point.psis) for event in events), default=0)):
         numbers[f"psi_{i + 1}"] = [(*event.point.psis, *[math.nan] * 4)[i] for event in events]
-    loose = [i for i, e in enumerate(events) if e.kind in (Kind.SETTLED, Kind.REGIME)]
-    return Told(kinds, numbers, [event.work for event in events], loose)
+    loose = [i for i, e in enumerate(events) if e.kind in (EventKind.SETTLED, EventKind.REGIME)]
+    return EventColumns(kinds, numbers, [event.evaluations for event in events], loose)
 
 
-def unit_of(name: str, a: float) -> float:
+def number_scale(name: str, a: float) -> float:
     """The change of a number that weighs as much as one of 1 in ln V."""
-    return 1.0 if name in ("time", "slip", "log_slip_rate", "growth") else a
+    return 1.0 if name in ("time", "slip", "log_slip_rate", "log_slip_rate_derivative") else a
 
 
-def apart(motion: Motion | Track, reference: Told, other: Told) -> tuple[float, float]:
+def largest_differences(
+    motion: Motion | Track, reference: EventColumns, other: EventColumns
+) -> tuple[float, float]:
     """The largest relative differences between what is told of a motion, in all rows but those of
     steps, and in those; infinite where something else is told.
 
@@ -93,40 +101,43 @@ def apart(motion: Motion | Track, reference: Told, other: Told) -> tuple[float, 
     worst = [0.0, 0.0]
     for name, values in reference.numbers.items():
         known = (abs(value) for value in values if math.isfinite(value))
-        scale = max([unit_of(name, motion.fields["a"]), *known])
+        scale = max([number_scale(name, motion.fields["a"]), *known])
         for row, (x, y) in enumerate(zip(values, other.numbers[name], strict=True)):
             if x != y and not (math.isnan(x) and math.isnan(y)):
                 off = abs(x - y) / scale
-                off, of_step = off if math.isfinite(off) else math.inf, row in reference.loose
+                off, of_step = off if math.isfinite(off) else math.inf, row in reference.step_rows
                 worst[of_step] = max(worst[of_step], off)
     return worst[0], worst[1]
 
 
-def freeze() -> None:
+def write_frozen_events() -> None:
     """Write the events of all frozen scenes, by SciPy, and the work of both engines."""
     frozen = {}
     for name, motion in MOTIONS.items():
-        found, other = (told(motion, engine) for engine in (SCIPY, COMPILED))
+        found, other = (record_frozen_motion(motion, engine) for engine in (SCIPY, COMPILED))
         work = {"scipy": found.work[-1:], "compiled": other.work[-1:]}
         frozen[name] = {"kinds": found.kinds, "work": work, "numbers": found.numbers}
     lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(it)}" for name, it in frozen.items())
-    FROZEN.write_text(f"{{\n{lines}\n}}\n")
+    FROZEN_EVENTS_FILE.write_text(f"{{\n{lines}\n}}\n")
 
 
 def sensitivity(draws: int = 20, last_bit: float = 2.3e-16) -> None:
     """Print how far events move, and those of steps, with a last bit of all fields."""
     chance = random.Random(1)
     for name, motion in MOTIONS.items():
-        reference = told(motion, SCIPY)
+        reference = record_frozen_motion(motion, SCIPY)
         fields = {"mu_star": 0.76, **motion.fields}
         numbers = [n for n, value in fields.items() if type(value) is float]
-        off = [apart(motion, reference, told(motion, COMPILED))]
+        off = [largest_differences(motion, reference, record_frozen_motion(motion, COMPILED))]
         for _ in range(draws):
             moved = {n: fields[n] * (1.0 + chance.choice((-1, 0, 1)) * last_bit) for n in numbers}
             scene = Scene(**fields | moved)
-            off += [apart(motion, reference, told(motion, by, scene)) for by in (SCIPY, COMPILED)]
+            off += [
+                largest_differences(motion, reference, record_frozen_motion(motion, by, scene))
+                for by in (SCIPY, COMPILED)
+            ]
         print(f"{name:50}", *(f"{max(each):.1e}" for each in zip(*off, strict=True)))
 
 
 if __name__ == "__main__":
-    {"freeze": freeze, "sensitivity": sensitivity}[sys.argv[1]]()
+    {"freeze": write_frozen_events, "sensitivity": sensitivity}[sys.argv[1]]()

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
-from running import claimed
+from running import example_claim
 
 import rsfstudy
 import rsfstudy.api.accessor  # datasets of others have it too, whichever test is the first
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.errors import DataError, InvalidValue, NoAnswer
+from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
 from rsfstudy.measures.critical_step import CriticalStep
 
 STUDY = Study(
@@ -22,10 +22,14 @@ STUDY = Study(
     axes=[Axis("law", ["slip", "slowness"]), Axis("stiffness_ratio", [0.8, 1.2])],
     measure=CriticalStep(),
     claims=[
-        claimed(variable="critical_velocity_ratio", where={"law": "slip", "stiffness_ratio": 1.2},
-                tolerance=0.0, relation="above")
+        example_claim(
+            variable="critical_velocity_ratio",
+            where={"law": "slip", "stiffness_ratio": 1.2},
+            tolerance=0.0,
+            relation="above",
+        )
     ],
-)  # fmt: skip
+)
 SI = {"normal_stress": 1e8, "slip_distance": 1e-5}
 
 
@@ -67,7 +71,7 @@ def test_a_motion_knows_its_scene(scene, tmp_path):
 
 def test_an_answer_knows_its_scene_and_why_it_has_no_number():
     scene = Scene(stiffness_ratio=0.8)
-    with pytest.warns(NoAnswer):
+    with pytest.warns(NoResultWarning):
         step = rsfstudy.critical_step(scene, rtol=1e-3)
     assert step.rsf.scene == scene
     (row,) = step.rsf.failures().to_dict("records")

@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import EACH_STEP
-from extended_precision import critical_velocity, slider
-from rsfstudy.named_studies._cheapest import Cheapest
+from conftest import STEP_END_EVENT
+from extended_precision import critical_velocity, make_slider
+from rsfstudy.named_studies._cheapest import CheapestIntegrator
 from rsfstudy.named_studies._problem import Problem
 from rsfstudy.named_studies.accuracy_cost import WorkPrecision
 
@@ -20,12 +20,12 @@ from rsfstudy.measures import Outcome
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import along
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.course import events_along
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.steppers.scipy import METHODS
-from rsfstudy.reduce import reduced
-from rsfstudy.slider.equations import between_ruptures
+from rsfstudy.reduce import apply_reductions
+from rsfstudy.slider.equations import equations_between_ruptures
 from rsfstudy.status import Status
 
 SCENE = Scene(law="slowness", normal_stress="constant", load_velocity_ratio=20.0)
@@ -43,13 +43,15 @@ CYCLE = Scene(normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio
 @pytest.mark.parametrize("method", sorted(METHODS))
 def test_every_right_hand_side_is_counted(method, monkeypatch):
     """By the meter as by the equations themselves: Jacobians and interpolants included."""
-    system, calls = between_ruptures(SCENE, clock=False), []
-    counted = system._replace(rate=lambda state, p: (calls.append(state), system.rate(state, p))[1])
-    meter = Meter(10**6, {"quasi_static": method})
+    system, calls = equations_between_ruptures(SCENE, clock=False), []
+    counted = system._replace(
+        rate_function=lambda state, p: (calls.append(state), system.rate_function(state, p))[1]
+    )
+    meter = WorkMeter(10**6, {"quasi_static": method})
     # within each step it is recorded, which asks for interpolants
-    path = along(counted, (0.0, 0.0), 1e-6, meter, [EACH_STEP], recording=Recording())
+    path = events_along(counted, (0.0, 0.0), 1e-6, meter, [STEP_END_EVENT], recording=Recording())
     told = list(itertools.islice(path, 22))
-    assert meter.spent == told[-1].work == len(calls)
+    assert meter.evaluations == told[-1].evaluations == len(calls)
     assert meter.steps == 21
     assert (meter.jacobians > 0) == (method in ("Radau", "BDF"))
 
@@ -111,7 +113,9 @@ def runs(achieved, work) -> xr.Dataset:
 def test_the_cheapest_integrator_is_found_between_its_runs():
     """The default makes 10 of its 100 to 1000 between 4 and 8 digits: at 6, sqrt(100 1000)."""
     dataset = runs([[4, 8, 10], [2, 6, 7]], [[100, 1000, 5000], [10, 50, np.nan]])
-    found = reduced(dataset, (Cheapest(name="c", of="achieved_digits", digits=(6.0, 9.0)),))
+    found = apply_reductions(
+        dataset, (CheapestIntegrator(name="c", of="achieved_digits", digits=(6.0, 9.0)),)
+    )
     assert found.c_integrator.values.tolist() == ["other", "DOP853"]
     assert float(found.c_default_work.sel(digits=6)) == pytest.approx(math.sqrt(1e5))
     assert float(found.c_ratio.sel(digits=6)) == pytest.approx(math.sqrt(1e5) / 50.0)
@@ -120,19 +124,23 @@ def test_the_cheapest_integrator_is_found_between_its_runs():
 
 def test_digits_reached_by_luck_do_not_count():
     dataset = runs([[9, 5, 9], [1, 2, 3]], [[10, 100, 1000], [10, 100, 1000]])
-    found = reduced(dataset, (Cheapest(name="c", of="achieved_digits", digits=(6.0,)),))
+    found = apply_reductions(
+        dataset, (CheapestIntegrator(name="c", of="achieved_digits", digits=(6.0,)),)
+    )
     assert float(found.c_default_work[0]) > 100.0
 
 
 def test_a_reference_computed_anew():
     """One of those stored: critical velocity of a/(b-a) = 1, slip law, constant normal stress."""
-    assert float(critical_velocity(slider(), 5e-4)) == pytest.approx(1.999949384410229, rel=1e-14)
+    assert float(critical_velocity(make_slider(), 5e-4)) == pytest.approx(
+        1.999949384410229, rel=1e-14
+    )
 
 
 @pytest.mark.parametrize(("name", "within"), [("critical_step", 0.15), ("limit_cycle", 0.4)])
 def test_the_work_a_user_is_told_is_the_work_it_takes(name, within):
     """The table of cycles is that of another one."""
-    problems = catalogue.load("accuracy_cost").measure.problems
+    problems = catalogue.load_study("accuracy_cost").measure.problems
     problem = next(p for p in problems if p.measure.name == name)
     measure = problem.measure
     typical = measure(problem.scene, Accuracy()).rhs_evaluations

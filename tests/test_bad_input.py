@@ -10,13 +10,13 @@ import pytest
 import xarray as xr
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from running import SMALL, called, run
+from running import SMALL_STUDY, run, run_command
 
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.slider.registry import FIELDS
+from rsfstudy.slider.registry import FIELD_NAMES
 
 #: Anything a user, a JSON file or a notebook may put where a value is asked for.
 ODD = st.one_of(
@@ -29,7 +29,7 @@ ODD = st.one_of(
 
 
 @settings(max_examples=50)
-@given(st.dictionaries(st.sampled_from(FIELDS) | st.text(max_size=6), ODD, max_size=4))
+@given(st.dictionaries(st.sampled_from(FIELD_NAMES) | st.text(max_size=6), ODD, max_size=4))
 def test_a_scene_is_made_or_refused(fields):
     try:
         stiffness = Scene(**fields).stiffness
@@ -42,13 +42,13 @@ def test_a_scene_is_made_or_refused(fields):
     assert any(name in said for name in named), said
 
 
-NAMES = st.sampled_from(FIELDS) | st.text(max_size=6)
+NAMES = st.sampled_from(FIELD_NAMES) | st.text(max_size=6)
 
 
 @given(st.dictionaries(NAMES, ODD | st.lists(ODD, max_size=3), max_size=3))
 def test_overrides_make_a_study_or_are_refused(overrides):
     try:
-        study = SMALL.with_(**overrides)
+        study = SMALL_STUDY.with_(**overrides)
         scenes = list(study.scenes())
     except InvalidValue:
         return
@@ -63,11 +63,11 @@ SETTINGS = st.one_of(
     st.text(max_size=12),
     st.builds(
         "{}={}".format,
-        st.sampled_from([*FIELDS, "case", "b_over"]),
+        st.sampled_from([*FIELD_NAMES, "case", "b_over"]),
         st.text(alphabet=string.digits + ".,:-+eainf ", max_size=10),
     ),
     st.builds(
-        "{}={}:{}:{}".format, st.sampled_from(FIELDS), st.floats(), st.floats(),
+        "{}={}:{}:{}".format, st.sampled_from(FIELD_NAMES), st.floats(), st.floats(),
         st.integers(-2, 30) | st.floats(),
     ),
 )  # fmt: skip
@@ -85,7 +85,7 @@ def test_any_setting_is_taken_or_refused(texts):
     words = ["show", "rate_step_boundary"]
     for text in texts:
         words += ["--set", text]
-    code, said = called(words)
+    code, said = run_command(words)
     assert code in (0, 2), said
     assert code == 0 or "rror" in said
 
@@ -139,7 +139,7 @@ def test_any_study_file_is_taken_or_refused(tmp_path_factory, text):
     path = tmp_path_factory.mktemp("file") / "mine.py"
     path.write_text(text, errors="surrogatepass")
     with pytest.raises(InvalidValue, match="mine"):
-        catalogue.load(str(path))
+        catalogue.load_study(str(path))
 
 
 # ---- where results go ---------------------------------------------------------------------------
@@ -148,6 +148,6 @@ def test_any_study_file_is_taken_or_refused(tmp_path_factory, text):
 @pytest.mark.parametrize("output", ["/dev/null/results", "/proc/results"])
 def test_an_output_that_cannot_be_written(output, monkeypatch):
     """Told before any cell is computed."""
-    monkeypatch.setattr("rsfstudy.compute.cells.computed", None)
+    monkeypatch.setattr("rsfstudy.compute.cells.compute_cell", None)
     with pytest.raises(DataError, match=f"cannot use {output}.*Choose another --output"):
         run(output=output)

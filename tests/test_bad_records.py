@@ -21,11 +21,13 @@ FOUR = ("a", "b", "slip_distance", "mu_star")
 
 def columns(count: int = ROWS) -> dict[str, np.ndarray]:
     """A velocity step by the slip law, with correlated noise."""
-    time = synthetic.rows(synthetic.STEP, 50.0, count)
-    friction = synthetic.motion("slip", time)[0] + synthetic.correlated(count, 0.5, 1e-4, 3)
+    time = synthetic.sample_times(synthetic.STEP_UP, 50.0, count)
+    friction = synthetic.friction_and_sensitivities("slip", time)[0] + synthetic.correlated_noise(
+        count, 0.5, 1e-4, 3
+    )
     return {
         "time": time,
-        "displacement": synthetic.load_point(synthetic.STEP, time),
+        "displacement": synthetic.load_point_displacement(synthetic.STEP_UP, time),
         "friction": friction,
     }
 

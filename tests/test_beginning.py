@@ -7,10 +7,10 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from running import begun
+from running import start_point
 
 from rsfstudy import Scene
-from rsfstudy.motion.starting import starting
+from rsfstudy.motion.starting import initial_point
 
 DYNAMICS = ({}, {"radiation_damping": 1e-3}, {"inertia": True})
 
@@ -33,19 +33,19 @@ def test_it_begins_as_stated(stress, state, normal_stress, dependence, dynamics)
         initial_state=state,
         **dynamics,
     )
-    begin = begun(scene)
+    begin = start_point(scene)
     assert begin.spring_stress == stress
     assert begin.state == pytest.approx(state, abs=1e-13)
     friction = scene.mu_star + scene.a * begin.log_slip_rate + state
-    assert begin.coefficient == pytest.approx(friction, abs=1e-12)
+    assert begin.friction_coefficient == pytest.approx(friction, abs=1e-12)
 
 
 def test_steps_come_on_top():
     """With mass, slip rate at the instant of a step is that of the stated stress and state."""
     scene = Scene(initial_state=0.05, inertia=True, normal_stress="imposed", alpha=0.3)
-    begin = starting(scene)
-    after = starting(scene.with_(displacement_step=0.5, normal_stress_step=-0.01))
+    begin = initial_point(scene)
+    after = initial_point(scene.with_(displacement_step=0.5, normal_stress_step=-0.01))
     assert after.log_slip_rate == pytest.approx(begin.log_slip_rate, abs=1e-12)
     assert after.spring_stress == scene.stiffness * 0.5
-    after = begun(scene.with_(displacement_step=0.5, normal_stress_step=-0.01))
+    after = start_point(scene.with_(displacement_step=0.5, normal_stress_step=-0.01))
     assert after.state == pytest.approx(0.05 - 0.3 * math.log(0.99), abs=1e-14)

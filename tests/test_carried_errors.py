@@ -6,22 +6,22 @@ import xarray as xr
 
 from rsfstudy.reduce import (
     Boundary,
-    DecadeFit,
+    ClosedFormRatio,
     Difference,
     Inverse,
     LinearFit,
     Logarithm,
     Mean,
-    OverClosedForm,
     PowerLaw,
     ProportionalFit,
     Quantile,
     Range,
     RelativeDifference,
+    SemilogFit,
     StandardDeviation,
-    reduced,
+    apply_reductions,
 )
-from rsfstudy.reduce.base import COMMENT
+from rsfstudy.reduce.base import ERROR_COMMENT
 from rsfstudy.status import Status
 
 X = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
@@ -53,11 +53,11 @@ KINDS = [
     ProportionalFit("r", OF, ON, minus=1.0),
     ProportionalFit("r", OF, ON, within=(0.5, 2.0)),
     LinearFit("r", OF, ON),
-    DecadeFit("r", OF, ON),
+    SemilogFit("r", OF, ON),
     PowerLaw("r", OF, ON, within=(0.5, 4.0)),
     Difference("r", OF, **AGAINST),
     RelativeDifference("r", OF, **AGAINST),
-    OverClosedForm("r", OF, form="velocity_step_at_critical_stiffness"),
+    ClosedFormRatio("r", OF, form="velocity_step_at_critical_stiffness"),
     Range("r", OF, ON),
     Range("r", OF, ON, within=(0.5, 2.0)),
     Mean("r", OF, over="b_over_a"),
@@ -68,22 +68,22 @@ KINDS = [
 
 def moved_one_by_one(reduction, dataset) -> xr.DataArray:
     """What the errors of cells change, each cell moved by its own and reduced again, all added."""
-    still, sums = reduced(dataset, (reduction,)).r, 0.0
+    still, sums = apply_reductions(dataset, (reduction,)).r, 0.0
     for place in np.ndindex(dataset[OF].shape):
         other = dataset.copy(deep=True)
         other[OF][place] += dataset[f"{OF}_error"][place]
-        sums = sums + abs(reduced(other, (reduction,)).r - still)
+        sums = sums + abs(apply_reductions(other, (reduction,)).r - still)
     return sums
 
 
 @pytest.mark.parametrize("reduction", KINDS, ids=lambda r: f"{r.kind} {getattr(r, 'within', '')}")
 def test_the_error_is_what_cells_moved_by_theirs_change_in_all(reduction):
     dataset = lattice()
-    error = reduced(dataset, (reduction,)).r_error
+    error = apply_reductions(dataset, (reduction,)).r_error
     # 1e-6 of a number is the second order; and the last bits of it
     expected = moved_one_by_one(reduction, dataset).transpose(*error.dims)
     np.testing.assert_allclose(error, expected, rtol=1e-5, atol=2e-15)
-    assert error.attrs["comment"] == COMMENT
+    assert error.attrs["comment"] == ERROR_COMMENT
     assert error.attrs["long_name"].startswith("numerical error estimate of")
 
 
@@ -92,11 +92,11 @@ def test_an_inverse_has_them_beside_its_own(noise):
     """Each cell moved, and the uncertainty of the interpolant as it is without them."""
     values = 1.3 * X**0.8 * (1.0 + noise * RANDOM.uniform(-1.0, 1.0, (2, 5)))
     inverse = Inverse("r", OF, ON, levels=2.0)
-    exact = reduced(lattice(values, errors=0.0), (inverse,)).r_error
+    exact = apply_reductions(lattice(values, errors=0.0), (inverse,)).r_error
     dataset = lattice(values)
     expected = exact + moved_one_by_one(inverse, dataset)
     np.testing.assert_allclose(
-        reduced(dataset, (inverse,)).r_error, expected, rtol=1e-4, atol=1e-14
+        apply_reductions(dataset, (inverse,)).r_error, expected, rtol=1e-4, atol=1e-14
     )
     assert (expected > exact + 1e-8).all()
 
@@ -106,7 +106,7 @@ def test_an_exact_relation_has_no_standard_error_but_that_of_its_cells():
     truth, part = 1.0 + 4.0 / 3.0 * X, 3e-8
     dataset = lattice([truth * (1.0 + part)] * 2, errors=part * truth)
     fit = LinearFit("slope", OF, ON)
-    result = reduced(dataset, (fit,)).isel(case=0)
+    result = apply_reductions(dataset, (fit,)).isel(case=0)
     off = abs(float(result.slope) - 4.0 / 3.0)
     assert float(result.slope_stderr) < 1e-3 * off
     assert off <= float(result.slope_error) < 5.0 * off
@@ -114,7 +114,7 @@ def test_an_exact_relation_has_no_standard_error_but_that_of_its_cells():
 
 def test_a_reference_is_like_itself_whatever_its_error():
     for kind in (Difference, RelativeDifference):
-        result = reduced(lattice(), (kind("r", OF, **AGAINST),))
+        result = apply_reductions(lattice(), (kind("r", OF, **AGAINST),))
         assert (result.r_error.sel(case="reference") == 0.0).all()
 
 
@@ -123,7 +123,7 @@ def test_a_cell_of_no_known_error_leaves_it_unknown():
     errors = ERRORS.copy()
     errors[1, 4] = np.nan
     fits = (LinearFit("all", OF, ON), LinearFit("some", OF, ON, within=(0.25, 2.0)))
-    result = reduced(lattice(errors=errors), (*fits, Range("r", OF, ON)))
+    result = apply_reductions(lattice(errors=errors), (*fits, Range("r", OF, ON)))
     for name in ("all", "r"):
         assert result[f"{name}_error"].isnull().values.tolist() == [False, True]
         assert result[name].notnull().all()
@@ -136,23 +136,23 @@ def test_a_cell_without_a_number_has_no_say(status):
     values[1, 4] = errors[1, 4] = np.nan
     dataset = lattice(values, errors)
     dataset["status"][1, 4] = int(status)
-    result = reduced(dataset, (LinearFit("r", OF, ON),), despite_failures=True)
+    result = apply_reductions(dataset, (LinearFit("r", OF, ON),), despite_failures=True)
     assert int(result.r_points[1]) == 4
     only = dataset.isel(b_over_a=slice(4))
-    expected = reduced(only, (LinearFit("r", OF, ON),)).r_error
+    expected = apply_reductions(only, (LinearFit("r", OF, ON),)).r_error
     np.testing.assert_allclose(result.r_error[1], expected[1], rtol=1e-12)
 
 
 def test_a_result_that_is_refused_has_no_error():
     dataset = lattice()
     dataset["status"][1, 2] = int(Status.WORK_BUDGET_SPENT)
-    result = reduced(dataset, (LinearFit("r", OF, ON),))
+    result = apply_reductions(dataset, (LinearFit("r", OF, ON),))
     assert result.r_error.isnull().values.tolist() == [False, True]
     assert "failed or are missing" in result.r_error.attrs["refused"]
 
 
 def test_cells_without_errors_give_none():
-    result = reduced(lattice().drop_vars(f"{OF}_error"), (LinearFit("r", OF, ON),))
+    result = apply_reductions(lattice().drop_vars(f"{OF}_error"), (LinearFit("r", OF, ON),))
     assert "r_error" not in result
     assert "r_error" not in result.r.attrs["ancillary_variables"]
 
@@ -161,7 +161,7 @@ def test_a_spread_knows_the_cells_that_may_be_farthest():
     """The second largest is off by more than what the largest leads by."""
     values = np.tile([1.0, 1.5, 2.0, 2.999, 3.0], (2, 1))
     errors = np.tile([1e-6, 1e-6, 1e-6, 1e-2, 1e-6], (2, 1))
-    result = reduced(lattice(values, errors), (Range("r", OF, ON),))
+    result = apply_reductions(lattice(values, errors), (Range("r", OF, ON),))
     np.testing.assert_allclose(result.r_error, 1e-2 + 1e-6, rtol=1e-9)
 
 
@@ -170,7 +170,7 @@ def test_the_error_of_a_quantile_bounds_whatever_cells_change_places():
     quantile, random = Quantile("r", OF, over="b_over_a", level=0.3), np.random.default_rng(7)
     values = np.tile([1.0, 2.0, 2.01, 3.0, 4.0], (2, 1))
     errors = np.array([[1e-6, 1e-6, 0.5, 1e-6, 1e-6], [1e-6, 0.4, 1e-6, np.nan, 1e-6]])
-    found = reduced(lattice(values, errors), (quantile,))
+    found = apply_reductions(lattice(values, errors), (quantile,))
     # 2.002, of which 1.608 is left where 2.01 is 1.51
     assert float(found.r_error[0]) == pytest.approx(0.394, abs=2e-6)
     for _ in range(50):
@@ -181,7 +181,7 @@ def test_the_error_of_a_quantile_bounds_whatever_cells_change_places():
 
 def test_errors_go_through_several_reductions():
     chain = (LinearFit("slope", OF, ON), Difference("steeper", "slope", **AGAINST))
-    result = reduced(lattice(), chain)
+    result = apply_reductions(lattice(), chain)
     expected = float(result.slope_error.sum())
     assert float(result.steeper_error.sel(case="other")) == pytest.approx(expected, rel=1e-8)
 
@@ -189,8 +189,8 @@ def test_errors_go_through_several_reductions():
 def test_a_boundary_leaves_out_what_is_nearer_to_the_level_than_its_error():
     values = np.tile([0.0, 0.2, 0.52, 0.9, 1.0], (2, 1))
     boundary = Boundary("r", OF, ON)
-    sharp = reduced(lattice(values, errors=0.01), (boundary,))
-    blurred = reduced(lattice(values, errors=0.05), (boundary,))
+    sharp = apply_reductions(lattice(values, errors=0.01), (boundary,))
+    blurred = apply_reductions(lattice(values, errors=0.05), (boundary,))
     assert [float(v[0]) for v in (sharp.r_stable, sharp.r_unstable)] == [0.5, 1.0]
     assert [float(v[0]) for v in (blurred.r_stable, blurred.r_unstable)] == [0.5, 2.0]
     assert float(blurred.r_error[0]) == 0.75

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from running import run
 
 import rsfstudy
-from rsfstudy import Laboratory, Study
+from rsfstudy import Rig, Study
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.rig.units import factor
+from rsfstudy.rig.units import unit_factor
 
 NAMES = {
     "Pa": ("Pa", "kPa", "MPa", "GPa", "bar", "N/m^2", "N/cm^2"),
@@ -34,7 +34,7 @@ RIG = {
     "stiffness": ("1e9", "Pa/m"),
     "period": ("0.02", "s"),
 }
-PLAIN = Laboratory(**{name: float(size) for name, (size, _kind) in RIG.items()})
+PLAIN = Rig(**{name: float(size) for name, (size, _kind) in RIG.items()})
 FRICTION = {"law": "slowness", "a": 0.01, "b_over_a": 1.5}
 HOW = {"engine": "compiled", "rtol": 1e-5}
 few = settings(max_examples=12)
@@ -44,7 +44,7 @@ def stated(size, kind):
     """A quantity in any of its units in which it has no more digits than a number holds."""
 
     def text(unit):
-        value = Fraction(size) / factor("x", unit, kind)
+        value = Fraction(size) / unit_factor("x", unit, kind)
         return f"{float(value)!r} {unit}" if Fraction(repr(float(value))) == value else None
 
     return st.sampled_from([text(unit) for unit in UNITS[kind] if text(unit)])
@@ -52,7 +52,7 @@ def stated(size, kind):
 
 def rigs(*names):
     texts = {name: stated(*RIG[name]) for name in names or RIG}
-    return st.fixed_dictionaries(texts).map(lambda given: Laboratory(**given))
+    return st.fixed_dictionaries(texts).map(lambda given: Rig(**given))
 
 
 def same(found: xr.Dataset, known: xr.Dataset) -> None:
@@ -63,7 +63,7 @@ def same(found: xr.Dataset, known: xr.Dataset) -> None:
 
 def cycles(rig, stresses, velocities):
     study = Study(
-        name="cycles", title="Cycles", laboratory=rig, base=rig.scene(**FRICTION),
+        name="cycles", title="Cycles", rig=rig, base=rig.scene(**FRICTION),
         axes=[rig.axis("normal_stress", stresses), rig.axis("load_velocity", velocities)],
         measure=LimitCycle(phases=3),
     )  # fmt: skip

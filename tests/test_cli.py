@@ -6,15 +6,15 @@ import sys
 from dataclasses import replace
 
 import pytest
-from faulty import declared
-from running import SMALL as LATTICE
-from running import call, claimed, named_results
+from faulty import faulty_study
+from running import SMALL_STUDY as LATTICE
+from running import call_main, example_claim, named_results
 
 import rsfstudy
 from rsfstudy.cli import assignments
 from rsfstudy.declare import catalogue, names
 from rsfstudy.files import store
-from rsfstudy.motion import engines
+from rsfstudy.motion import engine_factory
 
 NAME = "rate_step_boundary"
 SMALL = ["--serial", "--set", "b_over_a=2,3,5"]
@@ -45,13 +45,13 @@ def test_run_writes_the_dataset_and_the_figure_and_prints_what_it_found(results)
 
 def test_check_a_name_and_a_file(results):
     output, _said = results
-    assert call("check", NAME, "--output", output).returncode == 0
-    assert call("check", output / f"{NAME}.nc").returncode == 0
+    assert call_main("check", NAME, "--output", output).returncode == 0
+    assert call_main("check", output / f"{NAME}.nc").returncode == 0
 
 
 def test_check_all_checks_what_is_there_and_names_what_is_not(results):
     output, _said = results
-    checked = call("check", "--all", "--output", output)
+    checked = call_main("check", "--all", "--output", output)
     others = [name for name in rsfstudy.studies() if name != NAME]
     assert checked.returncode == (1 if others else 0)
     assert "C7" in checked.stdout
@@ -62,8 +62,8 @@ def test_check_all_checks_what_is_there_and_names_what_is_not(results):
 def test_check_fails_when_a_verdict_moves(tmp_path, tmp_path_factory):
     moved, _path = named_results(NAME, tmp_path_factory)
     moved["zeta"] = moved["zeta"] + 0.5
-    store.write(moved, tmp_path / "moved.nc")
-    checked = call("check", tmp_path / "moved.nc")
+    store.write_dataset(moved, tmp_path / "moved.nc")
+    checked = call_main("check", tmp_path / "moved.nc")
     assert checked.returncode == 1
     assert "differs, expected reproduced" in checked.stdout
 
@@ -79,14 +79,14 @@ def test_check_fails_when_a_verdict_moves(tmp_path, tmp_path_factory):
 )
 def test_other_lattices_run_check_and_plot_and_say_what_they_are(settings, tmp_path):
     """Both say how many claims were checked; where none is, `check` fails."""
-    ran = call("run", NAME, "--serial", *settings, "--output", tmp_path)
+    ran = call_main("run", NAME, "--serial", *settings, "--output", tmp_path)
     assert ran.returncode == 0, ran.stderr
-    checked = call("check", NAME, "--output", tmp_path)
+    checked = call_main("check", NAME, "--output", tmp_path)
     counted = next(line for line in checked.stdout.splitlines() if " of 6 claims checked" in line)
     assert counted in ran.stdout
     nothing = counted == "0 of 6 claims checked: other values or units have no published numbers"
     assert checked.returncode == int(nothing), checked.stderr
-    drawn = call("plot", NAME, "--output", tmp_path)
+    drawn = call_main("plot", NAME, "--output", tmp_path)
     assert drawn.returncode == 0, drawn.stderr
     assert "not as declared" in ran.stdout
     assert settings[1].split("=")[0] in ran.stdout
@@ -98,25 +98,25 @@ def test_other_lattices_run_check_and_plot_and_say_what_they_are(settings, tmp_p
 def test_a_claim_that_is_named_must_apply(tmp_path):
     """Of claim C6 the slope is left out with cells of its support, the value at b/a = 2 is not."""
     dataset = rsfstudy.run(NAME, workers=0, output=None, progress=False, b_over_a=[2, 3])
-    store.write(dataset, tmp_path / "few.nc")
-    everything = call("check", tmp_path / "few.nc")
+    store.write_dataset(dataset, tmp_path / "few.nc")
+    everything = call_main("check", tmp_path / "few.nc")
     assert everything.returncode == 0
     assert "2 of 6 claims checked: 2 reproduced, 4 not applicable" in everything.stdout
-    named = call("check", tmp_path / "few.nc", "--claim", "C6")
+    named = call_main("check", tmp_path / "few.nc", "--claim", "C6")
     assert named.returncode == 1
     assert "1 of 2 claims checked" in named.stdout
-    unknown = call("check", tmp_path / "few.nc", "--claim", "C99")
+    unknown = call_main("check", tmp_path / "few.nc", "--claim", "C99")
     assert unknown.returncode == 2
     assert "C6, C7" in " ".join(unknown.stderr.split())
 
 
 def test_list_and_show():
-    listed = call("list")
+    listed = call_main("list")
     assert listed.returncode == 0
     said = " ".join(listed.stdout.split())
     for name, study in rsfstudy.studies().items():
         assert f"{name} {study.title}" in said
-    shown = call("show", NAME, "--set", "b_over_a=2,3")
+    shown = call_main("show", NAME, "--set", "b_over_a=2,3")
     assert shown.returncode == 0
     assert ["cells", "6"] in [line.split() for line in shown.stdout.splitlines()]
     assert "right-hand sides" in shown.stdout
@@ -134,15 +134,17 @@ def test_list_and_show():
     ],
 )
 def test_settings(text, values):
-    assert assignments.setting(text, ())[1] == values
+    assert assignments.parse_setting(text, ())[1] == values
 
 
 def test_a_label_may_hold_commas_and_colons(tmp_path):
     label = "rigid, V = 1e12 V_*"
-    ran = call("run", "hard_cases", "--set", f"hard_case={label}", "--output", tmp_path, "--serial")
+    ran = call_main(
+        "run", "hard_cases", "--set", f"hard_case={label}", "--output", tmp_path, "--serial"
+    )
     assert ran.returncode == 0, ran.stderr
     assert rsfstudy.open("hard_cases", tmp_path).hard_case.values.tolist() == [label]
-    several = assignments.setting(f"hard_case={label},other , {label}", (label, "rigid"))
+    several = assignments.parse_setting(f"hard_case={label},other , {label}", (label, "rigid"))
     assert several == ("hard_case", [label, "other", label])
 
 
@@ -154,9 +156,9 @@ def catalogued(monkeypatch):
     """Puts studies in the place of the named ones."""
 
     def named(*studies):
-        by_name, load = {study.name: study for study in studies}, catalogue.load
-        monkeypatch.setattr(names, "names", lambda: tuple(by_name))
-        monkeypatch.setattr(catalogue, "load", lambda name: by_name.get(name) or load(name))
+        by_name, load = {study.name: study for study in studies}, catalogue.load_study
+        monkeypatch.setattr(names, "study_names", lambda: tuple(by_name))
+        monkeypatch.setattr(catalogue, "load_study", lambda name: by_name.get(name) or load(name))
 
     return named
 
@@ -173,16 +175,16 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
     the others are run, and a table says what became of each.
     """
     monkeypatch.setenv("COLUMNS", "150")
-    claim = claimed(variable="total", where={"b_over_a": 2.0}, published=3.0)
+    claim = example_claim(variable="total", where={"b_over_a": 2.0}, published=3.0)
     catalogued(
-        replace(declared("raises", at=(2.5,)), name="failing"),
-        replace(declared(), name="moving", claims=[claim]),
-        replace(declared(), name="undrawn", plot="no_such_figure"),
-        replace(declared(), name="taken"),
-        replace(declared(), name="fine"),
+        replace(faulty_study("raises", at=(2.5,)), name="failing"),
+        replace(faulty_study(), name="moving", claims=[claim]),
+        replace(faulty_study(), name="undrawn", plot="no_such_figure"),
+        replace(faulty_study(), name="taken"),
+        replace(faulty_study(), name="fine"),
     )
     (tmp_path / "taken.cells.sqlite").write_text("something else")
-    ran = call("run", "--all", "--serial", "--output", tmp_path)
+    ran = call_main("run", "--all", "--serial", "--output", tmp_path)
     assert ran.returncode == 1
     assert "taken.cells.sqlite" in ran.stderr.replace("\n", "")
     ended = rows(ran.stdout)
@@ -201,46 +203,48 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
 def without_numba(monkeypatch):
     """As where Numba is not installed."""
     monkeypatch.setitem(sys.modules, "rsfstudy.motion.compiled.machine", None)
-    engines.compiled_engine.cache_clear()
+    engine_factory.compiled_engine.cache_clear()
     yield
-    engines.compiled_engine.cache_clear()
+    engine_factory.compiled_engine.cache_clear()
 
 
 def compiled(**fields):
-    study = declared()
+    study = faulty_study()
     return replace(study, accuracy=replace(study.accuracy, engine="compiled"), **fields)
 
 
 def test_run_all_names_the_studies_it_leaves_out(catalogued, tmp_path, monkeypatch, without_numba):
     """Where Numba is missing, a study that needs it is no failure."""
     monkeypatch.setenv("COLUMNS", "150")
-    catalogued(compiled(name="dear"), replace(declared(), name="plain"))
-    ran = call("run", "--all", "--serial", "--output", tmp_path)
+    catalogued(compiled(name="dear"), replace(faulty_study(), name="plain"))
+    ran = call_main("run", "--all", "--serial", "--output", tmp_path)
     assert ran.returncode == 0, ran.stderr
     said, short = "left out: needs Numba (pip install 'rsfstudy[fast]')", "left out: needs Numba"
     assert f"dear: {said}" in ran.stdout
     ended = {name: row[-1] for name, row in rows(ran.stdout).items()}
     assert ended == {"plain": "ok", "dear": short}
     assert not list(tmp_path.glob("dear*"))
-    checked = call("check", "--all", "--output", tmp_path)
+    checked = call_main("check", "--all", "--output", tmp_path)
     assert f"dear: {said}" in checked.stdout
     assert "not run yet" not in checked.stdout
 
 
 def test_what_is_asked_for_is_not_left_out(catalogued, tmp_path, without_numba):
     """A study alone, or the engine itself: an error with the remedy, before any work."""
-    catalogued(compiled(name="dear"), replace(declared(), name="plain"))
+    catalogued(compiled(name="dear"), replace(faulty_study(), name="plain"))
     for words in (["dear"], ["--all", "--engine", "compiled"]):
-        ran = call("run", *words, "--serial", "--output", tmp_path / "o")
+        ran = call_main("run", *words, "--serial", "--output", tmp_path / "o")
         assert ran.returncode == 2
         assert "pip install 'rsfstudy[fast]'" in " ".join(ran.stderr.split())
         assert not (tmp_path / "o").exists()
 
 
 def test_ctrl_c_ends_all_studies(catalogued, tmp_path):
-    interrupted = replace(declared("interrupts", at=(2.5,)), name="interrupted")
-    catalogued(replace(declared(), name="before"), interrupted, replace(declared(), name="after"))
-    ran = call("run", "--all", "--serial", "--output", tmp_path)
+    interrupted = replace(faulty_study("interrupts", at=(2.5,)), name="interrupted")
+    catalogued(
+        replace(faulty_study(), name="before"), interrupted, replace(faulty_study(), name="after")
+    )
+    ran = call_main("run", "--all", "--serial", "--output", tmp_path)
     assert ran.returncode == 1
     assert "cells are finished and kept" in ran.stderr
     assert list(rows(ran.stdout)) == ["before"]
@@ -248,8 +252,10 @@ def test_ctrl_c_ends_all_studies(catalogued, tmp_path):
 
 
 def test_wrong_usage_of_a_later_study_is_told_before_any_work(catalogued, tmp_path):
-    catalogued(LATTICE, declared())
-    ran = call("run", "--all", "--serial", "--set", "case=constant", "--output", tmp_path / "o")
+    catalogued(LATTICE, faulty_study())
+    ran = call_main(
+        "run", "--all", "--serial", "--set", "case=constant", "--output", tmp_path / "o"
+    )
     assert ran.returncode == 2
     assert "case" in ran.stderr
     assert not (tmp_path / "o").exists()
@@ -271,7 +277,7 @@ def test_exit_statuses_of_a_motion(duration, budget, status, said, tmp_path):
     settings = [word for name, value in words.items() for word in ("--set", f"{name}={value}")]
     least = ("--duration", duration, "--budget", budget, "--engine", "compiled")
     least += ("--quiet",) * (status == 1)
-    ran = call("simulate", *settings, *least, "--output", tmp_path / "motion.png")
+    ran = call_main("simulate", *settings, *least, "--output", tmp_path / "motion.png")
     assert ran.returncode == status
     assert ("peak friction" in ran.stdout) is (status != 1)
     assert said in ran.stderr
@@ -282,7 +288,7 @@ def test_exit_statuses_of_a_motion(duration, budget, status, said, tmp_path):
 
 def test_a_motion_that_cannot_begin_is_told(tmp_path):
     output = tmp_path / "motion.png"
-    ended = call("simulate", "--set", "displacement_step=-200", "--output", output)
+    ended = call_main("simulate", "--set", "displacement_step=-200", "--output", output)
     assert (ended.returncode, ended.stderr) == (1, "")
     assert "normal_stress_lost" in ended.stdout
     assert "nothing moved" in ended.stdout

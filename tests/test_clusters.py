@@ -19,18 +19,18 @@ import dask
 import psutil
 import pytest
 import yaml
-from faulty import declared
+from faulty import faulty_study
 from running import (
-    FAULTY,
-    HANGS,
-    QUIET,
-    SMALL,
-    command,
-    ended,
+    FAULTY_STUDY_FILE,
+    HANG_TIMEOUT,
+    QUIET_CLUSTER_OPTIONS,
+    SMALL_STUDY,
+    have_same_numbers,
     run,
-    same_numbers,
-    until,
-    until_kept,
+    start_command,
+    wait_for_command,
+    wait_for_journal_cells,
+    wait_until,
 )
 
 import rsfstudy
@@ -80,7 +80,7 @@ class Cluster:
         words = [word.replace("8786", "0") for word in container("rsfstudy-scheduler")[1]["args"]]
         words += ["--host", "127.0.0.1", "--scheduler-file", str(file)]
         self.scheduler = self._start(*words, cwd=self.place)
-        until(lambda: file.exists() and file.stat().st_size > 0, self.scheduler)
+        wait_until(lambda: file.exists() and file.stat().st_size > 0, self.scheduler)
         self.address = json.loads(file.read_text())["address"]
 
     def _start_worker(self):
@@ -107,7 +107,7 @@ class Cluster:
     def _end(process):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
-        process.wait(HANGS)
+        process.wait(HANG_TIMEOUT)
 
 
 @pytest.fixture(scope="module")
@@ -123,9 +123,9 @@ def separate(started):
 
 def test_the_same_bits_as_in_this_process(separate, tmp_path):
     """The workers write nothing, neither where they are nor where the results go."""
-    with clusters.existing_cluster(separate.address, timeout=HANGS) as client:
+    with clusters.connect_to_cluster(separate.address, timeout=HANG_TIMEOUT) as client:
         client.wait_for_workers(2)
-        same_numbers(run(SMALL, client=client, output=tmp_path / "results"), run())
+        have_same_numbers(run(SMALL_STUDY, client=client, output=tmp_path / "results"), run())
     assert sorted(os.listdir(tmp_path / "results")) == ["small.cells.sqlite", "small.nc"]
     for place in separate.place.glob("worker*"):
         assert not list(place.rglob("*.nc"))
@@ -138,10 +138,10 @@ def held(separate, tmp_path):
     open; its directory, and that gate.
     """
     output = tmp_path / "results"
-    words = ("run", FAULTY, "--scheduler", separate.address, "--output", output)
-    process = command(*words, FAULT_CELLS="30")
-    until_kept(output / "faulty.cells.sqlite", process)
-    until(lambda: len(list(separate.gate.iterdir())) == 2, process)  # both have cells
+    words = ("run", FAULTY_STUDY_FILE, "--scheduler", separate.address, "--output", output)
+    process = start_command(*words, FAULT_CELLS="30")
+    wait_for_journal_cells(output / "faulty.cells.sqlite", process)
+    wait_until(lambda: len(list(separate.gate.iterdir())) == 2, process)  # both have cells
     yield process, output, separate.gate / "open"
     process.kill()
     process.communicate()
@@ -152,28 +152,28 @@ def test_a_worker_lost_in_mid_run(separate, held):
     process, output, gate = held
     separate.workers[0].kill()
     gate.touch()
-    code, out, said = ended(process)
+    code, out, said = wait_for_command(process)
     assert code == 0, out + said
-    same_numbers(rsfstudy.open("faulty", output), run(declared(cells=30)))
+    have_same_numbers(rsfstudy.open("faulty", output), run(faulty_study(cells=30)))
 
 
 def test_a_scheduler_lost_in_mid_run(separate, held):
     """The run ends with what it has, and goes on without the cluster."""
     process, output, _gate = held
     separate.scheduler.kill()
-    code, _out, said = ended(process)
+    code, _out, said = wait_for_command(process)
     assert code == 1
     assert "the Dask scheduler is lost" in said
     assert "distributed." not in said  # told once, not by Dask too
     assert "of 30 cells are finished and kept" in said
     assert (output / "faulty.partial.nc").exists()
-    resumed = run(declared(cells=30), output=output)
-    same_numbers(resumed, run(declared(cells=30)))
+    resumed = run(faulty_study(cells=30), output=output)
+    have_same_numbers(resumed, run(faulty_study(cells=30)))
 
 
 def test_a_worker_of_another_version_is_refused(cluster, monkeypatch):
-    other = {**provenance.code(), "scipy": "0.1"}
-    monkeypatch.setattr(provenance, "code", lambda *_used: other)
+    other = {**provenance.code_fingerprint(), "scipy": "0.1"}
+    monkeypatch.setattr(provenance, "code_fingerprint", lambda *_used: other)
     with pytest.raises(RunError, match=r"a worker has scipy .*, this run 0\.1"):
         run(client=cluster)
 
@@ -197,12 +197,14 @@ def test_a_scheduler_by_tls():
     pem = security.get_tls_config_for_role("client")
     names = {f"distributed.comm.tls.{name}": pem[key] for name, key in (
         ("ca-file", "ca_file"), ("client.cert", "cert"), ("client.key", "key"))}  # fmt: skip
-    with LocalCluster(1, processes=False, protocol="tls", security=security, **QUIET) as encrypted:
+    with LocalCluster(
+        1, processes=False, protocol="tls", security=security, **QUIET_CLUSTER_OPTIONS
+    ) as encrypted:
         connected = functools.partial(
-            clusters.existing_cluster, encrypted.scheduler_address, timeout=HANGS
+            clusters.connect_to_cluster, encrypted.scheduler_address, timeout=HANG_TIMEOUT
         )
         with dask.config.set(names), connected() as client:
-            same_numbers(run(client=client), run())
+            have_same_numbers(run(client=client), run())
         with pytest.raises(RunError, match=r"ssl_context.*certificates for tls://"), connected():
             pass
 
@@ -213,7 +215,7 @@ def test_a_scheduler_by_tls():
 def test_a_scheduler_that_does_not_answer_is_named(address):
     with (
         pytest.raises(RunError, match=re.escape(f"no Dask scheduler answers at {address!r}")),
-        clusters.existing_cluster(address, timeout=0.3),
+        clusters.connect_to_cluster(address, timeout=0.3),
     ):
         pass
 
@@ -223,7 +225,7 @@ def test_a_port_that_listens_and_says_nothing():
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with (
             pytest.raises(RunError, match="no Dask scheduler answers"),
-            clusters.existing_cluster(address, timeout=0.3),
+            clusters.connect_to_cluster(address, timeout=0.3),
         ):
             pass
 
@@ -235,7 +237,7 @@ def test_the_slurm_job_is_what_it_says(tmp_path, monkeypatch):
     from dask_jobqueue import SLURMCluster
 
     monkeypatch.setenv("HOME", str(tmp_path))  # where the certificates are written
-    job = runpy.run_path(str(CLUSTERS / "slurm.py"))["JOB"]
+    job = runpy.run_path(str(CLUSTERS / "slurm.py"))["JOB_OPTIONS"]
     with SLURMCluster(**job, scheduler_options={"dashboard_address": "127.0.0.1:0"}) as cluster:
         script = cluster.job_script()
         assert cluster.scheduler_address.startswith("tls://")

@@ -15,7 +15,7 @@ import rsfstudy
 from rsfstudy import measures
 from rsfstudy.compute import code_digest, provenance
 from rsfstudy.declare import catalogue, names
-from rsfstudy.declare.names import PACKAGE
+from rsfstudy.declare.names import STUDIES_PACKAGE
 from rsfstudy.errors import DataError, RunError
 from rsfstudy.measures import Outcome
 from rsfstudy.measures.critical_step import CriticalStep
@@ -78,12 +78,12 @@ def inner(x):
 @dataclass(frozen=True)
 class Own(Measure):
     name: ClassVar[str] = "own"
-    headline = "total"
+    primary_output = "total"
     variables = {"total": ()}
     typical_work = 1
     least: float = 0.0
 
-    def find(self, scene, accuracy, meter):
+    def compute(self, scene, accuracy, meter):
         total = inner(helper.twice(scene.b_over_a)) + kept(Tool.shifted(TOOL.more))
         if total in {4.0, 5.0, 6.0}:
             total += 1.0
@@ -96,22 +96,22 @@ study = Study(
 """
 
 
-FOUND = 'find(self, scene, accuracy, meter):\n        """A remark."""'
+FOUND = 'compute(self, scene, accuracy, meter):\n        """A remark."""'
 
 
 def study_in(place, *, helper=HELPER, measure=MEASURE):
     place.mkdir(exist_ok=True)
     (place / "helper.py").write_text(helper)
     (place / "mine.py").write_text(measure)
-    return catalogue.load(str(place / "mine.py"))
+    return catalogue.load_study(str(place / "mine.py"))
 
 
 def digest(study):
-    return code_digest.of_classes(type(study.measure))
+    return code_digest.digest_classes(type(study.measure))
 
 
 def test_a_measure_of_rsfstudy_has_its_version():
-    assert code_digest.of_classes(CriticalStep) == "none"
+    assert code_digest.digest_classes(CriticalStep) == "none"
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_whatever_a_measure_draws_on_changes_its_digest(part, old, new, tmp_path
         ("helper", "    return 1\n", "    return 2\n"),
         ("measure", "[2.0, 3.0]", "[2.0, 2.5, 3.0]"),
         ("measure", "SCALE = 1.0", "# a remark\n\nSCALE = 1.0"),
-        ("measure", "find(self, scene, accuracy, meter):", FOUND),
+        ("measure", "compute(self, scene, accuracy, meter):", FOUND),
         ("measure", "class Own(Measure):", 'class Own(Measure):\n    """A remark."""\n'),
     ],
 )
@@ -165,7 +165,7 @@ def test_the_code_of_a_measure_within_another_counts(tmp_path):
     found = set()
     for number, helper in enumerate((HELPER, HELPER, HELPER.replace("2.0 * x", "3.0 * x"))):
         study = study_in(tmp_path / str(number), helper=helper, measure=text)
-        found.add(provenance.fingerprint(study)["own_code"])
+        found.add(provenance.run_fingerprint(study)["own_code"])
     assert len(found - {"none"}) == 2
 
 
@@ -173,7 +173,7 @@ def test_it_is_the_same_in_other_processes(tmp_path):
     """Whatever the seed of their hashes; in a script, and in code that has no file, too."""
     expected = digest(study_in(tmp_path))
     script = tmp_path / "script.py"
-    ask = "\nfrom rsfstudy.compute import code_digest\nprint(code_digest.of_classes(Own))"
+    ask = "\nfrom rsfstudy.compute import code_digest\nprint(code_digest.digest_classes(Own))"
     script.write_text(MEASURE + ask)
     for seed, words in (("1", [str(script)]), ("2", ["-c", MEASURE + ask])):
         said = subprocess.run(
@@ -232,20 +232,22 @@ def test_a_worker_with_another_helper_is_refused(tmp_path, monkeypatch, cluster)
 
 
 def physics_of(study):
-    return provenance.fingerprint(study)["physics"]
+    return provenance.run_fingerprint(study)["physics"]
 
 
 def with_measures_of_their_own():
     """Modules of named studies that hold the measure of their study."""
-    loaded = [catalogue.load(name) for name in names.names()]
+    loaded = [catalogue.load_study(name) for name in names.study_names()]
     homes = {study.name: type(study.measure).__module__ for study in loaded}
-    return [sys.modules[home] for name, home in homes.items() if home == f"{PACKAGE}.{name}"]
+    return [
+        sys.modules[home] for name, home in homes.items() if home == f"{STUDIES_PACKAGE}.{name}"
+    ]
 
 
 def test_a_measure_in_the_file_of_a_named_study_is_no_code_of_ones_own():
-    fingerprint = provenance.fingerprint(effects.study)
+    fingerprint = provenance.run_fingerprint(effects.study)
     assert fingerprint["own_code"] == "none"
-    assert fingerprint["physics"] != provenance.code()["physics"]
+    assert fingerprint["physics"] != provenance.code_fingerprint()["physics"]
 
 
 def digest_of_edited(module, edits, monkeypatch):
@@ -272,9 +274,13 @@ def is_reduction(value):
 def test_what_its_measure_draws_on_does(monkeypatch):
     before = physics_of(effects.study)
     timed = lambda equations, state: 1.0  # noqa: E731
-    for edits in ({"_TURNS": 26}, {"_seconds": timed}, {"_CYCLE": LimitCycle(phases=3)}):
+    for edits in (
+        {"_TIMING_REPEATS": 26},
+        {"_time_right_hand_side": timed},
+        {"_CYCLE_MEASURE": LimitCycle(phases=3)},
+    ):
         assert digest_of_edited(effects, edits, monkeypatch) != before
-    monkeypatch.setattr(effects.EffectCost, "find", lambda *_: Outcome(Status.OK))
+    monkeypatch.setattr(effects.EffectCost, "compute", lambda *_: Outcome(Status.OK))
     assert physics_of(effects.study) != before
 
 
@@ -314,31 +320,32 @@ def test_of_the_physics_its_code_counts_and_no_remark(old, new, same, tmp_path):
         (tmp_path / name / "slider" / "law.py").write_text(text)
     assert old in LAW
     before, after = (
-        code_digest.of_sources(provenance.sources(tmp_path / name)) for name in ("before", "after")
+        code_digest.digest_sources(provenance.read_sources(tmp_path / name))
+        for name in ("before", "after")
     )
     assert (before == after) is same
 
 
 def test_the_digest_of_the_physics_is_that_of_its_files():
     package = Path(rsfstudy.__file__).parent
-    files = provenance.sources(package)
+    files = provenance.read_sources(package)
     assert {"slider/friction.py", "motion/loop.py", "measures/__init__.py"} <= set(files)
     moved = {**files, "slider/moved.py": files["slider/friction.py"]}
-    digests = [code_digest.of_sources(each) for each in (files, moved)]
-    assert digests[0] == provenance.code()["physics"] != digests[1]
+    digests = [code_digest.digest_sources(each) for each in (files, moved)]
+    assert digests[0] == provenance.code_fingerprint()["physics"] != digests[1]
 
 
 @pytest.mark.parametrize("name", ["triggering", "hard_cases"])
 def test_cached_properties_of_a_study_do_not_change_its_digest(name):
     """One process may have used the measures and scenes of a study, and another may not."""
-    study = catalogue.load(name)
-    fresh = code_digest.with_measures("", study.measure.classes)
+    study = catalogue.load_study(name)
+    fresh = code_digest.digest_with_measures("", study.measure.code_classes)
     values = [
         value
-        for kind in study.measure.classes
+        for kind in study.measure.code_classes
         for value in vars(sys.modules[kind.__module__]).values()
     ]
     values += [part for value in values if isinstance(value, dict) for part in value.values()]
     used = [value.variables for value in values if isinstance(value, measures.Measure)]
     assert used
-    assert code_digest.with_measures("", study.measure.classes) == fresh
+    assert code_digest.digest_with_measures("", study.measure.code_classes) == fresh

@@ -6,7 +6,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from running import call, run, study_of
+from running import call_main, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Scene
@@ -160,12 +160,12 @@ def files(two, tmp_path, monkeypatch):
     second["status"][1, 0] = int(Status.NO_STEADY_STATE)
     places = tmp_path / "first.nc", tmp_path / "second.nc"
     for dataset, place in zip((first, second.isel(b_over_a=[0, 1])), places, strict=True):
-        store.write(dataset, place)
+        store.write_dataset(dataset, place)
     return places
 
 
 def test_the_command_says_what_differs(files):
-    ran = call("compare", *files)
+    ran = call_main("compare", *files)
     assert ran.returncode == 1, ran.stderr
     for words in (
         "4 cells in both, 4 only in A, 0 only in B",
@@ -178,12 +178,12 @@ def test_the_command_says_what_differs(files):
 
 
 def test_the_command_says_that_nothing_differs(files):
-    ran = call("compare", files[0], files[0])
+    ran = call_main("compare", files[0], files[0])
     assert ran.returncode == 0, ran.stderr
     assert "nothing differs beyond error estimates" in ran.stdout
 
 
 def test_exit_statuses(files, tmp_path):
-    assert call("compare", files[0]).returncode == 2
-    assert call("compare", files[0], "nothing").returncode == 2
-    assert call("compare", files[0], tmp_path / "missing.nc").returncode == 1
+    assert call_main("compare", files[0]).returncode == 2
+    assert call_main("compare", files[0], "nothing").returncode == 2
+    assert call_main("compare", files[0], tmp_path / "missing.nc").returncode == 1

@@ -13,17 +13,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numba.core.bytecode import FunctionIdentity
-from running import LEFT_TO_COMPILED, SMALL, enough, run
+from running import COMPILED_ONLY_STUDIES, SMALL_STUDY, reduced_study, run
 
 from rsfstudy import Scene, critical_step, limit_cycle, simulate
 from rsfstudy.compute.plan import Plan
 from rsfstudy.declare import catalogue
-from rsfstudy.errors import DataError, Incomplete, InvalidValue
+from rsfstudy.errors import DataError, IncompleteWarning, InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.compiled import building, machine
-from rsfstudy.motion.engines import COMPILED, ENGINES, compiling
-from rsfstudy.slider.equations import between_ruptures
+from rsfstudy.motion.engines import COMPILED, ENGINES, compilation_log
+from rsfstudy.slider.equations import equations_between_ruptures
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.places import LAW
@@ -40,7 +40,7 @@ def test_a_recording_is_the_same_however_few_rows_a_call_may_fill(rows, monkeypa
     """Regimes change in the middle of a table, and at its last rows."""
     scene, accuracy = Scene(**CYCLE), Accuracy(rtol=1e-3, engine=COMPILED)
     whole = LimitCycle(phases=50)(scene, accuracy)
-    monkeypatch.setattr("rsfstudy.motion.running._RECORDED", rows)
+    monkeypatch.setattr("rsfstudy.motion.running._RECORDING_ROWS", rows)
     pieces = LimitCycle(phases=50)(scene, accuracy)
     assert np.array_equal(whole.values["shear_stress"], pieces.values["shear_stress"])
     assert whole.values["recurrence_interval"] == pieces.values["recurrence_interval"]
@@ -48,7 +48,7 @@ def test_a_recording_is_the_same_however_few_rows_a_call_may_fill(rows, monkeypa
 
 def test_hard_cases_come_out():
     """All that break ordinary codes, held against their answers."""
-    study = catalogue.load("hard_cases")
+    study = catalogue.load_study("hard_cases")
     ended = run(study, engine=COMPILED)
     assert (ended["status"] == int(Status.OK)).all()
 
@@ -79,7 +79,7 @@ class Tabulated(Law):
 def test_a_part_that_cannot_be_compiled_is_named_with_the_line():
     line = tabulated.__code__.co_firstlineno + 1
     with pytest.raises(InvalidValue, match=rf"the part .*tabulated.*test_compiled.py, line {line}"):
-        machine.prepare(Scene(law=Tabulated), clock=True)
+        machine.compile_scene(Scene(law=Tabulated), with_time=True)
     assert (
         simulate(Scene(law=Tabulated, stiffness=0.01, hold_time=1.0), duration=1.0).attrs["status"]
         == "ok"
@@ -120,7 +120,7 @@ class Ending(Law):
 @pytest.mark.parametrize("by", ENGINES)
 def test_a_rate_that_is_no_number_ends_the_motion(by):
     scene = Scene(law=Ending, stiffness_ratio=1.5, load_velocity_ratio=20.0)
-    with pytest.warns(Incomplete, match="the motion ends after"):
+    with pytest.warns(IncompleteWarning, match="the motion ends after"):
         ended = simulate(scene, duration=10.0, budget=5_000, engine=by)
     assert ended.attrs["status"] in ("integration_failed", "work_budget_spent")
     assert float(ended["log10_slip_rate"].max()) <= 1.0 / math.log(10.0)
@@ -130,7 +130,7 @@ def test_a_rate_that_is_no_number_ends_the_motion(by):
 
 
 def test_a_file_says_which_engine_and_cells_are_not_mixed(tmp_path):
-    small = replace(SMALL, axes=SMALL.axes[:1])
+    small = replace(SMALL_STUDY, axes=SMALL_STUDY.axes[:1])
     ran = run(small, engine=COMPILED, output=tmp_path)
     assert '"engine": "compiled"' in ran.attrs["provenance"]
     assert '"numba"' in ran.attrs["provenance"]
@@ -139,20 +139,22 @@ def test_a_file_says_which_engine_and_cells_are_not_mixed(tmp_path):
 
 
 # waves are compared with the same motion without them, which is another's equations
-@pytest.mark.parametrize("name", [name for name in LEFT_TO_COMPILED if name != "wave_triggering"])
+@pytest.mark.parametrize(
+    "name", [name for name in COMPILED_ONLY_STUDIES if name != "wave_triggering"]
+)
 def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
     """By what their measure says of time."""
-    wanted, addresses = list[tuple[str, ...]](), machine.addresses
+    wanted, addresses = list[tuple[str, ...]](), machine.function_addresses
 
     def asked(equations):
         wanted.append((equations.regime, *equations.unknowns))
         return addresses(equations)
 
-    study = enough(name)
+    study = reduced_study(name)
     scene = Plan(study).examples[0]
-    monkeypatch.setattr(machine, "addresses", asked)
-    for clock in study.measure.clocks:
-        machine.prepare(scene, clock=clock)
+    monkeypatch.setattr(machine, "function_addresses", asked)
+    for clock in study.measure.needs_time:
+        machine.compile_scene(scene, with_time=clock)
     prepared = set(wanted)
     wanted.clear()
     study.measure(scene, study.accuracy)
@@ -182,10 +184,10 @@ def empty_cache(tmp_path, monkeypatch) -> Path:
 
 def compiled_programs(function=doubled) -> int:
     """How many programs it takes to have a function called by its address."""
-    before = compiling.programs
-    (address,) = building.called_by_address([function])
+    before = compilation_log.programs
+    (address,) = building.compile_cfuncs([function])
     assert address
-    return compiling.programs - before
+    return compilation_log.programs - before
 
 
 def test_other_processes_find_equations_again(tmp_path):
@@ -193,13 +195,13 @@ def test_other_processes_find_equations_again(tmp_path):
     asks = (
         "from rsfstudy import Scene\n"
         "from rsfstudy.analysis.critical_path import CriticalPath\n"
-        "from rsfstudy.motion.compiled.machine import addresses\n"
-        "from rsfstudy.motion.engines import compiling\n"
-        "from rsfstudy.slider.equations import between_ruptures\n"
+        "from rsfstudy.motion.compiled.machine import function_addresses\n"
+        "from rsfstudy.motion.engines import compilation_log\n"
+        "from rsfstudy.slider.equations import equations_between_ruptures\n"
         "scene = Scene(normal_stress='constant')\n"
-        "addresses(between_ruptures(scene, clock=False))\n"
-        "CriticalPath.of(scene, 'compiled')\n"
-        "print(compiling.programs)\n"
+        "function_addresses(equations_between_ruptures(scene, clock=False))\n"
+        "CriticalPath.of_scene(scene, 'compiled')\n"
+        "print(compilation_log.programs)\n"
     )
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
     programs, written = list[int](), list[set[str]]()
@@ -276,30 +278,37 @@ def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeyp
     function, state = ctypes.CFUNCTYPE(None, *[ctypes.POINTER(ctypes.c_double)] * 4), (0.01, 0.02)
     for law in ("perrin_rice_zheng", "slip", "perrin_rice_zheng", "slip"):
         monkeypatch.setattr(FunctionIdentity, "_unique_ids", itertools.count(10**7))
-        building._compiled_inside.cache_clear()
-        monkeypatch.setattr(machine, "_ADDRESSES", {})
-        equations = between_ruptures(Scene(law=law, normal_stress="constant"), clock=False)
-        y, p = (ctypes.c_double * 2)(*state), (ctypes.c_double * len(equations.p))(*equations.p)
+        building._jit_internal.cache_clear()
+        monkeypatch.setattr(machine, "_ADDRESS_CACHE", {})
+        equations = equations_between_ruptures(
+            Scene(law=law, normal_stress="constant"), clock=False
+        )
+        y, p = (
+            (ctypes.c_double * 2)(*state),
+            (ctypes.c_double * len(equations.parameters))(*equations.parameters),
+        )
         result = (ctypes.c_double * 2)()
-        function(machine.addresses(equations)[0])(y, y, p, result)
-        assert list(result) == pytest.approx(list(equations.rates(state)), rel=1e-12)
+        function(machine.function_addresses(equations)[0])(y, y, p, result)
+        assert list(result) == pytest.approx(list(equations.evaluate_rates(state)), rel=1e-12)
 
 
 def test_a_cache_of_other_code_is_never_used(monkeypatch):
     """Any change of a function, or of a number it reads, makes another digest."""
     scene = Scene(law=SlipLaw)
-    rate = between_ruptures(scene, clock=False).rate
-    before = building.digest_of(None, rate)
-    assert building.digest_of(None, rate) == before
+    rate = equations_between_ruptures(scene, clock=False).rate_function
+    before = building.compute_digest(None, rate)
+    assert building.compute_digest(None, rate) == before
     cells = scene.functions.friction.strength.__closure__
-    effect = next(c.cell_contents for c in cells if c.cell_contents.__name__ == "linker_dieterich")
+    effect = next(
+        c.cell_contents for c in cells if c.cell_contents.__name__ == "linker_dieterich_effect"
+    )
     monkeypatch.setitem(effect.__globals__, "NORMAL_STRESS", 3)
-    assert building.digest_of(None, rate) != before
-    assert building.digest_of(None, doubled) != building.digest_of(None, tripled)
-    before = building.digest_of(None, doubled)
-    assert building.digest_of(int, doubled) != before
-    monkeypatch.setitem(building._OPTIONS, "fastmath", {"nsz"})
-    assert building.digest_of(None, doubled) != before
+    assert building.compute_digest(None, rate) != before
+    assert building.compute_digest(None, doubled) != building.compute_digest(None, tripled)
+    before = building.compute_digest(None, doubled)
+    assert building.compute_digest(int, doubled) != before
+    monkeypatch.setitem(building._COMPILER_OPTIONS, "fastmath", {"nsz"})
+    assert building.compute_digest(None, doubled) != before
 
 
 def by_module(y, rates, p, result):
@@ -308,6 +317,6 @@ def by_module(y, rates, p, result):
 
 def test_a_number_of_another_module_counts_too(monkeypatch):
     monkeypatch.setattr(known, "NUMBER", 2.0)
-    before = building.digest_of(by_module)
+    before = building.compute_digest(by_module)
     monkeypatch.setattr(known, "NUMBER", 3.0)
-    assert building.digest_of(by_module) != before
+    assert building.compute_digest(by_module) != before

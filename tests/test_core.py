@@ -7,20 +7,20 @@ import math
 
 import numpy as np
 import pytest
-from conftest import follow
+from conftest import follow_until
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import along
+from rsfstudy.motion.course import events_along
 from rsfstudy.motion.engines import PYTHON, SCIPY
-from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.slider.equations import (
     Equations,
-    between_ruptures,
-    by_displacement,
+    equations_between_ruptures,
+    equations_by_displacement,
 )
 from rsfstudy.slider.places import LAW
 from rsfstudy.slider.point import Point
@@ -38,15 +38,15 @@ def test_invariant_of_the_slowness_law_at_critical_stiffness(load_velocity_ratio
     weakening, held = 0.7, []
 
     def invariant(point):
-        steadiness = point.imbalance / scene.b  # ln(V theta/D_c)
-        load = scene.log_load_rate - point.log_slip_rate + steadiness
+        steadiness = point.steady_state_offset / scene.b  # ln(V theta/D_c)
+        load = scene.log_load_velocity - point.log_slip_rate + steadiness
         return math.exp(steadiness) - steadiness + weakening * (math.exp(load) - load)
 
     def until(event):
         held.append(invariant(event.point))
         return event.clock > 300.0  # some ten periods
 
-    follow(scene, 1e-9, until)
+    follow_until(scene, 1e-9, until)
     # H is of order 10; its drift is what local errors of 2e-11 add up to
     assert np.ptp(held) < 1e-8
 
@@ -72,7 +72,7 @@ def test_separatrix_of_the_slip_law_at_critical_stiffness(b_over_a):
         assert invariant(event.point) == pytest.approx(1.0, abs=1e-10 * amplified)
         return event.point.log_slip_rate > 6.0
 
-    follow(scene, 1e-10, until)
+    follow_until(scene, 1e-10, until)
 
 
 def cycle(law: str, accuracy: Accuracy) -> tuple[float, float]:
@@ -101,15 +101,15 @@ def test_requested_tolerance_is_met_by_stick_slip_cycles(law, rtol):
 
 
 def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
-    """What `Accuracy.switch_correction` rests on; ln V grows by 12.2 per slip of D_c there."""
+    """What `Accuracy.max_inertia_correction` rests on; ln V grows by 12.2 per slip of D_c there."""
 
     @dataclasses.dataclass(frozen=True)
     class Switched(Accuracy):
         weight: float = 1e-3
 
-        switch_weight = property(lambda self: self.weight)
-        switch_correction = property(lambda _self: math.inf)
-        remaining_slip = property(lambda _self: 1e-9)
+        max_inertia_weight = property(lambda self: self.weight)
+        max_inertia_correction = property(lambda _self: math.inf)
+        max_remaining_slip = property(lambda _self: 1e-9)
         solver = property(lambda _self: 1e-11)
 
     exact, _drop = REFERENCES["slip"]
@@ -134,18 +134,28 @@ def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
 def test_growth_on_the_slow_manifold_is_that_of_its_slip_rate(fields):
     """By differences along the motion, at a weight of mass of 1e-3."""
     scene = Scene(load_velocity_ratio=2.0, inertia=True, **fields)
-    equations = between_ruptures(scene, clock=False)
+    equations = equations_between_ruptures(scene, clock=False)
     weight = math.sqrt(1e-3 * scene.a / scene.stiffness) / scene.inertial_time
-    psis = (-scene.a * math.log(weight), *[1e-3] * (scene.states - 1))
+    psis = (-scene.a * math.log(weight), *[1e-3] * (scene.state_count - 1))
     state, step = np.array([2e-3, *psis]), 1e-4
-    rates = np.array(equations.rates(tuple(state)))
-    ahead, behind = (equations.at(tuple(state + s * rates)).log_slip_rate for s in (step, -step))
-    point = equations.at(tuple(state))
-    assert abs(point.growth) > 0.1
+    rates = np.array(equations.evaluate_rates(tuple(state)))
+    ahead, behind = (
+        equations.evaluate_point(tuple(state + s * rates)).log_slip_rate for s in (step, -step)
+    )
+    point = equations.evaluate_point(tuple(state))
+    assert abs(point.log_slip_rate_derivative) > 0.1
     # differences err by the square of the step
-    assert point.growth == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-5)
+    assert point.log_slip_rate_derivative == pytest.approx(
+        (ahead - behind) / (2.0 * step), rel=1e-5
+    )
     # without the growth of what mass takes
-    assert abs(point.growth - (point.spring_stress - point.friction) / (scene.a * 1e-3)) > 1e-9
+    assert (
+        abs(
+            point.log_slip_rate_derivative
+            - (point.spring_stress - point.frictional_stress) / (scene.a * 1e-3)
+        )
+        > 1e-9
+    )
 
 
 @given(st.floats(-1e12, 1e12))
@@ -163,10 +173,10 @@ def test_rates_along_the_path_are_those_by_displacement_over_its_length(law, log
     """
     scene = Scene(law=law, normal_stress="constant", load_velocity_ratio=3.0)
     state = (0.01, 0.01 - scene.a * log_slip_rate)
-    by = by_displacement(scene)
-    growth = by.at(state).growth
-    along = between_ruptures(scene, clock=False).rates(state)
-    for ours, theirs in zip(along, by.rates(state), strict=True):
+    by = equations_by_displacement(scene)
+    growth = by.evaluate_point(state).log_slip_rate_derivative
+    along = equations_between_ruptures(scene, clock=False).evaluate_rates(state)
+    for ours, theirs in zip(along, by.evaluate_rates(state), strict=True):
         assert ours * math.sqrt(1.0 + (growth / 6.0) ** 2) == pytest.approx(theirs, rel=1e-12)
 
 
@@ -175,8 +185,8 @@ def test_inertia_is_integrated_only_where_it_acts():
     their cost.
     """
     slow = Scene(load_velocity_ratio=1.2, stiffness_ratio=1.2, inertia=True)
-    meter = follow(slow, 1e-7, lambda event: event.clock > 100.0)
-    assert set(meter.by_regime) == {"slow_manifold"}
+    meter = follow_until(slow, 1e-7, lambda event: event.clock > 100.0)
+    assert set(meter.evaluations_by_regime) == {"slow_manifold"}
     fast = slow.with_(stiffness_ratio=0.8)
     regimes = []
 
@@ -184,8 +194,8 @@ def test_inertia_is_integrated_only_where_it_acts():
         regimes.append((event.regime, event.point.log_slip_rate + math.log(fast.inertial_time)))
         return len(regimes) > 1500
 
-    follow(fast, 1e-7, until)
-    switch = 0.5 * math.log(Accuracy(1e-7).switch_weight * fast.a / fast.stiffness)
+    follow_until(fast, 1e-7, until)
+    switch = 0.5 * math.log(Accuracy(1e-7).max_inertia_weight * fast.a / fast.stiffness)
     assert all(norm <= switch + 1e-9 for regime, norm in regimes if regime == "slow_manifold")
     assert {regime for regime, _norm in regimes} == {"slow_manifold", "inertial"}
 
@@ -208,8 +218,8 @@ LOCKS = {"law": "slowness", "b_over_a": 8.1, "a": 0.066, "mu_star": 0.6, "phi": 
     ],
 )  # fmt: skip
 def test_what_ends_a_motion_is_named(fields, budget, message, status):
-    with pytest.raises(Halt, match=message) as halted:
-        follow(Scene(**fields), 1e-9, lambda event: event.point.log_slip_rate > 300.0, budget)
+    with pytest.raises(MotionStopped, match=message) as halted:
+        follow_until(Scene(**fields), 1e-9, lambda event: event.point.log_slip_rate > 300.0, budget)
     assert halted.value.status is status
 
 
@@ -222,7 +232,7 @@ def test_equations_that_fail_end_in_a_status_and_not_in_nan(engine):
         return Point(*[float(state[0])] * len(Point._fields))._replace(psis=state)
 
     system = Equations("broken", ("y",), (1.0,), rate, point, (1.0,) * LAW)
-    meter = Meter(10**5, engine=engine)
-    with np.errstate(invalid="ignore"), pytest.raises(Halt) as halted:
-        list(along(system, (0.0,), 1e-8, meter))
+    meter = WorkMeter(10**5, engine=engine)
+    with np.errstate(invalid="ignore"), pytest.raises(MotionStopped) as halted:
+        list(events_along(system, (0.0,), 1e-8, meter))
     assert halted.value.status in (Status.INTEGRATION_FAILED, Status.WORK_BUDGET_SPENT)

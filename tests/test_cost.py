@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from running import SMALL, call, run
+from running import SMALL_STUDY, call_main, run
 
 from rsfstudy.cli import cost
 from rsfstudy.compute.plan import Plan
@@ -15,21 +15,21 @@ FILE = "small.cells.sqlite"
 
 
 def words(study, output):
-    return cost.in_words(Plan(study), output)
+    return cost.cost_text(Plan(study), output)
 
 
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory):
     """A journal whose cells took 10 s each."""
     output = tmp_path_factory.mktemp("kept")
-    run(SMALL, output=output, rtol=1e-4)
+    run(SMALL_STUDY, output=output, rtol=1e-4)
     with sqlite3.connect(output / FILE) as db:
         db.execute("UPDATE cells SET seconds = 10.0")
     db.close()
     return output
 
 
-LOOSE = replace(SMALL, accuracy=Accuracy(1e-4))
+LOOSE = replace(SMALL_STUDY, accuracy=Accuracy(1e-4))
 
 
 def test_the_same_cells_take_what_they_took(kept):
@@ -43,7 +43,7 @@ def test_other_cells_take_as_long_as_those_that_are_there(kept):
 
 
 def test_without_cells_of_that_accuracy_it_is_a_guess(kept, tmp_path):
-    for study, output in ((SMALL, kept), (LOOSE, tmp_path)):
+    for study, output in ((SMALL_STUDY, kept), (LOOSE, tmp_path)):
         assert "at a guess" in words(study, output)
         assert "last" not in words(study, output)
 
@@ -55,25 +55,25 @@ def test_a_journal_that_cannot_be_read_is_passed_over(tmp_path):
 
 def test_show_tells_it(tmp_path):
     few = ("rate_step_boundary", "--set", "b_over_a=2", "--output", tmp_path)
-    assert "at a guess" in " ".join(call("show", *few).stdout.split())
-    assert call("run", *few, "--serial").returncode == 0
-    assert "on one core here last" in " ".join(call("show", *few).stdout.split())
+    assert "at a guess" in " ".join(call_main("show", *few).stdout.split())
+    assert call_main("run", *few, "--serial").returncode == 0
+    assert "on one core here last" in " ".join(call_main("show", *few).stdout.split())
 
 
 # ---- advice on the engine ------------------------------------------------------------------------
 
 #: So many cells that SciPy takes above a minute.
-MANY = SMALL.with_(b_over_a=np.linspace(1.5, 3.0, 1500))
+MANY = SMALL_STUDY.with_(b_over_a=np.linspace(1.5, 3.0, 1500))
 
 
 def test_the_compiled_engine_is_named_where_it_would_save_a_minute(tmp_path):
-    assert cost.estimated_cost(Plan(MANY))[1] > 60.0
-    advice = cost.faster(Plan(MANY), tmp_path)
+    assert cost.estimate_cost(Plan(MANY))[1] > 60.0
+    advice = cost.compiled_engine_hint(Plan(MANY), tmp_path)
     assert advice == "--engine compiled is about 10 times faster here"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cost, "_FASTER", {"limit_cycle": 30})
-        assert cost.faster(Plan(MANY), tmp_path).endswith(
+        patch.setattr(cost, "_COMPILED_SPEEDUP", {"limit_cycle": 30})
+        assert cost.compiled_engine_hint(Plan(MANY), tmp_path).endswith(
             "as a rule: about 30 times with limit_cycle"
         )
     (tmp_path / FILE).touch()  # its cells would all be computed anew
-    assert cost.faster(Plan(MANY), tmp_path) == ""
+    assert cost.compiled_engine_hint(Plan(MANY), tmp_path) == ""

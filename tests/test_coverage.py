@@ -3,24 +3,28 @@
 import numpy as np
 import pytest
 import xarray as xr
-from agreement import LIKE
+from agreement import RANDOM_SCENE_TEMPLATES
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rsfstudy.named_studies._random_scenes import QUESTIONS, READINGS, random_scene
-from rsfstudy.named_studies.coverage import Coverage, Covered
+from rsfstudy.named_studies._random_scenes import (
+    LABORATORY_QUESTIONS,
+    MOTION_QUESTIONS,
+    random_scene,
+)
+from rsfstudy.named_studies.coverage import Coverage, CoverageStatistics
 
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import limit_cycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.reduce import reduced
+from rsfstudy.reduce import apply_reductions
 from rsfstudy.status import Status
 
 
 @settings(deadline=None, derandomize=True)
 @given(
-    st.sampled_from([*LIKE, Scene(normal_stress="imposed")]),
-    st.sampled_from([*QUESTIONS, *READINGS]),
+    st.sampled_from([*RANDOM_SCENE_TEMPLATES, Scene(normal_stress="imposed")]),
+    st.sampled_from([*MOTION_QUESTIONS, *LABORATORY_QUESTIONS]),
     st.integers(0, 10**6),
 )
 def test_any_draw_is_a_scene_of_its_kind_and_the_same_each_time(like, question, sample):
@@ -43,8 +47,8 @@ def test_shares_worst_and_typical_are_counted():
             "status": (("sample", "requested_digits"), np.zeros(ratios.shape, dtype=np.int8)),
         }
     )
-    found = reduced(
-        dataset, (Covered(name="c", of="error_over_estimate", by=("requested_digits",)),)
+    found = apply_reductions(
+        dataset, (CoverageStatistics(name="c", of="error_over_estimate", by=("requested_digits",)),)
     )
     np.testing.assert_allclose(found.c_share, [1.0, 2.0 / 3.0])
     np.testing.assert_allclose(found.c_worst, [1.0, 2.0])
@@ -54,10 +58,10 @@ def test_shares_worst_and_typical_are_counted():
 
 def test_an_estimate_that_is_too_small_shows(monkeypatch):
     """The same cell, with estimates of a hundredth: errors beyond them, which were within."""
-    cell, like = Coverage(sample=3, requested_digits=5), LIKE[1]
+    cell, like = Coverage(sample=3, requested_digits=5), RANDOM_SCENE_TEMPLATES[1]
     ratios = cell(like, Accuracy()).values["error_over_estimate"]
-    usual = limit_cycle.error_between
-    monkeypatch.setattr(limit_cycle, "error_between", lambda *given: 0.01 * usual(*given))
+    usual = limit_cycle.estimate_error
+    monkeypatch.setattr(limit_cycle, "estimate_error", lambda *given: 0.01 * usual(*given))
     smaller = cell(like, Accuracy()).values["error_over_estimate"]
     known = np.isfinite(ratios)
     assert known.sum() == 5
@@ -67,7 +71,7 @@ def test_an_estimate_that_is_too_small_shows(monkeypatch):
 
 def test_a_scene_without_a_number_counts_its_status():
     """Slip without mass runs away, at either accuracy."""
-    found = Coverage(sample=0, requested_digits=4)(LIKE[0], Accuracy())
+    found = Coverage(sample=0, requested_digits=4)(RANDOM_SCENE_TEMPLATES[0], Accuracy())
     assert found.status is Status.OK
     assert found.values["status_kept"] == 1.0
     assert found.values["ended_as"] == float(Status.SLIP_RATE_UNBOUNDED)

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from conftest import cot_phi, reaches_the_norm
+from conftest import cot_phi, reaches_instability_norm
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from in_time import InTime
+from in_time import TimeDomainMotion
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -20,11 +20,12 @@ from rsfstudy.analysis.critical_path import CriticalPath
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import COMPILED, SCIPY, of_floats
-from rsfstudy.motion.handover import error_of_slow_manifold
-from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.roots import root_of
-from rsfstudy.slider.equations import between_ruptures, log_slip_rate_at
+from rsfstudy.motion.engine_factory import scalar_function
+from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.motion.handover import slow_manifold_error
+from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.roots import build_root_finder
+from rsfstudy.slider.equations import equations_between_ruptures, log_slip_rate_at
 from rsfstudy.slider.point import Point
 from rsfstudy.status import Status
 
@@ -37,7 +38,7 @@ def found(scene: Scene, of: str = RATE, direction: str = "up", rtol=1e-7, engine
     measure = CriticalStep(of=of, direction=direction)
     outcome = measure(scene, Accuracy(rtol, engine=engine))
     assert outcome.status is Status.OK, outcome
-    name = measure.headline
+    name = measure.primary_output
     return outcome.values[name], outcome.values[f"{name}_error"], outcome
 
 
@@ -155,7 +156,7 @@ def test_the_error_estimate_covers_the_true_error(law, weakening, stiffness_rati
     loose, tight = measure(scene, Accuracy(1e-6)), measure(scene, Accuracy(1e-10))
     assert loose.status is tight.status
     if loose.status is Status.OK:
-        name = measure.headline
+        name = measure.primary_output
         value, exact = loose.values[name], tight.values[name]
         allowed = loose.values[f"{name}_error"] + tight.values[f"{name}_error"]
         assert abs(value - exact) <= allowed
@@ -171,22 +172,27 @@ def peak_in_time(scene: Scene) -> float:
     """Highest ln V after a step up to the norm, from equations in time: nothing is shared with the
     package.
     """
-    theirs, norm = InTime(scene), scene.log_norm_rate
+    theirs, norm = TimeDomainMotion(scene), scene.log_instability_rate
 
     def at_norm(t, y):
-        return theirs.both(t, y, 0.0)[1].x - norm
+        return theirs.rates_and_state(t, y, 0.0)[1].log_slip_rate - norm
 
     def slowing(t, y):
-        return theirs.both(t, y, 0.0)[1].growth
+        return theirs.rates_and_state(t, y, 0.0)[1].log_slip_rate_derivative
 
     at_norm.terminal = slowing.terminal = True
     slowing.direction = -1.0
     motion = solve_ivp(
-        lambda t, y: theirs.both(t, y, 0.0)[0], (0.0, 1e3), theirs.start(), "DOP853",
-        rtol=1e-12, atol=1e-15, events=(at_norm, slowing),
-    )  # fmt: skip
+        lambda t, y: theirs.rates_and_state(t, y, 0.0)[0],
+        (0.0, 1e3),
+        theirs.initial_unknowns(),
+        "DOP853",
+        rtol=1e-12,
+        atol=1e-15,
+        events=(at_norm, slowing),
+    )
     assert motion.status == 1
-    return float(theirs.both(motion.t[-1], motion.y[:, -1], 0.0)[1].x)
+    return float(theirs.rates_and_state(motion.t[-1], motion.y[:, -1], 0.0)[1].log_slip_rate)
 
 
 @pytest.mark.parametrize(
@@ -204,7 +210,7 @@ def test_a_second_formulation_agrees_on_both_sides(fields, of):
             stepped = {of: value * (1.0 + side), RATE: held}
         peak = peak_in_time(scene.with_(**stepped))
         # where it reaches the norm it stops there, to rounding
-        assert (peak >= scene.log_norm_rate - 1e-9) is reaches
+        assert (peak >= scene.log_instability_rate - 1e-9) is reaches
 
 
 # ---- mass
@@ -243,7 +249,7 @@ def test_paths_on_the_slow_manifold_agree_with_motions_of_the_full_equations(cas
     values = {}
     for heavy in (False, True):
         for module in (critical_step, after_step):
-            monkeypatch.setattr(module, "mass_acts", lambda *_scene, heavy=heavy: heavy)
+            monkeypatch.setattr(module, "inertia_matters", lambda *_scene, heavy=heavy: heavy)
         values[heavy] = found(scene, rtol=1e-8)[:2]
     (path, error), (forward, its_error) = values[False], values[True]
     assert abs(path - forward) <= error + its_error
@@ -252,7 +258,7 @@ def test_paths_on_the_slow_manifold_agree_with_motions_of_the_full_equations(cas
     # the first order of mass is there, and what is left is within the bound of the second
     assert 0.05 * weight < moved < 0.8 * weight
     left = abs(math.log(forward / path) / math.log(path))
-    assert left < error_of_slow_manifold(scene) + 1e-8
+    assert left < slow_manifold_error(scene) + 1e-8
 
 
 def test_mass_counts_at_a_norm_just_above_the_loading_rate():
@@ -293,13 +299,13 @@ def test_a_displacement_step_may_jump_to_the_norm_at_once():
     scene = Scene(law="slowness", stiffness_ratio=5.0, instability_norm=0.01)
     value, _error, outcome = found(scene, DISPLACEMENT)
     jump = log_slip_rate_at(scene, scene.stiffness * value, 0.0)
-    assert jump == pytest.approx(scene.log_norm_rate, rel=1e-8)
+    assert jump == pytest.approx(scene.log_instability_rate, rel=1e-8)
     assert "jump" in outcome.message
     with_mass = found(scene.with_(inertia=True), DISPLACEMENT)[0]
     assert with_mass == pytest.approx(value, rel=1e-3)
     # what waves carry away at the norm is stress that the step has to supply as well
     damped = scene.with_(stiffness=scene.stiffness, radiation_damping=1e-7)
-    carried = damped.radiation_damping * math.expm1(scene.log_norm_rate)
+    carried = damped.radiation_damping * math.expm1(scene.log_instability_rate)
     more = found(damped, DISPLACEMENT)[0] - value
     assert more == pytest.approx(carried / scene.stiffness, rel=1e-5)
 
@@ -318,7 +324,7 @@ def test_an_orbit_that_grows_slowly_is_known_to_reach_the_norm_in_a_few_leaps():
     """Leaps that had to be shortened each time would take ten times the work."""
     slowly = {"law": "slowness", "b_over_a": 2.46, "phi": 82.8, "alpha": 0.129}
     scene = Scene(**slowly, stiffness_ratio=0.998, load_velocity_ratio=0.16, instability_norm=3e-4)
-    assert after_step.reaches_norm(scene, Accuracy(1e-6), Meter(15_000))
+    assert after_step.reaches_norm(scene, Accuracy(1e-6), WorkMeter(15_000))
 
 
 def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
@@ -326,7 +332,7 @@ def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
     scene = Scene(law="slowness", load_velocity_ratio=200.0, instability_norm=10.0, **CONSTANT)
     for inertia in (False, True):
         reached = after_step.reaches_norm(
-            scene.with_(inertia=inertia), Accuracy(1e-6), Meter(500_000)
+            scene.with_(inertia=inertia), Accuracy(1e-6), WorkMeter(500_000)
         )
         assert reached is not inertia
 
@@ -337,10 +343,10 @@ def test_a_limit_cycle_below_the_norm_is_not_leapt_over():
     """
     for load, peak in ((0.25, 9.57), (0.3, 8.49)):
         scene = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=load)
-        assert peak < scene.log_norm_rate
-        assert not after_step.reaches_norm(scene, Accuracy(1e-6), Meter(500_000))
+        assert peak < scene.log_instability_rate
+        assert not after_step.reaches_norm(scene, Accuracy(1e-6), WorkMeter(500_000))
     low = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=0.15)
-    assert after_step.reaches_norm(low, Accuracy(1e-6), Meter(500_000))
+    assert after_step.reaches_norm(low, Accuracy(1e-6), WorkMeter(500_000))
 
 
 def test_a_spent_budget_is_a_failure_with_a_name():
@@ -371,12 +377,12 @@ def test_public_call_returns_a_small_dataset():
 def test_the_critical_path_touches_the_norm_at_rest(law, load):
     """At the touching point ln V is at the norm and stationary, by the assembled equations."""
     scene = Scene(law=law, load_velocity_ratio=load)
-    start = CriticalPath.of(scene).tangency
+    start = CriticalPath.of_scene(scene).tangency_point
     assert start is not None
-    system = between_ruptures(scene, clock=False)
-    point = system.at(start)
-    assert point.log_slip_rate == pytest.approx(scene.log_norm_rate, rel=1e-12)
-    assert point.growth == pytest.approx(0.0, abs=1e-11)
+    system = equations_between_ruptures(scene, clock=False)
+    point = system.evaluate_point(start)
+    assert point.log_slip_rate == pytest.approx(scene.log_instability_rate, rel=1e-12)
+    assert point.log_slip_rate_derivative == pytest.approx(0.0, abs=1e-11)
 
 
 @pytest.mark.parametrize("normal_stress", ["constant", "variable"])
@@ -387,11 +393,11 @@ def test_where_a_path_begins_and_ends_is_the_same_by_all_engines(law, normal_str
     """
     for load in (1e-3, 1.5, 40.0):
         scene = Scene(law=law, normal_stress=normal_stress, load_velocity_ratio=load)
-        paths = [CriticalPath.of(scene, engine) for engine in (SCIPY, COMPILED)]
-        plain, compiled = (path.tangency for path in paths)
+        paths = [CriticalPath.of_scene(scene, engine) for engine in (SCIPY, COMPILED)]
+        plain, compiled = (path.tangency_point for path in paths)
         assert compiled == pytest.approx(plain, rel=1e-12, abs=1e-14)
-        begin = (0.01, -0.02), paths[0].p
-        at = [of_floats(path.point_of, path.engine, *begin)(*begin) for path in paths]
+        begin = (0.01, -0.02), paths[0].parameters
+        at = [scalar_function(path.evaluate_point, path.engine, *begin)(*begin) for path in paths]
         assert all(isinstance(point, Point) for point in at)
         assert np.hstack(at[1]) == pytest.approx(np.hstack(at[0]), rel=1e-11, abs=1e-14)
 
@@ -404,7 +410,7 @@ def test_a_root_is_that_of_the_same_method_elsewhere():
         asked.append(x)
         return given * math.atan(x - 0.3) + x**3
 
-    root = root_of(function)
+    root = build_root_finder(function)
     for low, high, finest, relative in ((-1.0, 2.0, 1e-15, 1e-14), (-9.0, 0.7, 1e-6, 1e-9)):
         expected, how = brentq(
             lambda x: function(x, 2.0), low, high, xtol=finest, rtol=relative, full_output=True
@@ -449,11 +455,11 @@ def test_motions_on_each_side_go_as_told(law, of, direction, stress):
     outcome = measure(scene, Accuracy(1e-6, engine=COMPILED))
     held = {} if of == RATE else {"load_velocity_ratio": 0.0}
     if outcome.status is Status.STABLE_FOR_ALL_STEPS:
-        largest = outcome.values[f"{measure.headline}_stable"]
-        assert not reaches_the_norm(scene.with_(**{of: largest}, **held), 1e-10, 10)
+        largest = outcome.values[f"{measure.primary_output}_stable"]
+        assert not reaches_instability_norm(scene.with_(**{of: largest}, **held), 1e-10, 10)
         return
     assert outcome.status is Status.OK
-    critical = outcome.values[measure.headline]
+    critical = outcome.values[measure.primary_output]
     for share, reaches in ((1.0 - 1e-5, False), (1.0 + 1e-5, True)):
         step = critical**share if of == RATE else critical * share
-        assert reaches_the_norm(scene.with_(**{of: step}, **held), 1e-10, 100) is reaches
+        assert reaches_instability_norm(scene.with_(**{of: step}, **held), 1e-10, 100) is reaches

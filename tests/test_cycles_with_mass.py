@@ -5,7 +5,7 @@ round, and against the same scene in other words.
 import math
 
 import pytest
-from in_time import InTime
+from in_time import TimeDomainMotion
 from rsfstudy.named_studies._bifurcation import Bifurcation
 
 from rsfstudy import Scene
@@ -55,17 +55,27 @@ def true_numbers(scene: Scene, until: float) -> list[float]:
     it began.
     """
     load = scene.load_velocity
-    watches = [lambda now: now.v - load] * 2 + [lambda now: now.growth] * 2
-    rises, falls, tops, lows = InTime(scene).solved([until], watches, [1.0, -1.0, -1.0, 1.0])[1]
+    watches = [lambda now: now.velocity - load] * 2 + [lambda now: now.log_slip_rate_derivative] * 2
+    rises, falls, tops, lows = TimeDomainMotion(scene).solve(
+        [until], watches, [1.0, -1.0, -1.0, 1.0]
+    )[1]
     (began, first), (ended, _last) = rises[-2:]
     within = [[now for at, now in told if began < at < ended] for told in (falls, tops, lows)]
     trough, top, low = (
-        min(now.f for now in within[0]),
-        max(within[1], key=lambda now: now.x),
+        min(now.spring_stress for now in within[0]),
+        max(within[1], key=lambda now: now.log_slip_rate),
         within[2],
     )
-    rates = [min(now.x for now in low) / math.log(10.0), top.x / math.log(10.0)]
-    return [ended - began, first.f - trough, first.f - top.f, *rates]
+    rates = [
+        min(now.log_slip_rate for now in low) / math.log(10.0),
+        top.log_slip_rate / math.log(10.0),
+    ]
+    return [
+        ended - began,
+        first.spring_stress - trough,
+        first.spring_stress - top.spring_stress,
+        *rates,
+    ]
 
 
 @pytest.mark.parametrize("words", ["one", "two", "dilatant"])

@@ -13,11 +13,11 @@ from rsfstudy.named_studies import effects
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.equations import (
-    between_ruptures,
-    in_rupture,
+    equations_between_ruptures,
+    equations_in_rupture,
+    equations_of_rigid_slider,
+    friction_relation,
     log_slip_rate_at,
-    relation_of,
-    rigid,
 )
 
 shear = st.floats(-0.5, 0.5)
@@ -29,12 +29,12 @@ def test_strength_is_shear_over_normal_stress(g, phi, mu_star):
     scene = Scene(phi=phi, mu_star=mu_star, alpha=0.0)
     ratio = 1.0 + cot_phi(scene) * g
     exact = (mu_star + g) / ratio - mu_star
-    assert relation_of(scene)(g)[0] == pytest.approx(exact, abs=4e-15 / ratio)
+    assert friction_relation(scene)(g)[0] == pytest.approx(exact, abs=4e-15 / ratio)
 
 
 @given(shear, st.floats(0.0, 1.2), st.floats(50.0, 89.0))
 def test_slopes_are_derivatives(g, alpha, phi):
-    relation, h = relation_of(Scene(alpha=alpha, phi=phi)), 1e-6
+    relation, h = friction_relation(Scene(alpha=alpha, phi=phi)), 1e-6
     ahead, behind, here = relation(g + h), relation(g - h), relation(g)
     for value in (0, 2):
         numeric = (ahead[value] - behind[value]) / (2 * h)
@@ -47,7 +47,7 @@ def test_the_shift_is_the_integral_of_the_linker_dieterich_term(g, alpha, phi):
     """dTheta = -alpha dsigma/sigma over a jump from sigma_* is eq. 2 of the paper."""
     scene = Scene(alpha=alpha, phi=phi)
     cot = cot_phi(scene)
-    _value, _slope, shift, slope = relation_of(scene)(g)
+    _value, _slope, shift, slope = friction_relation(scene)(g)
     assert -shift == pytest.approx(-alpha * math.log(1.0 + cot * g), abs=1e-14)
     assert slope == pytest.approx(alpha * cot / (1.0 + cot * g), rel=1e-14)
 
@@ -71,15 +71,15 @@ def test_jump_of_slip_rate_is_eq_13(displacement, alpha, phi):
 @given(shear)
 def test_alpha_to_zero_is_the_effect_absent(g):
     """Each effect at vanishing strength equals the effect absent."""
-    absent, vanishing = relation_of(Scene(alpha=0.0)), relation_of(Scene(alpha=1e-12))
+    absent, vanishing = friction_relation(Scene(alpha=0.0)), friction_relation(Scene(alpha=1e-12))
     for ours, theirs in zip(vanishing(g), absent(g), strict=True):
         assert ours == pytest.approx(theirs, abs=3e-12)
 
 
 @given(shear)
 def test_phi_to_90_degrees_is_constant_normal_stress(g):
-    absent = relation_of(Scene(normal_stress="constant"))
-    vanishing = relation_of(Scene(phi=90.0 - 1e-10))
+    absent = friction_relation(Scene(normal_stress="constant"))
+    vanishing = friction_relation(Scene(phi=90.0 - 1e-10))
     for ours, theirs in zip(vanishing(g), absent(g), strict=True):
         assert ours == pytest.approx(theirs, abs=1e-11)  # cot(phi) = 1.7e-12
 
@@ -87,33 +87,33 @@ def test_phi_to_90_degrees_is_constant_normal_stress(g):
 @pytest.mark.parametrize(
     ("equations", "unknowns"),
     [
-        (rigid(Scene(normal_stress="constant"), 1.0), 1),
-        (rigid(Scene(), 1.0), 1),
-        (between_ruptures(Scene(normal_stress="constant"), clock=False), 2),
-        (between_ruptures(Scene(alpha=0.0), clock=False), 2),
-        (between_ruptures(Scene(), clock=False), 2),
-        (between_ruptures(Scene(), clock=True), 3),
-        (between_ruptures(Scene(radiation_damping=0.1), clock=False), 2),
-        (between_ruptures(Scene(inertia=True), clock=False), 2),
-        (in_rupture(Scene(inertia=True)), 3),
+        (equations_of_rigid_slider(Scene(normal_stress="constant"), 1.0), 1),
+        (equations_of_rigid_slider(Scene(), 1.0), 1),
+        (equations_between_ruptures(Scene(normal_stress="constant"), clock=False), 2),
+        (equations_between_ruptures(Scene(alpha=0.0), clock=False), 2),
+        (equations_between_ruptures(Scene(), clock=False), 2),
+        (equations_between_ruptures(Scene(), clock=True), 3),
+        (equations_between_ruptures(Scene(radiation_damping=0.1), clock=False), 2),
+        (equations_between_ruptures(Scene(inertia=True), clock=False), 2),
+        (equations_in_rupture(Scene(inertia=True)), 3),
     ],
 )
 def test_number_of_unknowns(equations, unknowns):
     assert len(equations.unknowns) == len(equations.scales) == unknowns
-    assert len(equations.rates([0.01] * unknowns)) == unknowns
+    assert len(equations.evaluate_rates([0.01] * unknowns)) == unknowns
 
 
 def test_the_same_functions_serve_all_scenes_of_the_same_parts():
     """None holds a number of a scene: those are arguments."""
     one, other = (
-        between_ruptures(Scene(a=a, phi=phi, load_velocity_ratio=load), clock=False)
+        equations_between_ruptures(Scene(a=a, phi=phi, load_velocity_ratio=load), clock=False)
         for a, phi, load in ((0.01, 55.0, 2.0), (0.02, 70.0, 3.0))
     )
-    assert one.rate is other.rate
-    assert one.point is other.point
-    assert one.p != other.p
-    assert all(isinstance(number, float) for number in one.p)
-    cells = (cell.cell_contents for cell in one.rate.__closure__ or ())
+    assert one.rate_function is other.rate_function
+    assert one.point_function is other.point_function
+    assert one.parameters != other.parameters
+    assert all(isinstance(number, float) for number in one.parameters)
+    cells = (cell.cell_contents for cell in one.rate_function.__closure__ or ())
     assert all(isinstance(value, types.FunctionType | int) for value in cells)
 
 
@@ -126,11 +126,16 @@ def test_trial_states_outside_of_the_physics_give_finite_rates():
     for scene in (*scenes, *fluid):
         massive = scene.with_(inertia=True)
         for wild, psi in itertools.product((-1e6, -2.0, -1.7320508, 3.0, 1e6), (-50.0, 0.0, 50.0)):
-            pores = [wild, psi][: scene.states - 1]
-            for system in (between_ruptures(s, clock=True) for s in (scene, massive)):
-                assert all(map(math.isfinite, system.rates([wild, psi, *pores, 0.0])))
+            pores = [wild, psi][: scene.state_count - 1]
+            for system in (equations_between_ruptures(s, clock=True) for s in (scene, massive)):
+                assert all(map(math.isfinite, system.evaluate_rates([wild, psi, *pores, 0.0])))
             for x in (-1e4, 0.0, 1e4):
-                assert all(map(math.isfinite, in_rupture(massive).rates([wild, x, wild, *pores])))
+                assert all(
+                    map(
+                        math.isfinite,
+                        equations_in_rupture(massive).evaluate_rates([wild, x, wild, *pores]),
+                    )
+                )
 
 
 def test_what_a_right_hand_side_costs_is_relative_to_the_plainest_of_the_moment(monkeypatch):
@@ -142,7 +147,7 @@ def test_what_a_right_hand_side_costs_is_relative_to_the_plainest_of_the_moment(
         turn = next(turns) // 3
         return (1.0 + turn) * (10.0 if turn % 4 == 0 else 1.0) * slowness[equations.regime]
 
-    monkeypatch.setattr(effects, "_seconds", seconds)
+    monkeypatch.setattr(effects, "_time_right_hand_side", seconds)
     found = effects.EffectCost()(Scene(inertia=True), Accuracy(1e-3)).values
     assert found["evaluation_cost"] == pytest.approx(4.0, rel=1e-12)
     assert found["evaluation_cost_in_rupture"] == pytest.approx(3.0, rel=1e-12)

@@ -15,7 +15,7 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Output
-from rsfstudy.rig.quantities import of_scene
+from rsfstudy.rig.quantities import derive_scene_fields
 from rsfstudy.status import Status
 
 #: Where boundaries have closed forms that the norm does not show in.
@@ -48,8 +48,13 @@ def test_closed_forms(measure, exact):
         elasticity, error = found[name]
         assert abs(elasticity - value) <= error <= 1e-5
     lacking = {name for name, (elasticity, _error) in found.items() if math.isnan(elasticity)}
-    assert {"alpha", "phi", "displacement_step", "stiffness"} - set(measure.sought) <= lacking
-    assert outcome.values[measure.headline] == measure(SCENE, COMPILED).values[measure.headline]
+    assert {"alpha", "phi", "displacement_step", "stiffness"} - set(
+        measure.solved_fields
+    ) <= lacking
+    assert (
+        outcome.values[measure.primary_output]
+        == measure(SCENE, COMPILED).values[measure.primary_output]
+    )
 
 
 def test_at_the_critical_stiffness_there_is_one_side():
@@ -97,7 +102,7 @@ def extrapolated(measure, scene, name, steps=(0.004, 0.002, 0.001)):
 
     def level(by):
         changed = scene.with_(**{name: getattr(scene, name) * math.exp(by)})
-        return math.log(abs(measure(changed, accuracy).values[measure.headline]))
+        return math.log(abs(measure(changed, accuracy).values[measure.primary_output]))
 
     first, second, third = ((level(h) - level(-h)) / (2.0 * h) for h in steps)
     rough, fine = second + (second - first) / 3.0, third + (third - second) / 3.0
@@ -136,12 +141,12 @@ class Known(Measure):
 
     error: float = 0.0
     name: ClassVar[str] = "known"
-    headline = "y"
+    primary_output = "y"
     typical_work = 1
     outputs = (Output("y", "", "1", "known", error=True),)
     asked: ClassVar[list[Scene]] = []
 
-    def find(self, scene, accuracy, meter):
+    def compute(self, scene, accuracy, meter):
         self.asked.append(scene)
         if scene.mu_star > 0.9:
             return Outcome(Status.WORK_BUDGET_SPENT, message="too far")
@@ -173,7 +178,7 @@ def test_steps_know_the_error_of_the_number(error):
 class Ending(Known):
     """y = (1 - k/k_cr)^0.05, no number from k_cr on, and an error that is stated, and made."""
 
-    def find(self, scene, accuracy, meter):
+    def compute(self, scene, accuracy, meter):
         if scene.stiffness_ratio >= 1.0:
             return Outcome(Status.NO_LIMIT_CYCLE)
         y = (1.0 - scene.stiffness_ratio) ** 0.05
@@ -231,7 +236,7 @@ def test_the_elasticities_that_uncertain_recurrence_states():
         ends = []
         for by in (-0.01, 0.01):
             rig = known | {name: known[name] * math.exp(by)}
-            cycle = LimitCycle(phases=2)(stated.base.with_(**of_scene(rig)), COMPILED)
+            cycle = LimitCycle(phases=2)(stated.base.with_(**derive_scene_fields(rig)), COMPILED)
             interval = cycle.values["recurrence_interval"] * rig["slip_distance"]
             ends.append(math.log(interval / rig["reference_velocity"]))
         assert (ends[1] - ends[0]) / 0.02 == pytest.approx(value, abs=1e-3)

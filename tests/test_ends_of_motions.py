@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 
 import pytest
-from running import begun
+from running import start_point
 from scipy.optimize import brentq
 
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.analysis.after_step import reaches_norm
-from rsfstudy.errors import Incomplete, NoAnswer
+from rsfstudy.errors import IncompleteWarning, NoResultWarning
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, SCIPY
-from rsfstudy.motion.events import Kind, rise
-from rsfstudy.motion.handover import GOES_ON, margin, termination_of
-from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.events import EventKind, rise
+from rsfstudy.motion.handover import CONTINUES, find_termination, termination_margin
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.status import Status
 
 ENGINES = (SCIPY, COMPILED)
@@ -28,8 +28,8 @@ def test_a_margin_is_left_where_a_motion_goes_on():
     for load in (0.0, 1.0):
         for x in rates:
             for stress in stresses:
-                goes_on = termination_of(x, stress, load) == GOES_ON
-                assert (margin(x, stress, load) > 1e-12) == goes_on, (x, stress, load)
+                goes_on = find_termination(x, stress, load) == CONTINUES
+                assert (termination_margin(x, stress, load) > 1e-12) == goes_on, (x, stress, load)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -37,18 +37,18 @@ def test_a_runaway_is_followed_to_its_end(engine):
     """Without mass, slip rate grows without bound within one step: every level before is told."""
     scene = Scene(stiffness_ratio=0.5, displacement_step=3.0)
     levels = [rise("log_slip_rate", to) for to in (50.0, 150.0, 250.0)]
-    met, meter = [], Meter(100_000, engine=engine)
+    met, meter = [], WorkMeter(100_000, engine=engine)
 
     def follow_on() -> None:
-        for event in follow(scene, Accuracy(1e-6, engine=engine), meter, levels):
-            met.extend([event.watch.level] if event.kind is Kind.RISE else [])
+        for event in integrate_events(scene, Accuracy(1e-6, engine=engine), meter, levels):
+            met.extend([event.specification.level] if event.kind is EventKind.RISE else [])
 
-    with pytest.raises(Halt, match=r"beyond 10\^120"):
+    with pytest.raises(MotionStopped, match=r"beyond 10\^120"):
         follow_on()
     assert met == [50.0, 150.0, 250.0]
     with (
-        pytest.warns(Incomplete, match="slip_rate_unbounded"),
-        pytest.warns(NoAnswer, match="beyond the instability norm"),
+        pytest.warns(IncompleteWarning, match="slip_rate_unbounded"),
+        pytest.warns(NoResultWarning, match="beyond the instability norm"),
     ):
         motion = rsfstudy.simulate(scene, engine=engine)
     assert float(motion.log10_slip_rate[-1]) == pytest.approx(120.0, abs=1e-6)
@@ -63,9 +63,9 @@ def test_slip_that_nothing_loads_is_followed_to_its_end(engine):
         law="slowness", normal_stress="constant", b_over_a=5.0, stiffness_ratio=0.5,
         inertia=True, displacement_step=3.0,
     )  # fmt: skip
-    meter = Meter(5_000, engine=engine)
-    with pytest.raises(Halt) as halt:
-        list(follow(scene, Accuracy(1e-4, engine=engine), meter))
+    meter = WorkMeter(5_000, engine=engine)
+    with pytest.raises(MotionStopped) as halt:
+        list(integrate_events(scene, Accuracy(1e-4, engine=engine), meter))
     assert halt.value.status is Status.SLIP_STOPPED
 
 
@@ -79,7 +79,7 @@ def test_the_norm_is_met_before_normal_stress_is_lost(engine):
     for step, reached in ((-0.0271, False), (-0.028, True), (-0.035, True), (-0.05, True)):
         stepped = scene.with_(normal_stress_step=step)
         for rtol in (1e-6, 1e-8):
-            asked = Accuracy(rtol, engine=engine), Meter(100_000, engine=engine)
+            asked = Accuracy(rtol, engine=engine), WorkMeter(100_000, engine=engine)
             assert reaches_norm(stepped, *asked) is reached, (step, rtol)
 
 
@@ -102,4 +102,4 @@ def test_waves_after_a_large_rise_of_normal_stress(rise_by, damping):
 
     # stress falls and strength rises with x, where normal stress is left
     expected = brentq(missing, -60.0, 60.0, xtol=1e-13)
-    assert begun(scene).log_slip_rate == pytest.approx(expected, abs=1e-9)
+    assert start_point(scene).log_slip_rate == pytest.approx(expected, abs=1e-9)

@@ -16,19 +16,19 @@ import xarray as xr
 from running import study_of
 
 import rsfstudy
-from rsfstudy import Axis, Figure, Laboratory, Panel, Scene, Segment, measures, reduce
-from rsfstudy.argument_checks import MOST_ITEMS, describe_type, is_match
+from rsfstudy import Axis, Figure, Panel, Rig, Scene, Segment, measures, reduce
+from rsfstudy.argument_checks import MAX_ITEMS, describe_type, matches_annotation
 from rsfstudy.error_boundary import error_boundary
-from rsfstudy.errors import CallError, DataError, Incomplete, InvalidValue, RsfStudyError
+from rsfstudy.errors import CallError, DataError, IncompleteWarning, InvalidValue, RsfStudyError
 from rsfstudy.measures import Measure
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.velocity_step import VelocityStep
-from rsfstudy.quantity import table
-from rsfstudy.reduce import LinearFit, OverClosedForm, PowerLaw, Range
+from rsfstudy.quantity import html_table
+from rsfstudy.reduce import ClosedFormRatio, LinearFit, PowerLaw, Range
 
 ROOT = Path(__file__).resolve().parents[1]
 
-RIG = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
+RIG = Rig(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
 ENDLESS = range(10**12)
 STEP = ROOT / "studies/pages/step.csv"
 #: An array with another dimension than the reductions below expect.
@@ -111,7 +111,7 @@ def test_calls_from_inside_rsfstudy_keep_the_original_exception():
         (lambda d: LinearFit("z", of="x", onn="y"), "'onn'.* Did you mean 'on'"),
         (lambda d: Segment(1.0, duratoin=2.0), "'duratoin'.* It takes load_velocity"),
         (lambda d: RIG.axis(units=5), r"axis\(\) .*'dimension'. It takes dimension"),
-        (lambda d: rsfstudy.cell("x", {}, studdy=1), "Did you mean 'study'"),
+        (lambda d: rsfstudy.recompute_cell("x", {}, studdy=1), "Did you mean 'study'"),
         (lambda d: rsfstudy.check(d, **{"\x1b[31m": 1}), r"'\\x1b\[31m'"),
     ],
 )
@@ -128,28 +128,31 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda r: r.window("5 s", "9 s"), "begins = '5 s': must be a number"),
+        (lambda r: r.window("5 s", "9 s"), "start = '5 s': must be a number"),
         (lambda r: r.with_steps([(1, 2)]), r"step = \(1, 2\): (must be four|is no step)"),
         (lambda r: r.with_steps(7), "steps = 7: must be a list"),
         (lambda r: rsfstudy.fit("rec.csv"), "record = 'rec.csv': is no record. .*read_record"),
         (lambda r: rsfstudy.fit(r, laws="slip", stiffness=1e-3), r"laws = 'slip': .*\['slip'\]"),
         (lambda r: RIG.axis("slip_distance", ["1 um"], units=5), "units = 5: must be a mapping"),
         (lambda r: RIG.in_units("x"), "dataset = 'x': must be an xarray.Dataset"),
-        (lambda r: Scene().under(None), "segment = None: must be a rsfstudy.Segment"),
-        (lambda r: rsfstudy.protocol([{"velocity": 2.0}]).stated_at(9), "number = 9: is out of"),
+        (lambda r: Scene().with_segment(None), "segment = None: must be a rsfstudy.Segment"),
+        (
+            lambda r: rsfstudy.protocol([{"velocity": 2.0}]).describe_reversal(9),
+            "index = 9: is out of",
+        ),
         (lambda r: Figure(panels=int), "panels = <class 'int'>: must be a list"),
         (lambda r: Panel(x=5), "x = 5: must be a text or a function"),
-        (lambda r: Panel(by="law"), "by = 'law': must be a list"),
+        (lambda r: Panel(hue="law"), "hue = 'law': must be a list"),
         (lambda r: Panel(log="z"), "log = 'z': must name axes"),
         (lambda r: Segment("a"), "load_velocity = 'a': must be a number"),
-        (lambda r: OverClosedForm("z", of="x", form=np.ones(3)), "form = array.*must be a text"),
+        (lambda r: ClosedFormRatio("z", of="x", form=np.ones(3)), "form = array.*must be a text"),
         (lambda r: LinearFit("z", of=None, on="x"), "of = None: must be a text"),
-        (lambda r: reduce.reduced(r, ()), "dataset = Record.*must be an xarray.Dataset"),
+        (lambda r: reduce.apply_reductions(r, ()), "dataset = Record.*must be an xarray.Dataset"),
         (lambda r: rsfstudy.run("a" * 300), "study = 'aaa.*at most 255 bytes"),
         (lambda r: rsfstudy.history({"time": [0, 1], "velocity": "="}), "velocity = '=': must"),
         (lambda r: study_of("s", LinearStability(), Axis("a", [0.1])).scene(-1), "number = -1: is"),
         (lambda r: rsfstudy.read_record({"time": np.datetime64("2020")}), "time = .*one dim"),
-        (lambda r: rsfstudy.Accuracy().at(np.timedelta64(1)), "rtol = .*must be a number"),
+        (lambda r: rsfstudy.Accuracy().with_rtol(np.timedelta64(1)), "rtol = .*must be a number"),
         (lambda r: Scene(a=np.timedelta64(1, "s")), "a = .*must be a number"),
         (lambda r: Axis("a", [0.1]).with_rows(np, {}), "rows = <module 'numpy'.*must be a list"),
         (lambda r: Figure(panels=np.ndarray), "panels = <class.*must be a list"),
@@ -160,9 +163,12 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         ),
         (lambda r: rsfstudy.read_table(STEP, {"time": ("a", "s", "x")}), "must be a heading, or"),
         (lambda r: rsfstudy.read_table(STEP, xr.Dataset({"time": 1.0})), "column = <xarray.Data"),
-        (lambda r: reduce.Mean("z", of="x").values(ARRAY), "of = .*has no dimension 'sample'. Ch"),
-        (lambda r: PowerLaw("z", of="x", on="y").centred(ARRAY, "y"), "has no dimension 'y'"),
-        (lambda r: reduce.Difference("z", of="x", along="y").draws_on(ARRAY), "no dimension 'y'"),
+        (lambda r: reduce.Mean("z", of="x").compute(ARRAY), "of = .*has no dimension 'sample'. Ch"),
+        (lambda r: PowerLaw("z", of="x", on="y").centre_values(ARRAY, "y"), "has no dimension 'y'"),
+        (
+            lambda r: reduce.Difference("z", of="x", along="y").support_status(ARRAY),
+            "no dimension 'y'",
+        ),
         (
             lambda r: rsfstudy.run("rate_step_boundary", alpha=[{}], output=None, workers=0),
             "alpha = {}: must be a number, a string",
@@ -188,7 +194,7 @@ def test_the_argument_is_named(call, message, record):
     ],
 )
 def test_a_list_without_end_is_refused(call):
-    with pytest.raises(InvalidValue, match=f"{MOST_ITEMS:,}"):
+    with pytest.raises(InvalidValue, match=f"{MAX_ITEMS:,}"):
         call()
 
 
@@ -217,18 +223,18 @@ def test_a_name_of_a_study_leaves_room_for_endings():
 def test_numbers_and_lists_of_numpy_match():
     from collections.abc import Callable, Mapping, Sequence
 
-    assert is_match(np.float32(1), float)
-    assert is_match(np.int8(1), int)
-    assert is_match(np.ones(3), Sequence[float])
-    assert is_match([0, None], tuple[float | None, float | None])
-    assert is_match({"a": [1]}, Mapping[str, Sequence[int]])
-    assert is_match(len, Callable[[str], int])
+    assert matches_annotation(np.float32(1), float)
+    assert matches_annotation(np.int8(1), int)
+    assert matches_annotation(np.ones(3), Sequence[float])
+    assert matches_annotation([0, None], tuple[float | None, float | None])
+    assert matches_annotation({"a": [1]}, Mapping[str, Sequence[int]])
+    assert matches_annotation(len, Callable[[str], int])
     for value, annotation in [
         (True, float), (1.5, int), ("ab", Sequence[str]), (np.array(1.0), Sequence[float]),
         ([1.0], tuple[float, float]), ({1: 2}, Mapping[str, int]), (None, str | int), (int, int),
     ]:  # fmt: skip
-        assert not is_match(value, annotation), annotation
-    assert not is_match(xr.Dataset({"a": 1.0}), Mapping[str, object])
+        assert not matches_annotation(value, annotation), annotation
+    assert not matches_annotation(xr.Dataset({"a": 1.0}), Mapping[str, object])
 
 
 def test_constructors_convert_numpy_numbers():
@@ -236,7 +242,7 @@ def test_constructors_convert_numpy_numbers():
     assert measure.plain_fields == {"step_number": 1, "record": 2.5, "phases": 3}
     assert {type(value) for value in measure.plain_fields.values()} == {int, float}
     assert type(LinearFit("z", of="x", on="y", within=(0.0, 1.0)).within) is tuple
-    assert type(Panel(points=np.True_).points) is bool
+    assert type(Panel(markers_only=np.True_).markers_only) is bool
 
 
 def test_types_are_described_in_words():
@@ -253,22 +259,22 @@ ESCAPE = "\x1b]0;x\x07\x1b[31m"
 
 
 def test_headings_of_html_are_spelt_out():
-    shown = table([f"zeta ({ESCAPE})"], [[ESCAPE]], ESCAPE)
+    shown = html_table([f"zeta ({ESCAPE})"], [[ESCAPE]], ESCAPE)
     assert shown.isprintable()
     assert shown.count("x1b[31m") == 3
 
 
 def test_warnings_are_spelt_out():
-    assert str(Incomplete(ESCAPE)).isprintable()
+    assert str(IncompleteWarning(ESCAPE)).isprintable()
 
 
 def test_headings_of_the_terminal_are_spelt_out(dataset, tmp_path, capsys):
     from rsfstudy.api.tables import Table
-    from rsfstudy.cli.layout import show
+    from rsfstudy.cli.layout import print_piece
 
     rows = [{f"zeta ({ESCAPE})": "1", "why": "x" * 60}]
-    show(Table(rows, caption=ESCAPE, prose={"why"}))
-    show({ESCAPE: "1"})
+    print_piece(Table(rows, caption=ESCAPE, wrappable={"why"}))
+    print_piece({ESCAPE: "1"})
     wide = {f"{n} {ESCAPE}": "y" * 30 for n in range(5)}
-    show(Table([wide]))  # does not fit, and is printed as a list
+    print_piece(Table([wide]))  # does not fit, and is printed as a list
     assert all(c.isprintable() or c == "\n" for c in capsys.readouterr().out)

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 import synthetic_records as synthetic
 import xarray as xr
-from synthetic_records import OPTIONS, STEP, TRUTH
+from synthetic_records import EXACT_PARAMETERS, FIT_OPTIONS, STEP_UP
 
 import rsfstudy
 from rsfstudy.api import fit_results, summaries
-from rsfstudy.reduce import Range, reduced
+from rsfstudy.reduce import Range, apply_reductions
 from rsfstudy.status import Status
 
 
 def record_with(noise: np.ndarray, jitter: np.ndarray | float = 0.0, trend: float = 0.0):
     """A record of a velocity step with this noise of friction and of displacement."""
-    time = synthetic.rows(STEP, synthetic.end(STEP), len(noise))
-    moved = synthetic.load_point(STEP, time)
-    friction = synthetic.motion("slowness", time)[0] + trend * (moved - 40.0)
+    time = synthetic.sample_times(STEP_UP, synthetic.loading_end_time(STEP_UP), len(noise))
+    moved = synthetic.load_point_displacement(STEP_UP, time)
+    friction = synthetic.friction_and_sensitivities("slowness", time)[0] + trend * (moved - 40.0)
     columns = {"time": time, "displacement": moved + jitter, "friction": friction + noise}
     return rsfstudy.read_record(columns)
 
@@ -28,47 +28,49 @@ def record_with(noise: np.ndarray, jitter: np.ndarray | float = 0.0, trend: floa
 @functools.cache
 def naive() -> xr.Dataset:
     """A fit that assumes white noise, of a record with correlated noise."""
-    record = record_with(synthetic.correlated(400, 0.9, 3e-4, 0)).with_steps([(40, 40, 1, 10)])
-    return rsfstudy.fit(record, **OPTIONS | {"noise": "white", "laws": ["slowness"]})
+    record = record_with(synthetic.correlated_noise(400, 0.9, 3e-4, 0)).with_steps(
+        [(40, 40, 1, 10)]
+    )
+    return rsfstudy.fit(record, **FIT_OPTIONS | {"noise": "white", "laws": ["slowness"]})
 
 
 def test_autocorrelated_whitened_residuals_change_the_status() -> None:
     assert int(Status.ERRORS_NOT_VALID) == 19
     assert Status.ERRORS_NOT_VALID.is_answer
-    row = naive().rsf.table().iloc[0]
+    row = naive().rsf.fit_table().iloc[0]
     assert row["status"] == "errors_not_valid"
     assert row["p_value"] < 1e-6
     assert "still autocorrelated" in naive().message.item()
     # the values stand
-    assert row["a"] == pytest.approx(TRUTH["a"], rel=0.2)
+    assert row["a"] == pytest.approx(EXACT_PARAMETERS["a"], rel=0.2)
 
 
 def test_tables_mark_standard_errors_that_are_not_valid() -> None:
-    assert not fit_results.answered(naive())  # exit status 1
-    assert fit_results.with_error(naive().squeeze(), "a").endswith("*")
-    texts = [piece for piece in summaries.numbers(naive()) if isinstance(piece, str)]
+    assert not fit_results.all_answered(naive())  # exit status 1
+    assert fit_results.format_with_stderr(naive().squeeze(), "a").endswith("*")
+    texts = [piece for piece in summaries.summary_pieces(naive()) if isinstance(piece, str)]
     assert any("standard errors marked by * are not valid" in text for text in texts)
 
 
 def test_reductions_do_not_use_standard_errors_that_are_not_valid() -> None:
     both = xr.concat([naive()[["a", "a_stderr", "status"]]] * 2, "record")
-    made = reduced(
+    made = apply_reductions(
         both.isel(law=0),
         (Range("spread", "a", over="record"), Range("spread_of_errors", "a_stderr", over="record")),
     )
     assert made["spread"].item() == 0.0
     assert np.isnan(made["spread_of_errors"].item())
     valid = both.isel(law=0).assign(status=xr.zeros_like(both["status"].isel(law=0)))
-    found = reduced(valid, (Range("spread_of_errors", "a_stderr", over="record"),))
+    found = apply_reductions(valid, (Range("spread_of_errors", "a_stderr", over="record"),))
     assert found["spread_of_errors"].item() == 0.0
 
 
 def test_a_fit_that_explains_nothing_has_no_valid_errors() -> None:
     """Friction goes down at the step, and the only free parameter is its level."""
-    record = record_with(synthetic.correlated(300, 0.0, 3e-4, 1))
+    record = record_with(synthetic.correlated_noise(300, 0.0, 3e-4, 1))
     record.columns["friction"] = 1.2 - record.columns["friction"]
     fixed = {"a": 0.01, "b_over_a": 1.3, "slip_distance": 10.0, "laws": ["slowness"]}
-    found = rsfstudy.fit(record, **OPTIONS | fixed, free=["mu_star"]).squeeze()
+    found = rsfstudy.fit(record, **FIT_OPTIONS | fixed, free=["mu_star"]).squeeze()
     assert float(found.r_squared) < 0.0
     assert found.status.item() == Status.ERRORS_NOT_VALID
     assert "R2 is not positive" in found.message.item()
@@ -77,31 +79,33 @@ def test_a_fit_that_explains_nothing_has_no_valid_errors() -> None:
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_regressor_of_the_trend_has_no_noise(seed: int) -> None:
     """Friction has noise that wanders and a trend, and the load point signal has jitter."""
-    noise = synthetic.correlated(600, 0.97, 3e-4, seed)
-    jitter = synthetic.correlated(600, 0.0, 0.3, 10 + seed)
+    noise = synthetic.correlated_noise(600, 0.97, 3e-4, seed)
+    jitter = synthetic.correlated_noise(600, 0.0, 0.3, 10 + seed)
     record = record_with(noise, jitter, trend=-6e-5)
-    options = OPTIONS | {"noise": "ar", "laws": ["slowness"]}
+    options = FIT_OPTIONS | {"noise": "ar", "laws": ["slowness"]}
     found = rsfstudy.fit(record, **options).squeeze()
     assert found.status.item() == Status.OK
-    for name, true in {**TRUTH, "trend1": -6e-5}.items():
+    for name, true in {**EXACT_PARAMETERS, "trend1": -6e-5}.items():
         if f"{name}_stderr" in found:  # of 10 numbers one is off by 3.5 once in 200 records
-            assert abs(synthetic.off(found, name, true)) < 3.5, name
+            assert abs(synthetic.deviation_in_stderrs(found, name, true)) < 3.5, name
     assert float(found.slip_distance_stderr) < 2.0
 
 
 def test_outliers_are_left_out_and_named() -> None:
-    noise = synthetic.correlated(400, 0.0, 3e-4, 3)
+    noise = synthetic.correlated_noise(400, 0.0, 3e-4, 3)
     noise[[100, 222, 390]] += [0.02, -0.02, 0.02]
-    options = OPTIONS | {"noise": "ar", "laws": ["slowness"]}
+    options = FIT_OPTIONS | {"noise": "ar", "laws": ["slowness"]}
     found = rsfstudy.fit(record_with(noise), **options).squeeze()
     assert found.status.item() == Status.OK
     assert int(found.outliers) == 3
     assert np.isnan(found.innovation.values[[100, 222, 390]]).all()
     assert "3 outliers were left out: rows 101, 223, 391" in found.message.item()
-    clean = rsfstudy.fit(record_with(synthetic.correlated(400, 0.0, 3e-4, 3)), **options).squeeze()
+    clean = rsfstudy.fit(
+        record_with(synthetic.correlated_noise(400, 0.0, 3e-4, 3)), **options
+    ).squeeze()
     assert float(found.a_stderr) == pytest.approx(float(clean.a_stderr), rel=0.1)
     for name in ("a", "b", "slip_distance"):
-        assert abs(synthetic.off(found, name, TRUTH[name])) < 3.5, name
+        assert abs(synthetic.deviation_in_stderrs(found, name, EXACT_PARAMETERS[name])) < 3.5, name
 
 
 @pytest.mark.parametrize(("quantum", "valid"), [(2e-4, True), (4e-4, False)])
@@ -109,10 +113,10 @@ def test_rounded_friction_has_valid_errors_if_the_noise_covers_it(
     quantum: float, valid: bool
 ) -> None:
     """The noise is 1e-4."""
-    record = record_with(synthetic.correlated(400, 0.0, 1e-4, 4))
+    record = record_with(synthetic.correlated_noise(400, 0.0, 1e-4, 4))
     rounded = quantum * np.rint(record.columns["friction"] / quantum)
     columns = record.columns | {"friction": rounded}
-    options = OPTIONS | {"noise": "ar", "laws": ["slowness"]}
+    options = FIT_OPTIONS | {"noise": "ar", "laws": ["slowness"]}
     found = rsfstudy.fit(rsfstudy.read_record(columns), **options).squeeze()
     assert float(found.friction_quantum) == pytest.approx(quantum)
     assert (found.status.item() == Status.OK) == valid
@@ -125,14 +129,14 @@ def test_errors_include_the_rounding_of_displacement(seed: int) -> None:
     shift = np.random.default_rng(seed).uniform(0.0, 0.5, 2)
     loading = ((0.0, 1.0), (40.0 + shift[0], 10.0))
     time = np.arange(0.0, 52.0, 0.1)
-    moved = 0.5 * np.rint(synthetic.load_point(loading, time) / 0.5 + shift[1])
-    friction = synthetic.motion("slowness", time, loading)[0]
-    friction += synthetic.correlated(len(time), 0.0, 1e-4, seed)
+    moved = 0.5 * np.rint(synthetic.load_point_displacement(loading, time) / 0.5 + shift[1])
+    friction = synthetic.friction_and_sensitivities("slowness", time, loading)[0]
+    friction += synthetic.correlated_noise(len(time), 0.0, 1e-4, seed)
     record = rsfstudy.read_record({"time": time, "displacement": moved, "friction": friction})
-    options = OPTIONS | {"noise": "ar", "laws": ["slowness"]}
+    options = FIT_OPTIONS | {"noise": "ar", "laws": ["slowness"]}
     found = rsfstudy.fit(record, **options).squeeze()
     for name in ("a", "b", "slip_distance"):
-        assert abs(synthetic.off(found, name, TRUTH[name])) < 3.0, name
+        assert abs(synthetic.deviation_in_stderrs(found, name, EXACT_PARAMETERS[name])) < 3.0, name
     begins = loading[1][0]
     exact = record.with_steps([(begins, begins, 1.0, 10.0)])
     stated = rsfstudy.fit(exact, **options).squeeze()
@@ -143,15 +147,15 @@ def test_errors_include_the_rounding_of_displacement(seed: int) -> None:
 def test_coarse_sampling_is_fitted_as_far_as_intervals_cover(rows: float, status: Status) -> None:
     """The load point moves by 10 um/s after the step, and D_c is 10 um."""
     time = np.concatenate([np.arange(0.5, 40.0, 1.0), np.arange(40.1, 80.0, 1.0 / rows)])
-    friction = synthetic.motion("slowness", time)[0]
-    friction += synthetic.correlated(len(time), 0.0, 3e-4, 2)
-    moved = synthetic.load_point(STEP, time)
+    friction = synthetic.friction_and_sensitivities("slowness", time)[0]
+    friction += synthetic.correlated_noise(len(time), 0.0, 3e-4, 2)
+    moved = synthetic.load_point_displacement(STEP_UP, time)
     record = rsfstudy.read_record({"time": time, "displacement": moved, "friction": friction})
-    options = OPTIONS | {"noise": "ar", "laws": ["slowness"]}
+    options = FIT_OPTIONS | {"noise": "ar", "laws": ["slowness"]}
     found = rsfstudy.fit(record.with_steps([(40.0, 40.0, 1.0, 10.0)]), **options).squeeze()
     assert found.status.item() == status, found.message.item()
     for name in ("a", "b", "slip_distance"):
-        assert abs(synthetic.off(found, name, TRUTH[name])) < 3.5, name
+        assert abs(synthetic.deviation_in_stderrs(found, name, EXACT_PARAMETERS[name])) < 3.5, name
     if status is Status.NOT_IDENTIFIED:
         assert "1.5 are needed: sample faster" in found.message.item()
 
@@ -159,7 +163,7 @@ def test_coarse_sampling_is_fitted_as_far_as_intervals_cover(rows: float, status
 def test_a_stiffness_that_is_bounded_from_below_only_is_reported() -> None:
     """A machine so stiff that friction reaches its peak between two rows."""
     found = rsfstudy.fit(
-        synthetic.record(truth=TRUTH | {"stiffness": 0.5}, seed=6, size=1e-4),
+        synthetic.synthetic_record(truth=EXACT_PARAMETERS | {"stiffness": 0.5}, seed=6, size=1e-4),
         laws=["slowness"],
         stiffness=0.3,
         free=["a", "b", "slip_distance", "mu_star", "trend1", "stiffness"],

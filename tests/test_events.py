@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.errors import InvalidValue, NoAnswer
+from rsfstudy.errors import InvalidValue, NoResultWarning
 
 STICK_SLIP = Scene(b_over_a=2.0, stiffness_ratio=0.5, load_velocity_ratio=10.0, inertia=True)
 
@@ -62,7 +62,7 @@ def test_events_of_a_motion_in_units_are_in_them(motion):
     """As those of the motion, once these are converted: to the errors of reading of both."""
     rate = float(motion.reference_rate)
     scales = {"normal_stress": "5 MPa", "slip_distance": 1e-5, "reference_velocity": 1e-5 * rate}
-    rig = rsfstudy.Laboratory(**scales)
+    rig = rsfstudy.Rig(**scales)
     units = {"stress": "MPa", "length": "um"}
     ours = rig.in_units(motion, **units).rsf.events()
     theirs = rig.in_units(motion.rsf.events(), **units)
@@ -171,7 +171,7 @@ def test_a_load_point_moves_on_through_drops(motion):
         np.interp(time, motion.time, motion[name]) + rng.normal(0.0, 1e-2, 10_000)
         for name in ("slip", "load_point_displacement")
     )
-    with pytest.warns(NoAnswer, match="no faster during the drops.* that of the rig"):
+    with pytest.warns(NoResultWarning, match="no faster during the drops.* that of the rig"):
         refused = rsfstudy.events(time=time, displacement=load_point, shear_stress=stress)
     for name in ("slip", "slip_error", "peak_slip_rate", "dynamic_stress_drop"):
         assert refused[name].isnull().all(), name

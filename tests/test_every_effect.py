@@ -17,15 +17,15 @@ from hypothesis import strategies as st
 from rsfstudy import Scene
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Kind, maximum
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.course import integrate_events
+from rsfstudy.motion.events import EventKind, maximum
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.slider import laws, stability, steady
 from rsfstudy.slider.equations import (
     Equations,
-    between_ruptures,
-    by_displacement,
-    by_inertial_time,
+    equations_between_ruptures,
+    equations_by_displacement,
+    equations_by_inertial_time,
 )
 from rsfstudy.status import Status
 
@@ -45,7 +45,7 @@ EFFECTS = [
 #: Any law, under any normal stress, with each of them that goes with both.
 SCENES = [
     {"law": law, **stress, **effect}
-    for law, stress, effect in itertools.product(sorted(laws.PARTS), STRESSES, EFFECTS)
+    for law, stress, effect in itertools.product(sorted(laws.BUILT_IN_PARTS), STRESSES, EFFECTS)
     if not ("stress_dependence" in effect and stress.get("normal_stress") == "imposed")
 ]
 SCENES += [{"law": law, **STRENGTHENING} for law in ("two_slip_states", "two_slowness_states")]
@@ -68,7 +68,7 @@ def eigenvalues(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
     at, columns = np.array(state), []
     for unit, scale in zip(np.eye(len(at)), equations.scales, strict=True):
         step = 1e-5 * scale * unit  # rounding and truncation balance
-        ahead, behind = (equations.rates(tuple((at + s).tolist())) for s in (step, -step))
+        ahead, behind = (equations.evaluate_rates(tuple((at + s).tolist())) for s in (step, -step))
         columns.append((np.array(ahead) - np.array(behind)) / (2e-5 * scale))
     return np.sort_complex(np.linalg.eigvals(np.array(columns).T))
 
@@ -79,10 +79,10 @@ def test_growth_rates_are_eigenvalues_of_the_assembled_equations(fields, ratio, 
     """Their clock is slip and load point displacement: twice as fast as slip."""
     scene = scene_of(fields, ratio, log_slip_rate)
     found = steady.steady_sliding(scene, log_slip_rate)
-    equations, at = by_displacement(scene), (found.spring_stress, *found.psis)
-    assert np.abs(equations.rates(at)).max() < 1e-13
+    equations, at = equations_by_displacement(scene), (found.spring_stress, *found.psis)
+    assert np.abs(equations.evaluate_rates(at)).max() < 1e-13
     ours, theirs = 0.5 * stability.growth_rates(scene, log_slip_rate), eigenvalues(equations, at)
-    assert len(ours) == 1 + scene.states
+    assert len(ours) == 1 + scene.state_count
     # pore pressure may drain, and one of two states evolve, many times as fast as others:
     # differences have the digits of the fastest
     within = 1e-7 * np.abs(ours).max()
@@ -94,9 +94,9 @@ def test_growth_rates_with_mass_are_eigenvalues_of_the_full_equations(fields):
     """In inertial time: w times as much."""
     scene = Scene(**{"stiffness_ratio": 0.9, **fields})
     found = steady.steady_sliding(scene, 0.0)
-    at = (found.spring_stress, 0.0, found.friction, *found.psis[1:])
+    at = (found.spring_stress, 0.0, found.frictional_stress, *found.psis[1:])
     ours = scene.inertial_time * stability.growth_rates(scene, 0.0)
-    theirs = eigenvalues(by_inertial_time(scene), at)
+    theirs = eigenvalues(equations_by_inertial_time(scene), at)
     np.testing.assert_allclose(np.sort_complex(ours), theirs, rtol=1e-6)
 
 
@@ -110,7 +110,7 @@ def test_critical_stiffness_is_where_growth_begins(fields):
 
 
 @given(
-    law=st.sampled_from(sorted(laws.PARTS)),
+    law=st.sampled_from(sorted(laws.BUILT_IN_PARTS)),
     alpha=st.none() | st.floats(0.0, 1.0),
     phi=st.floats(50.0, 85.0),
     log_slip_rate=st.floats(-3.0, 3.0),
@@ -158,12 +158,14 @@ def test_the_measure_finds_the_threshold_of_growth(
 def test_slip_rate_grows_as_the_unknowns_change(fields):
     """The growth of ln V that is told is that along the equations, away from steady sliding."""
     scene = Scene(**{"load_velocity_ratio": 3.0, "stiffness": 0.01, **fields})
-    equations = between_ruptures(scene, clock=False)
-    at = scene.a * np.array([0.3, 0.2, 0.1, 0.05, 0.02][: 1 + scene.states])
-    rates, step = np.array(equations.rates(tuple(at))), 1e-5
-    ahead, behind = (equations.at(tuple(at + s * rates)).log_slip_rate for s in (step, -step))
+    equations = equations_between_ruptures(scene, clock=False)
+    at = scene.a * np.array([0.3, 0.2, 0.1, 0.05, 0.02][: 1 + scene.state_count])
+    rates, step = np.array(equations.evaluate_rates(tuple(at))), 1e-5
+    ahead, behind = (
+        equations.evaluate_point(tuple(at + s * rates)).log_slip_rate for s in (step, -step)
+    )
     # differences err by the square of the step, and by rounding over it
-    told = equations.at(tuple(at)).growth
+    told = equations.evaluate_point(tuple(at)).log_slip_rate_derivative
     assert told == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-6, abs=1e-9)
 
 
@@ -196,10 +198,10 @@ def test_small_oscillations_grow_as_linear_theory_says(fields, ratio):
     rates = stability.growth_rates(scene, 0.0)
     turning = max((rate for rate in rates if rate.imag), key=lambda rate: rate.real)
     peaks = []
-    for event in follow(
-        scene, Accuracy(1e-9), Meter(10**6), [maximum("log_slip_rate")], clock=True
+    for event in integrate_events(
+        scene, Accuracy(1e-9), WorkMeter(10**6), [maximum("log_slip_rate")], with_time=True
     ):
-        if event.kind is Kind.MAXIMUM:
+        if event.kind is EventKind.MAXIMUM:
             peaks.append((event.time, event.point.log_slip_rate))
         if len(peaks) == 8:
             break

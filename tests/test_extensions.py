@@ -16,8 +16,8 @@ import cloudpickle
 import numpy as np
 import pytest
 from frozen_scenes import Motion
-from running import call, run, same_numbers, study_of
-from telling import apart, told
+from running import call_main, have_same_numbers, run, study_of
+from telling import largest_differences, record_frozen_motion
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, limit_cycle, plots
@@ -29,14 +29,14 @@ from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.slider import laws, places, registry
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.laws.slip import SlipLaw
-from rsfstudy.slider.loading.step import Step
+from rsfstudy.slider.loading.step import StepLoading
 from rsfstudy.slider.normal_stress import NormalStress
 from rsfstudy.slider.parts import flag, number
 from rsfstudy.slider.places import LAW
 from rsfstudy.status import Status
 
 #: Fields of every scene; others are among its values only if they are stated.
-PLAIN = tuple(name for name in registry.FIELDS if name not in registry.IF_STATED)
+PLAIN = tuple(name for name in registry.FIELD_NAMES if name not in registry.OMITTED_IF_NONE)
 EXAMPLES = sorted((Path(__file__).parent / "extensions").glob("*.py"))
 #: One cell of each.
 PLACES = {
@@ -76,10 +76,10 @@ def test_every_example_is_used():
 def test_it_is_checked_rerun_and_drawn(name, outside):
     example = outside[name]
     assert (example.dataset.status == int(Status.OK)).all(), example.dataset.message.values
-    same_numbers(rsfstudy.open(example.file), example.dataset)
-    checked = call("check", example.file)
+    have_same_numbers(rsfstudy.open(example.file), example.dataset)
+    checked = call_main("check", example.file)
     assert checked.returncode == 0, checked.stderr
-    drawn = call("plot", example.file, "--study", example.study)
+    drawn = call_main("plot", example.file, "--study", example.study)
     assert (drawn.returncode, drawn.stderr) == (0, "")
     assert example.file.with_suffix(".png").is_file()
 
@@ -87,7 +87,7 @@ def test_it_is_checked_rerun_and_drawn(name, outside):
 @pytest.mark.parametrize("name", PLACES)
 def test_one_cell_and_all_cells_are_as_on_the_workers(name, outside):
     example, place = outside[name], PLACES[name]
-    _scene, found = rsfstudy.cell(example.file, place, study=example.study)
+    _scene, found = rsfstudy.recompute_cell(example.file, place, study=example.study)
     there = example.dataset.sel(place)
     for number_, value in found.values.items():
         assert float(value) == pytest.approx(float(there[number_]), rel=0.0, abs=0.0, nan_ok=True)
@@ -101,13 +101,13 @@ def test_one_cell_and_all_cells_are_as_on_the_workers(name, outside):
 )
 def test_its_motions_are_the_same_compiled(name, outside):
     """As ours are held to frozen events: SciPy's stepper takes the same steps but for rounding."""
-    *_others, scene = catalogue.load(str(outside[name].study)).scenes()
+    *_others, scene = catalogue.load_study(str(outside[name].study)).scenes()
     stepped = {"rest_time": 30.0} if name == "hold_and_reload" else {"load_velocity_ratio": 2.0}
     scene = scene.with_(**stepped)
     motion = Motion({"a": scene.a}, until=300.0, rtol=1e-8)
-    one, other = (told(motion, engine, scene) for engine in ("scipy", "compiled"))
+    one, other = (record_frozen_motion(motion, engine, scene) for engine in ("scipy", "compiled"))
     assert len(one.kinds) > 3
-    along, of_steps = apart(motion, one, other)
+    along, of_steps = largest_differences(motion, one, other)
     assert along < 1e-12
     assert of_steps < 1e-8
 
@@ -118,7 +118,7 @@ def test_what_it_says_of_itself_is_in_the_file_and_on_the_figure(outside):
     stated = {"long_name": "sharpness of the law", "units": "1", "symbol": "$n$"}
     assert stated.items() <= about.items()
     lattice = example.dataset.transpose("stiffness_ratio", "sharpness", ...)
-    assert plots.figure(lattice).axes[0].get_xlabel() == "Sharpness of the law, $n$"
+    assert plots.draw_figure(lattice).axes[0].get_xlabel() == "Sharpness of the law, $n$"
     assert outside["loading_time"].dataset.loading_time.attrs["units"] == "s"
     exponent = outside["power_law"].dataset.exponent
     assert exponent.attrs["long_name"] == "exponent of critical_stiffness as a power of a"
@@ -127,7 +127,7 @@ def test_what_it_says_of_itself_is_in_the_file_and_on_the_figure(outside):
 
 def test_what_has_no_meaning_in_a_cell_is_left_out(outside):
     """As alpha at constant normal stress: the cells without it are one."""
-    study = catalogue.load(str(outside["saturating_law"].study))
+    study = catalogue.load_study(str(outside["saturating_law"].study))
     dataset = run(study, law=["slip", "saturating"], stiffness_ratio=[0.8])
     assert dataset.sizes == {"law": 2, "sharpness": 3, "stiffness_ratio": 1}
     slip, own = dataset.critical_displacement.squeeze("stiffness_ratio").transpose("law", ...)
@@ -148,7 +148,7 @@ def test_a_stepper_of_a_users_own(outside):
     for step in found.dataset.critical_velocity_ratio:
         b_over_a = float(step.b_over_a)
         assert float(step) == pytest.approx(1.0 + 1.0 / (b_over_a - 1.0), abs=bias[b_over_a])
-    stepper = catalogue.load(str(found.study))
+    stepper = catalogue.load_study(str(found.study))
     assert stepper.accuracy.engine == "order_four"
     scene = stepper.base.with_(inertia=True, stiffness_ratio=0.8, load_velocity_ratio=2.0)
     ours, theirs = (limit_cycle(scene, rtol=1e-5, engine=by) for by in ("order_four", "scipy"))
@@ -163,7 +163,7 @@ def test_a_hold_and_a_reload(outside):
     of t peaks at b ln(t) - a b ln(K/b)/(K - b); what is left out of both goes as 1/t.
     """
     found = outside["hold_and_reload"]
-    study = catalogue.load(str(found.study))
+    study = catalogue.load_study(str(found.study))
     scene, hold = study.base, found.dataset.rest_time
     a, b, stiffness, ratio = scene.a, scene.b, scene.stiffness, scene.stiffness_ratio
     limit = -a * ratio * math.log(ratio) / (ratio - 1.0)
@@ -216,8 +216,8 @@ def test_a_measure_a_reduction_and_a_figure(outside):
     seconds = base.a / (base.stiffness * base.reference_rate)
     np.testing.assert_allclose(times * times.load_velocity_ratio, seconds, rtol=1e-14)
     np.testing.assert_allclose(outside["power_law"].dataset.exponent, 1.0, rtol=1e-12)
-    study = catalogue.load(str(outside["own_figure"].study))
-    drawn = plots.figure(outside["own_figure"].dataset, study.plot).axes[0]
+    study = catalogue.load_study(str(outside["own_figure"].study))
+    drawn = plots.draw_figure(outside["own_figure"].dataset, study.plot).axes[0]
     assert drawn.get_ylabel() == "Angle (degrees)"
 
 
@@ -231,25 +231,27 @@ def test_without_the_study_file(outside, tmp_path, monkeypatch):
         shutil.copy(outside[name].file, tmp_path)
     saturating, figure = (outside[n].file.name for n in ("saturating_law", "own_figure"))
     monkeypatch.chdir(tmp_path)
-    drawn = call("plot", figure)
+    drawn = call_main("plot", figure)
     assert drawn.returncode == 0
     assert "drawn as maps or lines. plot = 'stiffness_map': is no figure of" in drawn.stderr
     assert "--study" in drawn.stderr
     as_lines = Path(figure).with_suffix(".png").read_bytes()
-    assert call("plot", figure, "--study", outside["own_figure"].study).stderr == ""
+    assert call_main("plot", figure, "--study", outside["own_figure"].study).stderr == ""
     assert Path(figure).with_suffix(".png").read_bytes() != as_lines
-    assert call("plot", figure, "--study", gone).stderr.startswith("error: study = ")
+    assert call_main("plot", figure, "--study", gone).stderr.startswith("error: study = ")
     with pytest.raises(InvalidValue, match="'saturating': is a user's own.*--study FILE.*mine.py"):
-        rsfstudy.cell(saturating, PLACES["saturating_law"])
+        rsfstudy.recompute_cell(saturating, PLACES["saturating_law"])
     with pytest.raises(InvalidValue, match="declares the study 'stiffness_map'"):
-        rsfstudy.cell(saturating, PLACES["saturating_law"], study=outside["own_figure"].study)
+        rsfstudy.recompute_cell(
+            saturating, PLACES["saturating_law"], study=outside["own_figure"].study
+        )
     with pytest.raises(InvalidValue, match="reduction = 'exponent'.*--study FILE"):
         rsfstudy.rerun(outside["power_law"].file, workers=0)
 
 
 def test_a_process_that_does_not_know_the_parts_opens_their_results(outside, monkeypatch):
     for slot in registry.SLOTS:
-        monkeypatch.setitem(vars(slot), "own", {})
+        monkeypatch.setitem(vars(slot), "user_parts", {})
     dataset = rsfstudy.open(outside["saturating_law"].file)
     assert dataset.attrs["id"] == "saturating_laws"
     assert rsfstudy.check(dataset).empty
@@ -276,7 +278,7 @@ class Sticky(QuasiStatic):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Steplike(Step):
+class Steplike(StepLoading):
     name = "steplike"
 
 
@@ -385,7 +387,8 @@ def test_a_law_rests_in_its_steady_states(body, complaint):
 
 
 def test_members_may_bear_their_former_names():
-    part = made(name="formerly", resting=staticmethod(lambda log_slip_rate, shift, p: (shift,)))
+    with pytest.warns(DeprecationWarning, match="'resting' of Made is now called"):
+        part = made(name="formerly", resting=staticmethod(lambda log_slip_rate, shift, p: (shift,)))
     assert part.steady_states is part.resting
 
 
@@ -435,11 +438,11 @@ class Held(Measure):
     """Says which parts a scene has, where it is computed."""
 
     name = "held"
-    headline = "held"
+    primary_output = "held"
     variables = {"held": ()}  # noqa: RUF012
     typical_work = 1
 
-    def find(self, scene, accuracy, meter):
+    def compute(self, scene, accuracy, meter):
         grip = getattr(scene.parts.dynamics, "grip", 0.0)
         return Outcome(Status.OK, {"held": grip + 10.0 * scene.as_dict().get("is_odd", False)})
 
@@ -470,8 +473,8 @@ def test_parts_along_zipped_axes_reach_the_workers(cluster, tmp_path):
     assert here.grip.attrs["units"] == "m"
     assert here.dynamics.attrs["long_name"] == "what balances the spring besides friction"
     there = run(study, client=cluster, output=tmp_path)
-    same_numbers(rsfstudy.open(tmp_path / "zipped.nc"), here)
-    same_numbers(there, here)
+    have_same_numbers(rsfstudy.open(tmp_path / "zipped.nc"), here)
+    have_same_numbers(there, here)
 
 
 def test_overrides_by_class_whatever_their_order():
@@ -494,12 +497,12 @@ def squares(dataset, axes):
 
 def test_panels_draw():
     """By the name of their study; with labels and units from what the measure says of itself."""
-    figure = Figure([Panel(x="phi", y="held", each=["law"]), squares])
+    figure = Figure([Panel(x="phi", y="held", facet=["law"]), squares])
     axes = [Axis("law", ["slip", "slowness"]), Axis("phi", [60, 70])]
     study = Study(name="n", title="t", base=Scene(), axes=axes, measure=Held(), plot=figure)
     dataset = run(study)
     assert json.loads(dataset.attrs["declaration"])["plot"] == "n"
-    slip, slowness, own = plots.figure(dataset, study.plot).axes
+    slip, slowness, own = plots.draw_figure(dataset, study.plot).axes
     assert (slip.get_title(), slowness.get_title(), own.get_title()) == (
         "Slip law",
         "Slowness law",

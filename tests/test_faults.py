@@ -11,18 +11,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from faulty import declared
-from running import FAULTY, HANGS, QUIET, call, run, run_with_failures
+from faulty import faulty_study
+from running import (
+    FAULTY_STUDY_FILE,
+    HANG_TIMEOUT,
+    QUIET_CLUSTER_OPTIONS,
+    call_main,
+    run,
+    run_with_failures,
+)
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.api import tables
 from rsfstudy.cli import assignments, terminal
 from rsfstudy.compute import clusters, runner, workers
-from rsfstudy.compute.plan import Batches
-from rsfstudy.errors import Incomplete, InvalidValue, RunError
+from rsfstudy.compute.plan import BatchIterator
+from rsfstudy.errors import IncompleteWarning, InvalidValue, RunError
 from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import LinearFit, reduced
+from rsfstudy.reduce import LinearFit, apply_reductions
 from rsfstudy.status import Status
 
 LABELS = {s.label: s for s in Status}
@@ -62,7 +69,7 @@ def gone_wrong(tmp_path_factory, cluster):
     """Cells that go wrong in all these ways, each among others that do not: computed in this
     process and on workers, and the files.
     """
-    each = declared(at=(2.5,))
+    each = faulty_study(at=(2.5,))
     study = replace(each, axes=[Axis("fault", list(WRONG)), *each.axes])
     found = []
     for where in ({"workers": 0}, {"client": cluster}):
@@ -79,7 +86,7 @@ def test_a_cell_that_goes_wrong(fault, gone_wrong, capsys):
         cells = dataset.sel(fault=fault)
         only_one_failed(cells, status)
         assert message in cells.message.values[1]
-        assert terminal.failures(cells) == 1
+        assert terminal.print_failures(cells) == 1
         assert status in capsys.readouterr().out
 
 
@@ -87,7 +94,7 @@ def test_a_cell_that_goes_wrong(fault, gone_wrong, capsys):
 def sturdy(tmp_path_factory):
     """A worker that is started again when a cell kills it."""
     log = tmp_path_factory.mktemp("sturdy") / "workers.log"
-    with clusters.local_cluster(1, log) as client:
+    with clusters.start_local_cluster(1, log) as client:
         yield client, log
 
 
@@ -102,15 +109,15 @@ def lost(*words, **options):
 
 def test_a_cell_that_kills_its_worker(sturdy, monkeypatch):
     """One batch holds the killer and its neighbours: only the killer is recorded."""
-    monkeypatch.setattr(Batches, "size", lambda _self: 4)
-    dataset = lost(declared("segfaults", at=(2.5,)), client=sturdy[0])
+    monkeypatch.setattr(BatchIterator, "next_size", lambda _self: 4)
+    dataset = lost(faulty_study("segfaults", at=(2.5,)), client=sturdy[0])
     only_one_failed(dataset, "worker_lost")
     assert "more memory than a worker may use" in dataset.message.values[1]
 
 
 def test_a_cell_that_raises_keyboard_interrupt_on_a_worker(cluster):
     """Nobody pressed Ctrl-C there."""
-    dataset = run_with_failures(declared("interrupts", at=(2.5,)), client=cluster)
+    dataset = run_with_failures(faulty_study("interrupts", at=(2.5,)), client=cluster)
     only_one_failed(dataset, "cell_raised")
     assert "KeyboardInterrupt" in dataset.message.values[1]
 
@@ -120,8 +127,8 @@ def test_a_time_limit_does_not_end_the_process_of_the_user(monkeypatch):
     from distributed import Client
 
     monkeypatch.setenv("FAULT_TAKES", "0.3")
-    with Client(processes=False, n_workers=1, **QUIET) as client:
-        dataset = run(declared(cells=2), client=client, time_limit=0.1)
+    with Client(processes=False, n_workers=1, **QUIET_CLUSTER_OPTIONS) as client:
+        dataset = run(faulty_study(cells=2), client=client, time_limit=0.1)
     assert dataset.status.values.tolist() == [0, 0]
 
 
@@ -130,8 +137,8 @@ def test_a_cell_that_computes_for_ever(sturdy, monkeypatch):
     alone before it is blamed.
     """
     client, log = sturdy
-    monkeypatch.setattr(workers, "_TRIES", 1)  # a worker takes seconds to start
-    dataset = lost(declared("spins in C", at=(2.5,)), client=client, time_limit=0.5)
+    monkeypatch.setattr(workers, "_MAX_WORKER_DEATHS", 1)  # a worker takes seconds to start
+    dataset = lost(faulty_study("spins in C", at=(2.5,)), client=client, time_limit=0.5)
     only_one_failed(dataset, "time_limit_spent")
     assert "no answer within 0.5 s of CPU time" in dataset.message.values[1]
     assert "--time-limit" in dataset.message.values[1]
@@ -140,7 +147,7 @@ def test_a_cell_that_computes_for_ever(sturdy, monkeypatch):
 
 def test_a_cell_that_waits_for_ever(sturdy):
     """It takes no CPU time, and has ten times as long."""
-    dataset = lost(declared("hangs in C", cells=1), client=sturdy[0], time_limit=0.1)
+    dataset = lost(faulty_study("hangs in C", cells=1), client=sturdy[0], time_limit=0.1)
     assert dataset.status.values.tolist() == [Status.TIME_LIMIT_SPENT]
 
 
@@ -149,39 +156,39 @@ def test_a_time_limit_is_one_of_cpu_time():
     script = """
 import collections, itertools, time
 from rsfstudy.compute import cells
-cells.WAITING = 1e6
-with cells._limits.within(0.1):
+cells.WALL_TIME_FACTOR = 1e6
+with cells._cpu_time_limits.enforced(0.1):
     time.sleep(1.5)
 print("slept")
-with cells._limits.within(0.1):
+with cells._cpu_time_limits.enforced(0.1):
     collections.deque(itertools.repeat(1), maxlen=0)
 """
     words = [sys.executable, "-u", "-c", script]
-    ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANGS)
+    ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANG_TIMEOUT)
     assert (ran.returncode, ran.stdout) == (-signal.SIGPROF, "slept\n")
     assert 'File "<string>"' in ran.stderr  # where it was
 
 
 def test_a_cell_that_is_slow_on_the_clock_alone_is_not_ended(sturdy):
     """As on a machine that is busy with something else."""
-    dataset = run(declared("sleeps", at=(2.5,)), client=sturdy[0], time_limit=2.0)
+    dataset = run(faulty_study("sleeps", at=(2.5,)), client=sturdy[0], time_limit=2.0)
     assert dataset.status.values.tolist() == [0, 0, 0, 0]
 
 
 @pytest.mark.parametrize("fault", ["raises", "nan"])
 def test_if_everything_fails_at_the_start_the_run_stops_and_says_why(fault, tmp_path):
     with pytest.raises(RunError, match=r"the first \d+ cells all failed, .*keep_going=True"):
-        run(declared(fault, cells=100), output=tmp_path)
+        run(faulty_study(fault, cells=100), output=tmp_path)
     partial = rsfstudy.open(tmp_path / "faulty.partial.nc")
     tried = partial.status != int(Status.PENDING)
-    assert runner._HOPELESS <= int(tried.sum()) < 100
+    assert runner._MAX_FIRST_FAILURES <= int(tried.sum()) < 100
     assert not (tmp_path / "faulty.nc").exists()
 
 
 def test_a_corner_of_the_lattice_that_fails_does_not_stop_a_run():
     """The first cells are a sample of all, wherever they stand on their axis."""
     corner = tuple(2.0 + 0.5 * i for i in range(100))
-    study = declared("raises", at=corner, cells=400)
+    study = faulty_study("raises", at=corner, cells=400)
     status = run_with_failures(study).status.values
     assert (status[:100] == Status.CELL_RAISED).all()
     assert (status[100:] == Status.OK).all()
@@ -189,29 +196,31 @@ def test_a_corner_of_the_lattice_that_fails_does_not_stop_a_run():
 
 def test_a_run_says_which_cells_failed(tmp_path, capsys):
     """In Python by a warning, with their statuses; the command prints a table, and no more."""
-    study = declared("nan", at=(2.5, 3.0))
-    with pytest.warns(Incomplete, match=r"^2 of 4 cells failed: not_finite 2; dataset\.rsf\."):
+    study = faulty_study("nan", at=(2.5, 3.0))
+    with pytest.warns(
+        IncompleteWarning, match=r"^2 of 4 cells failed: not_finite 2; dataset\.rsf\."
+    ):
         dataset = run(study)
     assert len(dataset.rsf.failures()) == 2
     assert "failed" not in "".join(capsys.readouterr())
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FAULT", "nan")
         patch.setenv("FAULT_AT", "2.5 3.0")
-        told = call("run", FAULTY, "--serial", "--quiet", "--output", tmp_path)
+        told = call_main("run", FAULTY_STUDY_FILE, "--serial", "--quiet", "--output", tmp_path)
     assert "2 cells failed" in told.stdout
     assert told.stderr == ""
 
 
 def test_it_goes_on_when_told_to():
-    dataset = run_with_failures(declared("raises", cells=100), keep_going=True)
+    dataset = run_with_failures(faulty_study("raises", cells=100), keep_going=True)
     assert (dataset.status == int(Status.CELL_RAISED)).all()
 
 
 def test_failed_cells_are_listed_with_how_to_reproduce_each_alone(tmp_path, monkeypatch):
     for name, value in {"FAULT": "raises", "FAULT_AT": "2.5 3.5", "COLUMNS": "500"}.items():
         monkeypatch.setenv(name, value)
-    assert call("run", FAULTY, "--serial", "--output", tmp_path).returncode == 1
-    shown = call("show", tmp_path / "faulty.nc")
+    assert call_main("run", FAULTY_STUDY_FILE, "--serial", "--output", tmp_path).returncode == 1
+    shown = call_main("show", tmp_path / "faulty.nc")
     out = shown.stdout
     assert shown.returncode == 1
     assert "2 cells failed" in out
@@ -221,9 +230,9 @@ def test_failed_cells_are_listed_with_how_to_reproduce_each_alone(tmp_path, monk
     words = shlex.split(commands[0])
     assert words[-2:] == ["--cell", "b_over_a=2.5"]
     # it fails as it failed, with the traceback that says where
-    alone = call(*words[1:])
+    alone = call_main(*words[1:])
     assert alone.returncode == 1
-    assert "in find" in alone.stderr
+    assert "in compute" in alone.stderr
     assert "ZeroDivisionError: in the cell" in alone.stderr
 
 
@@ -244,24 +253,30 @@ def test_cells_with_awkward_labels_alone(tmp_path):
     dataset["status"][:, 1] = int(Status.UNVERIFIED)
     for number, label in enumerate(AWKWARD):
         place = {"study": label, "inertia": dataset.inertia.values[1]}
-        words = shlex.split(tables.reproducing(dataset, str(tmp_path / "awkward.nc"), place))
-        cells = dict(assignments.place(text) for text in words if "=" in text)
-        scene, _outcome = rsfstudy.cell(tmp_path / "awkward.nc", cells)
+        words = shlex.split(tables.rerun_command(dataset, str(tmp_path / "awkward.nc"), place))
+        cells = dict(assignments.parse_cell_coordinate(text) for text in words if "=" in text)
+        scene, _outcome = rsfstudy.recompute_cell(tmp_path / "awkward.nc", cells)
         assert (scene.b_over_a, scene.inertia) == (2.0 + number, True)
 
 
 def test_a_cell_is_that_of_the_file_and_not_of_the_study_as_it_is_now(tmp_path):
     """The study file has other values meanwhile; its measure is what is taken from it."""
-    run(FAULTY, output=tmp_path, b_over_a=[7.0, 8.0])
-    scene, outcome = rsfstudy.cell(tmp_path / "faulty.nc", {"b_over_a": "8"}, study=FAULTY)
+    run(FAULTY_STUDY_FILE, output=tmp_path, b_over_a=[7.0, 8.0])
+    scene, outcome = rsfstudy.recompute_cell(
+        tmp_path / "faulty.nc", {"b_over_a": "8"}, study=FAULTY_STUDY_FILE
+    )
     assert scene.b_over_a == outcome.values["total"] == 8.0
-    (tmp_path / "other.py").write_text(FAULTY.read_text().replace('name="faulty"', 'name="other"'))
+    (tmp_path / "other.py").write_text(
+        FAULTY_STUDY_FILE.read_text().replace('name="faulty"', 'name="other"')
+    )
     with pytest.raises(InvalidValue, match="'other', and the results are of 'faulty'"):
-        rsfstudy.cell(tmp_path / "faulty.nc", {"b_over_a": 8}, study=tmp_path / "other.py")
+        rsfstudy.recompute_cell(
+            tmp_path / "faulty.nc", {"b_over_a": 8}, study=tmp_path / "other.py"
+        )
 
 
 def lattice(failing=(3.0,)) -> xr.Dataset:
-    study = declared("raises", at=failing, cells=6)
+    study = faulty_study("raises", at=failing, cells=6)
     return (run_with_failures if failing == (3.0,) else run)(study)
 
 
@@ -269,20 +284,20 @@ FIT = (LinearFit(name="slope", of="total", on="b_over_a"),)
 
 
 def test_reductions_draw_on_what_there_is_when_told_to_and_say_so():
-    found = reduced(lattice(), FIT, despite_failures=True)
+    found = apply_reductions(lattice(), FIT, despite_failures=True)
     assert float(found.slope) == pytest.approx(1.0, rel=1e-14)
     assert int(found.slope_points) == 5
     assert found.slope.despite == "1 failed cells are left out"
     assert found.attrs["reduced_despite"] == "1 failed cells are left out"
     # the lattice itself is as it was
     assert found.status.values[2] == Status.CELL_RAISED
-    whole = reduced(lattice(failing=(99.0,)), FIT, despite_failures=True)
+    whole = apply_reductions(lattice(failing=(99.0,)), FIT, despite_failures=True)
     assert "reduced_despite" not in whole.attrs
 
 
 def test_the_run_passes_it_on(tmp_path):
     """One cell of a fit over b/a fails: its slope is refused, or drawn from the others."""
-    study = replace(declared("raises", at=(3.0,), cells=6), reductions=FIT)
+    study = replace(faulty_study("raises", at=(3.0,), cells=6), reductions=FIT)
     assert np.isnan(run_with_failures(study, output=tmp_path).slope)
     told = run_with_failures(study, output=tmp_path, despite_failures=True)
     assert float(told.slope) == pytest.approx(1.0, rel=1e-14)
@@ -293,12 +308,12 @@ def test_workers_that_never_come(monkeypatch):
     """A scheduler without workers: the run says so, and ends with the reason."""
     from distributed import Client, LocalCluster
 
-    for name, seconds in {"_LOOK": 0.1, "TELL": 0.2, "PATIENCE": 0.4}.items():
+    for name, seconds in {"_POLL_INTERVAL": 0.1, "WARN_AFTER": 0.2, "GIVE_UP_AFTER": 0.4}.items():
         monkeypatch.setattr(workers, name, seconds)
     with (
-        LocalCluster(n_workers=0, **QUIET) as cluster,
+        LocalCluster(n_workers=0, **QUIET_CLUSTER_OPTIONS) as cluster,
         Client(cluster) as client,
         pytest.warns(UserWarning, match=r"has no worker: waiting 0\.4 s for one"),
         pytest.raises(RunError, match=r"no worker for 0\.4 s: start some"),
     ):
-        run(declared(), client=client)
+        run(faulty_study(), client=client)

@@ -13,12 +13,12 @@ from matplotlib.image import imread
 from matplotlib.lines import Line2D
 from matplotlib.mathtext import MathTextParser
 from matplotlib.text import Text
-from running import call, named_results, run
+from running import call_main, named_results, run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
 from rsfstudy.declare import names
-from rsfstudy.defaults import FIGURES
+from rsfstudy.defaults import FIGURE_FORMATS
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import store
 from rsfstudy.measures.linear_stability import LinearStability
@@ -31,11 +31,11 @@ MM = 25.4
 SLACK = 0.015
 
 
-@pytest.fixture(scope="module", params=names.names())
+@pytest.fixture(scope="module", params=names.study_names())
 def figure(request, tmp_path_factory):
     """The figure of enough of each study."""
     dataset, _path = named_results(request.param, tmp_path_factory)
-    return plots.figure(dataset)
+    return plots.draw_figure(dataset)
 
 
 def boxes(figure, artists):
@@ -108,8 +108,10 @@ def test_nothing_sticks_out_or_covers_anything_else(figure):
 
 def test_a_figure_says_where_its_results_are_partial(tmp_path):
     dataset = run().assign_attrs(completeness="partial: 1 of 2 cells")
-    assert plots.figure(dataset).get_suptitle() == "[partial: 1 of 2 cells]"  # once, for all panels
-    plots.save(dataset, tmp_path / "figure.png")
+    assert (
+        plots.draw_figure(dataset).get_suptitle() == "[partial: 1 of 2 cells]"
+    )  # once, for all panels
+    plots.save_figure(dataset, tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000
 
 
@@ -165,14 +167,14 @@ def test_numbers_along_axes_do_not_touch(figure):
 def test_narrowed_studies_repeat_no_panel(tmp_path_factory):
     """One law, one case and a selected cell: a panel for each point that there is, and no more."""
     laws, _path = named_results("displacement_boundary", tmp_path_factory)
-    assert len(plots.figure(laws).axes) == 5
-    assert len(plots.figure(laws.isel(law=[0])).axes) == 3
-    assert len(plots.figure(laws.isel(law=0, load=0)).axes) == 2
+    assert len(plots.draw_figure(laws).axes) == 5
+    assert len(plots.draw_figure(laws.isel(law=[0])).axes) == 3
+    assert len(plots.draw_figure(laws.isel(law=0, load=0)).axes) == 2
     slip, _path = named_results("bounded_slip", tmp_path_factory)
-    assert len(plots.figure(slip).axes) == 5
-    assert len(plots.figure(slip.isel(inertia=[0])).axes) == 3
+    assert len(plots.draw_figure(slip).axes) == 5
+    assert len(plots.draw_figure(slip.isel(inertia=[0])).axes) == 3
     zeta, _path = named_results("rate_step_boundary", tmp_path_factory)
-    (axes,) = plots.figure(zeta.isel(b_over_a=0)).axes
+    (axes,) = plots.draw_figure(zeta.isel(b_over_a=0)).axes
     points = [line for line in axes.lines if line.get_linestyle() == "None"]
     assert len(points) == zeta.sizes["case"]
 
@@ -183,7 +185,7 @@ def test_narrowed_studies_repeat_no_panel(tmp_path_factory):
 def test_where_no_line_fits_the_figure_says_so(tmp_path_factory):
     """And draws none: the drops of the slowness law at 50 degrees are curved."""
     dataset, _path = named_results("stress_drop", tmp_path_factory)
-    for axes in plots.figure(dataset).axes[1:4:2]:
+    for axes in plots.draw_figure(dataset).axes[1:4:2]:
         labels = set(axes.get_legend_handles_labels()[1])
         curved = [label for label in labels if "no line fits" in label]
         assert [label.split(":")[0] for label in curved] == [r"$\phi$ = 50"]
@@ -233,7 +235,7 @@ AWKWARD = {
     ids=lambda axes: ", ".join(axis.dimension for axis in axes),
 )
 def test_any_lattice_is_printable(axes):
-    drawn = plots.figure(lattice(*axes))
+    drawn = plots.draw_figure(lattice(*axes))
     assert_printable(drawn)
     for test in (test_it_fits_a_journal, test_legends_name_what_is_drawn):
         test(drawn)
@@ -243,7 +245,7 @@ def test_any_lattice_is_printable(axes):
 def test_curves_that_lie_on_each_other_are_one():
     """An angle means nothing at constant normal stress: one curve, named once."""
     stress = Axis("normal_stress", ["constant", "variable"])
-    axes = plots.figure(lattice(stress, Axis("phi", [50.0, 60.0]), RATES)).axes[0]
+    axes = plots.draw_figure(lattice(stress, Axis("phi", [50.0, 60.0]), RATES)).axes[0]
     assert axes.get_legend_handles_labels()[1] == [
         "constant normal stress",
         r"variable normal stress, $\phi$ = 50°",
@@ -253,7 +255,7 @@ def test_curves_that_lie_on_each_other_are_one():
 
 def test_two_axes_of_numbers_are_a_map_with_statuses_that_are_no_number():
     dataset = lattice(ANGLES, RATES)
-    drawn = plots.figure(dataset)
+    drawn = plots.draw_figure(dataset)
     assert drawn.axes[0].get_xscale() == "log"
     assert texts(drawn).count("no steady state") == 1
     (unknown,) = (c for c in drawn.axes[0].collections if c.get_label() == "no steady state")
@@ -279,7 +281,7 @@ def test_a_style_of_the_users_own(tmp_path):
     dataset = lattice(RATES)
     sheet = tmp_path / "mine.mplstyle"
     sheet.write_text("figure.figsize: 3.5, 2.6\naxes.prop_cycle: cycler('color', ['123456'])\n")
-    ours, theirs = plots.figure(dataset), rsfstudy.plot(dataset, style=sheet)
+    ours, theirs = plots.draw_figure(dataset), rsfstudy.plot(dataset, style=sheet)
     assert theirs.get_size_inches()[0] == pytest.approx(7.0 + 6.0 / MM)
     assert theirs.axes[0].lines[0].get_color() in ("#123456", "123456")
     assert ours.axes[0].lines[0].get_color() != theirs.axes[0].lines[0].get_color()
@@ -312,10 +314,10 @@ def test_styles_are_checked_and_never_imported(style, message, tmp_path, monkeyp
     Path("text.mplstyle").write_text("root:x\n")
     Path("latin.mplstyle").write_bytes(b"font.family: \xe9\n")
     Path("folder.mplstyle").mkdir()
-    with pytest.raises(InvalidValue, match=re.escape(message)), plots.styled(style):
+    with pytest.raises(InvalidValue, match=re.escape(message)), plots.style_context(style):
         pass
     if isinstance(style, str):
-        ran = call("plot", "missing.nc", "--style", style)
+        ran = call_main("plot", "missing.nc", "--style", style)
         assert (ran.returncode, ran.stdout) == (2, "")
         assert len(ran.stderr) < 2000
 
@@ -332,7 +334,7 @@ def test_styles_are_checked_and_never_imported(style, message, tmp_path, monkeyp
 def test_a_style_in_which_nothing_can_be_drawn_is_named(settings, tmp_path):
     message = r"^style = \{.*: a figure cannot be drawn in it: .* Draw it without this style"
     with pytest.raises(InvalidValue, match=message):
-        plots.save(lattice(RATES), tmp_path / "figure.png", style=settings)
+        plots.save_figure(lattice(RATES), tmp_path / "figure.png", style=settings)
     assert not list(tmp_path.iterdir())
 
 
@@ -347,8 +349,8 @@ def test_a_font_that_is_missing_is_named_once(tmp_path, monkeypatch):
     sheet = tmp_path / "mine.mplstyle"
     sheet.write_text("font.family: No Such Font\n")
     file = tmp_path / "lattice.nc"
-    store.write(lattice(RATES), file)
-    ran = call("plot", file, "--style", sheet)
+    store.write_dataset(lattice(RATES), file)
+    ran = call_main("plot", file, "--style", sheet)
     said = " ".join(ran.stderr.split())
     assert (ran.returncode, said.count("Font family 'No Such Font' not found")) == (0, 1)
 
@@ -356,10 +358,10 @@ def test_a_font_that_is_missing_is_named_once(tmp_path, monkeypatch):
 def test_style_sheets_are_read_as_matplotlib_reads_them():
     import matplotlib
 
-    sheets = [*Path(matplotlib.get_data_path(), "stylelib").glob("*.mplstyle"), _style.SHEET]
+    sheets = [*Path(matplotlib.get_data_path(), "stylelib").glob("*.mplstyle"), _style.STYLE_SHEET]
     for sheet in sheets:
         theirs = matplotlib.rc_params_from_file(sheet, use_default_template=False)
-        with plots.styled([{"font.size": 5.0}, sheet]):
+        with plots.style_context([{"font.size": 5.0}, sheet]):
             assert {name: matplotlib.rcParams[name] for name in theirs} == dict(theirs)
 
 
@@ -368,7 +370,7 @@ def test_ours_is_left_alone():
     import matplotlib
 
     before = dict(matplotlib.rcParams)
-    plots.figure(lattice(RATES))
+    plots.draw_figure(lattice(RATES))
     assert dict(matplotlib.rcParams) == before
 
 
@@ -382,19 +384,19 @@ BEGINS = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     path = tmp_path_factory.mktemp("results") / "mine.nc"
-    store.write(lattice(ANGLES, RATES), path)
+    store.write_dataset(lattice(ANGLES, RATES), path)
     return path
 
 
-@pytest.mark.parametrize("form", FIGURES)
+@pytest.mark.parametrize("form", FIGURE_FORMATS)
 def test_plot_writes_the_file_it_is_told_to(form, results, tmp_path):
     target = tmp_path / "deep" / f"fig.{form}"
-    ran = call("plot", results, "--output", target)
+    ran = call_main("plot", results, "--output", target)
     assert ran.returncode == 0, ran.stderr
     assert target.read_bytes().startswith(BEGINS[form])
     assert [file.name for file in results.parent.iterdir()] == ["mine.nc"]
     again = tmp_path / f"again.{form}"
-    assert call("plot", results, "--output", again).returncode == 0
+    assert call_main("plot", results, "--output", again).returncode == 0
     assert again.read_bytes() == target.read_bytes()
 
 
@@ -402,9 +404,9 @@ def test_plot_takes_a_directory_a_format_a_style_and_a_variable(results, tmp_pat
     sheet = tmp_path / "mine.mplstyle"
     sheet.write_text("savefig.dpi: 50\n")
     options = ["--output", tmp_path, "--variable", "steady_friction", "--style", sheet]
-    assert call("plot", results, *options).returncode == 0
+    assert call_main("plot", results, *options).returncode == 0
     assert imread(tmp_path / "mine.steady_friction.png").shape[1] == int(84.0 / MM * 50)
-    assert call("plot", results, "--figure", "svg", "--output", tmp_path).returncode == 0
+    assert call_main("plot", results, "--figure", "svg", "--output", tmp_path).returncode == 0
     assert (tmp_path / "mine.svg").exists()
 
 
@@ -426,7 +428,7 @@ def test_plot_takes_a_directory_a_format_a_style_and_a_variable(results, tmp_pat
     ],
 )
 def test_words(text, written):
-    assert _text.pretty(text) == written
+    assert _text.to_mathtext(text) == written
 
 
 @pytest.mark.parametrize(("count", "columns"), [(5, 4), (7, 3), (4, 2), (3, 5)])
@@ -435,7 +437,7 @@ def test_a_legend_is_read_line_by_line(count, columns):
     axes = figure.add_subplot()
     for number in range(count):
         axes.plot([0.0, 1.0], [number, number], label=f"{number} MPa/mm")
-    _style.legend(axes, columns)
+    _style.add_legend(axes, columns)
     figure.draw_without_rendering()
     placed = [(text.get_window_extent(), text) for text in axes.get_legend().get_texts()]
     read = sorted(placed, key=lambda one: (-round(one[0].y0), one[0].x0))
@@ -446,5 +448,5 @@ def test_a_legend_is_read_line_by_line(count, columns):
 def test_units_stay_with_the_last_word(units):
     about = Quantity("recurrence", "", units, "recurrence interval of stick-slip")
     for width in range(8, 60):
-        last = _text.label(about, width).split("\n")[-1]
+        last = _text.axis_label(about, width).split("\n")[-1]
         assert re.match(r"(?!\().*\(.*\)$", last)

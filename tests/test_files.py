@@ -13,7 +13,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from running import call, cell_key, run
+from running import call_main, cell_key, run
 
 import rsfstudy
 from rsfstudy import Scene, plots
@@ -21,7 +21,7 @@ from rsfstudy.compute.provenance import git_state
 from rsfstudy.declare import catalogue, names
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import contents, restore, store
-from rsfstudy.files.journal import Journal, Layout
+from rsfstudy.files.journal import Journal, OutputPacking
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 
@@ -39,7 +39,7 @@ def test_attributes_netcdf_would_change_are_made_plain(tmp_path):
     odd = dataset().assign_attrs(
         none=None, flag=True, table={"a": 1}, one=[3.0], several=(1, 2), empty=[]
     )
-    store.write(odd, tmp_path / "odd.nc")
+    store.write_dataset(odd, tmp_path / "odd.nc")
     attrs = xr.load_dataset(tmp_path / "odd.nc").attrs
     assert "none" not in attrs
     assert (attrs["flag"], attrs["table"], attrs["one"]) == ("true", '{"a": 1}', 3.0)
@@ -47,7 +47,7 @@ def test_attributes_netcdf_would_change_are_made_plain(tmp_path):
 
 
 def test_coordinates_and_flags_carry_no_fill_value(tmp_path):
-    store.write(dataset(), tmp_path / "plain.nc")
+    store.write_dataset(dataset(), tmp_path / "plain.nc")
     with xr.open_dataset(tmp_path / "plain.nc") as back:
         assert back.flag.dtype == np.int8
         assert "_FillValue" not in back.x.encoding
@@ -56,23 +56,23 @@ def test_coordinates_and_flags_carry_no_fill_value(tmp_path):
 
 def test_a_reader_with_the_old_file_open_keeps_its_data(tmp_path):
     path = tmp_path / "trial.nc"
-    store.write(dataset(1.0), path)
+    store.write_dataset(dataset(1.0), path)
     with xr.open_dataset(path) as reader:
-        store.write(dataset(2.0), path)
+        store.write_dataset(dataset(2.0), path)
         assert float(reader.v.sum()) == 3.0
     assert float(xr.load_dataset(path).v.sum()) == 6.0
 
 
 def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
     path = tmp_path / "trial.nc"
-    store.write(dataset(1.0), path)
+    store.write_dataset(dataset(1.0), path)
 
     def full(*_args, **_kwargs):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(xr.Dataset, "to_netcdf", full)
     with pytest.raises(DataError, match="No space left.*Nothing was replaced"):
-        store.write(dataset(2.0), path)
+        store.write_dataset(dataset(2.0), path)
     monkeypatch.undo()
     assert os.listdir(tmp_path) == ["trial.nc"]
     assert float(xr.load_dataset(path).v.sum()) == 3.0
@@ -82,12 +82,12 @@ def test_what_reads_back_differently_is_not_put_in_place(tmp_path, monkeypatch):
     path = tmp_path / "trial.nc"
     monkeypatch.setattr(store, "fill_value_encoding", lambda _d: {"v": {"dtype": "float32"}})
     with pytest.raises(DataError, match="what was read back differs"):
-        store.write(dataset(0.1), path)
+        store.write_dataset(dataset(0.1), path)
     assert os.listdir(tmp_path) == []
 
 
 def test_a_motion_is_no_results_of_a_study(tmp_path):
-    path, said = tmp_path / "motion.nc", r"one scene \(Motion of .*rsfstudy.picture"
+    path, said = tmp_path / "motion.nc", r"one scene \(Motion of .*rsfstudy.plot_motion"
     motion = rsfstudy.simulate(Scene(hold_time=1.0), duration=1.0, rtol=1e-2)
     motion.to_netcdf(path)
     for ask in (rsfstudy.open, rsfstudy.check, rsfstudy.plot):
@@ -107,7 +107,7 @@ class Pair(Measure):
     inner_coordinates = {"phase": np.arange(2.0)}  # noqa: RUF012
 
 
-LAYOUT = Layout(Pair())
+LAYOUT = OutputPacking(Pair())
 DONE = (Outcome(Status.OK, {"v": 1.5, "profile": np.array([1.0, np.nan])}, "", 42), 0.1)
 KEYS = np.array([cell_key(Scene(b_over_a=b), Pair()) for b in (2.0, 3.0)], dtype="V16")
 
@@ -120,10 +120,10 @@ def journal(tmp_path, fingerprint=None, **options):
 
 def test_the_journal_returns_what_it_was_given(tmp_path):
     with journal(tmp_path) as kept:
-        kept.add([LAYOUT.finished(KEYS[0].tobytes(), *DONE)])
+        kept.add([LAYOUT.pack_cell(KEYS[0].tobytes(), *DONE)])
     with journal(tmp_path) as kept:
-        assert kept.ended(KEYS).tolist() == [Status.OK, Status.PENDING]
-        found = kept.read(KEYS)
+        assert kept.statuses(KEYS).tolist() == [Status.OK, Status.PENDING]
+        found = kept.read_cells(KEYS)
     assert found.status.tolist() == [Status.OK, Status.PENDING]
     assert (found.work[0], found.seconds[0]) == (42, 0.1)
     np.testing.assert_array_equal(found.numbers[0], [1.5, 1.0, np.nan])
@@ -139,24 +139,24 @@ def test_a_damaged_journal_is_named(tmp_path):
 
 def test_a_number_changed_in_the_journal_is_noticed(tmp_path):
     with journal(tmp_path) as kept:
-        kept.add([LAYOUT.finished(KEYS[0].tobytes(), *DONE)])
+        kept.add([LAYOUT.pack_cell(KEYS[0].tobytes(), *DONE)])
     path = tmp_path / "trial.cells.sqlite"
     right, wrong = np.array([1.5]).tobytes(), np.array([1.25]).tobytes()
     content = path.read_bytes()
     assert content.count(right) == 1
     path.write_bytes(content.replace(right, wrong))
     with journal(tmp_path) as kept, pytest.raises(DataError, match="is damaged.*--fresh"):
-        kept.read(KEYS)
+        kept.read_cells(KEYS)
 
 
 def test_a_result_moved_to_another_cell_of_the_journal_is_noticed(tmp_path):
     """It is whole, but for the other."""
     with journal(tmp_path) as kept:
-        kept.add([LAYOUT.finished(KEYS[0].tobytes(), *DONE)])
+        kept.add([LAYOUT.pack_cell(KEYS[0].tobytes(), *DONE)])
     with contextlib.closing(sqlite3.connect(tmp_path / "trial.cells.sqlite")) as db, db:
         db.execute("UPDATE cells SET key = ?", (KEYS[1].tobytes(),))
     with journal(tmp_path) as kept, pytest.raises(DataError, match="is damaged.*--fresh"):
-        kept.read(KEYS)
+        kept.read_cells(KEYS)
 
 
 def test_cells_differ_by_the_last_bit():
@@ -192,10 +192,10 @@ def test_what_another_program_saved_is_read_and_told(small, tmp_path):
 
 
 def test_a_file_of_a_later_version_is_told_for_what_it_is(small, tmp_path):
-    later = xr.load_dataset(small).assign_attrs(layout=contents.LAYOUT + 1)
-    store.write(later, tmp_path / "later.nc")
+    later = xr.load_dataset(small).assign_attrs(layout=contents.LAYOUT_VERSION + 1)
+    store.write_dataset(later, tmp_path / "later.nc")
     with pytest.raises(
-        DataError, match=f"layout is 3, and this version .* reads 1 to {contents.LAYOUT}"
+        DataError, match=f"layout is 3, and this version .* reads 1 to {contents.LAYOUT_VERSION}"
     ):
         rsfstudy.open(tmp_path / "later.nc")
 
@@ -207,13 +207,15 @@ def test_opening_a_file_runs_no_code(small, tmp_path, monkeypatch):
     dataset = xr.load_dataset(small)
     declared = json.loads(dataset.attrs["declaration"])
     declared["measure"]["name"] = declared["plot"] = "evil"
-    store.write(dataset.assign_attrs(declaration=json.dumps(declared)), tmp_path / "trap.nc")
+    store.write_dataset(
+        dataset.assign_attrs(declaration=json.dumps(declared)), tmp_path / "trap.nc"
+    )
     rsfstudy.open(tmp_path / "trap.nc")
     rsfstudy.check(tmp_path / "trap.nc")
     with pytest.raises(InvalidValue, match="measure = 'evil': is not part of rsfstudy"):
         rsfstudy.rerun(tmp_path / "trap.nc", workers=0, progress=False)
     with pytest.raises(InvalidValue, match="plot = 'evil': is unknown"):
-        plots.figure(rsfstudy.open(tmp_path / "trap.nc"))
+        plots.draw_figure(rsfstudy.open(tmp_path / "trap.nc"))
     assert "evil" not in sys.modules
 
 
@@ -253,11 +255,13 @@ def test_git_tells_the_commit_and_whether_it_was_clean(tmp_path):
 # ---- from the file alone ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", names.names())
+@pytest.mark.parametrize("name", names.study_names())
 def test_every_declaration_restores_its_study(name):
-    study = catalogue.load(name)
+    study = catalogue.load_study(name)
     described = json.loads(json.dumps(study.describe()))
-    restored = restore.from_declaration(contents.declaration_of(described), study.own_parts)
+    restored = restore.study_from_declaration(
+        contents.parse_declaration(described), study.user_parts
+    )
     assert json.loads(json.dumps(restored.describe())) == described
     assert restored.size == study.size
     # of thousands of cells some, which have all points of every axis
@@ -267,11 +271,11 @@ def test_every_declaration_restores_its_study(name):
 
 def test_measures_and_reductions_in_the_files_of_studies_are_found_by_their_names():
     """In a process that has loaded no study."""
-    described = [catalogue.load(name).describe() for name in ("effects", "coverage")]
+    described = [catalogue.load_study(name).describe() for name in ("effects", "coverage")]
     asked = (
         "import json, sys; from rsfstudy.files import contents, restore\n"
         "for plain in json.load(sys.stdin):\n"
-        "    study = restore.from_declaration(contents.declaration_of(plain), {})\n"
+        "    study = restore.study_from_declaration(contents.parse_declaration(plain), {})\n"
         "    print(*(type(p).__name__ for p in (study.measure, study.reductions[0])))"
     )
     ran = subprocess.run(
@@ -281,9 +285,9 @@ def test_measures_and_reductions_in_the_files_of_studies_are_found_by_their_name
         check=True,
         input=json.dumps(described),
     )
-    assert ran.stdout == "EffectCost RelativeDifference\nCoverage Covered\n"
+    assert ran.stdout == "EffectCost RelativeDifference\nCoverage CoverageStatistics\n"
     with pytest.raises(InvalidValue, match="Did you mean 'effect_cost'"):
-        restore.measure({"name": "effect_costs"}, "")
+        restore.rebuild_measure({"name": "effect_costs"}, "")
 
 
 def test_a_rerun_reproduces_every_number(small):
@@ -306,7 +310,7 @@ def test_a_rerun_shows_what_differs(small, tmp_path):
     other["critical_velocity_ratio"][0, 0] += 1e-9
     about = json.loads(other.attrs["provenance"])
     about["fingerprint"]["scipy"] = "0.1"
-    store.write(other.assign_attrs(provenance=json.dumps(about)), tmp_path / "other.nc")
+    store.write_dataset(other.assign_attrs(provenance=json.dumps(about)), tmp_path / "other.nc")
     table = rsfstudy.rerun(tmp_path / "other.nc", workers=0, progress=False).set_index("variable")
     changed = table.loc["critical_velocity_ratio"]
     assert changed["values"] - changed["identical"] == 1
@@ -323,19 +327,19 @@ def test_a_cell_computed_by_other_code_says_so(small, tmp_path):
     other = xr.load_dataset(small)
     about = json.loads(other.attrs["provenance"])
     about["fingerprint"]["physics"] = "older"
-    store.write(other.assign_attrs(provenance=json.dumps(about)), tmp_path / "other.nc")
+    store.write_dataset(other.assign_attrs(provenance=json.dumps(about)), tmp_path / "other.nc")
     place = {"case": "constant", "b_over_a": "2.5"}
     with pytest.warns(UserWarning, match="physics: older then, .* now"):
-        rsfstudy.cell(tmp_path / "other.nc", place)
+        rsfstudy.recompute_cell(tmp_path / "other.nc", place)
     with pytest.raises(InvalidValue, match="inf.* is not on its axis"):
-        rsfstudy.cell(small, {**place, "b_over_a": "inf"})
+        rsfstudy.recompute_cell(small, {**place, "b_over_a": "inf"})
     words = [f"--cell={name}={value}" for name, value in place.items()]
-    told = call("rerun", tmp_path / "other.nc", *words)
+    told = call_main("rerun", tmp_path / "other.nc", *words)
     assert (told.returncode, "physics: older then" in told.stdout) == (0, True)
 
 
 def test_show_tells_what_is_in_a_file(small):
-    told = call("show", small)
+    told = call_main("show", small)
     assert told.returncode == 0
     for text in ("2 case x 3 b_over_a", "complete", "6 ok", "scipy", "critical_velocity_ratio"):
         assert text in told.stdout

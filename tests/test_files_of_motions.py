@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from running import call, study_of
+from running import call_main, study_of
 from scipy.io import loadmat
 
 import rsfstudy
@@ -29,13 +29,15 @@ def place(tmp_path_factory):
     fields = ("--set", "stiffness_ratio=0.5", "--set", "load_velocity_ratio=10")
     common = ("simulate", *fields, "--set", "inertia=yes", "--engine", "compiled")
     for name, rest in (("plain", ("--duration", "8")), ("rig", ("--duration", "80 s", *RIG))):
-        ran = call(*common, *rest, "--output", place / f"{name}.png")
+        ran = call_main(*common, *rest, "--output", place / f"{name}.png")
         assert ran.returncode == 0, ran.stderr
         assert "stiffness is 0.5 of the critical" in ran.stdout
         assert "Events faster than 100 V_*" in ran.stdout
     asked = rsfstudy.simulate(SCENE, times=[1.0, 2.0], engine="compiled")
-    store.write(asked, place / "asked.nc")
-    store.write(rsfstudy.limit_cycle(SCENE, rtol=1e-3, engine="compiled"), place / "cycle.nc")
+    store.write_dataset(asked, place / "asked.nc")
+    store.write_dataset(
+        rsfstudy.limit_cycle(SCENE, rtol=1e-3, engine="compiled"), place / "cycle.nc"
+    )
     return place
 
 
@@ -50,17 +52,19 @@ def test_a_motion_names_version_commit_date_and_command(place):
 
 @pytest.mark.parametrize("name", ["plain", "rig"])
 def test_commands_take_files_of_motions(place, tmp_path, name):
-    shown = call("show", place / f"{name}.nc")
+    shown = call_main("show", place / f"{name}.nc")
     assert shown.returncode == 0, shown.stderr
     for text in ("stiffness_ratio = 0.5", "made by 20", "peak friction", "Events faster than"):
         assert text in " ".join(shown.stdout.split())
     figures = [tmp_path / f"{against}.svg" for against in ("time", "displacement")]
     for figure in figures:
-        drawn = call("plot", place / f"{name}.nc", "--against", figure.stem, "--output", figure)
+        drawn = call_main(
+            "plot", place / f"{name}.nc", "--against", figure.stem, "--output", figure
+        )
         assert drawn.returncode == 0, drawn.stderr
     first, second = (figure.read_text() for figure in figures)
     assert first != second
-    again = call("rerun", place / f"{name}.nc")
+    again = call_main("rerun", place / f"{name}.nc")
     assert again.returncode == 0, again.stdout + again.stderr
     assert "every number is the same" in again.stdout
 
@@ -68,7 +72,7 @@ def test_commands_take_files_of_motions(place, tmp_path, name):
 def test_a_motion_that_differs_is_told(place, tmp_path):
     motion = xr.load_dataset(place / "plain.nc")
     motion["slip"] = motion["slip"] * (1.0 + 1e-9)
-    store.write(motion, tmp_path / "other.nc")
+    store.write_dataset(motion, tmp_path / "other.nc")
     table = rsfstudy.rerun(tmp_path / "other.nc").set_index("variable")
     assert table.loc["slip", "identical"] < table.loc["slip", "values"]
     assert table.loc["shear_stress", "identical"] == table.loc["shear_stress", "values"]
@@ -92,9 +96,9 @@ def test_other_programs_read_what_is_exported(place, tmp_path):
     motion = xr.load_dataset(place / "rig.nc")
     for form in ("csv", "mat"):
         file = tmp_path / f"motion.{form}"
-        ran = call("export", place / "rig.nc", f"--{form}", "--output", file)
+        ran = call_main("export", place / "rig.nc", f"--{form}", "--output", file)
         assert ran.returncode == 0, ran.stderr
-        assert call("export", place / "rig.nc", f"--{form}", "--output", file).returncode == 2
+        assert call_main("export", place / "rig.nc", f"--{form}", "--output", file).returncode == 2
     table = pd.read_csv(tmp_path / "motion.csv")
     np.testing.assert_allclose(table["shear_stress (MPa)"], motion["shear_stress"], rtol=1e-15)
     assert not any(name.startswith("reference_rate") for name in table)  # it never changes
@@ -106,13 +110,13 @@ def test_other_programs_read_what_is_exported(place, tmp_path):
     assert mat["reference_rate"] == pytest.approx(0.1, rel=1e-15)  # V_*/D_c, one rounding
     assert str(mat["units"]["shear_stress"]) == "MPa"
     assert "simulate" in str(mat["attributes"]["history"])
-    assert call("export", place / "rig.nc").returncode == 2  # of which kind?
+    assert call_main("export", place / "rig.nc").returncode == 2  # of which kind?
     shutil.copy(place / "rig.nc", tmp_path / "both.nc")
-    both = call("export", tmp_path / "both.nc", "--csv", "--mat")
+    both = call_main("export", tmp_path / "both.nc", "--csv", "--mat")
     assert both.returncode == 0, both.stderr
     assert (tmp_path / "both.csv").read_bytes() == (tmp_path / "motion.csv").read_bytes()
     assert loadmat(tmp_path / "both.mat").keys() == mat.keys()
-    one = call("export", place / "rig.nc", "--csv", "--mat", "--output", tmp_path / "one.csv")
+    one = call_main("export", place / "rig.nc", "--csv", "--mat", "--output", tmp_path / "one.csv")
     assert one.returncode == 0, one.stderr
     assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "motion.csv").read_bytes()
     assert (tmp_path / "one.mat").exists()

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 import synthetic_records as synthetic
-from synthetic_records import OPTIONS, TRUTH
+from synthetic_records import EXACT_PARAMETERS, FIT_OPTIONS
 
 import rsfstudy
-from rsfstudy.analysis.fitting.averaging import Overlap, average
-from rsfstudy.analysis.fitting.filters import KINDS, LOW_PASS, Filter
+from rsfstudy.analysis.fitting.averaging import AveragingCorrelation, apply_running_mean
+from rsfstudy.analysis.fitting.filters import FILTER_KINDS, LOW_PASS_ORDERS, Filter
 from rsfstudy.errors import InvalidValue
 from rsfstudy.status import Status
 
@@ -22,26 +22,26 @@ LAW = {"noise": "ar", "laws": ["slowness"]}
 def filtered(text: str, size: float, seed: int) -> rsfstudy.Record:
     """A record at 12.5 Hz whose friction and noise passed a filter."""
     fine = np.arange(0.0, 60.0, 0.016)
-    friction = synthetic.motion("slowness", fine, LOADING)[0]
+    friction = synthetic.friction_and_sensitivities("slowness", fine, LOADING)[0]
     friction += size * np.random.default_rng(seed).standard_normal(len(fine))
     passed = Filter.parse(text)
     if passed is not None:
         friction = passed.apply(fine, np.interp(passed.sample_times(fine), fine, friction))
     rows = slice(100, -100, 5)
     columns = {"time": fine[rows], "friction": friction[rows]}
-    moved = synthetic.load_point(LOADING, fine[rows])
+    moved = synthetic.load_point_displacement(LOADING, fine[rows])
     record = rsfstudy.read_record(columns | {"displacement": moved})
     return record.with_steps([(40.07, 40.07, 1.0, 10.0)])
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", FILTER_KINDS)
 def test_filters_of_an_exponential_are_exact(kind: str) -> None:
     """Friction that is steady up to 10 s and then decays with a rate of 1/s."""
     time, size = np.arange(5.0, 20.0, 0.05), 0.8
     one = Filter(kind, size)
     at = one.sample_times(time)
     found = one.apply(time, np.where(at > 10.0, np.exp(10.0 - np.maximum(at, 10.0)), 1.0))
-    if kind not in LOW_PASS:
+    if kind not in LOW_PASS_ORDERS:
         late = time + (0.5 * size if kind == "mean" else 0.0)
         whole = late - size > 10.0
         exact = (np.exp(10.0 - late + size) - np.exp(10.0 - late)) / size
@@ -61,12 +61,12 @@ def test_the_correlation_of_averages_is_removed() -> None:
     time = 0.2 * np.arange(60.0)
     lags = np.abs(time[:, None] - time)
     exact = np.maximum(1.0 - lags, 0.0) + 0.002 * np.eye(60)
-    overlap = Overlap(time, 1.0)
+    overlap = AveragingCorrelation(time, 1.0)
     root = np.linalg.inv(np.linalg.cholesky(exact))
-    np.testing.assert_allclose(overlap.whitened(np.eye(60)), root, atol=1e-9)
+    np.testing.assert_allclose(overlap.whiten(np.eye(60)), root, atol=1e-9)
     assert overlap.log_determinant == pytest.approx(np.linalg.slogdet(exact)[1])
-    assert overlap.rows == pytest.approx(5.0, rel=0.1)  # but for the ends
-    line = average(time, time[:, None] ** 2, 1.0)[:, 0]
+    assert overlap.rows_per_independent_row == pytest.approx(5.0, rel=0.1)  # but for the ends
+    line = apply_running_mean(time, time[:, None] ** 2, 1.0)[:, 0]
     # the mean of t^2 over 1 s is t^2 + 1/12; lines between rows add less than 0.2^2/2
     np.testing.assert_allclose(line[3:-3], time[3:-3] ** 2 + 1.0 / 12.0, atol=0.02)
 
@@ -80,10 +80,10 @@ def test_the_correlation_of_averages_is_removed() -> None:
     ],
 )
 def test_a_stated_filter_gives_the_truth_back(text: str, options: dict[str, str]) -> None:
-    found = rsfstudy.fit(filtered(text, 3e-4, 1), **OPTIONS | LAW | options).squeeze()
+    found = rsfstudy.fit(filtered(text, 3e-4, 1), **FIT_OPTIONS | LAW | options).squeeze()
     assert found.status.item() == Status.OK, found.message.item()
     for name in ("a", "b", "slip_distance"):
-        assert abs(synthetic.off(found, name, TRUTH[name])) < 3.5, name
+        assert abs(synthetic.deviation_in_stderrs(found, name, EXACT_PARAMETERS[name])) < 3.5, name
 
 
 @pytest.mark.parametrize(
@@ -95,14 +95,14 @@ def test_a_stated_filter_gives_the_truth_back(text: str, options: dict[str, str]
     ],
 )
 def test_an_unstated_filter_is_detected(text: str, message: str) -> None:
-    found = rsfstudy.fit(filtered(text, 3e-4, 1), **OPTIONS | LAW).squeeze()
+    found = rsfstudy.fit(filtered(text, 3e-4, 1), **FIT_OPTIONS | LAW).squeeze()
     assert found.status.item() == Status.ERRORS_NOT_VALID
     assert message in found.message.item()
-    assert abs(synthetic.off(found, "a", TRUTH["a"])) > 3.0
+    assert abs(synthetic.deviation_in_stderrs(found, "a", EXACT_PARAMETERS["a"])) > 3.0
 
 
 def test_no_filter_is_detected_in_unfiltered_friction() -> None:
-    plain = rsfstudy.fit(filtered("", 3e-4, 1), **OPTIONS | LAW).squeeze()
+    plain = rsfstudy.fit(filtered("", 3e-4, 1), **FIT_OPTIONS | LAW).squeeze()
     assert plain.status.item() == Status.OK
 
 
@@ -118,4 +118,4 @@ def test_no_filter_is_detected_in_unfiltered_friction() -> None:
 )
 def test_filters_that_cannot_be_are_refused(options: dict[str, str], text: str) -> None:
     with pytest.raises(InvalidValue, match=text):
-        rsfstudy.fit(synthetic.record(), stiffness=3e-3, **options)
+        rsfstudy.fit(synthetic.synthetic_record(), stiffness=3e-3, **options)

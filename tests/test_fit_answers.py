@@ -10,24 +10,32 @@ import numpy as np
 import pytest
 import synthetic_records as synthetic
 from scipy.stats import t as student
-from synthetic_records import LAWS, OPTIONS, STEP, TRUTH, record
+from synthetic_records import (
+    EXACT_PARAMETERS,
+    FIT_OPTIONS,
+    LAW_FUNCTIONS,
+    STEP_UP,
+    synthetic_record,
+)
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.analysis.fitting.load_point import moved_steps
-from rsfstudy.analysis.fitting.model import MOVED, Model
-from rsfstudy.analysis.fitting.record import loading_of
+from rsfstudy.analysis.fitting.load_point import shift_steps
+from rsfstudy.analysis.fitting.model import STEP_SHIFT_FRACTION, WindowModel
+from rsfstudy.analysis.fitting.record import loading_history
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 
-WHITE = {**OPTIONS, "noise": "white", "laws": ["slowness"]}
+WHITE = {**FIT_OPTIONS, "noise": "white", "laws": ["slowness"]}
 #: The true parameters where they are not looked for.
-TRUE = {"a": 0.01, "b_over_a": 1.3, "slip_distance": TRUTH["slip_distance"]}
+TRUE = {"a": 0.01, "b_over_a": 1.3, "slip_distance": EXACT_PARAMETERS["slip_distance"]}
 
 
 def test_intervals_of_linear_parameters_are_those_of_students_t() -> None:
     """Friction before the step and a trend: a regression with n - 2 degrees of freedom."""
-    fit = rsfstudy.fit(record(count=60), free=("mu_star", "trend1"), **WHITE, **TRUE).squeeze()
+    fit = rsfstudy.fit(
+        synthetic_record(count=60), free=("mu_star", "trend1"), **WHITE, **TRUE
+    ).squeeze()
     bare, moved = fit.detrended_friction - fit.mu_star, fit.record_displacement.values
     moved = moved - 40.0  # from the step
     columns = np.column_stack([np.ones(60), moved])
@@ -41,20 +49,20 @@ def test_intervals_of_linear_parameters_are_those_of_students_t() -> None:
         assert ends == pytest.approx([value - by, value + by], abs=1e-6 * by), name
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", LAW_FUNCTIONS)
 def test_a_spring_softer_than_critical_is_not_followed(law: str) -> None:
     """(b - a)/D_c is critical for all laws of one state."""
     fields = {"normal_stress": "constant", "stiffness": 0.03, "mu_star": 0.6}
     scene = Scene(law=law, a=0.01, b_over_a=1.3, **fields)
-    meter, loading = Meter(10**9), np.array([(t, v, 1.0, 0.0) for t, v in STEP])
-    times = synthetic.rows(STEP, 50.0, 50)
-    model = Model(scene, times, times, times, loading, Accuracy(engine="compiled"), meter)
-    critical = (TRUTH["b"] - TRUTH["a"]) / TRUTH["slip_distance"]
-    soft, stiff = (TRUTH | {"stiffness": part * critical} for part in (0.999, 3.0))
-    assert np.isnan(model.curve(soft, checked=True)).all()
-    assert meter.spent == 0
-    assert np.isfinite(model.curve(stiff, checked=True)).all()
-    assert meter.spent > 0
+    meter, loading = WorkMeter(10**9), np.array([(t, v, 1.0, 0.0) for t, v in STEP_UP])
+    times = synthetic.sample_times(STEP_UP, 50.0, 50)
+    model = WindowModel(scene, times, times, times, loading, Accuracy(engine="compiled"), meter)
+    critical = (EXACT_PARAMETERS["b"] - EXACT_PARAMETERS["a"]) / EXACT_PARAMETERS["slip_distance"]
+    soft, stiff = (EXACT_PARAMETERS | {"stiffness": part * critical} for part in (0.999, 3.0))
+    assert np.isnan(model.model_friction(soft, require_stable=True)).all()
+    assert meter.evaluations == 0
+    assert np.isfinite(model.model_friction(stiff, require_stable=True)).all()
+    assert meter.evaluations > 0
 
 
 #: A ramp of 0.4 s: the load point moves by 2.2 um, of which a steady velocity misses up to 0.45.
@@ -62,11 +70,11 @@ RAMP = ((0.0, 1.0), *((40.0 + 0.002 * n, 1.0225 + 0.045 * n) for n in range(200)
 
 
 def test_a_ramp_is_loaded_at_steady_acceleration() -> None:
-    times = synthetic.rows(RAMP, synthetic.end(RAMP), 400)
-    columns = {"time": times, "displacement": synthetic.load_point(RAMP, times)}
-    columns["friction"] = synthetic.motion("slowness", times, RAMP)[0]
+    times = synthetic.sample_times(RAMP, synthetic.loading_end_time(RAMP), 400)
+    columns = {"time": times, "displacement": synthetic.load_point_displacement(RAMP, times)}
+    columns["friction"] = synthetic.friction_and_sensitivities("slowness", times, RAMP)[0]
     one = rsfstudy.read_record(columns).with_steps([(40.0, 40.4, 1.0, 10.0)])
-    pieces = loading_of(one, 0.0, 50.0, recorded=False)
+    pieces = loading_history(one, 0.0, 50.0, from_rows=False)
     ends = np.append(pieces[1:, 0], 50.0)
     moved = np.cumsum(pieces[:, 1] * (ends - pieces[:, 0]))
     lasts = np.clip(ends - 40.0, 0.0, 0.4)
@@ -75,34 +83,36 @@ def test_a_ramp_is_loaded_at_steady_acceleration() -> None:
     fit = rsfstudy.fit(one, **WHITE).squeeze()
     for name in ("a", "b", "slip_distance"):
         # pieces leave displacement off by 0.45 um/16^2, k of which is 5e-6 of friction
-        assert float(fit[name]) == pytest.approx(TRUTH[name], rel=1e-3), name
+        assert float(fit[name]) == pytest.approx(EXACT_PARAMETERS[name], rel=1e-3), name
     found = rsfstudy.fit(rsfstudy.read_record(columns), **WHITE).squeeze()
     # rows are 0.4 s apart before the ramp, so that it seems twice as long
-    assert float(found.slip_distance) == pytest.approx(TRUTH["slip_distance"], rel=0.03)
+    assert float(found.slip_distance) == pytest.approx(EXACT_PARAMETERS["slip_distance"], rel=0.03)
 
 
 @pytest.mark.parametrize(("noise", "told"), [(0.02, False), (0.3, True)])
 def test_noise_of_a_load_point_that_is_loaded_as_recorded(noise: float, told: bool) -> None:
-    truth = TRUTH | {"stiffness": 0.02}
-    times = synthetic.rows(STEP, synthetic.end(STEP), 600)
-    moved = synthetic.load_point(STEP, times)
-    friction = synthetic.motion("slowness", times, STEP, truth)[0]
-    moved = moved + synthetic.correlated(600, 0.0, noise, 1)
+    truth = EXACT_PARAMETERS | {"stiffness": 0.02}
+    times = synthetic.sample_times(STEP_UP, synthetic.loading_end_time(STEP_UP), 600)
+    moved = synthetic.load_point_displacement(STEP_UP, times)
+    friction = synthetic.friction_and_sensitivities("slowness", times, STEP_UP, truth)[0]
+    moved = moved + synthetic.correlated_noise(600, 0.0, noise, 1)
     columns = {"time": times, "displacement": moved, "friction": friction}
     one = rsfstudy.read_record(columns).with_steps([(40.0, 40.0, 1.0, 10.0)])
     fit = rsfstudy.fit(one, **{**WHITE, "stiffness": 0.02}, loading="recorded").squeeze()
     assert float(fit.load_point_noise) == pytest.approx(noise, rel=0.2)  # 600 samples, by a median
     assert ("noise of the recorded load point" in str(fit.message.values)) == told
-    assert (float(fit.slip_distance) > 1.1 * TRUTH["slip_distance"]) == told
+    assert (float(fit.slip_distance) > 1.1 * EXACT_PARAMETERS["slip_distance"]) == told
     steps = rsfstudy.fit(one, **{**WHITE, "stiffness": 0.02}).squeeze()
-    assert float(steps.slip_distance) == pytest.approx(TRUTH["slip_distance"], rel=2e-3)
+    assert float(steps.slip_distance) == pytest.approx(EXACT_PARAMETERS["slip_distance"], rel=2e-3)
     assert str(steps.message.values) == ""
 
 
 def with_noise(size: float, seed: int, rho: float = 0.0) -> rsfstudy.Record:
     """A record of 400 rows whose steps are found in displacement with noise."""
-    columns = {name: of.copy() for name, of in record(size=5e-5, seed=seed).columns.items()}
-    columns["displacement"] += synthetic.correlated(400, rho, size, 1000 + seed)
+    columns = {
+        name: of.copy() for name, of in synthetic_record(size=5e-5, seed=seed).columns.items()
+    }
+    columns["displacement"] += synthetic.correlated_noise(400, rho, size, 1000 + seed)
     return rsfstudy.read_record(columns)
 
 
@@ -111,18 +121,20 @@ def test_errors_of_steps_are_those_of_two_straight_lines() -> None:
     and 4 s^2/n that of either end.
     """
     one = with_noise(0.1, 0)
-    times = np.array([[step[:4] for step in steps] for steps in moved_steps(one, one.found)])
-    variances = np.square(times - np.array([one.found[0][:4]])).sum(axis=(0, 1))
-    variances = variances[[0, 2, 3]] / MOVED**2
-    (step,) = one.found
-    counts = np.array([(one.time < step.begins).sum(), (one.time >= step.begins).sum()])
-    lasts = np.array([step.begins - one.time[0], one.time[-1] - step.begins])
-    of_time = np.sum(4 * 0.01 / counts) / (step.after - step.before) ** 2
+    times = np.array(
+        [[step[:4] for step in steps] for steps in shift_steps(one, one.loading_steps)]
+    )
+    variances = np.square(times - np.array([one.loading_steps[0][:4]])).sum(axis=(0, 1))
+    variances = variances[[0, 2, 3]] / STEP_SHIFT_FRACTION**2
+    (step,) = one.loading_steps
+    counts = np.array([(one.time < step.start).sum(), (one.time >= step.start).sum()])
+    lasts = np.array([step.start - one.time[0], one.time[-1] - step.start])
+    of_time = np.sum(4 * 0.01 / counts) / (step.velocity_after - step.velocity_before) ** 2
     exact = [of_time, *(12 * 0.01 / (counts * lasts**2))]
     # 400 rows tell s^2 to 7 per cent, and an order above 0 that chance may take to some more
     assert variances == pytest.approx(exact, rel=0.25)
-    assert moved_steps(one.with_steps([step[:4]]), [step]) == []
-    assert moved_steps(record(), [step]) == []
+    assert shift_steps(one.with_steps([step[:4]]), [step]) == []
+    assert shift_steps(synthetic_record(), [step]) == []
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.9])
@@ -133,10 +145,12 @@ def test_errors_count_noise_of_the_load_point(rho: float) -> None:
     names = ("a", "b", "slip_distance")
     squares = dict.fromkeys(names, 0.0)
     for seed in range(6):
-        fit = rsfstudy.fit(with_noise(0.4, seed, rho), **{**OPTIONS, "laws": ["slowness"]})
+        fit = rsfstudy.fit(with_noise(0.4, seed, rho), **{**FIT_OPTIONS, "laws": ["slowness"]})
         assert "noise of load point displacement makes most" in str(fit.message.values.item())
         for name in names:
-            squares[name] += synthetic.off(fit.squeeze(), name, TRUTH[name]) ** 2
+            squares[name] += (
+                synthetic.deviation_in_stderrs(fit.squeeze(), name, EXACT_PARAMETERS[name]) ** 2
+            )
             low, high = (float(fit[f"{name}_{end}"].item()) for end in ("low", "high"))
             assert high - low > 3.9 * float(fit[f"{name}_stderr"].item())
     assert all(0.5 < found < 25.0 for found in squares.values()), squares  # chi^2 of 6

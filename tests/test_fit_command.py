@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 import synthetic_records as synthetic
 import xarray as xr
-from running import call
+from running import call_main
 
 import rsfstudy
 from rsfstudy.api import fit_results
-from rsfstudy.api.fit_results import with_error
+from rsfstudy.api.fit_results import format_with_stderr
 from rsfstudy.status import Status
 
 PAGES = Path(__file__).parent.parent / "studies" / "pages"
@@ -34,9 +34,11 @@ def rows() -> np.ndarray:
     loading = ((0.0, 1.0), (100.0, 10.0), (140.0, 1.0))
     times = [np.arange(0.0, 100.0, 0.5), 100.0 + 0.1 * np.arange(400), np.arange(140.0, 440.0, 0.5)]
     time = np.concatenate(times)
-    place = synthetic.load_point(loading, time)
-    friction = synthetic.motion("slowness", time, loading, TRUE | {"stiffness": STIFFNESS})[0]
-    noise = synthetic.correlated(len(time), 0.8, 3e-4, 0)
+    place = synthetic.load_point_displacement(loading, time)
+    friction = synthetic.friction_and_sensitivities(
+        "slowness", time, loading, TRUE | {"stiffness": STIFFNESS}
+    )[0]
+    noise = synthetic.correlated_noise(len(time), 0.8, 3e-4, 0)
     return np.column_stack([time, place, friction + TRUE["trend1"] * place + noise])
 
 
@@ -50,7 +52,7 @@ def written(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("COLUMNS", "80")
         patch.chdir(here)
-        ran = call("fit", "record.csv", *FIT)
+        ran = call_main("fit", "record.csv", *FIT)
     assert ran.returncode == 0, ran.stdout + ran.stderr
     return here, ran.stdout
 
@@ -76,7 +78,7 @@ def test_what_it_finds_is_what_the_record_was_made_of(written):
     here, _said = written
     found = rsfstudy.open(here / "fit.nc")
     for name in ("a", "b", "slip_distance", "trend1"):
-        for one in fit_results.cells(found):
+        for one in fit_results.split_fits(found):
             off = (one[name].item() - TRUE[name]) / one[f"{name}_stderr"].item()
             assert abs(off) < 4.0, (name, off)
 
@@ -84,25 +86,25 @@ def test_what_it_finds_is_what_the_record_was_made_of(written):
 def test_its_file_is_shown_drawn_and_exported(written):
     here, said = written
     file = str(here / "fit.nc")
-    shown = call("show", file)
+    shown = call_main("show", file)
     assert shown.returncode == 0
     table = [line for line in said.splitlines() if "+-" in line]
     assert table
     assert all(line.rstrip() in map(str.rstrip, shown.stdout.splitlines()) for line in table)
     assert "made by rsfstudy fit record.csv" in " ".join(shown.stdout.split())
     assert (here / "fit.png").read_bytes().startswith(b"\x89PNG")
-    drawn = call("plot", file, "--output", str(here / "again.pdf"))
+    drawn = call_main("plot", file, "--output", str(here / "again.pdf"))
     assert drawn.returncode == 0, drawn.stderr
     assert "drawn as lines" not in drawn.stderr
-    assert call("export", file, "--csv").returncode == 0
+    assert call_main("export", file, "--csv").returncode == 0
     assert "slip_distance_stderr" in (here / "fit.csv").read_text().splitlines()[0]
-    assert call("check", file).returncode == 0
+    assert call_main("check", file).returncode == 0
 
 
 def test_steps_fitted_together_have_one_law_and_a_curve_each(written, tmp_path, monkeypatch):
     here, _said = written
     monkeypatch.chdir(tmp_path)
-    ran = call("fit", str(here / "record.csv"), *FIT, "--together")
+    ran = call_main("fit", str(here / "record.csv"), *FIT, "--together")
     assert ran.returncode == 0, ran.stderr
     assert "step 1 of record, step 2 of record" in " ".join(ran.stdout.split())
     for name in ("a", r"Dc \(um\)", "mu_0_1", "mu_0_2", r"trend_2 \(1/um\)"):
@@ -121,20 +123,20 @@ def test_steps_fitted_together_have_one_law_and_a_curve_each(written, tmp_path, 
 def test_a_rerun_says_what_it_lacks(written):
     here, _said = written
     for words in ((), ("--cell", "step=1")):
-        ran = call("rerun", str(here / "fit.nc"), "--serial", *words)
+        ran = call_main("rerun", str(here / "fit.nc"), "--serial", *words)
         assert ran.returncode == 2
         assert "Fit them again" in " ".join(ran.stderr.split())
 
 
 def test_a_file_that_is_not_there_is_told():
-    ran = call("fit", "nowhere.csv", *FIT)
+    ran = call_main("fit", "nowhere.csv", *FIT)
     assert (ran.returncode, ran.stderr.strip()) == (1, "error: there is no file nowhere.csv")
 
 
 def test_files_of_others_are_not_replaced(written, tmp_path):
     here, _said = written
     (tmp_path / "fit.nc").write_text("mine")
-    ran = call("fit", str(here / "record.csv"), *FIT, "--output", str(tmp_path / "fit.png"))
+    ran = call_main("fit", str(here / "record.csv"), *FIT, "--output", str(tmp_path / "fit.png"))
     assert ran.returncode == 2
     assert "no fit" in ran.stderr
     assert (tmp_path / "fit.nc").read_text() == "mine"
@@ -161,7 +163,9 @@ def test_a_stiffness_of_stress_is_taken_over_normal_stress(written):
 
 def test_a_number_has_the_digits_that_its_error_gives_it():
     def told(value, error, status=0):
-        return with_error(xr.Dataset({"x": value, "x_stderr": error, "status": status}), "x")
+        return format_with_stderr(
+            xr.Dataset({"x": value, "x_stderr": error, "status": status}), "x"
+        )
 
     assert told(0.0100312, 0.00011) == "0.01003 +- 0.00011"
     assert told(12.345, 0.14) == "12.35 +- 0.14"
@@ -191,7 +195,7 @@ def test_the_page_prints_what_the_command_does(tmp_path, monkeypatch):
     command, told = re.findall(r"```(?:sh|text)\n(.*?)```", block, re.DOTALL)[:2]
     shutil.copy(PAGES / "step.csv", tmp_path)
     monkeypatch.chdir(tmp_path)
-    ran = call(*shlex.split(command)[1:])
+    ran = call_main(*shlex.split(command)[1:])
     assert ran.returncode == 0, ran.stderr
     ours, theirs = (
         [line.rstrip() for line in text.strip("\n").splitlines()] for text in (ran.stdout, told)

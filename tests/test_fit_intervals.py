@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from rsfstudy.analysis.fitting import intervals
-from rsfstudy.analysis.fitting.model import QUICK, Differences, Values
-from rsfstudy.analysis.fitting.search import Fitted, Search
+from rsfstudy.analysis.fitting.model import QUICK_DIFFERENCES, DifferenceScheme, Values
+from rsfstudy.analysis.fitting.search import FitProblem, FitSolution
 
 ROWS, SIZE = 80, 1e-3
 FREE = ("b", "slip_distance", "mu_star")
@@ -20,18 +20,20 @@ FREE = ("b", "slip_distance", "mu_star")
 class Relaxation:
     """``mu_star - b (1 - exp(-x/D_c))`` over 30 um, in place of the model of a record."""
 
-    averaging = 0.0
+    averaging_time = 0.0
 
     @property
-    def frictions(self) -> list[np.ndarray]:
+    def friction_per_window(self) -> list[np.ndarray]:
         return [self.friction]
 
     def __init__(self, truth: Values, seed: int = 2) -> None:
         self.time = self.displacement = np.linspace(0.0, 30.0, ROWS)
         noise = np.random.default_rng(seed).standard_normal(ROWS)
-        self.friction = self.curve(truth) + SIZE * noise
+        self.friction = self.model_friction(truth) + SIZE * noise
 
-    def curve(self, values: Values, *, refined: bool = False, checked: bool = False) -> np.ndarray:
+    def model_friction(
+        self, values: Values, *, refined: bool = False, require_stable: bool = False
+    ) -> np.ndarray:
         """The relaxation."""
         return np.asarray(
             values["mu_star"]
@@ -46,15 +48,18 @@ class Relaxation:
         """Only its level is told without a step."""
         return name == "mu_star"
 
-    def check(self, values: Values) -> None:
+    def check_parameters(self, values: Values) -> None:
         """All is right."""
 
-    def by_loading(self, _values: Values) -> np.ndarray:
+    def loading_sensitivity(self, _values: Values) -> np.ndarray:
         """Nothing: no load point moves it."""
         return np.zeros((ROWS, 0))
 
     def jacobian(
-        self, values: Values, free: Sequence[str], differences: Differences = QUICK
+        self,
+        values: Values,
+        free: Sequence[str],
+        difference_scheme: DifferenceScheme = QUICK_DIFFERENCES,
     ) -> np.ndarray:
         """In closed form."""
         over = self.displacement / values["slip_distance"]
@@ -66,12 +71,12 @@ class Relaxation:
         return np.column_stack([columns[name] for name in free])
 
 
-def fit(distance: float) -> tuple[Relaxation, Search, Fitted]:
+def fit(distance: float) -> tuple[Relaxation, FitProblem, FitSolution]:
     """A search on such a record, and what it found."""
     truth = {"a": 0.01, "b": 0.01, "slip_distance": distance, "mu_star": 0.6}
     model = Relaxation(truth)
-    search = Search(model, truth, FREE, "white")  # type: ignore[arg-type]
-    return model, search, search.run()
+    search = FitProblem(model, truth, FREE, "white")  # type: ignore[arg-type]
+    return model, search, search.solve()
 
 
 def squares(model: Relaxation, b: float, distance: float) -> float:
@@ -91,9 +96,9 @@ def by_hand(model: Relaxation, b: float) -> float:
 
 def test_intervals_end_where_the_likelihood_has_fallen() -> None:
     model, search, found = fit(25.0)
-    far = intervals.half_width(found, intervals.COVERS)
+    far = intervals.stderr_multiplier(found, intervals.CONFIDENCE_LEVEL)
     b = found.values["b"]
-    low, high = intervals.interval(search, found, "b")
+    low, high = intervals.confidence_interval(search, found, "b")
     # squared distances are off by a fifth, to first order, where a parabola is nearly one
     for end, slack in ((low, 0.25), (high, 0.06)):
         fallen = (by_hand(model, end) - by_hand(model, b)) / found.noise_sd**2
@@ -107,8 +112,8 @@ def test_noise_alone_tells_neither_b_nor_its_slip_distance() -> None:
     for size in told:
         for seed in range(20):
             model = Relaxation(first | {"b": size}, seed)
-            search = Search(model, first, FREE, "ar")  # type: ignore[arg-type]
-            told[size] += not {"b", "slip_distance"} & set(search.run().unidentified)
+            search = FitProblem(model, first, FREE, "ar")  # type: ignore[arg-type]
+            told[size] += not {"b", "slip_distance"} & set(search.solve().unidentified)
     # chance passes a difference of ten of criteria in some of a thousand records
     assert told[0.0] == 0
     assert told[4.0 * SIZE] > 15

@@ -9,12 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 import synthetic_records as synthetic
-from synthetic_records import DOWN, HOLD, LAWS, SENSITIVE, STEP, TRUTH
+from synthetic_records import (
+    EXACT_PARAMETERS,
+    LAW_FUNCTIONS,
+    SENSITIVITY_PARAMETERS,
+    SLIDE_HOLD_SLIDE,
+    STEP_DOWN,
+    STEP_UP,
+)
 
 from rsfstudy import Scene
-from rsfstudy.analysis.fitting.model import FINE, QUICK, Model
+from rsfstudy.analysis.fitting.model import FINE_DIFFERENCES, QUICK_DIFFERENCES, WindowModel
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 
 ENOUGH = 10**9
 
@@ -27,52 +34,68 @@ def scene_of(law: str, **fields: Any) -> Scene:
 
 def model_of(
     law: str, loading: Sequence[tuple[float, float]], times: np.ndarray, friction: np.ndarray
-) -> Model:
+) -> WindowModel:
     """A model of a record."""
     pieces = np.array([(begins, speed, 1.0, 0.0) for begins, speed in loading])
     accuracy = Accuracy(1e-9, ENOUGH, engine="compiled")
-    moved = synthetic.load_point(loading, times)
-    return Model(scene_of(law), times, moved, friction, pieces, accuracy, Meter(ENOUGH))
+    moved = synthetic.load_point_displacement(loading, times)
+    return WindowModel(scene_of(law), times, moved, friction, pieces, accuracy, WorkMeter(ENOUGH))
 
 
 @pytest.mark.parametrize(
     ("law", "loading", "changes"),
     [
-        *((law, STEP, {}) for law in LAWS),
-        ("slip", STEP, {"stiffness": 1e-3}),  # a threefold critical stiffness: nearly unstable
-        ("perrin_rice_zheng", STEP, {"stiffness": 1e-3}),
-        ("slowness", DOWN, {"stiffness": 0.05}),  # stiff: steps are those that stability allows
-        ("slowness", DOWN, {"b": -0.004}),
-        ("slip", HOLD, {}),
-        ("slowness", HOLD, {"stiffness": 1e-3}),
+        *((law, STEP_UP, {}) for law in LAW_FUNCTIONS),
+        ("slip", STEP_UP, {"stiffness": 1e-3}),  # a threefold critical stiffness: nearly unstable
+        ("perrin_rice_zheng", STEP_UP, {"stiffness": 1e-3}),
+        (
+            "slowness",
+            STEP_DOWN,
+            {"stiffness": 0.05},
+        ),  # stiff: steps are those that stability allows
+        ("slowness", STEP_DOWN, {"b": -0.004}),
+        ("slip", SLIDE_HOLD_SLIDE, {}),
+        ("slowness", SLIDE_HOLD_SLIDE, {"stiffness": 1e-3}),
     ],
 )
 def test_derivatives_are_those_of_the_augmented_equations(
     law: str, loading: Sequence[tuple[float, float]], changes: Mapping[str, float]
 ) -> None:
-    truth = {**TRUTH, **changes}
-    times = synthetic.rows(loading, synthetic.end(loading), 200)
-    friction, exact = synthetic.motion(law, times, loading, truth)
+    truth = {**EXACT_PARAMETERS, **changes}
+    times = synthetic.sample_times(loading, synthetic.loading_end_time(loading), 200)
+    friction, exact = synthetic.friction_and_sensitivities(law, times, loading, truth)
     model = model_of(law, loading, times, friction)
     # friction to ten times the accuracy asked for, which local errors of order eight stay below
-    assert np.abs(model.curve(truth) - friction).max() < 1e-8 * truth["a"]
+    assert np.abs(model.model_friction(truth) - friction).max() < 1e-8 * truth["a"]
     largest = np.abs(exact).max(axis=0)
-    fine = np.abs(model.jacobian(truth, SENSITIVE, FINE) - exact).max(axis=0) / largest
+    fine = (
+        np.abs(model.jacobian(truth, SENSITIVITY_PARAMETERS, FINE_DIFFERENCES) - exact).max(axis=0)
+        / largest
+    )
     assert (fine < 1e-6).all(), fine
-    quick = np.abs(model.jacobian(truth, SENSITIVE, QUICK) - exact).max(axis=0) / largest
+    quick = (
+        np.abs(model.jacobian(truth, SENSITIVITY_PARAMETERS, QUICK_DIFFERENCES) - exact).max(axis=0)
+        / largest
+    )
     assert (quick < 2e-3).all(), quick  # enough to go downhill by
 
 
 def test_derivatives_by_offset_trend_and_time_of_a_step() -> None:
-    times = synthetic.rows(STEP, 50.0, 202)[1:]
-    friction, _exact = synthetic.motion("slip", times)
-    model = model_of("slip", STEP, times, friction)
-    found = model.jacobian(TRUTH | {"step_time": 0.0}, ("mu_star", "trend2", "step_time"))
+    times = synthetic.sample_times(STEP_UP, 50.0, 202)[1:]
+    friction, _exact = synthetic.friction_and_sensitivities("slip", times)
+    model = model_of("slip", STEP_UP, times, friction)
+    found = model.jacobian(
+        EXACT_PARAMETERS | {"step_time": 0.0}, ("mu_star", "trend2", "step_time")
+    )
     assert (found[:, 0] == 1.0).all()
-    np.testing.assert_allclose(found[:, 1], synthetic.load_point(STEP, times) ** 2, rtol=1e-15)
+    np.testing.assert_allclose(
+        found[:, 1], synthetic.load_point_displacement(STEP_UP, times) ** 2, rtol=1e-15
+    )
     # a motion that comes late is the motion of some time before
     late = 1e-3
-    ahead, behind = (synthetic.motion("slip", times + s * late)[0] for s in (1.0, -1.0))
+    ahead, behind = (
+        synthetic.friction_and_sensitivities("slip", times + s * late)[0] for s in (1.0, -1.0)
+    )
     exact = -(ahead - behind) / (2.0 * late)
     away = np.abs(times - 40.0) > 0.03  # friction has a kink at the step
     off = np.abs(found[:, 2] - exact)[away].max() / np.abs(exact).max()
@@ -82,20 +105,20 @@ def test_derivatives_by_offset_trend_and_time_of_a_step() -> None:
 @pytest.mark.parametrize("exponent", [0.0, 0.012, 1.0])
 def test_derivatives_at_the_ends_of_the_family(exponent: float) -> None:
     """By a difference of sixth order of motions by SciPy, that goes beyond the ends."""
-    times = synthetic.rows(STEP, 46.0, 60)
-    truth = TRUTH | {"law_exponent": exponent}
-    model = model_of("family", STEP, times, times)
+    times = synthetic.sample_times(STEP_UP, 46.0, 60)
+    truth = EXACT_PARAMETERS | {"law_exponent": exponent}
+    model = model_of("family", STEP_UP, times, times)
 
     def friction(at: float) -> np.ndarray:
-        synthetic.LAWS["any"] = lambda u: (
+        synthetic.LAW_FUNCTIONS["any"] = lambda u: (
             (math.expm1(-at * u) / at, -math.exp(-at * u)) if at else (-u, -1.0)
         )
-        return synthetic.motion("any", times)[0]
+        return synthetic.friction_and_sensitivities("any", times)[0]
 
     moved = {n: friction(exponent + 0.02 * n) for n in (-3, -2, -1, 1, 2, 3)}
-    del synthetic.LAWS["any"]
+    del synthetic.LAW_FUNCTIONS["any"]
     weights = {1: 0.75, 2: -0.15, 3: 1.0 / 60.0}
     exact = sum(w / 0.02 * (moved[n] - moved[-n]) for n, w in weights.items())
-    found = model.jacobian(truth, ("law_exponent",), FINE)[:, 0]
+    found = model.jacobian(truth, ("law_exponent",), FINE_DIFFERENCES)[:, 0]
     # to one side the third order of the step, .005, is what is left
     assert np.abs(found - exact).max() < 2e-5 * np.abs(exact).max()

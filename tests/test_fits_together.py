@@ -11,16 +11,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 import synthetic_records as synthetic
-from synthetic_records import HOLD, OPTIONS, PAIR, STEP, TRUTH, off, record
+from synthetic_records import (
+    EXACT_PARAMETERS,
+    FIT_OPTIONS,
+    SLIDE_HOLD_SLIDE,
+    STEP_UP,
+    STEP_UP_AND_BACK,
+    deviation_in_stderrs,
+    synthetic_record,
+)
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.analysis.fitting.joint import Joint
-from rsfstudy.analysis.fitting.model import Model
-from rsfstudy.errors import Incomplete, InvalidValue
+from rsfstudy.analysis.fitting.joint import JointModel
+from rsfstudy.analysis.fitting.model import WindowModel
+from rsfstudy.errors import IncompleteWarning, InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 
 ENOUGH = 10**9
 SHARED = ("a", "b", "slip_distance")
@@ -28,23 +36,23 @@ SHARED = ("a", "b", "slip_distance")
 
 def test_two_steps_of_a_record_share_a_law() -> None:
     trend = 2e-5
-    one = record(PAIR, trend=trend, seed=1)
-    alone = rsfstudy.fit(one, laws=["slowness"], **OPTIONS)
-    both = rsfstudy.fit(one, laws=["slowness"], together=True, **OPTIONS).squeeze()
+    one = synthetic_record(STEP_UP_AND_BACK, trend=trend, seed=1)
+    alone = rsfstudy.fit(one, laws=["slowness"], **FIT_OPTIONS)
+    both = rsfstudy.fit(one, laws=["slowness"], together=True, **FIT_OPTIONS).squeeze()
     # at the second step the load point has moved by 140 um, at ten times the velocity
-    second = 0.6 + (TRUTH["a"] - TRUTH["b"]) * math.log(10.0) + 140.0 * trend
-    true = {n: TRUTH[n] for n in SHARED} | {"mu_star_1": 0.6, "mu_star_2": second}
+    second = 0.6 + (EXACT_PARAMETERS["a"] - EXACT_PARAMETERS["b"]) * math.log(10.0) + 140.0 * trend
+    true = {n: EXACT_PARAMETERS[n] for n in SHARED} | {"mu_star_1": 0.6, "mu_star_2": second}
     true |= {"trend1_1": trend, "trend1_2": trend}
     for name, value in true.items():  # 4 standard errors: one of 2,000 records for seven numbers
-        assert abs(off(both, name, value)) < 4.0, name
+        assert abs(deviation_in_stderrs(both, name, value)) < 4.0, name
     for name in SHARED:
         assert both[f"{name}_stderr"] < alone[f"{name}_stderr"].min(), name
 
 
 def test_one_step_together_is_that_step() -> None:
-    one = record(PAIR, seed=1)
+    one = synthetic_record(STEP_UP_AND_BACK, seed=1)
     alone, both = (
-        rsfstudy.fit(one, laws=["slip"], steps=[1], together=together, **OPTIONS)
+        rsfstudy.fit(one, laws=["slip"], steps=[1], together=together, **FIT_OPTIONS)
         for together in (False, True)
     )
     for name in (*SHARED, "mu_star", "criterion"):
@@ -55,15 +63,15 @@ def test_derivatives_of_windows_are_differences() -> None:
     scene = Scene(
         law="slip", a=0.01, b_over_a=1.3, normal_stress="constant", stiffness=0.03, mu_star=0.6
     )
-    accuracy, meter = Accuracy(1e-9, ENOUGH, engine=COMPILED), Meter(ENOUGH, engine=COMPILED)
+    accuracy, meter = Accuracy(1e-9, ENOUGH, engine=COMPILED), WorkMeter(ENOUGH, engine=COMPILED)
     parts = []
-    for loading in (STEP, synthetic.DOWN):
-        times = synthetic.rows(loading, synthetic.end(loading), 60)
+    for loading in (STEP_UP, synthetic.STEP_DOWN):
+        times = synthetic.sample_times(loading, synthetic.loading_end_time(loading), 60)
         pieces = np.array([(begins, speed, 1.0, 0.0) for begins, speed in loading])
-        moved = synthetic.load_point(loading, times)
-        parts.append(Model(scene, times, moved, 0.0 * times, pieces, accuracy, meter))
-    joint = Joint(tuple(parts))
-    plainly = {n: TRUTH[n] for n in ("a", "b", "slip_distance", "stiffness")}
+        moved = synthetic.load_point_displacement(loading, times)
+        parts.append(WindowModel(scene, times, moved, 0.0 * times, pieces, accuracy, meter))
+    joint = JointModel(tuple(parts))
+    plainly = {n: EXACT_PARAMETERS[n] for n in ("a", "b", "slip_distance", "stiffness")}
     values = plainly | {"mu_star_1": 0.6, "mu_star_2": 0.5, "trend1_1": 1e-5, "trend1_2": -2e-5}
     free = ("a", "slip_distance", "mu_star_2", "trend1_1")
     found = joint.jacobian(values, free)
@@ -71,7 +79,7 @@ def test_derivatives_of_windows_are_differences() -> None:
     def friction(name: str, by: float) -> np.ndarray:
         moved = values[name] * math.exp(by) if name == "slip_distance" else values[name] + by
         changed = values | {name: moved}
-        return joint.curve(changed) + joint.trend(changed)
+        return joint.model_friction(changed) + joint.trend(changed)
 
     for column, name in enumerate(free):
         step = 1e-3 if name == "slip_distance" else 1e-5
@@ -85,15 +93,15 @@ def test_derivatives_of_windows_are_differences() -> None:
 @pytest.mark.parametrize(("law", "exponent"), [("family", 0.5), ("slip", 0.0), ("slowness", 1.0)])
 def test_a_pair_of_steps_tells_the_exponent(law: str, exponent: float) -> None:
     free = ("a", "b", "slip_distance", "mu_star", "law_exponent")
-    one = record(PAIR, law, seed=3)
+    one = synthetic_record(STEP_UP_AND_BACK, law, seed=3)
     scene = {"law_exponent": 0.7}
-    fit = rsfstudy.fit(one, laws=["family"], free=free, together=True, **OPTIONS, **scene)
+    fit = rsfstudy.fit(one, laws=["family"], free=free, together=True, **FIT_OPTIONS, **scene)
     fit = fit.squeeze()
     low, high = (float(fit[f"law_exponent_{end}"]) for end in ("low", "high"))
     assert low <= float(fit.law_exponent) <= high
     assert low >= 0.0
     assert high <= 1.0
-    assert abs(off(fit, "law_exponent", exponent)) < 4.0
+    assert abs(deviation_in_stderrs(fit, "law_exponent", exponent)) < 4.0
     assert float(fit.law_exponent_stderr) < 0.05  # one step tells it to some .1
     ends = {0.0: low, 1.0: high}
     assert ends.get(exponent, exponent) == exponent  # the interval ends at the bound
@@ -108,21 +116,21 @@ def test_two_states_come_back_in_their_order() -> None:
     """From a first guess of both slip distances that is nearer to the longer one."""
     loading, size = ((0.0, 1.0), (500.0, 10.0)), 2.5e-4
     times = np.concatenate([np.linspace(0.0, 499.0, 100), np.linspace(500.0, 650.0, 300)])
-    friction = synthetic.two_states(times, loading, TWO_STATES | {"stiffness": 0.01})
-    arrays = {"time": times, "displacement": synthetic.load_point(loading, times)}
-    arrays["friction"] = friction + synthetic.correlated(400, 0.0, size, 1)
+    friction = synthetic.two_state_friction(times, loading, TWO_STATES | {"stiffness": 0.01})
+    arrays = {"time": times, "displacement": synthetic.load_point_displacement(loading, times)}
+    arrays["friction"] = friction + synthetic.correlated_noise(400, 0.0, size, 1)
     one = rsfstudy.read_record(arrays).with_steps([(500.0, 500.0, 1.0, 10.0)])
     options = {"stiffness": 0.01, "slip_distance": 300.0, "noise": "white", "engine": COMPILED}
     free = (*TWO_STATES, "trend1")
     fit = rsfstudy.fit(one, laws=["two_slip_states"], free=free, **options).squeeze()
     for name in free:
-        assert abs(off(fit, name, TWO_STATES.get(name, 0.0))) < 4.0, name
+        assert abs(deviation_in_stderrs(fit, name, TWO_STATES.get(name, 0.0))) < 4.0, name
     assert fit.slip_distance_high < fit.slip_distance_2_low
 
 
 def test_laws_of_one_and_of_two_states_are_fitted_beside_each_other() -> None:
     """Each by the parameters that it has, as if it were alone; those of others are NaN."""
-    one, options = record(count=150), OPTIONS | {"noise": "white"}
+    one, options = synthetic_record(count=150), FIT_OPTIONS | {"noise": "white"}
     own = {"slip": {"b"}, "two_slip_states": {"b1", "b2", "slip_distance_2"}}
     fits = rsfstudy.fit(one, laws=list(own), **options)
     effects = set().union(*own.values())
@@ -137,7 +145,7 @@ def test_laws_of_one_and_of_two_states_are_fitted_beside_each_other() -> None:
         for name in (*parameters, "criterion", "a_minus_b_stderr"):
             assert float(fit[name]) == float(alone[name]), name
         assert fit.rsf.scene == alone.rsf.scene
-        assert {*fit.rsf.draw(2).data_vars} == {*parameters}
+        assert {*fit.rsf.sample_parameters(2).data_vars} == {*parameters}
 
 
 @pytest.mark.parametrize(
@@ -150,24 +158,31 @@ def test_laws_of_one_and_of_two_states_are_fitted_beside_each_other() -> None:
 )
 def test_parameters_fit_a_law_and_each_law_has_some(free: tuple[str, ...], error: str) -> None:
     with pytest.raises(InvalidValue, match=re.escape(error)):
-        rsfstudy.fit(record(count=50), laws=["slip", "two_slip_states"], free=free, **OPTIONS)
+        rsfstudy.fit(
+            synthetic_record(count=50), laws=["slip", "two_slip_states"], free=free, **FIT_OPTIONS
+        )
 
 
 def test_windows_tell_the_error_of_a_trend_that_is_none_of_the_fit() -> None:
-    curved, times = 1e-6, synthetic.rows(STEP, synthetic.end(STEP) + 10.0, 200)
-    moved = synthetic.load_point(STEP, times)
-    friction = synthetic.motion("slowness", times)[0] + curved * (moved - 40.0) ** 2
+    curved, times = (
+        1e-6,
+        synthetic.sample_times(STEP_UP, synthetic.loading_end_time(STEP_UP) + 10.0, 200),
+    )
+    moved = synthetic.load_point_displacement(STEP_UP, times)
+    friction = (
+        synthetic.friction_and_sensitivities("slowness", times)[0] + curved * (moved - 40.0) ** 2
+    )
     for seed in range(2):
-        noise = synthetic.correlated(200, 0.0, 2e-4, seed)
+        noise = synthetic.correlated_noise(200, 0.0, 2e-4, seed)
         arrays = {"time": times, "displacement": moved, "friction": friction + noise}
         one = rsfstudy.read_record(arrays).with_steps([(40.0, 40.0, 1.0, 10.0)])
-        fits = rsfstudy.fit(one, laws=["slowness"], windows=3, **OPTIONS | {"noise": "white"})
+        fits = rsfstudy.fit(one, laws=["slowness"], windows=3, **FIT_OPTIONS | {"noise": "white"})
         fit = fits.squeeze().isel(part=0)
         for name in SHARED:
-            assert abs(off(fit, name, TRUTH[name])) > 5.0, name
+            assert abs(deviation_in_stderrs(fit, name, EXACT_PARAMETERS[name])) > 5.0, name
             # of a trend with x^2, 3/4 of what the whole window is off by is gone in half of it
             told = math.hypot(fit[f"{name}_stderr"], fit[f"{name}_windows"])
-            assert abs(float(fit[name]) - TRUTH[name]) < 2.0 * told, name
+            assert abs(float(fit[name]) - EXACT_PARAMETERS[name]) < 2.0 * told, name
             apart = float(fits[name].max() - fits[name].min())
             assert float(fit[f"{name}_windows"]) == pytest.approx(apart, rel=1e-12)
 
@@ -181,27 +196,27 @@ def test_windows_tell_the_error_of_a_trend_that_is_none_of_the_fit() -> None:
 )
 def test_noise_tells_nothing_but_friction(law: str, free: tuple[str, ...], tmp_path: Path) -> None:
     """A report does not call that ok."""
-    times = synthetic.rows(STEP, synthetic.end(STEP), 200)
-    arrays = {"time": times, "displacement": synthetic.load_point(STEP, times)}
-    arrays["friction"] = 0.6 + synthetic.correlated(200, 0.5, 0.02, 0)
+    times = synthetic.sample_times(STEP_UP, synthetic.loading_end_time(STEP_UP), 200)
+    arrays = {"time": times, "displacement": synthetic.load_point_displacement(STEP_UP, times)}
+    arrays["friction"] = 0.6 + synthetic.correlated_noise(200, 0.5, 0.02, 0)
     one = rsfstudy.read_record(arrays).with_steps([(40.0, 40.0, 1.0, 10.0)])
-    fits = rsfstudy.fit(one, laws=[law], free=free, **OPTIONS)
+    fits = rsfstudy.fit(one, laws=[law], free=free, **FIT_OPTIONS)
     fits.to_netcdf(tmp_path / "fit.nc")
     assert ' yellow">1 not identified<' in rsfstudy.report(tmp_path).read_text()
     fit = fits.squeeze()
-    assert fit.rsf.table().status.item() == "not_identified"
+    assert fit.rsf.fit_table().status.item() == "not_identified"
     message = str(fit.message.values).removeprefix("the record does not constrain ")
     untold = set(message.partition(";")[0].split(", "))
     assert untold == set(free) - {"mu_star", "trend1"}
-    assert abs(off(fit, "mu_star", 0.6)) < 4.0
+    assert abs(deviation_in_stderrs(fit, "mu_star", 0.6)) < 4.0
     for name in untold - {"slip_distance"}:  # nothing within the bounds of the search is excluded
         bounds = {"a": (1e-4, 1.0), "b": (-1.0, 1.0), "law_exponent": (0.0, 1.0)}[name]
         assert (float(fit[f"{name}_low"]), float(fit[f"{name}_high"])) == bounds, name
 
 
 def test_draws_have_the_mean_and_covariance_of_the_fit() -> None:
-    fit = rsfstudy.fit(record(seed=4), laws=["slip"], **OPTIONS).squeeze()
-    drawn, names = fit.rsf.draw(20_000, seed=1), [str(n) for n in fit.parameter.values]
+    fit = rsfstudy.fit(synthetic_record(seed=4), laws=["slip"], **FIT_OPTIONS).squeeze()
+    drawn, names = fit.rsf.sample_parameters(20_000, seed=1), [str(n) for n in fit.parameter.values]
     degrees = float(fit.degrees_of_freedom)
     spread = np.array([drawn[n] - fit[n] for n in names]) / [
         [float(fit[f"{n}_stderr"])] for n in names
@@ -212,12 +227,12 @@ def test_draws_have_the_mean_and_covariance_of_the_fit() -> None:
     exact = fit.correlation.values * degrees / (degrees - 2.0)
     assert np.abs(np.cov(spread) - exact).max() < 0.08
     assert (drawn.slip_distance > 0.0).all()
-    assert np.array_equal(drawn.a, fit.rsf.draw(20_000, seed=1).a)
+    assert np.array_equal(drawn.a, fit.rsf.sample_parameters(20_000, seed=1).a)
 
 
 def test_the_table_has_the_columns_of_laboratories() -> None:
-    fit = rsfstudy.fit(record(seed=4), laws=["slip", "slowness"], **OPTIONS)
-    table = fit.rsf.table()
+    fit = rsfstudy.fit(synthetic_record(seed=4), laws=["slip", "slowness"], **FIT_OPTIONS)
+    table = fit.rsf.fit_table()
     short = ("a", "b", "a_minus_b", "Dc", "mu_0", "trend")
     columns = {*short, *(f"{n}_std" for n in short), "V0", "V1", "law", "window", "R2", "status"}
     assert columns <= set(table.columns)
@@ -227,13 +242,15 @@ def test_the_table_has_the_columns_of_laboratories() -> None:
 
 def test_a_window_does_not_begin_within_a_hold() -> None:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Incomplete)
-        fit = rsfstudy.fit(record(HOLD, seed=3), laws=["slowness"], **OPTIONS)
+        warnings.simplefilter("ignore", IncompleteWarning)
+        fit = rsfstudy.fit(
+            synthetic_record(SLIDE_HOLD_SLIDE, seed=3), laws=["slowness"], **FIT_OPTIONS
+        )
     hold, reloading = (fit.squeeze().sel(step=n) for n in (1, 2))
     assert (float(hold.velocity_before), float(hold.velocity_after)) == (1.0, 0.0)
     for name in SHARED:  # the reloading tells them, to a few per cent
-        assert abs(off(hold, name, TRUTH[name])) < 4.0, name
-        assert float(hold[f"{name}_stderr"]) < 0.1 * TRUTH[name], name
+        assert abs(deviation_in_stderrs(hold, name, EXACT_PARAMETERS[name])) < 4.0, name
+        assert float(hold[f"{name}_stderr"]) < 0.1 * EXACT_PARAMETERS[name], name
     assert "begins in a hold" in str(reloading.message.values)
     assert np.isnan(float(reloading.a))
 
@@ -241,16 +258,18 @@ def test_a_window_does_not_begin_within_a_hold() -> None:
 @pytest.mark.parametrize("law", ["family", "slowness"])
 def test_a_law_is_fitted_without_the_compiled_engine(law: str) -> None:
     free, scene = ("a", "b", "slip_distance"), {"law_exponent": 0.5} if law == "family" else {}
-    options = {**OPTIONS, "engine": "scipy", "noise": "white"}
-    one = record(law=law, count=100, size=2e-4)
+    options = {**FIT_OPTIONS, "engine": "scipy", "noise": "white"}
+    one = synthetic_record(law=law, count=100, size=2e-4)
     fit = rsfstudy.fit(one, laws=[law], free=free, **options, **scene).squeeze()
     for name in free:
-        assert abs(off(fit, name, TRUTH[name])) < 5.0, name  # noise is correlated, and taken white
+        assert abs(deviation_in_stderrs(fit, name, EXACT_PARAMETERS[name])) < 5.0, (
+            name
+        )  # noise is correlated, and taken white
 
 
 def test_the_scene_of_a_fit_moves_as_fitted() -> None:
     """From the instant of the step on, in units of D_c and of the velocity before it."""
-    fit = rsfstudy.fit(record(seed=4), laws=["slowness"], **OPTIONS).squeeze()
+    fit = rsfstudy.fit(synthetic_record(seed=4), laws=["slowness"], **FIT_OPTIONS).squeeze()
     rows = fit.record_time.values > 40.0
     times = (fit.record_time.values[rows] - 40.0) / float(fit.slip_distance)
     motion = rsfstudy.simulate(fit.rsf.scene, times=times, engine="compiled")
@@ -258,19 +277,21 @@ def test_the_scene_of_a_fit_moves_as_fitted() -> None:
     assert np.abs(seen - fitted).max() < 1e-6  # the default accuracy, 1e-7, times some
     # what was not looked for is as it was while it was looked for
     held = {"b_over_a": 1.3, "a": 0.01, "slip_distance": "10 um"}
-    some = rsfstudy.fit(record(seed=4), laws=["slowness"], free=("a", "mu_star"), **OPTIONS | held)
+    some = rsfstudy.fit(
+        synthetic_record(seed=4), laws=["slowness"], free=("a", "mu_star"), **FIT_OPTIONS | held
+    )
     assert some.squeeze().rsf.scene.b == pytest.approx(0.013, rel=1e-12)
     with pytest.raises(InvalidValue, match="normal_stress = None: is not in the record"):
-        _ = fit.rsf.laboratory
+        _ = fit.rsf.rig
 
 
 def test_the_rig_of_a_fit_gives_the_record_back() -> None:
     """In s and um, where the record states its normal stress."""
-    one = record(seed=4)
+    one = synthetic_record(seed=4)
     columns = {**one.columns, "normal_stress": np.full(len(one), 20.0)}
-    stressed = rsfstudy.read_record(columns).with_steps(one.found)
-    fit = rsfstudy.fit(stressed, laws=["slowness"], **OPTIONS).squeeze()
-    rig, scene = fit.rsf.laboratory, fit.rsf.scene
+    stressed = rsfstudy.read_record(columns).with_steps(one.loading_steps)
+    fit = rsfstudy.fit(stressed, laws=["slowness"], **FIT_OPTIONS).squeeze()
+    rig, scene = fit.rsf.rig, fit.rsf.scene
     assert rig.normal_stress == pytest.approx(20e6)
     assert rig.slip_distance == pytest.approx(1e-6 * float(fit.slip_distance))
     assert rig.scene(stiffness=rig.stiffness).stiffness == pytest.approx(scene.stiffness)
@@ -292,8 +313,8 @@ def test_the_posterior_is_that_of_the_errors(free: tuple[str, ...], draws: int) 
     independent rows, whose likelihood is nearly a parabola.
     """
     known = {"slip_distance": 10.0, "a": 0.01, "b_over_a": 1.3, "mu_star": 0.6}
-    options = OPTIONS | {n: v for n, v in known.items() if n not in free}
-    one = record(seed=4, count=200)
+    options = FIT_OPTIONS | {n: v for n, v in known.items() if n not in free}
+    one = synthetic_record(seed=4, count=200)
     fit = rsfstudy.fit(one, laws=["slowness"], free=free, posterior=draws, **options).squeeze()
     drawn = fit.posterior
     spread = np.sqrt(np.diag(fit.covariance))
@@ -308,15 +329,15 @@ def test_the_posterior_is_that_of_the_errors(free: tuple[str, ...], draws: int) 
 
 
 def test_a_chain_that_is_too_short_is_refused() -> None:
-    one, options = record(seed=4, count=200), {"laws": ["slowness"], **OPTIONS}
+    one, options = synthetic_record(seed=4, count=200), {"laws": ["slowness"], **FIT_OPTIONS}
     enough = int(rsfstudy.fit(one, **options).rhs_evaluations.item()) + 20_000
-    with pytest.warns(Incomplete):
+    with pytest.warns(IncompleteWarning):
         fit = rsfstudy.fit(one, posterior=100, budget=enough, **options)
-    assert fit.rsf.table().status.item() == "work_budget_spent"
+    assert fit.rsf.fit_table().status.item() == "work_budget_spent"
     assert np.isnan(fit.posterior).all()
 
 
 def test_a_posterior_without_emcee_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "emcee", None)
     with pytest.raises(InvalidValue, match=r"needs emcee.*pip install 'rsfstudy\[posterior\]'"):
-        rsfstudy.fit(record(seed=4), posterior=1, **OPTIONS)
+        rsfstudy.fit(synthetic_record(seed=4), posterior=1, **FIT_OPTIONS)

@@ -15,17 +15,17 @@ from test_steady import PLAIN
 from rsfstudy import Scene, simulate
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import along, follow
+from rsfstudy.motion.course import events_along, integrate_events
 from rsfstudy.motion.engines import ENGINES
-from rsfstudy.motion.events import Kind, maximum
-from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.recording import READ, STATES, Recording
+from rsfstudy.motion.events import EventKind, maximum
+from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLES, Recording
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import (
-    rigid,
+    equations_of_rigid_slider,
 )
 from rsfstudy.slider.fluid import Fluid
-from rsfstudy.slider.fluid.dilatant import Dilatant
+from rsfstudy.slider.fluid.dilatant import DilatantFluid
 from rsfstudy.slider.parts import number
 from rsfstudy.slider.places import FLUID
 
@@ -85,13 +85,16 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
     """
     scene = dilatant(0.01, drainage, load_velocity_ratio=rate, **CONSTANT)
     x, c, start = math.log(rate), drainage / rate, scene.a * math.log(rate)
-    recording, meter = Recording(at=np.array([0.1, 0.7, 2.0, 5.0])), Meter(100_000)
-    equations = rigid(scene, x)
-    path = along(equations, (start, 0.0, 0.0), 1e-11, meter, recording=recording)
-    next(event for event in path if event.kind is Kind.SAMPLED)
-    for row, asked in zip(recording.seen(scene), recording.at, strict=True):
-        slip, friction = row[READ.index("slip")], row[READ.index("frictional_stress")] - 0.76
-        porosity, pressure = row[STATES + 1 :]
+    recording, meter = Recording(sample_times=np.array([0.1, 0.7, 2.0, 5.0])), WorkMeter(100_000)
+    equations = equations_of_rigid_slider(scene, x)
+    path = events_along(equations, (start, 0.0, 0.0), 1e-11, meter, recording=recording)
+    next(event for event in path if event.kind is EventKind.SAMPLED)
+    for row, asked in zip(recording.table(scene), recording.sample_times, strict=True):
+        slip, friction = (
+            row[RECORDED_VARIABLES.index("slip")],
+            row[RECORDED_VARIABLES.index("frictional_stress")] - 0.76,
+        )
+        porosity, pressure = row[FIRST_STATE_COLUMN + 1 :]
         assert slip == asked
         assert porosity == pytest.approx(0.01 * x * -math.expm1(-slip), abs=1e-11)
         exact = -0.01 * x * (math.exp(-slip) - math.exp(-c * slip)) / (c - 1.0)
@@ -100,10 +103,10 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
         stress = (1.0 - exact) * coefficient - 0.76
         # tolerance of a step 1e-11 of the scale a, over hundreds of steps
         assert friction == pytest.approx(stress, abs=1e-10)
-        ratio = row[READ.index("normal_stress_ratio")]
+        ratio = row[RECORDED_VARIABLES.index("normal_stress_ratio")]
         assert ratio == pytest.approx(1.0 - exact, abs=1e-10)
-        point = equations.at((friction, porosity, pressure))
-        assert point.coefficient == pytest.approx(coefficient, abs=1e-10)
+        point = equations.evaluate_point((friction, porosity, pressure))
+        assert point.friction_coefficient == pytest.approx(coefficient, abs=1e-10)
 
 
 @pytest.mark.parametrize(
@@ -117,8 +120,8 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
 def test_without_drainage_pressure_is_lost_to_porosity(fields):
     """P = -(phi - phi_0)/beta: no fluid comes or goes, in any regime."""
     scene, far = dilatant(0.01, 1e-30, load_velocity_ratio=10.0, **fields), 0.0
-    for event in follow(
-        scene, Accuracy(1e-9), Meter(20_000), [maximum("log_slip_rate")], until=40.0
+    for event in integrate_events(
+        scene, Accuracy(1e-9), WorkMeter(20_000), [maximum("log_slip_rate")], until=40.0
     ):
         porosity, pressure = event.point.psis[1:]
         far = max(far, porosity)
@@ -179,7 +182,7 @@ class Tight(Fluid):
     opening: float = number(0.005, "", "1", "dilatancy")
 
     name = "tight"
-    unknowns = Dilatant.unknowns
+    unknowns = DilatantFluid.unknowns
     auxiliary_rates = staticmethod(tight)
     auxiliary_steady_states = staticmethod(filled)
 

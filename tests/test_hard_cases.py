@@ -15,7 +15,7 @@ from running import named_results
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.analysis.cycles import cycles
+from rsfstudy.analysis.cycles import iterate_cycles
 from rsfstudy.declare import catalogue
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
@@ -23,10 +23,10 @@ from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.status import Status
 
-STUDY = catalogue.load("hard_cases")
+STUDY = catalogue.load_study("hard_cases")
 PROBLEMS = dict(zip(STUDY.axes[0].labels, STUDY.measure.problems, strict=True))
 
 
@@ -75,8 +75,8 @@ def test_two_hundred_cycles_do_not_drift():
     )
     intervals = []
     accuracy = Accuracy(1e-5, budget=10**7, engine=COMPILED)
-    for cycle in cycles(scene, accuracy, Meter(10**7, engine=COMPILED), None):
-        intervals.append(cycle.interval)
+    for cycle in iterate_cycles(scene, accuracy, WorkMeter(10**7, engine=COMPILED), None):
+        intervals.append(cycle.recurrence_interval)
         if len(intervals) == 203:
             break
     settled = np.array(intervals[3:])
@@ -144,7 +144,7 @@ def test_any_scene_ends_in_numbers_or_in_a_name(
         found = measure(scene, Accuracy(1e-5, budget=30_000))
     assert found.rhs_evaluations <= 30_001
     if found.status is Status.OK:
-        for name in (measure.headline, f"{measure.headline}_error"):
+        for name in (measure.primary_output, f"{measure.primary_output}_error"):
             assert math.isfinite(found.values[name]), name
     else:
         assert found.message

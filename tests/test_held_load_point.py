@@ -4,16 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from conftest import reaches_the_norm
+from conftest import reaches_instability_norm
 
 from rsfstudy import Scene, simulate
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.events import fall, maximum
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.status import Status
 
 DISPLACEMENT, FALL = "displacement_step", "normal_stress_step"
@@ -45,10 +45,10 @@ def test_the_first_peak_of_several_states_is_not_the_last(of, direction, fields,
     outcome = CriticalStep(of=of, direction=direction)(scene, Accuracy(1e-5, engine=engine))
     assert outcome.status is Status.OK
     stepped = scene.with_(load_velocity_ratio=0.0)
-    critical = outcome.values[CriticalStep(of=of).headline]
+    critical = outcome.values[CriticalStep(of=of).primary_output]
     for share, reaches in ((0.25, False), (0.9, False), (0.9999, False), (1.0001, True)):
         at = stepped.with_(**{of: share * critical})
-        assert reaches_the_norm(at) is reaches
+        assert reaches_instability_norm(at) is reaches
         triggered = Triggered()(at, Accuracy(1e-5, engine=engine))
         assert triggered.values["unstable"] == reaches
 
@@ -80,8 +80,8 @@ def random_scene(draw: np.random.Generator, number: int) -> tuple[str, str, dict
 
 
 # they end early where slip runs away, and where drainage holds the integrator to short steps
-@pytest.mark.filterwarnings("ignore::rsfstudy.errors.Incomplete")
-@pytest.mark.filterwarnings("ignore::rsfstudy.errors.NoAnswer")
+@pytest.mark.filterwarnings("ignore::rsfstudy.errors.IncompleteWarning")
+@pytest.mark.filterwarnings("ignore::rsfstudy.errors.NoResultWarning")
 @pytest.mark.parametrize("number", range(12))
 def test_no_smaller_step_runs_away(number):
     """Of random scenes, by `simulate`, which knows of nothing that ends a motion early."""
@@ -91,12 +91,12 @@ def test_no_smaller_step_runs_away(number):
     outcome = measure(scene, Accuracy(1e-4, engine=COMPILED))
     stepped = scene.with_(load_velocity_ratio=0.0)
     assert outcome.status is Status.OK
-    critical = outcome.values[measure.headline]
+    critical = outcome.values[measure.primary_output]
     for share in (0.25, 0.5, 0.8, 0.97, 1.02):
         at = stepped.with_(**{of: share * critical})
         motion = simulate(at, duration=1e4, rtol=1e-6, budget=20_000, engine=COMPILED)
         highest = math.log(10.0) * motion.log10_slip_rate.max()
-        assert (highest >= scene.log_norm_rate) == (share > 1.0)
+        assert (highest >= scene.log_instability_rate) == (share > 1.0)
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
@@ -107,13 +107,13 @@ def test_pore_pressure_stays_below_its_bound(law, drainage):
                   stiffness_ratio=2.0, displacement_step=0.5, load_velocity_ratio=0.0)  # fmt: skip
     points = [
         event.point
-        for event in follow(
+        for event in integrate_events(
             scene,
             Accuracy(1e-6, engine=COMPILED),
-            Meter(20_000, engine=COMPILED),
+            WorkMeter(20_000, engine=COMPILED),
             (
                 maximum("log_slip_rate"),
-                *(fall("log_slip_rate", -float(x), ends=x == 4) for x in range(5)),
+                *(fall("log_slip_rate", -float(x), terminal=x == 4) for x in range(5)),
             ),
         )
     ]
@@ -141,7 +141,7 @@ def test_springs_far_stiffer_than_critical_end_in_a_status(stiffness_ratio, of, 
     measure = CriticalStep(of=of, direction=direction)
     outcome = measure(scene, Accuracy(1e-4, budget=3_000, engine=COMPILED))
     if of == DISPLACEMENT and direction == "up":
-        jump = scene.a * scene.log_norm_rate / scene.stiffness
+        jump = scene.a * scene.log_instability_rate / scene.stiffness
         assert outcome.values["critical_displacement"] == pytest.approx(jump, rel=1e-8)
         assert outcome.values["slip_rate_after_closed_form_step"] == math.inf
     else:

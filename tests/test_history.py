@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from extensions.order_four import OrderFour
-from running import called, run, study_of
+from running import run, run_command, study_of
 
 import rsfstudy
 from rsfstudy import (
     Axis,
-    Laboratory,
+    Rig,
     Scene,
     history,
     protocol,
@@ -27,9 +27,9 @@ from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion import engines
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 
 PLAIN = {"normal_stress": "constant", "stiffness": 0.02, "a": 0.01, "b_over_a": 1.4}
 SLIDERS = {
@@ -107,14 +107,14 @@ def test_a_sample_costs_one_step(engine):
 
 
 def test_units_of_a_rig(tmp_path):
-    rig = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
+    rig = Rig(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
     record = wave(30)
     known = history(record)
     file = tmp_path / "record.csv"
     rows = [f"{10.0 * t:.17g},{10.0 * d:.17g}" for t, d in zip(*record.values(), strict=True)]
     file.write_text("\n".join(["time (s), displacement (um)", *rows]))
     read = history(file, rig)
-    np.testing.assert_allclose(read.columns, known.columns, rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(read.sample_table, known.sample_table, rtol=1e-11, atol=1e-12)
     file.write_text("\n".join(["t, LVDT", *rows]))
     columns = {"time": ("t", "s"), "displacement": ("LVDT", "um")}
     assert history(file, rig, columns=columns).digest == read.digest
@@ -123,7 +123,7 @@ def test_units_of_a_rig(tmp_path):
         {"displacement": ("n", 10.0 * record["displacement"], {"units": "um"}),
          "time": ("n", 10.0 * record["time"], {"units": "s"})}
     )  # fmt: skip
-    np.testing.assert_allclose(history(dataset, rig).columns, known.columns, atol=1e-11)
+    np.testing.assert_allclose(history(dataset, rig).sample_table, known.sample_table, atol=1e-11)
     with pytest.raises(InvalidValue, match="time = 'time': has no units"):
         history(dataset.assign(time=("n", record["time"])), rig)
     with pytest.raises(InvalidValue, match="units = .*: need the scales of a rig for"):
@@ -183,11 +183,11 @@ def test_the_command_line_follows_files(tmp_path, monkeypatch):
     Path("record.csv").write_text("\n".join(["time (D_c/V_*), displacement (D_c)", *rows]))
     words = [f"--set={name}={value}" for name, value in PLAIN.items()]
     for told in (["--set", "loading=record.csv"], ["--protocol", "record.csv"]):
-        status, said = called(["simulate", *words, *told, "--rtol", "1e-4"])
+        status, said = run_command(["simulate", *words, *told, "--rtol", "1e-4"])
         assert status == 0, said
         motion = xr.load_dataset("motion.nc")
         assert motion.rsf.scene.parts.loading == history(wave(20), name="record")
-    status, said = called(["simulate", "--set", "loading=absent.csv"])
+    status, said = run_command(["simulate", "--set", "loading=absent.csv"])
     assert status == 1
     assert "absent.csv: cannot be read as CSV" in said
 
@@ -195,7 +195,7 @@ def test_the_command_line_follows_files(tmp_path, monkeypatch):
 def test_the_files_that_ship_are_followed():
     """Beside the page of the rig: a protocol and a record."""
     pages = Path(__file__).parent.parent / "studies" / "pages"
-    rig = Laboratory(
+    rig = Rig(
         normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s",
         stiffness="0.05 MPa/um",
     )  # fmt: skip
@@ -209,7 +209,7 @@ def test_the_files_that_ship_are_followed():
 
 
 # other tests load its file as a study file, in which the name stands for another class
-engines._OWN.pop(OrderFour.name)
+engines._USER_STEPPERS.pop(OrderFour.name)
 
 
 class Followed(OrderFour):
@@ -224,6 +224,6 @@ def test_other_steppers_follow_it_too(method):
     own = isinstance(method, type)
     accuracy = Accuracy(1e-6, 10**6, **({"engine": method} if own else {}))
     methods = {} if own else {"quasi_static": method}
-    meter = Meter(10**6, engine=accuracy.engine, methods=methods)
-    *_earlier, end = follow(scene, accuracy, meter, until=20.0)
+    meter = WorkMeter(10**6, engine=accuracy.engine, methods=methods)
+    *_earlier, end = integrate_events(scene, accuracy, meter, until=20.0)
     assert scene.mu_star + end.point.spring_stress == pytest.approx(known, abs=1e-7)

@@ -11,12 +11,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from fuzz_commands import STUDIES, Answer, Line, damage, faults, line_of
-from running import call, called
+from fuzz_commands import STUDIES, Answer, Line, damage_files, draw_line, faults
+from running import call_main, run_command
 
 from rsfstudy.cli import command_line
 from rsfstudy.cli.command_line import cli
-from rsfstudy.cli.console import Plain
+from rsfstudy.cli.console import PlainConsole
 
 LONG = "x" * 300
 TOO_LONG = "must have at most 255 bytes in each part"
@@ -56,7 +56,7 @@ def test_paths_are_refused_by_a_rule(words, message, tmp_path, monkeypatch):
     Path("motion.nc").touch()
     if "/proc" in words and not Path("/proc/self/mem").exists():
         pytest.skip("only Linux has a file that opens and cannot be read")
-    status, said = called(shlex.split(words))
+    status, said = run_command(shlex.split(words))
     assert message in said.replace(" x", "x")
     assert "Error:" not in said.replace("Error: Invalid", "").removeprefix("error:")
     assert status in (1, 2)
@@ -80,7 +80,7 @@ def test_numbers_are_bounded_before_memory_is_allocated(words, message, tmp_path
     monkeypatch.chdir(tmp_path)
     Path("record.csv").write_bytes(step.read_bytes())
     options = ["--normal-stress", "20 MPa", "--stiffness", "0.04 MPa/um"] * ("fit" in words)
-    status, said = called([*shlex.split(words), *options])
+    status, said = run_command([*shlex.split(words), *options])
     assert (status, message in said) == (2, True), said
     assert os.listdir() == ["record.csv"]
 
@@ -101,14 +101,14 @@ def test_pipes_are_neither_read_nor_replaced(words, tmp_path, monkeypatch):
     pipes = ("pipe.png", "pipe.svg", "pipe.html", "data.nc")
     for name in pipes:
         os.mkfifo(name)
-    status, said = called(shlex.split(words))
+    status, said = run_command(shlex.split(words))
     assert (status, "is a directory, a pipe or a device. Name a file." in said) == (2, True)
     assert all(Path(name).is_fifo() for name in pipes)
 
 
 @pytest.mark.parametrize("words", [["--\x1b[2J"], ["list", "\x1b[2J"], ["show", "a", "\x9b2J"]])
 def test_usage_errors_print_no_control_characters(words):
-    ran = call(*words)
+    ran = call_main(*words)
     assert ran.returncode == 2
     assert all(c.isprintable() or c == "\n" for c in ran.stderr)
 
@@ -134,7 +134,7 @@ def test_a_full_disk_is_named_whatever_prints(monkeypatch):
     ("columns", "width"), [("0", 16), ("1", 16), ("120", 120), ("9" * 11, 1000)]
 )
 def test_any_width_of_the_environment_is_bounded(columns, width):
-    printed = Plain(file=io.StringIO(), _environ={"COLUMNS": columns})
+    printed = PlainConsole(file=io.StringIO(), _environ={"COLUMNS": columns})
     assert printed.width == width
     printed.print("a study")
     assert printed.file.getvalue() == "a study\n"
@@ -144,8 +144,8 @@ def test_any_width_of_the_environment_is_bounded(columns, width):
 
 
 def test_the_fuzzer_uses_every_command_and_every_option():
-    lines = [line_of(1, index) for index in range(4000)]
-    assert lines[:50] == [line_of(1, index) for index in range(50)]
+    lines = [draw_line(1, index) for index in range(4000)]
+    assert lines[:50] == [draw_line(1, index) for index in range(50)]
     for name, command in cli.commands.items():
         of_it = [line.words for line in lines if line.words and line.words[0] == name]
         words = {word.partition("=")[0] for words in of_it for word in words}
@@ -185,6 +185,6 @@ def test_files_are_damaged_only_where_a_line_names_them(tmp_path, monkeypatch):
     Path("outputs").mkdir()
     for name in ("tiny.py", "outputs/tiny.cells.sqlite"):
         Path(name).write_bytes(bytes(range(256)))
-    damage(["show", "damaged_study.py"], random.Random(2))
+    damage_files(["show", "damaged_study.py"], random.Random(2))
     assert Path("damaged_study.py").read_bytes() != Path("tiny.py").read_bytes()
     assert not re.search("damaged_record", " ".join(os.listdir()))

@@ -14,14 +14,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from running import call, run
+from running import call_main, run
 from test_files import LAYOUT
 from test_strangers import TINY
 
 import rsfstudy
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import store
-from rsfstudy.files.journal import Journal, timed
+from rsfstudy.files.journal import Journal, read_timings
 from rsfstudy.referee import problem
 
 LONG = 130_000
@@ -44,7 +44,7 @@ def test_a_heading_is_bounded_before_it_is_parsed(units: str, tmp_path: Path) ->
         rsfstudy.read_record({"t": [0, 1]}, columns={"time": units, "displacement": "t (um)"})
     stated = {"slip_distance": "10 um", "reference_velocity": "1 um/s"}
     with pytest.raises(InvalidValue, match="no quantity, because it has more than 200 characters"):
-        rsfstudy.Laboratory(normal_stress=f"5 MPa {units}x", **stated)
+        rsfstudy.Rig(normal_stress=f"5 MPa {units}x", **stated)
 
 
 @contextlib.contextmanager
@@ -100,7 +100,7 @@ def test_few_choices_are_compared_with_a_value(monkeypatch) -> None:
 def test_toml_that_cannot_be_parsed_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "deep.toml").write_text(text)
     with pytest.raises(DataError, match="deep.toml: cannot be read as TOML"):
-        problem.read(tmp_path / "deep.toml")
+        problem.read_problem(tmp_path / "deep.toml")
 
 
 @pytest.mark.parametrize(
@@ -117,9 +117,9 @@ def test_a_journal_with_a_hostile_fingerprint_is_refused_and_not_locked(
     with pytest.raises(DataError, match="its fingerprint is damaged") as refused:
         Journal(path, {"rtol": 1e-7}, LAYOUT)
     assert refused.value.__traceback__ is not None  # which keeps its frames alive
-    assert timed(path) is None
+    assert read_timings(path) is None
     with Journal(path, {"rtol": 1e-7}, LAYOUT, fresh=True) as again:
-        assert again.ended(np.empty(0, dtype="V16")).size == 0
+        assert again.statuses(np.empty(0, dtype="V16")).size == 0
 
 
 # ---- attributes ----------------------------------------------------------------------------------
@@ -145,11 +145,11 @@ def tiny() -> xr.Dataset:
 def test_attributes_of_the_wrong_kind_are_refused(name, attributes, rule, tiny, tmp_path) -> None:
     dataset = tiny.copy()
     dataset[name].attrs.update(attributes)
-    store.write(dataset, tmp_path / "tiny.nc")
+    store.write_dataset(dataset, tmp_path / "tiny.nc")
     with pytest.raises(DataError, match=f"tiny.nc: .*{rule}"):
         rsfstudy.open(tmp_path / "tiny.nc")
     for command in ("show", "plot"):
-        told = call(command, tmp_path / "tiny.nc")
+        told = call_main(command, tmp_path / "tiny.nc")
         assert told.returncode == 1
         assert "Traceback" not in told.stderr
 
@@ -157,29 +157,29 @@ def test_attributes_of_the_wrong_kind_are_refused(name, attributes, rule, tiny, 
 def test_attributes_of_a_motion_are_checked(tmp_path: Path) -> None:
     motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=1.0, rtol=1e-3)
     motion["slip"].attrs["long_name"] = 5
-    store.write(motion, tmp_path / "motion.nc")
+    store.write_dataset(motion, tmp_path / "motion.nc")
     with pytest.raises(DataError, match="slip.long_name is 5, and must be a text"):
-        store.read_any(tmp_path / "motion.nc")
+        store.read_dataset(tmp_path / "motion.nc")
 
 
 def test_texts_along_a_motion_are_refused(tmp_path: Path) -> None:
     motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=1.0, rtol=1e-3)
     size = motion["slip"].size
     motion["shear_stress"] = (motion["slip"].dims, np.array(["x"] * size, dtype=object))
-    store.write(motion, tmp_path / "motion.nc")
+    store.write_dataset(motion, tmp_path / "motion.nc")
     with pytest.raises(DataError, match="shear_stress is .*, and must be numbers"):
-        store.read_any(tmp_path / "motion.nc")
+        store.read_dataset(tmp_path / "motion.nc")
 
 
 @pytest.mark.parametrize("name", ["normal_stress_ratio", "frictional_stress", "time"])
 def test_a_motion_without_a_variable_that_is_drawn_names_it(name: str) -> None:
     motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=1.0, rtol=1e-3)
     with pytest.raises(DataError, match="(normal_stress|frictional_stress|time) is missing: it"):
-        rsfstudy.picture(motion.drop_vars(name))
+        rsfstudy.plot_motion(motion.drop_vars(name))
 
 
 def test_a_lattice_with_the_same_point_twice_is_refused(tiny, tmp_path: Path) -> None:
-    store.write(tiny.isel(load_velocity_ratio=[0, 0, 2]), tmp_path / "tiny.nc")
+    store.write_dataset(tiny.isel(load_velocity_ratio=[0, 0, 2]), tmp_path / "tiny.nc")
     with pytest.raises(DataError, match="load_velocity_ratio has the same value more than once"):
         rsfstudy.open(tmp_path / "tiny.nc")
 

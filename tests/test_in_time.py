@@ -9,14 +9,14 @@ import math
 
 import numpy as np
 import pytest
-from in_time import InTime, columns
+from in_time import TimeDomainMotion, rows_to_columns
 
 from rsfstudy import Scene, simulate
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import ENGINES, PYTHON, SCIPY
 from rsfstudy.motion.events import fall, maximum, minimum, rise
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 
 CONSTANT, IMPOSED = {"normal_stress": "constant"}, {"normal_stress": "imposed", "alpha": 0.3}
 INCLINED = {"normal_stress": "variable", "phi": 65.0, "alpha": 0.3}
@@ -117,7 +117,7 @@ def in_time(name: str) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Fifty times, of which none is that of a break, and the motion there."""
     which, until = MOTIONS[name]
     times = np.linspace(0.0, until, 51)[1:] - 1e-3 * until
-    return times, columns(InTime(which).solved(times.tolist())[0])
+    return times, rows_to_columns(TimeDomainMotion(which).solve(times.tolist())[0])
 
 
 @pytest.mark.parametrize(
@@ -132,13 +132,13 @@ def test_motions_are_those_of_time(name, engine):
     (which, _until), (times, theirs) = MOTIONS[name], in_time(name)
     rtol = 1e-8
     motion = simulate(which, times=times, rtol=rtol, engine=engine)
-    allowed = 13.0 * rtol * (1.0 + np.abs(theirs["growth"]))
-    off = np.abs(motion.log10_slip_rate.values * math.log(10.0) - theirs["x"])
+    allowed = 13.0 * rtol * (1.0 + np.abs(theirs["log_slip_rate_derivative"]))
+    off = np.abs(motion.log10_slip_rate.values * math.log(10.0) - theirs["log_slip_rate"])
     assert (off / allowed).max() < 1.0
     for of, known in (
-        ("shear_stress", which.mu_star + theirs["f"]),
-        ("frictional_stress", which.mu_star + theirs["g"]),
-        ("normal_stress_ratio", theirs["s"]),
+        ("shear_stress", which.mu_star + theirs["spring_stress"]),
+        ("frictional_stress", which.mu_star + theirs["frictional_stress"]),
+        ("normal_stress_ratio", theirs["normal_stress"]),
         ("state_variable", theirs["theta"]),
     ):
         assert (np.abs(motion[of].values - known) / allowed).max() < which.a, of
@@ -151,12 +151,12 @@ def events_of(which: Scene) -> tuple[tuple, ...]:
     load = which.load_velocity_ratio
     above, below = math.log(load) + 0.1, math.log(load) - 0.1
     return (
-        (maximum("log_slip_rate"), lambda now: now.growth, -1.0),
-        (minimum("log_slip_rate"), lambda now: now.growth, 1.0),
-        (maximum("spring_stress"), lambda now: load - now.v, -1.0),
-        (minimum("spring_stress"), lambda now: load - now.v, 1.0),
-        (rise("log_slip_rate", above), lambda now: now.x - above, 1.0),
-        (fall("log_slip_rate", below), lambda now: now.x - below, -1.0),
+        (maximum("log_slip_rate"), lambda now: now.log_slip_rate_derivative, -1.0),
+        (minimum("log_slip_rate"), lambda now: now.log_slip_rate_derivative, 1.0),
+        (maximum("spring_stress"), lambda now: load - now.velocity, -1.0),
+        (minimum("spring_stress"), lambda now: load - now.velocity, 1.0),
+        (rise("log_slip_rate", above), lambda now: now.log_slip_rate - above, 1.0),
+        (fall("log_slip_rate", below), lambda now: now.log_slip_rate - below, -1.0),
     )
 
 
@@ -164,7 +164,7 @@ def events_of(which: Scene) -> tuple[tuple, ...]:
 def events_in_time(name: str) -> list[list]:
     which, until = EVENTFUL[name]
     _watches, functions, directions = zip(*events_of(which), strict=True)
-    return InTime(which).solved([until], functions, directions)[1]
+    return TimeDomainMotion(which).solve([until], functions, directions)[1]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -176,11 +176,11 @@ def test_events_are_those_of_time(name, engine):
     """
     which, until = EVENTFUL[name]
     rtol, watches = (1e-8 if which.has_mass else 1e-9), [row[0] for row in events_of(which)]
-    accuracy, meter = Accuracy(rtol, engine=engine), Meter(10**6, engine=engine)
+    accuracy, meter = Accuracy(rtol, engine=engine), WorkMeter(10**6, engine=engine)
     told = {watch: [] for watch in watches}
-    for event in follow(which, accuracy, meter, watches, clock=True, until=until):
-        if event.watch is not None:
-            told[event.watch].append(event)
+    for event in integrate_events(which, accuracy, meter, watches, with_time=True, until=until):
+        if event.specification is not None:
+            told[event.specification].append(event)
     known = dict(zip(watches, events_in_time(name), strict=True))
     assert {w: len(events) for w, events in told.items()} == {w: len(k) for w, k in known.items()}
     assert min(map(len, known.values())) > 0
@@ -189,7 +189,13 @@ def test_events_are_those_of_time(name, engine):
         for event, (time, now) in zip(events, known[watch], strict=True):
             point = event.point
             assert event.time == pytest.approx(time, rel=0.0, abs=allowed), watch
-            assert point.log_slip_rate == pytest.approx(now.x, rel=0.0, abs=allowed), watch
-            ours = point.spring_stress, point.friction, point.normal_stress, point.state
+            assert point.log_slip_rate == pytest.approx(now.log_slip_rate, rel=0.0, abs=allowed), (
+                watch
+            )
+            ours = point.spring_stress, point.frictional_stress, point.normal_stress, point.state
             within = allowed * which.a
-            assert ours == pytest.approx((now.f, now.g, now.s, now.theta), rel=0, abs=within), watch
+            assert ours == pytest.approx(
+                (now.spring_stress, now.frictional_stress, now.normal_stress, now.theta),
+                rel=0,
+                abs=within,
+            ), watch

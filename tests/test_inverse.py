@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from rsfstudy.reduce import Inverse, reduced
-from rsfstudy.reduce._crossing import Verdict
+from rsfstudy.reduce import Inverse, apply_reductions
+from rsfstudy.reduce._crossing import CrossingStatus
 
-OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW = (float(verdict) for verdict in Verdict)
+OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW = (float(verdict) for verdict in CrossingStatus)
 
 
 def inverted(x, y, level):
@@ -17,7 +17,7 @@ def inverted(x, y, level):
         coords={"x": np.exp(x)},
     )
     levels = float(np.exp(level))
-    found = reduced(dataset, (Inverse(name="at", of="y", on="x", levels=levels),))
+    found = apply_reductions(dataset, (Inverse(name="at", of="y", on="x", levels=levels),))
     return float(found["at"]), float(found["at_error"]), float(found["at_status"])
 
 
@@ -102,7 +102,7 @@ def test_noise_far_below_the_slope_is_no_oscillation():
 
 
 def test_status_is_described():
-    found = reduced(
+    found = apply_reductions(
         xr.Dataset(
             {"y": ("x", [1.0, 2.0, 4.0, 8.0]), "status": ("x", np.zeros(4, np.int8))},
             coords={"x": [1.0, 2.0, 4.0, 8.0]},

@@ -7,18 +7,18 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from running import call, called, run
+from running import call_main, run, run_command
 
 import rsfstudy
-from rsfstudy import Axis, Laboratory, Scene, Study, limit_cycle, protocol, read_protocol, simulate
-from rsfstudy.errors import DataError, InvalidValue, NoAnswer
+from rsfstudy import Axis, Rig, Scene, Study, limit_cycle, protocol, read_protocol, simulate
+from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
 from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.plots._motion import picture
+from rsfstudy.plots._motion import plot_motion
 from rsfstudy.slider.loading import Segment
-from rsfstudy.slider.registry import QUANTITIES
+from rsfstudy.slider.registry import FIELD_QUANTITIES
 
 SIGMA, D_C, V = 5e6, 1e-5, 1e-6
-RIG = Laboratory(
+RIG = Rig(
     normal_stress="5 MPa",
     slip_distance="10 um",
     reference_velocity="1 um/s",
@@ -68,10 +68,10 @@ CALLS: dict[str, dict] = {
 }
 
 
-@pytest.mark.parametrize("about", [q for q in QUANTITIES if q.scale], ids=lambda q: q.name)
+@pytest.mark.parametrize("about", [q for q in FIELD_QUANTITIES if q.scale], ids=lambda q: q.name)
 def test_every_field_with_a_scale_takes_units(about):
     text, value = VALUES[about.scale]
-    rig = Laboratory(normal_stress=SIGMA, slip_distance=D_C, reference_velocity=V)
+    rig = Rig(normal_stress=SIGMA, slip_distance=D_C, reference_velocity=V)
     scene = rig.scene(**CALLS.get(about.name, {}), **{about.name: text})
     assert getattr(scene, about.name) == pytest.approx(value, rel=1e-12)
     assert scene.reference_rate == V / D_C
@@ -89,7 +89,7 @@ def test_plain_numbers_are_si_and_ratios_stay_ratios():
 
 
 def test_mass_and_radiation():
-    heavy = Laboratory(
+    heavy = Rig(
         normal_stress=SIGMA,
         slip_distance=D_C,
         reference_velocity=V,
@@ -101,10 +101,10 @@ def test_mass_and_radiation():
     assert heavy.scene().period == pytest.approx(period)
     still = heavy.scene(inertia=False)
     assert (still.inertia, still.period) == (False, heavy.scene().period)
-    timed = Laboratory(**THREE, period="10 ms")
+    timed = Rig(**THREE, period="10 ms")
     assert (timed.scene().inertia, timed.scene().period) == (True, pytest.approx(0.01))
-    assert not Laboratory(**THREE).scene().inertia
-    radiating = Laboratory(
+    assert not Rig(**THREE).scene().inertia
+    radiating = Rig(
         normal_stress=SIGMA, slip_distance=D_C, reference_velocity=V,
         shear_modulus="30 GPa", density="2700 kg/m^3",
     )  # fmt: skip
@@ -115,7 +115,7 @@ def test_mass_and_radiation():
 
 def test_a_scale_that_is_unusual_is_told():
     with pytest.warns(UserWarning, match="slip_distance is 1 m: unusual for a rig. Is the unit"):
-        Laboratory(**{**THREE, "slip_distance": 1.0})
+        Rig(**{**THREE, "slip_distance": 1.0})
 
 
 def test_results_say_their_units():
@@ -198,13 +198,15 @@ def test_a_protocol_from_a_file(tmp_path):
     assert np.array(read.segments) == pytest.approx(
         np.array([(*step, 0.0) for step in steps]), rel=1e-12
     )
-    assert read.lasts == pytest.approx(113.0)
+    assert read.duration == pytest.approx(113.0)
     motion = simulate(RIG.scene(**LAW, loading=read), rtol=1e-4)
     assert float(motion.time[-1]) == pytest.approx(113.0)
     assert float(motion.load_point_displacement[-1]) == pytest.approx(80.0, rel=1e-6)
     path.write_text("velocity [V_*], duration [D_c/V_*]\n2, 3\n1,\n")
-    assert read_protocol(path).history == (Segment(2.0, 0.0, 3.0), Segment(1.0))
-    assert RIG.protocol([{"velocity": "2 um/s", "step": "5 um"}]).history == (Segment(2.0, 0.5),)
+    assert read_protocol(path).input_segments == (Segment(2.0, 0.0, 3.0), Segment(1.0))
+    assert RIG.protocol([{"velocity": "2 um/s", "step": "5 um"}]).input_segments == (
+        Segment(2.0, 0.5),
+    )
 
 
 # ---- pictures ------------------------------------------------------------------------------------
@@ -215,7 +217,7 @@ def test_a_protocol_from_a_file(tmp_path):
 def test_the_picture_of_a_motion(laboratory, against):
     """Whatever its parts: the line of steady sliding does not depend on the loading."""
     scene = RIG.scene(**LAW, loading=protocol([{"velocity": 3, "duration": 2}], "three"))
-    drawn = picture(simulate(scene, rtol=1e-4), laboratory, against=against)
+    drawn = plot_motion(simulate(scene, rtol=1e-4), laboratory, against=against)
     upper, lower, plane = drawn.axes
     units = {"time": ("D_c/V_*", "(s)"), "load_point_displacement": ("D_c", r"$\mu$m")}
     assert units[against][laboratory is not None] in lower.get_xlabel()
@@ -241,9 +243,9 @@ def test_a_limit_cycle_has_a_picture():
 
 def test_the_picture_of_steady_sliding_has_limits_about_its_slip_rate():
     """Without them matplotlib warns, which is an error here."""
-    with pytest.warns(NoAnswer, match="nothing is stepped"):
+    with pytest.warns(NoResultWarning, match="nothing is stepped"):
         motion = simulate(RIG.scene(**LAW), duration=1.0)
-    low, high = picture(motion, RIG).axes[1].get_ylim()
+    low, high = plot_motion(motion, RIG).axes[1].get_ylim()
     assert low < 1.0 < high  # um/s, which is V_*
 
 
@@ -254,7 +256,7 @@ def test_the_command_simulates_a_rig(tmp_path):
     words += ["--normal-stress", "5 MPa", "--slip-distance", "10 um", "--rtol", "1e-4"]
     words += ["--reference-velocity", "1e-6", "--stiffness", "0.05 MPa/um"]
     words += [word for name, value in LAW.items() for word in ("--set", f"{name}={value}")]
-    ran = call(*words)
+    ran = call_main(*words)
     assert ran.returncode == 0, ran.stderr
     assert (tmp_path / "out" / "test.png").stat().st_size > 10_000
     told = " ".join(ran.stdout.split())
@@ -278,7 +280,7 @@ def test_what_options_of_a_rig_state_acts(stated, fields, tmp_path):
     words = ["simulate", *stated, "--output", tmp_path / "motion.png", "--duration", "1 s"]
     words += ["--normal-stress", "5 MPa", "--slip-distance", "10 um"]
     words += ["--reference-velocity", "1 um/s", "--rtol", "1e-3", "--load-velocity", "2 um/s"]
-    code, said = called([str(word) for word in words])
+    code, said = run_command([str(word) for word in words])
     assert code == 0, said
     with xr.open_dataset(tmp_path / "motion.nc") as written:
         told = json.loads(written.attrs["scene"])
@@ -291,9 +293,9 @@ def test_a_motion_replaces_a_motion_whole_and_nothing_else(tmp_path):
     stable = "--set", "load_velocity_ratio=2", "--set", "stiffness_ratio=2"
     words = ["simulate", *stable, "--rtol", "1e-4", "--duration"]
     data, image = tmp_path / "motion.nc", tmp_path / "motion.png"
-    assert call(*words, "5", "--output", image).returncode == 0
+    assert call_main(*words, "5", "--output", image).returncode == 0
     with xr.open_dataset(data) as seen:
-        assert call(*words, "9", "--output", image).returncode == 0
+        assert call_main(*words, "9", "--output", image).returncode == 0
         assert float(seen.time[-1]) == pytest.approx(5.0)  # whoever reads the old one goes on
     with xr.open_dataset(data) as seen:
         assert float(seen.time[-1]) == pytest.approx(9.0)
@@ -301,7 +303,7 @@ def test_a_motion_replaces_a_motion_whole_and_nothing_else(tmp_path):
     run(output=tmp_path / "study")
     for other in (b"a plain text", (tmp_path / "study" / "small.nc").read_bytes()):
         data.write_bytes(other)
-        ran = call(*words, "5", "--output", image)
+        ran = call_main(*words, "5", "--output", image)
         assert ran.returncode == 2
         assert "is there already, and no motion" in " ".join(ran.stderr.split())
         assert data.read_bytes() == other

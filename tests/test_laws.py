@@ -15,28 +15,28 @@ from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Kind, settling
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.course import integrate_events
+from rsfstudy.motion.events import EventKind, approach_to_steady_state
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.slider import laws, steady
-from rsfstudy.slider.equations import evolution_of, evolutions_of, steady_states_of
+from rsfstudy.slider.equations import compute_steady_states, single_state_evolution, state_evolution
 from rsfstudy.slider.laws.composite import lambert_w
-from rsfstudy.slider.system import functions, velocity_ratios
+from rsfstudy.slider.system import build_scene_functions, velocity_ratios
 from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant"}
 CUT_OFFS = ("composite", "cut_off")
 
 
-@pytest.mark.parametrize("law", sorted(laws.PARTS))
+@pytest.mark.parametrize("law", sorted(laws.BUILT_IN_PARTS))
 def test_every_law_rests_where_it_says(law):
     """At -b ln V for most; either side of it each state returns. Rounding is that of the exponents,
     of order ten, times b.
     """
     scene = Scene(law=law)
-    evolutions = evolutions_of(scene)
+    evolutions = state_evolution(scene)
     for log_slip_rate in (-30.0, 0.0, 12.0):
-        steady = steady_states_of(scene, log_slip_rate, 0.0)
+        steady = compute_steady_states(scene, log_slip_rate, 0.0)
         if law not in CUT_OFFS:
             assert sum(steady) == pytest.approx(-scene.b * log_slip_rate, rel=1e-14)
         assert evolutions(log_slip_rate, steady, 0.0) == pytest.approx(
@@ -52,7 +52,7 @@ def test_every_law_rests_where_it_says(law):
 @pytest.mark.parametrize("law", CUT_OFFS)
 def test_friction_is_mu_star_at_the_reference_rate(law, cutoff):
     scene = Scene(law=law, cutoff_velocity_ratio=cutoff, stiffness=0.01)
-    assert steady.steady_excess(scene, 0.0) == pytest.approx(0.0, abs=1e-16)
+    assert steady.steady_friction_excess(scene, 0.0) == pytest.approx(0.0, abs=1e-16)
 
 
 @given(st.floats(-3000.0, 30.0), st.floats(-60.0, 60.0), st.floats(-20.0, 5.0))
@@ -67,9 +67,9 @@ def test_evolution_goes_over_to_that_of_stationary_contact(log_slip_rate, log_th
     def evolving(law: str) -> float:
         scene = Scene(law=law, a=0.5 * b, load_velocity_ratio=load)
         x, _slower, share = velocity_ratios(log_slip_rate, scene.numbers)
-        return functions(scene).friction.evolutions(x, (b * log_theta,), 0.0, share, scene.numbers)[
-            0
-        ]
+        return build_scene_functions(scene).friction.evolutions(
+            x, (b * log_theta,), 0.0, share, scene.numbers
+        )[0]
 
     # exp(-100) of the slip rate is taken too much where slip is slower than that
     assert evolving("slowness") == pytest.approx(exact, abs=100.0 * rounding + 1e-40)
@@ -86,7 +86,7 @@ def test_the_ends_of_the_family_are_the_two_laws_of_the_paper(log_slip_rate, sta
     """To the last bit: they are the same arithmetic."""
     for exponent, law in ((0.0, "slip"), (1.0, "slowness")):
         ours, theirs = Scene(law="family", law_exponent=exponent), Scene(law=law)
-        assert evolution_of(ours)(log_slip_rate, state) == evolution_of(theirs)(
+        assert single_state_evolution(ours)(log_slip_rate, state) == single_state_evolution(theirs)(
             log_slip_rate, state
         )
 
@@ -98,8 +98,10 @@ def test_cut_offs_beyond_all_slip_leave_plainer_laws(log_slip_rate, log_theta):
     """
     state = 0.029 * log_theta
     for law, cutoff, plain in (("composite", 1e-300, "slip"), ("cut_off", 1e300, "slowness")):
-        ours = evolution_of(Scene(law=law, cutoff_velocity_ratio=cutoff))(log_slip_rate, state)
-        theirs = evolution_of(Scene(law=plain))(log_slip_rate, state)
+        ours = single_state_evolution(Scene(law=law, cutoff_velocity_ratio=cutoff))(
+            log_slip_rate, state
+        )
+        theirs = single_state_evolution(Scene(law=plain))(log_slip_rate, state)
         assert ours == pytest.approx(theirs, rel=1e-13, abs=1e-15)
 
 
@@ -117,10 +119,10 @@ def test_steady_sliding_of_a_cut_off_keeps_its_digits_however_far_from_it():
             log_ratio = math.log(cutoff) - log_slip_rate
             exact = max(log_ratio, 0.0) + math.log1p(math.exp(-abs(log_ratio)))
             exact -= math.log1p(cutoff)
-            ours = steady_states_of(scene, log_slip_rate, 0.0)[0] / scene.b
+            ours = compute_steady_states(scene, log_slip_rate, 0.0)[0] / scene.b
             assert ours == pytest.approx(exact, rel=1e-12, abs=1e-12)
         share = cutoff / (1.0 + cutoff)
-        tiny = steady_states_of(scene, 1e-9, 0.0)[0] / scene.b
+        tiny = compute_steady_states(scene, 1e-9, 0.0)[0] / scene.b
         assert tiny == pytest.approx(-share * 1e-9, rel=1e-8)  # of second order: 1e-9 of it
 
 
@@ -149,7 +151,7 @@ def test_a_rigid_slider_follows_the_closed_form(fields, rate):
 
 
 def test_steps_to_either_side_mirror_one_another_by_symmetric_laws_alone():
-    scenes = (Scene(law=law, load_velocity_ratio=100.0, **CONSTANT) for law in laws.PARTS)
+    scenes = (Scene(law=law, load_velocity_ratio=100.0, **CONSTANT) for law in laws.BUILT_IN_PARTS)
     for scene in scenes:
         found = RigidResponse()(scene, Accuracy(1e-6)).values["evolution_distance"]
         inverse = scene.with_(load_velocity_ratio=0.01)
@@ -193,13 +195,17 @@ def test_with_any_b_below_a_every_spring_slides_steadily_in_the_end(law, b):
     accuracy = Accuracy(engine="compiled")
     assert scene.critical_stiffness == 0.0
     assert LimitCycle()(scene, accuracy).status is Status.NO_LIMIT_CYCLE
-    end = steady.steady_sliding(scene, scene.log_load_rate)
+    end = steady.steady_sliding(scene, scene.log_load_velocity)
     assert end is not None
     if law in ("slip", "slowness", "perrin_rice_zheng"):
-        assert end.friction == pytest.approx(scene.a * (1.0 - b) * math.log(3.0), rel=1e-12)
-    motion = follow(scene, accuracy, Meter(10**6, engine="compiled"), [settling(1e-6)])
-    settled = next(event for event in motion if event.kind is Kind.SETTLED)
-    assert settled.point.spring_stress == pytest.approx(end.friction, abs=1e-5 * scene.a)
+        assert end.frictional_stress == pytest.approx(
+            scene.a * (1.0 - b) * math.log(3.0), rel=1e-12
+        )
+    motion = integrate_events(
+        scene, accuracy, WorkMeter(10**6, engine="compiled"), [approach_to_steady_state(1e-6)]
+    )
+    settled = next(event for event in motion if event.kind is EventKind.SETTLED)
+    assert settled.point.spring_stress == pytest.approx(end.frictional_stress, abs=1e-5 * scene.a)
 
 
 def test_b_of_zero_is_refused_where_stress_acts_on_the_state_by_alpha_over_b():

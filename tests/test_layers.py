@@ -17,6 +17,7 @@ ROOT = Path(rsfstudy.__file__).parent
 FILES = sorted(ROOT.rglob("*.py"))
 #: From the bottom up: each imports from lower floors alone. The studies and their pages are above.
 FLOORS = (
+    ("_deprecation",),
     ("errors", "status", "defaults", "wording"),
     ("argument_checks",),
     ("error_boundary",),
@@ -140,7 +141,7 @@ def test_studies_load_nothing_that_draws():
     """A worker that is given a cell of any of them has no matplotlib."""
     asked = (
         "import sys; from rsfstudy.declare import catalogue, names\n"
-        "for name in names.names(): catalogue.load(name)\n"
+        "for name in names.study_names(): catalogue.load_study(name)\n"
         "print(*{'matplotlib'} & set(sys.modules))"
     )
     ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
@@ -149,10 +150,10 @@ def test_studies_load_nothing_that_draws():
 
 def test_a_worker_loads_nothing_more_for_a_measure_in_the_file_of_a_study(tmp_path):
     """It is sent what the measure draws on, and not what declares, reduces and draws."""
-    for name in names.names():
-        study = catalogue.load(name)
+    for name in names.study_names():
+        study = catalogue.load_study(name)
         task = cells.Task(study.base, study.measure, study.accuracy)
-        (tmp_path / name).write_bytes(cells.sendable(task))
+        (tmp_path / name).write_bytes(cells.serialize_task(task))
     heavy = {"xarray", "pandas", "matplotlib", "netCDF4", "numba"}
     asked = (
         "import pathlib, pickle, sys, rsfstudy.compute.cells\n"
@@ -161,7 +162,7 @@ def test_a_worker_loads_nothing_more_for_a_measure_in_the_file_of_a_study(tmp_pa
         f"print(*{heavy} & set(sys.modules))"
     )
     ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
-    assert ran.stdout.split("\n") == [str(len(names.names())), "", ""]
+    assert ran.stdout.split("\n") == [str(len(names.study_names())), "", ""]
 
 
 HEAVY = (

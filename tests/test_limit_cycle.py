@@ -11,10 +11,10 @@ import pytest
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.errors import NoAnswer
+from rsfstudy.errors import NoResultWarning
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.recording import OBSERVED
+from rsfstudy.motion.recording import MOTION_VARIABLES
 from rsfstudy.status import Status
 
 CASES = [
@@ -93,7 +93,7 @@ def test_an_orbit_of_two_points_is_the_ends_of_any(case):
         if name.endswith("_error"):
             assert 0.5 * values <= ends.values[name] <= 2.0 * values, name
             continue
-        same, off = (values[[0, -1]], 1e-6) if name in OBSERVED else (values, 1e-12)
+        same, off = (values[[0, -1]], 1e-6) if name in MOTION_VARIABLES else (values, 1e-12)
         assert ends.values[name] == pytest.approx(same, rel=off, abs=off, nan_ok=True), name
 
 
@@ -208,7 +208,7 @@ def test_the_healing_exponent_is_that_of_theta_where_there_is_one(fields, known)
 def test_slip_modes(changes, mode):
     scene = Scene(law="slowness", normal_stress="constant", b_over_a=2.0, load_velocity_ratio=2.0)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NoAnswer)
+        warnings.simplefilter("ignore", NoResultWarning)
         found = rsfstudy.limit_cycle(scene.with_(**changes), rtol=1e-4, engine="compiled").slip_mode
     meanings = found.attrs["flag_meanings"].split()
     assert found.attrs["flag_values"] == [0.0, 1.0, 2.0, 3.0]

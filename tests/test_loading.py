@@ -6,14 +6,14 @@ from itertools import pairwise
 import pytest
 
 from rsfstudy import Scene, simulate
-from rsfstudy.errors import Incomplete
+from rsfstudy.errors import IncompleteWarning
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Kind, fall, maximum, minimum, rise, settling
-from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.course import integrate_events
+from rsfstudy.motion.events import EventKind, approach_to_steady_state, fall, maximum, minimum, rise
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parts import number
 from rsfstudy.slider.stability import growth_rates
@@ -47,7 +47,7 @@ def scene(first=(1.0, 0.0, 1.0), then=(1.0, 0.0), **fields) -> Scene:
 
 
 def told(of: Scene, *watches, until: float, rtol: float = 1e-7) -> list:
-    return list(follow(of, Accuracy(rtol), Meter(10**6), watches, until=until))
+    return list(integrate_events(of, Accuracy(rtol), WorkMeter(10**6), watches, until=until))
 
 
 @pytest.mark.parametrize(
@@ -84,11 +84,11 @@ def test_jumps_between_segments_are_told():
         until=8.0,
     )
     kinds = [event.kind for event in jump]
-    assert kinds[:4] == [Kind.START, Kind.SEGMENT, Kind.RISE, Kind.FALL]
+    assert kinds[:4] == [EventKind.START, EventKind.SEGMENT, EventKind.RISE, EventKind.FALL]
     assert [event.time for event in jump[1:3]] == [5.0, 5.0]
-    assert kinds.count(Kind.END) == 1
+    assert kinds.count(EventKind.END) == 1
     held = told(scene((10.0, 0.0, 0.05), (0.0, 0.0)), maximum("spring_stress"), until=1.0)
-    (highest,) = (event for event in held if event.kind is Kind.MAXIMUM)
+    (highest,) = (event for event in held if event.kind is EventKind.MAXIMUM)
     assert highest.time == pytest.approx(0.05)
     assert highest.point.spring_stress == max(event.point.spring_stress for event in held)
 
@@ -96,8 +96,8 @@ def test_jumps_between_segments_are_told():
 def test_what_ends_a_motion_ends_it_between_regimes_too():
     """From rupture to slow slip the rate falls past the level at once."""
     of = scene((1.0, 0.1, 1e3), stiffness_ratio=0.5, inertia=True)
-    *_before, last = told(of, fall("log_slip_rate", 8.0, ends=True), until=500.0)
-    assert (last.kind, last.regime) == (Kind.FALL, "slow_manifold")
+    *_before, last = told(of, fall("log_slip_rate", 8.0, terminal=True), until=500.0)
+    assert (last.kind, last.regime) == (EventKind.FALL, "slow_manifold")
     assert last.point.log_slip_rate <= 8.0
 
 
@@ -106,11 +106,11 @@ def test_events_come_in_order_and_take_turns():
     watches = (
         maximum("log_slip_rate"), minimum("log_slip_rate"),
         rise("log_slip_rate", 2.0), fall("log_slip_rate", 2.0),
-        settling(1e-9),
+        approach_to_steady_state(1e-9),
     )  # fmt: skip
     events = told(of, *watches, until=60.0)
-    assert all(b.time >= a.time and b.work >= a.work for a, b in pairwise(events))
-    for pair in ({Kind.MAXIMUM, Kind.MINIMUM}, {Kind.RISE, Kind.FALL}):
+    assert all(b.time >= a.time and b.evaluations >= a.evaluations for a, b in pairwise(events))
+    for pair in ({EventKind.MAXIMUM, EventKind.MINIMUM}, {EventKind.RISE, EventKind.FALL}):
         turns = [event.kind for event in events if event.kind in pair]
         assert len(turns) > 4
         assert all(a is not b for a, b in pairwise(turns))
@@ -118,10 +118,10 @@ def test_events_come_in_order_and_take_turns():
 
 def test_a_step_that_takes_all_stress_is_refused_wherever_it_stands():
     of = scene((1.0, 0.0, 1.0), (1.0, -100.0), stiffness_ratio=1.5)
-    with pytest.raises(Halt) as halt:
+    with pytest.raises(MotionStopped) as halt:
         told(of, until=5.0)
     assert halt.value.status is Status.SHEAR_STRESS_REVERSED
-    with pytest.warns(Incomplete, match="after 1 of 5 .*shear_stress_reversed"):
+    with pytest.warns(IncompleteWarning, match="after 1 of 5 .*shear_stress_reversed"):
         motion = simulate(of, duration=5.0)
     assert motion.attrs["status"] == "shear_stress_reversed"
     assert float(motion.time[-1]) == pytest.approx(1.0)
@@ -151,7 +151,7 @@ def test_no_strength_is_the_scene_without_the_effect(idle, still, law):
     assert scene == plain
     assert scene.numbers == plain.numbers
     assert scene.functions is plain.functions
-    assert scene.states == plain.states
+    assert scene.state_count == plain.state_count
 
 
 @pytest.mark.parametrize("law", ["slip", "two_slowness_states"])
@@ -171,8 +171,8 @@ def test_steady_sliding_and_its_stability_are_those_before_normal_stress_changes
     assert scene.stiffness == still.stiffness
     if "normal_stress_step" in change:  # after which sliding is steady at another stress
         return
-    rates = growth_rates(still, still.log_load_rate)
-    assert growth_rates(scene, scene.log_load_rate) == pytest.approx(rates)
+    rates = growth_rates(still, still.log_load_velocity)
+    assert growth_rates(scene, scene.log_load_velocity) == pytest.approx(rates)
     one, other = (LinearStability()(which, Accuracy()) for which in (scene, still))
     assert one.status is other.status is Status.OK
     assert dict(one.values) == pytest.approx(dict(other.values), rel=1e-12, nan_ok=True)

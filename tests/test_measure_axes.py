@@ -9,14 +9,22 @@ from typing import ClassVar
 import numpy as np
 import pytest
 import xarray as xr
-from running import OWN, asked_for, call, claimed, run, same_numbers, study_of
+from running import (
+    USER_MEASURE_SOURCE,
+    call_main,
+    example_claim,
+    have_same_numbers,
+    record_computed_cells,
+    run,
+    study_of,
+)
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.compute.plan import Plan
-from rsfstudy.errors import DataError, InvalidValue, NoAnswer
+from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
 from rsfstudy.files import contents, restore
-from rsfstudy.files.lattice import coordinates
+from rsfstudy.files.lattice import build_coordinates
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.status import Status
@@ -40,7 +48,7 @@ class Scaled(Measure):
     unit: str = "one"
     table: tuple[float, ...] = (1.0,)
     name: ClassVar[str] = "scaled"
-    headline: ClassVar[str] = "total"
+    primary_output: ClassVar[str] = "total"
     variables: ClassVar = {"total": ()}
     typical_work: ClassVar[int] = 1
 
@@ -48,7 +56,7 @@ class Scaled(Measure):
         if self.factor == 13.0:
             raise RuntimeError("no luck")
 
-    def find(self, scene, accuracy, meter):
+    def compute(self, scene, accuracy, meter):
         total = sum(self.factor * scene.b_over_a for _ in range(self.times))
         return Outcome(Status.OK, {"total": -total if self.negative else total})
 
@@ -62,7 +70,7 @@ def scaled(*axes: Axis, **fields) -> Study:
 def test_each_cell_is_measured_as_the_axis_says():
     """Upward steps trigger instability here, downward ones never do."""
     found = run(BOTH).isel(b_over_a=0)
-    for direction, told in (("up", nullcontext()), ("down", pytest.warns(NoAnswer))):
+    for direction, told in (("up", nullcontext()), ("down", pytest.warns(NoResultWarning))):
         with told:
             step = rsfstudy.critical_step(
                 BOTH.scene(0), of="displacement_step", direction=direction
@@ -97,9 +105,9 @@ def test_a_point_of_a_zipped_axis_sets_both():
 
 
 def test_the_same_on_workers_and_in_pieces(tmp_path, cluster):
-    same_numbers(run(BOTH, client=cluster), run(BOTH))
+    have_same_numbers(run(BOTH, client=cluster), run(BOTH))
     run(BOTH, output=tmp_path, format="zarr")
-    same_numbers(rsfstudy.open(tmp_path / "both.zarr"), run(BOTH))
+    have_same_numbers(rsfstudy.open(tmp_path / "both.zarr"), run(BOTH))
 
 
 def test_overrides_change_the_measure():
@@ -124,7 +132,7 @@ def test_a_field_that_decides_the_shape_is_refused():
 
 def computed_by(study: Study, output) -> int:
     """How many cells a run of it computes."""
-    with asked_for() as asked:
+    with record_computed_cells() as asked:
         run(study, output=output)
     return len(asked)
 
@@ -141,12 +149,18 @@ def test_cells_are_found_again_by_the_fields_of_their_measure(tmp_path):
 
 def test_cells_differ_even_where_a_measure_does_not_say_so():
     silent = type("Silent", (Scaled,), {"describe": lambda self: {"name": "silent"}})
-    assert len(Plan(scaled(Axis("factor", [1.0, 2.0]), measure=silent())).different) == 4
+    assert len(Plan(scaled(Axis("factor", [1.0, 2.0]), measure=silent())).unique_cells) == 4
 
 
 def test_claims_and_selection_reach_a_place_on_the_axis():
-    claim = claimed(id="X1", variable="critical_displacement_stable", published=0.0, tolerance=0.0,
-                    relation="below", where={"direction": "down", "b_over_a": 2.0})  # fmt: skip
+    claim = example_claim(
+        id="X1",
+        variable="critical_displacement_stable",
+        published=0.0,
+        tolerance=0.0,
+        relation="below",
+        where={"direction": "down", "b_over_a": 2.0},
+    )
     declared = replace(BOTH, claims=[claim])
     assert rsfstudy.check(run(declared)).verdict.tolist() == ["reproduced"]
     assert rsfstudy.check(run(declared.with_(direction="up"))).verdict.tolist() == [
@@ -159,41 +173,41 @@ def test_claims_and_selection_reach_a_place_on_the_axis():
 def test_the_file_alone_reproduces_its_cells(tmp_path):
     found = run(BOTH, output=tmp_path).sel(direction="down", b_over_a=3.0)
     file = tmp_path / "both.nc"
-    restored = restore.from_declaration(contents.declaration(rsfstudy.open(file)), {})
+    restored = restore.study_from_declaration(contents.read_declaration(rsfstudy.open(file)), {})
     assert restored.describe() == BOTH.describe()
     xr.testing.assert_identical(
-        xr.Dataset(coords=coordinates(restored)), xr.Dataset(coords=coordinates(BOTH))
+        xr.Dataset(coords=build_coordinates(restored)), xr.Dataset(coords=build_coordinates(BOTH))
     )
     table = rsfstudy.rerun(file, workers=0, progress=False)
     assert (table["values"] == table["identical"]).all()
-    _scene, outcome = rsfstudy.cell(file, {"direction": "down", "b_over_a": 3.0})
+    _scene, outcome = rsfstudy.recompute_cell(file, {"direction": "down", "b_over_a": 3.0})
     assert outcome.values["critical_displacement_stable"] == found.critical_displacement_stable
 
 
 def test_a_study_file_with_a_measure_of_its_own(tmp_path, monkeypatch):
     """On workers, which cannot import it; and a failed cell is told with its place."""
     file = tmp_path / "own.py"
-    file.write_text(OWN)
+    file.write_text(USER_MEASURE_SOURCE)
     monkeypatch.setenv("COLUMNS", "500")
     words = ["--workers", "1", "--output", tmp_path, "--quiet"]
-    ran = call("run", file, "--set", "power=2,3,4", *words)
+    ran = call_main("run", file, "--set", "power=2,3,4", *words)
     assert ran.returncode == 1
     assert "--cell power=4.0 --cell b_over_a=2.0" in ran.stdout
     found = rsfstudy.open(tmp_path / "own.nc")
     assert found.total.sel(power=[2.0, 3.0]).values.tolist() == [[4.0, 9.0], [8.0, 27.0]]
     place = ["--cell", "power=3", "--cell", "b_over_a=3"]
-    alone = call("rerun", tmp_path / "own.nc", "--study", file, *place)
+    alone = call_main("rerun", tmp_path / "own.nc", "--study", file, *place)
     assert alone.returncode == 0
     assert ["total", "27.0", "same"] in [line.split() for line in alone.stdout.splitlines()]
 
 
 def test_a_measure_of_its_own_is_computed_anew_as_it_was_set(tmp_path):
     file = tmp_path / "own.py"
-    file.write_text(OWN)
+    file.write_text(USER_MEASURE_SOURCE)
     rsfstudy.run(file, workers=0, output=tmp_path, progress=False, offset=0.5)
     assert rsfstudy.open(tmp_path / "own.nc").total.values.tolist() == [[2.5, 3.5], [4.5, 9.5]]
     table = rsfstudy.rerun(tmp_path / "own.nc", study=file, workers=0, progress=False)
     assert (table["values"] == table["identical"]).all()
     place = {"power": 2, "b_over_a": 3}
-    _scene, outcome = rsfstudy.cell(tmp_path / "own.nc", place, study=file)
+    _scene, outcome = rsfstudy.recompute_cell(tmp_path / "own.nc", place, study=file)
     assert outcome.values["total"] == 9.5

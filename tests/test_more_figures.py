@@ -10,12 +10,12 @@ from rsfstudy import Axis, Panel, Scene, Study, plots
 from rsfstudy.declare import catalogue
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.plots import _text, lines
-from rsfstudy.rig.scales import Scale, scaled
+from rsfstudy.rig.scales import Scale, apply_scales
 from rsfstudy.status import Status
 
 
 def test_the_picture_of_a_motion_is_printable():
-    drawn = rsfstudy.picture(rsfstudy.simulate(Scene(hold_time=1.0), duration=1.0, rtol=1e-3))
+    drawn = rsfstudy.plot_motion(rsfstudy.simulate(Scene(hold_time=1.0), duration=1.0, rtol=1e-3))
     checks.assert_printable(drawn)
     for test in (
         checks.test_it_fits_a_journal,
@@ -30,7 +30,7 @@ def test_the_picture_of_a_motion_is_printable():
 def test_a_title_is_broken_where_the_figure_would_cut_it(tmp_path_factory):
     """Names along y move the panel, and its title with it; each curve has a name."""
     dataset, _path = named_results("accuracy_cost", tmp_path_factory)
-    drawn = plots.figure(dataset, variable="status")
+    drawn = plots.draw_figure(dataset, variable="status")
     checks.assert_printable(drawn)
     (axes,) = drawn.axes
     assert axes.get_title().count("\n") > 1
@@ -39,10 +39,10 @@ def test_a_title_is_broken_where_the_figure_would_cut_it(tmp_path_factory):
 
 def test_an_added_axis_lays_out_what_a_panel_shows_one_point_of():
     """The panel is at the first law; of two laws it is drawn twice, with the curves of each."""
-    study = catalogue.load("rate_step_boundary")
+    study = catalogue.load_study("rate_step_boundary")
     narrow = {"b_over_a": [1.5, 2.0, 3.0], "case": ["constant normal stress"]}
     dataset = run(study.with_(**narrow, law=["slip", "slowness"]), rtol=1e-3)
-    slip, slowness = plots.figure(dataset).axes
+    slip, slowness = plots.draw_figure(dataset).axes
     assert slip.get_title().endswith("slip law")
     assert slowness.get_title().endswith("slowness law")
     assert max(slowness.lines[0].get_ydata()) > 2.0 * max(slip.lines[0].get_ydata())
@@ -56,8 +56,8 @@ def stiffnesses() -> xr.Dataset:
 
 
 def test_names_along_y_are_written_from_the_top_down():
-    panel = Panel(x="critical_stiffness", y="weakening", by=["phi"])
-    (axes,) = plots.figure(stiffnesses(), plots.Declared([panel])).axes
+    panel = Panel(x="critical_stiffness", y="weakening", hue=["phi"])
+    (axes,) = plots.draw_figure(stiffnesses(), plots.Declared([panel])).axes
     assert [text.get_text() for text in axes.get_yticklabels()] == ["strong", "weak"]
     assert axes.yaxis_inverted()
     assert [line.get_linestyle() for line in axes.lines] == ["None", "None"]
@@ -68,10 +68,10 @@ def test_nothing_is_drawn_where_nothing_came_out():
     dataset = stiffnesses()
     failed = dataset["phi"] == 50.0
     dataset["critical_stiffness"] = dataset["critical_stiffness"].where(~failed)
-    panels = plots.Declared([Panel(x="weakening", y="critical_stiffness", each=["phi"])])
-    assert len(plots.figure(dataset, panels).axes) == 2
+    panels = plots.Declared([Panel(x="weakening", y="critical_stiffness", facet=["phi"])])
+    assert len(plots.draw_figure(dataset, panels).axes) == 2
     dataset["status"] = dataset["status"].where(~failed, np.int8(20))
-    assert len(plots.figure(dataset, panels).axes) == 1
+    assert len(plots.draw_figure(dataset, panels).axes) == 1
 
 
 def test_where_nothing_was_measured_the_statuses_are_drawn():
@@ -80,7 +80,7 @@ def test_where_nothing_was_measured_the_statuses_are_drawn():
     nothing = dataset.assign({n: dataset[n] * np.nan for n in numbers})
     nothing["status"] = dataset["status"].copy(data=np.full((2, 2), int(Status.NO_STEADY_STATE)))
     nothing["status"].attrs = dataset["status"].attrs
-    (axes,) = plots.figure(nothing).axes
+    (axes,) = plots.draw_figure(nothing).axes
     assert [text.get_text() for text in axes.get_yticklabels()] == ["no steady state"]
 
 
@@ -95,34 +95,34 @@ def test_a_legend_beside_a_scale_of_colours_leaves_the_panel_its_room():
         Axis("normal_stress", ["constant", "variable", "imposed"]),
     ]
     dataset = run(Study(name="n", title="", base=Scene(), axes=axes, measure=LinearStability()))
-    drawn = plots.figure(dataset, plots.Declared(lines.panels(dataset, "critical_stiffness")))
+    drawn = plots.draw_figure(dataset, plots.Declared(lines.panels(dataset, "critical_stiffness")))
     assert drawn.axes[0].get_position().width > 0.55
 
 
 def test_more_panels_than_can_be_read_are_lines_or_maps():
     """Seven panels, at each of two points of an axis that they do not know."""
-    many = plots.Declared([Panel(x="weakening", y="critical_stiffness", by=["phi"])] * 7)
+    many = plots.Declared([Panel(x="weakening", y="critical_stiffness", hue=["phi"])] * 7)
     dataset = run(stiffnesses().rsf.study.with_(alpha=[0.2, 0.5]))
-    assert len(plots.figure(dataset.isel(alpha=[0]), many).axes) == 7
-    assert len(plots.figure(dataset, many).axes) < 7
+    assert len(plots.draw_figure(dataset.isel(alpha=[0]), many).axes) == 7
+    assert len(plots.draw_figure(dataset, many).axes) < 7
 
 
 def test_what_is_in_units_is_called_no_ratio():
     held = {"scale": "D_c", "units": "1", "long_name": "load point displacement"}
     ratio = xr.Dataset({"moved": ((), 2.0, {**held, "symbol": r"$\delta_0/D_c$"})})
     scales = {"D_c": Scale(10.0, "um"), "V_*": Scale(1.0, "um s-1")}
-    moved = scaled(ratio, scales)["moved"]
+    moved = apply_scales(ratio, scales)["moved"]
     assert moved.attrs == {"units": "um", "long_name": "load point displacement"}
 
 
 def test_labels_of_errors_of_samples_are_short(tmp_path_factory):
     dataset, _path = named_results("uncertain_recurrence", tmp_path_factory)
-    drawn = plots.figure(dataset, variable="recurrence_interval_error")
+    drawn = plots.draw_figure(dataset, variable="recurrence_interval_error")
     checks.assert_printable(drawn)
     assert drawn.axes[1].get_ylabel().startswith("error of\nrecurrence")
 
 
 def test_errors_too_small_to_show_are_left_out():
-    assert _text.with_error(1.33333334, 8e-9, 4) == "$1.3333$"
-    assert _text.with_error(0.857, 0.007, 4) == r"$0.857 \pm 0.007$"
-    assert _text.with_error(0.857, 0.00006, 4) == r"$0.85700 \pm 0.00006$"
+    assert _text.format_with_error(1.33333334, 8e-9, 4) == "$1.3333$"
+    assert _text.format_with_error(0.857, 0.007, 4) == r"$0.857 \pm 0.007$"
+    assert _text.format_with_error(0.857, 0.00006, 4) == r"$0.85700 \pm 0.00006$"

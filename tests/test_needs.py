@@ -8,10 +8,10 @@ import pytest
 
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.fluid.dilatant import Dilatant
+from rsfstudy.slider.fluid.dilatant import DilatantFluid
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.places import LAW, MU_STAR, A
-from rsfstudy.slider.requirements import QUANTITIES, provided
+from rsfstudy.slider.requirements import PART_QUANTITIES, provided_quantities
 
 
 def evolution(log_slip_rate, state, p):
@@ -69,16 +69,16 @@ def test_a_scene_refuses_a_law_whose_stress_it_does_not_provide(fields, cause, r
 @pytest.mark.parametrize("fields", [{}, {"inertia": True}, {"velocity_oscillation": 0.1}])
 def test_constant_normal_stress_provides_shear_stress(fields):
     scene = Scene(law=Heated, **CONSTANT, **fields)
-    assert "shear_stress" in provided(scene, scene.parts.law)
+    assert "shear_stress" in provided_quantities(scene, scene.parts.law)
     with pytest.raises(InvalidValue, match="normal_stress='variable'"):
         scene.with_(normal_stress="variable")
 
 
 @dataclass(frozen=True, kw_only=True)
-class HeatedPores(Dilatant):
+class HeatedPores(DilatantFluid):
     name = "heated_pores"
     needs = ("shear_stress",)
-    auxiliary_rates = staticmethod(Dilatant.auxiliary_rates)
+    auxiliary_rates = staticmethod(DilatantFluid.auxiliary_rates)
 
 
 def test_no_scene_provides_shear_stress_to_a_fluid():
@@ -102,4 +102,4 @@ def test_needs_is_a_set_of_known_names(given, said):
 
 def test_dynamics_receive_every_quantity():
     scene = Scene(normal_stress="variable", fluid="dilatant")
-    assert provided(scene, scene.parts.dynamics) == frozenset(QUANTITIES)
+    assert provided_quantities(scene, scene.parts.dynamics) == frozenset(PART_QUANTITIES)

@@ -9,13 +9,13 @@ from rsfstudy import Scene
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.events import maximum
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.neglected_inertia import estimate_neglected_inertia
-from rsfstudy.motion.readings import growth_along_path
-from rsfstudy.motion.recording import REGIME, Recording
-from rsfstudy.slider.equations import IN_RUPTURE
+from rsfstudy.motion.readings import growth_rate_along_path
+from rsfstudy.motion.recording import REGIME_COLUMN, Recording
+from rsfstudy.slider.equations import RUPTURE_REGIME
 from rsfstudy.status import Status
 
 INERTIA = {"inertia": True, "reference_rate": 1e-3}
@@ -61,22 +61,22 @@ def read(measure, scene, rtol):
 def test_errors_cover_what_both_runs_neglect(measure, rtol, scene):
     """A run a thousand times tighter leaves the slow manifold earlier."""
     found, exact = read(measure, scene, rtol), read(measure, scene, 1e-3 * rtol)
-    for name in measure.estimated:
+    for name in measure.outputs_with_error:
         error = abs(found[name] - exact[name])
         assert error <= found[f"{name}_error"] + exact[f"{name}_error"], name
 
 
 def recorded(scene, rtol):
     recording, accuracy = Recording(), Accuracy(rtol, engine="compiled")
-    list(follow(scene, accuracy, Meter(10_000_000, engine="compiled"), clock=True,
+    list(integrate_events(scene, accuracy, WorkMeter(10_000_000, engine="compiled"), with_time=True,
                 recording=recording, until=12.0))  # fmt: skip
-    return recording, recording.seen(scene)
+    return recording, recording.table(scene)
 
 
 def test_a_scene_without_inertia_neglects_none():
     scene = Scene(law="slip", stiffness_ratio=2.0, load_velocity_ratio=3.0)
     recording, rows = recorded(scene, 1e-6)
-    slow = recording.number(scene.dynamics.regime)
+    slow = recording.regime_number(scene.dynamics.regime)
     assert not estimate_neglected_inertia(scene, rows, slow, 0.0).any()
 
 
@@ -87,11 +87,11 @@ def test_estimate_goes_with_the_accuracy():
     scene, found = CASES[2][2], []
     for rtol in (1e-4, 1e-5, 1e-6, 1e-8):
         recording, rows = recorded(scene, rtol)
-        slow = recording.number(scene.dynamics.regime)
+        slow = recording.regime_number(scene.dynamics.regime)
         estimate = estimate_neglected_inertia(scene, rows, slow, 0.0)
         assert (np.diff(estimate) >= 0.0).all()
         found.append(estimate[-1] / rtol)
-        assert (estimate[-1] > 0.0) == bool((rows[:, REGIME] == slow).any())
+        assert (estimate[-1] > 0.0) == bool((rows[:, REGIME_COLUMN] == slow).any())
     assert 0.1 < max(found) < 100.0
 
 
@@ -99,10 +99,13 @@ def test_growth_at_a_peak_has_one_unit_in_both_regimes():
     """A peak that is found on the slow manifold or in the full equations, depending on rtol."""
     scene, growths = CASES[0][2], {}
     for rtol in (1e-5, 1e-8):
-        meter, wanted = Meter(10_000_000, engine="compiled"), maximum("spring_stress", ends=True)
-        events = list(follow(scene, Accuracy(rtol, engine="compiled"), meter, [wanted]))
-        peak = next(event for event in events if event.watch == wanted)
-        growths[peak.regime] = growth_along_path(scene, peak, 8.22991)
-    assert set(growths) == {IN_RUPTURE, scene.dynamics.regime}
+        meter, wanted = (
+            WorkMeter(10_000_000, engine="compiled"),
+            maximum("spring_stress", terminal=True),
+        )
+        events = list(integrate_events(scene, Accuracy(rtol, engine="compiled"), meter, [wanted]))
+        peak = next(event for event in events if event.specification == wanted)
+        growths[peak.regime] = growth_rate_along_path(scene, peak, 8.22991)
+    assert set(growths) == {RUPTURE_REGIME, scene.dynamics.regime}
     first, second = growths.values()
     assert math.isclose(first, second, rel_tol=1e-2)

@@ -11,9 +11,9 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from rsfstudy.analysis.fitting import noise as noises
-from rsfstudy.analysis.fitting.noise import Noise
-from rsfstudy.analysis.fitting.noise_runs import Run, find_level_changes, find_runs
-from rsfstudy.analysis.fitting.outliers import find_kept_rows, find_quantum
+from rsfstudy.analysis.fitting.noise import NoiseModel
+from rsfstudy.analysis.fitting.noise_runs import SamplingRun, find_level_changes, find_runs
+from rsfstudy.analysis.fitting.outliers import find_kept_mask, find_quantum
 
 #: Coefficients of an autoregressive process of third order, with a pair of complex roots.
 AR3 = -np.real(np.poly([0.8, 0.5 + 0.4j, 0.5 - 0.4j]))[1:]
@@ -36,31 +36,41 @@ def partial(coefficients: np.ndarray) -> np.ndarray:
 
 
 #: Runs of two processes, of which one is shorter than their order.
-RUNS = (Run(0, 40, 0, 0, 0), Run(40, 42, 1, 0, 1), Run(42, 90, 0, 0, 0), Run(90, 130, 1, 0, 1))
+RUNS = (
+    SamplingRun(0, 40, 0, 0, 0),
+    SamplingRun(40, 42, 1, 0, 1),
+    SamplingRun(42, 90, 0, 0, 0),
+    SamplingRun(90, 130, 1, 0, 1),
+)
 SIZES = [1.0, 0.3]
-BOTH = Noise(RUNS, np.array([partial(AR3), [0.9, 0.0, 0.0]]), np.array(SIZES))
+BOTH = NoiseModel(RUNS, np.array([partial(AR3), [0.9, 0.0, 0.0]]), np.array(SIZES))
 #: One process whose size changes, first after fewer rows than its order.
-JOINED = (Run(0, 2, 0, 0, 0), Run(2, 42, 1, 2, 1), Run(42, 90, 0, 42, 0), Run(90, 130, 1, 90, 1))
-CHANGING = Noise(JOINED, np.array([partial(AR3)] * 2), np.array(SIZES))
+JOINED = (
+    SamplingRun(0, 2, 0, 0, 0),
+    SamplingRun(2, 42, 1, 2, 1),
+    SamplingRun(42, 90, 0, 42, 0),
+    SamplingRun(90, 130, 1, 90, 1),
+)
+CHANGING = NoiseModel(JOINED, np.array([partial(AR3)] * 2), np.array(SIZES))
 
 
-def dense(noise: Noise) -> np.ndarray:
+def dense(noise: NoiseModel) -> np.ndarray:
     """The covariance: runs of an AR(3) and of an AR(1) process in blocks, or one AR(3) process."""
     seen = [correlations(AR3, 300), correlations(np.array([0.9]), 300)]
-    sizes = np.concatenate([[noise.sizes[r.number]] * (r.last - r.first) for r in noise.runs])
+    sizes = np.concatenate([[noise.level_sds[r.process]] * (r.stop - r.start) for r in noise.runs])
     if noise is CHANGING:
         return np.asarray(toeplitz(seen[0][:130]) * np.outer(sizes, sizes))
-    if not noise.partial.any():
+    if not noise.partial_autocorrelations.any():
         return np.diag(sizes**2)
-    blocks = [toeplitz(seen[r.number][: r.last - r.first]) for r in noise.runs]
+    blocks = [toeplitz(seen[r.process][: r.stop - r.start]) for r in noise.runs]
     return np.asarray(block_diag(*blocks) * np.outer(sizes, sizes))
 
 
 @pytest.mark.parametrize("noise", [BOTH, CHANGING], ids=["apart", "one whose size changes"])
-def test_whitening_is_that_of_the_triangle_of_the_correlation_matrix(noise: Noise) -> None:
+def test_whitening_is_that_of_the_triangle_of_the_correlation_matrix(noise: NoiseModel) -> None:
     matrix = dense(noise)
     triangle = np.linalg.cholesky(matrix)
-    found = noise.whitened(np.eye(len(matrix)))
+    found = noise.whiten(np.eye(len(matrix)))
     # rounding times the condition of the matrix, 1e3
     np.testing.assert_allclose(found, np.linalg.inv(triangle), atol=1e-11)
     exact = 2.0 * np.log(np.diag(triangle)).sum()
@@ -68,11 +78,13 @@ def test_whitening_is_that_of_the_triangle_of_the_correlation_matrix(noise: Nois
 
 
 @pytest.mark.parametrize("noise", [BOTH, CHANGING], ids=["apart", "one whose size changes"])
-def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices(noise: Noise) -> None:
+def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices(
+    noise: NoiseModel,
+) -> None:
     rng = np.random.default_rng(1)
     jacobian = np.column_stack([np.ones(130), np.linspace(0.0, 50.0, 130), rng.normal(size=130)])
     residuals = 1e-3 * rng.normal(size=130)
-    products = noises._Products(noise.runs, np.column_stack([jacobian, residuals]), 3)
+    products = noises._LaggedProducts(noise.runs, np.column_stack([jacobian, residuals]), 3)
 
     def exact(matrix: np.ndarray) -> float:
         told = jacobian.T @ np.linalg.solve(matrix, jacobian)
@@ -82,29 +94,35 @@ def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices(noise:
         logs = np.linalg.slogdet(matrix)[1] + np.linalg.slogdet(told)[1]
         return float((130 - 3) * math.log(squares) + logs)
 
-    plain = Noise(noise.runs, np.zeros((2, 3)), np.array([1.0, 2.0]))
+    plain = NoiseModel(noise.runs, np.zeros((2, 3)), np.array([1.0, 2.0]))
     apart = exact(dense(noise)) - exact(dense(plain))
-    assert products.misfit(noise) - products.misfit(plain) == pytest.approx(apart, abs=1e-8)
+    assert products.reml_objective(noise) - products.reml_objective(plain) == pytest.approx(
+        apart, abs=1e-8
+    )
 
 
 def test_independent_samples_of_first_order() -> None:
-    one = Noise((Run(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
-    assert one.effective_samples == pytest.approx(500 * 0.1 / 1.9)
+    one = NoiseModel((SamplingRun(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
+    assert one.effective_sample_size == pytest.approx(500 * 0.1 / 1.9)
 
 
 def test_degrees_of_freedom_count_the_coefficients_that_are_found() -> None:
     """In closed form for first order; else by how the power at zero frequency scatters."""
-    one = Noise((Run(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
-    assert one.degrees == pytest.approx(500 / (1 + 2 * 1.9 / 0.1))
-    assert noises.white(np.arange(500.0)).degrees == 500
+    one = NoiseModel((SamplingRun(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
+    assert one.degrees_of_freedom == pytest.approx(500 / (1 + 2 * 1.9 / 0.1))
+    assert noises.white_noise(np.arange(500.0)).degrees_of_freedom == 500
     rng, logs = np.random.default_rng(7), []
     for _ in range(400):
         drawn = lfilter([1.0], [1.0, *(-AR3)], rng.normal(size=3_200))[200:]
-        found = Noise(
-            (Run(0, 3_000, 0, 0, 0),), np.array([noises._partial([drawn], 3)]), np.ones(1)
+        found = NoiseModel(
+            (SamplingRun(0, 3_000, 0, 0, 0),),
+            np.array([noises._burg_coefficients([drawn], 3)]),
+            np.ones(1),
         )
-        logs.append(math.log(np.var(drawn) / found.effective_samples))
-    exact = Noise((Run(0, 3_000, 0, 0, 0),), np.array([partial(AR3)]), np.ones(1)).degrees
+        logs.append(math.log(np.var(drawn) / found.effective_sample_size))
+    exact = NoiseModel(
+        (SamplingRun(0, 3_000, 0, 0, 0),), np.array([partial(AR3)]), np.ones(1)
+    ).degrees_of_freedom
     # a variance of 400 draws has a standard error of a fourteenth
     assert 2.0 / np.var(logs) == pytest.approx(exact, rel=0.25)
 
@@ -114,7 +132,9 @@ def test_coefficients_are_recovered() -> None:
     rng = np.random.default_rng(3)
     long = lfilter([1.0], [1.0, *(-AR3)], rng.normal(size=50_000))
     # standard errors are below 1/sqrt(n)
-    assert np.abs(noises._partial([long], 3) - partial(AR3)).max() < 5.0 / math.sqrt(50_000)
+    assert np.abs(noises._burg_coefficients([long], 3) - partial(AR3)).max() < 5.0 / math.sqrt(
+        50_000
+    )
     time = np.arange(400.0)
     jacobian = np.column_stack([np.ones(400), time, time**2, np.exp(-time / 60.0)])
     base = np.linalg.qr(jacobian)[0]
@@ -122,8 +142,8 @@ def test_coefficients_are_recovered() -> None:
     for _ in range(60):
         noise = lfilter([1.0], [1.0, -0.9], rng.normal(size=700))[300:]
         left = noise - base @ (base.T @ noise)
-        plain.append(noises._partial([left], 1)[0])
-        reml.append(noises.fitted("ar1", time, left, jacobian).partial[0, 0])
+        plain.append(noises._burg_coefficients([left], 1)[0])
+        reml.append(noises.fit_noise("ar1", time, left, jacobian).partial_autocorrelations[0, 0])
     # of 60 draws the mean has a standard error of sqrt((1 - .81)/400/60) = .0028
     assert abs(np.mean(reml) - 0.9) < 0.009
     assert np.mean(plain) < 0.885  # what the fit takes up is missing
@@ -135,7 +155,7 @@ def test_the_order_is_chosen(order: int, coefficients: np.ndarray) -> None:
     chosen = []
     for _ in range(20):
         left = lfilter([1.0], [1.0, *(-coefficients)], rng.normal(size=800))
-        chosen.append(noises._order([[left]]))
+        chosen.append(noises._select_order([[left]]))
     assert min(chosen) >= order
     assert np.median(chosen) == order  # the criterion takes too many at times, too few seldom
 
@@ -146,14 +166,17 @@ def test_noise_of_other_sampling_intervals_is_another() -> None:
     slow = lfilter([1.0], [1.0, -0.5], rng.normal(size=600)) * math.sqrt(0.75)
     fast = lfilter([1.0], [1.0, -0.95], rng.normal(size=1_500))[600:] * math.sqrt(1 - 0.95**2)
     left = np.concatenate([slow, 3.0 * fast])
-    found = noises.fitted("ar1", time, left, np.ones((1_500, 1)))
-    assert [(*run[:2], run.before) for run in found.runs] == [(0, 600, 0), (600, 1_500, 600)]
-    coefficients = dict(zip([run.number for run in found.runs], (0.5, 0.95), strict=True))
+    found = noises.fit_noise("ar1", time, left, np.ones((1_500, 1)))
+    assert [(*run[:2], run.preceding_rows) for run in found.runs] == [
+        (0, 600, 0),
+        (600, 1_500, 600),
+    ]
+    coefficients = dict(zip([run.process for run in found.runs], (0.5, 0.95), strict=True))
     for number, exact in coefficients.items():
-        assert found.partial[number, 0] == pytest.approx(exact, abs=0.12)
-    for noise in (found, noises.fitted("white", time, left, np.ones((1_500, 1)))):
+        assert found.partial_autocorrelations[number, 0] == pytest.approx(exact, abs=0.12)
+    for noise in (found, noises.fit_noise("white", time, left, np.ones((1_500, 1)))):
         # 900 samples at .95 are 23 independent ones, which tell a size to 15 per cent
-        sizes = noise.sizes[[run.level for run in noise.runs]]
+        sizes = noise.level_sds[[run.level for run in noise.runs]]
         assert sizes[1] / sizes[0] == pytest.approx(3.0, rel=0.5)
 
 
@@ -162,7 +185,7 @@ def test_a_clock_that_is_uneven_is_one_process(quantum: float) -> None:
     """Intervals that vary, or that a logger has rounded to one or two ticks, tell one noise."""
     rng = np.random.default_rng(6)
     time = np.cumsum(np.where(rng.random(2_000) < 0.5, 1.0, 2.0 if quantum else 1.2)) * 0.01
-    assert find_runs(time) == (Run(0, 2_000, 0, 0, 0),)
+    assert find_runs(time) == (SamplingRun(0, 2_000, 0, 0, 0),)
 
 
 @pytest.mark.parametrize("order", [0, 3])
@@ -174,8 +197,8 @@ def test_whiteness_is_that_of_ljung_and_box(order: int) -> None:
     lags = range(1, 20 + order + 1)
     seen = np.array([np.corrcoef(np.roll(left, k)[k:], left[k:])[0, 1] for k in lags])
     size = 300 * 302 * sum(r**2 / (300 - k) for r, k in zip(seen, lags, strict=True))
-    told = noises.whiteness(left + 5.0, order)
-    assert told == pytest.approx(noises.whiteness(left, order), rel=1e-9)
+    told = noises.ljung_box_p_value(left + 5.0, order)
+    assert told == pytest.approx(noises.ljung_box_p_value(left, order), rel=1e-9)
     # means and sizes of parts are not those of the whole: a few lags in 300
     assert chi2.isf(told, 20) == pytest.approx(size, rel=0.1)
 
@@ -185,12 +208,12 @@ def test_the_noise_level_may_change(rho: float) -> None:
     rng = np.random.default_rng(11)
     left = lfilter([1.0], [1.0, -rho], rng.normal(size=900))
     left[300:] *= 4.0
-    found = noises.fitted("ar", np.arange(900.0), left, np.ones((900, 1)))
-    assert len(found.sizes) == 2
-    assert abs(found.runs[1].first - 300) < 30
-    assert found.sizes[1] == pytest.approx(4.0, rel=0.3)
+    found = noises.fit_noise("ar", np.arange(900.0), left, np.ones((900, 1)))
+    assert len(found.level_sds) == 2
+    assert abs(found.runs[1].start - 300) < 30
+    assert found.level_sds[1] == pytest.approx(4.0, rel=0.3)
     # the level, not the whole record, decides on the error of the quiet part
-    weights = found.whitened(np.ones((900, 1)))[:, 0] ** 2
+    weights = found.whiten(np.ones((900, 1)))[:, 0] ** 2
     assert weights[:250].sum() > 4.0 * weights[350:600].sum()
 
 
@@ -215,8 +238,8 @@ def test_a_clock_with_jitter_keeps_its_two_sampling_rates() -> None:
     gaps = np.repeat([0.2, 0.02], [200, 1_000])
     time = np.cumsum(gaps) + 0.3 * gaps * rng.uniform(-1.0, 1.0, 1_200)
     runs = find_runs(time)
-    assert [run.number for run in runs] == [1, 0] or [run.number for run in runs] == [0, 1]
-    assert abs(runs[0].last - 200) < 10
+    assert [run.process for run in runs] == [1, 0] or [run.process for run in runs] == [0, 1]
+    assert abs(runs[0].stop - 200) < 10
 
 
 def test_outliers_are_found_and_peaks_of_the_model_are_not() -> None:
@@ -226,17 +249,17 @@ def test_outliers_are_found_and_peaks_of_the_model_are_not() -> None:
     left[spikes] += 0.02
     curve[250:] = 0.05 * np.exp(-np.arange(250) / 2.0)
     left[250] += 0.02  # a misfit at the step
-    kept = find_kept_rows(left, curve, 0.0)
+    kept = find_kept_mask(left, curve, 0.0)
     assert kept is not None
     assert np.flatnonzero(~kept).tolist() == spikes
-    assert find_kept_rows(1e-3 * rng.normal(size=500), curve, 0.0) is None
+    assert find_kept_mask(1e-3 * rng.normal(size=500), curve, 0.0) is None
 
 
 @pytest.mark.parametrize("change", [130, 160])
 def test_rows_after_a_change_of_the_noise_level_are_no_outliers(change: int) -> None:
     left = 1e-4 * np.random.default_rng(16).normal(size=500)
     left[change:] *= 10.0
-    assert find_kept_rows(left, np.zeros(500), 0.0) is None
+    assert find_kept_mask(left, np.zeros(500), 0.0) is None
 
 
 def test_the_quantum_of_values_is_found() -> None:

@@ -13,15 +13,15 @@ from rsfstudy.named_studies._triggers import Triggers
 
 from rsfstudy import Scene
 from rsfstudy.analysis.after_step import (
-    friction_acts_alone,
-    neutral,
-    orbits_may_close,
+    has_frictional_damping_only,
+    is_neutral,
+    may_have_closed_orbits,
     reaches_norm,
 )
 from rsfstudy.measures import critical_step
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.slider import closed_forms, stability
 from rsfstudy.status import Status
 
@@ -47,7 +47,7 @@ def test_an_extreme_law():
     )
     value, error, _outcome = found(scene)
     q = 1.0 / (1.0 + value)
-    start = closed_forms.after_fall(scene.mu_star, scene.a, scene.b_over_a, 0.4, q)
+    start = closed_forms.offset_after_stress_fall(scene.mu_star, scene.a, scene.b_over_a, 0.4, q)
     assert start == pytest.approx(math.asinh(2.0 * q), abs=(error + 1e-7 * abs(value)) / scene.a)
 
 
@@ -61,7 +61,7 @@ def test_triggers_are_the_critical_steps_and_their_stresses():
     for measure in (FALL, CriticalStep(of="displacement_step"), CriticalStep()):
         alone = measure(scene, Accuracy(1e-5)).values
         for end in ("", "_error", "_stable", "_unstable"):
-            name = f"{measure.headline}{end}"
+            name = f"{measure.primary_output}{end}"
             assert outcome.values[name] == alone[name]
     values = outcome.values
     friction = values["effective_friction"]
@@ -122,7 +122,7 @@ def test_either_side_of_a_fall(law, stress, dynamics, ratio, b_over_a, moves):
         return
     for side, reached in ((1.0 - 1e-4, False), (1.0 + 1e-4, True)):
         stepped = scene.with_(normal_stress_step=math.expm1(side * math.log1p(value)))
-        assert reaches_norm(stepped, Accuracy(1e-6), Meter(200_000)) is reached
+        assert reaches_norm(stepped, Accuracy(1e-6), WorkMeter(200_000)) is reached
 
 
 @pytest.mark.parametrize("dynamics", DYNAMICS, ids=str)
@@ -130,7 +130,7 @@ def test_paths_and_motions_agree(dynamics, monkeypatch):
     """What is shot for, and what a survey by motions alone closes in on."""
     scene = Scene(**STRESSES[2], **dynamics, stiffness_ratio=1.2, load_velocity_ratio=1.0)
     value, error, _outcome = found(scene)
-    for shot in ("from_critical_path", "from_touching_cycle"):
+    for shot in ("find_by_critical_path", "find_by_touching_cycle"):
         monkeypatch.setattr(critical_step, shot, lambda *_asked: None)
     forward, its_error, _outcome = found(scene, accuracy=Accuracy(1e-5))
     assert abs(value - forward) <= error + its_error
@@ -162,15 +162,15 @@ def test_normal_stress_that_is_imposed_is_constant_between_steps():
     proportion to normal stress.
     """
     scene = Scene(**IMPOSED, alpha=0.5, load_velocity_ratio=2.0)
-    assert friction_acts_alone(scene)
-    assert orbits_may_close(scene)
-    assert not friction_acts_alone(Scene(alpha=0.5))
+    assert has_frictional_damping_only(scene)
+    assert may_have_closed_orbits(scene)
+    assert not has_frictional_damping_only(Scene(alpha=0.5))
     stepped = scene.with_(normal_stress_step=0.25, stiffness_ratio=1.25)
-    after = stability.critical_stiffness(stepped, stepped.log_load_rate)
+    after = stability.critical_stiffness(stepped, stepped.log_load_velocity)
     assert after == pytest.approx(1.25 * scene.critical_stiffness, rel=1e-9)
     law = {"law": "perrin_rice_zheng"}
-    assert neutral(stepped.with_(**law), 1e-6)
-    assert not neutral(scene.with_(**law, normal_stress_step=0.25), 1e-6)
+    assert is_neutral(stepped.with_(**law), 1e-6)
+    assert not is_neutral(scene.with_(**law, normal_stress_step=0.25), 1e-6)
 
 
 def test_coulomb_stresses_add_up():

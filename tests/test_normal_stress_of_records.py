@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 import synthetic_records as synthetic
-from synthetic_records import STEP, TRUTH, off
+from synthetic_records import EXACT_PARAMETERS, STEP_UP, deviation_in_stderrs
 
 import rsfstudy
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.errors import InvalidValue
-from rsfstudy.status import LABELS
+from rsfstudy.status import STATUS_LABELS
 
 #: Stiffness of the machine in MPa/um: TRUTH["stiffness"] at 8 MPa.
-MACHINE = 8.0 * TRUTH["stiffness"]
+MACHINE = 8.0 * EXACT_PARAMETERS["stiffness"]
 OPTIONS: dict[str, Any] = {
     "laws": ["slowness"],
     "stiffness": f"{MACHINE} MPa/um",
@@ -31,11 +31,11 @@ def record_at(stress: float, seed: int, name: str, later: float | None = None) -
     If `later` is given, the normal stress rises to that value 60 um after the step, when friction
     is steady; friction then stays as it is, so that only the window decides which stress counts.
     """
-    times = synthetic.rows(STEP, 52.0, 400)
-    moved = synthetic.load_point(STEP, times)
-    truth = TRUTH | {"stiffness": MACHINE / stress}
-    friction = synthetic.motion("slowness", times, STEP, truth)[0]
-    friction += synthetic.correlated(len(times), 0.5, 1e-4, seed)
+    times = synthetic.sample_times(STEP_UP, 52.0, 400)
+    moved = synthetic.load_point_displacement(STEP_UP, times)
+    truth = EXACT_PARAMETERS | {"stiffness": MACHINE / stress}
+    friction = synthetic.friction_and_sensitivities("slowness", times, STEP_UP, truth)[0]
+    friction += synthetic.correlated_noise(len(times), 0.5, 1e-4, seed)
     sigma = np.where(moved > 100.0, later or stress, stress)
     columns = {"time": times, "displacement": moved, "friction": friction, "normal_stress": sigma}
     return rsfstudy.read_record(columns, name=name).with_steps([(40.0, 40.0, 1.0, 10.0)])
@@ -44,16 +44,18 @@ def record_at(stress: float, seed: int, name: str, later: float | None = None) -
 def test_stiffness_is_over_the_normal_stress_before_the_step() -> None:
     record = record_at(8.0, 1, "rising", later=24.0)
     fit = rsfstudy.fit(record, **OPTIONS, after="58 um").squeeze()
-    ratio = OPTIONS | {"stiffness": TRUTH["stiffness"]}
+    ratio = OPTIONS | {"stiffness": EXACT_PARAMETERS["stiffness"]}
     stated = rsfstudy.fit(record, **ratio, after="58 um").squeeze()
     for name in ("a", "b", "slip_distance"):
-        assert abs(off(fit.squeeze(), name, TRUTH[name])) < 3.5, name
+        assert abs(deviation_in_stderrs(fit.squeeze(), name, EXACT_PARAMETERS[name])) < 3.5, name
         assert float(fit[name]) == pytest.approx(float(stated[name]), rel=1e-9)
-    (row,) = fit.rsf.table().to_dict("records")
+    (row,) = fit.rsf.fit_table().to_dict("records")
     assert row["normal_stress"] == pytest.approx(8.0)
-    assert row["k"] == pytest.approx(TRUTH["stiffness"])
+    assert row["k"] == pytest.approx(EXACT_PARAMETERS["stiffness"])
     slider = fit.rsf.scene
-    assert slider.stiffness == pytest.approx(TRUTH["stiffness"] * float(fit.slip_distance))
+    assert slider.stiffness == pytest.approx(
+        EXACT_PARAMETERS["stiffness"] * float(fit.slip_distance)
+    )
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -62,23 +64,23 @@ def test_each_record_of_a_list_has_its_own_normal_stress(turned: bool) -> None:
     fit = rsfstudy.fit(records, **OPTIONS)
     for name in ("a", "b", "slip_distance"):
         assert (np.abs(off_each(fit, name)) < 3.5).all(), name
-    k = fit.rsf.table().set_index("record")["k"]
-    assert k["low"] == pytest.approx(TRUTH["stiffness"])
-    assert k["high"] == pytest.approx(TRUTH["stiffness"] / 3.0)
+    k = fit.rsf.fit_table().set_index("record")["k"]
+    assert k["low"] == pytest.approx(EXACT_PARAMETERS["stiffness"])
+    assert k["high"] == pytest.approx(EXACT_PARAMETERS["stiffness"] / 3.0)
 
 
 def off_each(fit: Any, name: str) -> np.ndarray:
-    return np.asarray((fit[name] - TRUTH[name]) / fit[f"{name}_stderr"])
+    return np.asarray((fit[name] - EXACT_PARAMETERS[name]) / fit[f"{name}_stderr"])
 
 
 def test_steps_of_a_joint_fit_have_their_own_normal_stress() -> None:
     records = [record_at(24.0, 2, "high"), record_at(8.0, 1, "low")]
     fit = rsfstudy.fit(records, **OPTIONS, together=True)
     for name in ("a", "b", "slip_distance"):
-        assert abs(off(fit.squeeze(), name, TRUTH[name])) < 3.5, name
-    (row,) = fit.rsf.table().to_dict("records")
+        assert abs(deviation_in_stderrs(fit.squeeze(), name, EXACT_PARAMETERS[name])) < 3.5, name
+    (row,) = fit.rsf.fit_table().to_dict("records")
     assert (row["normal_stress_1"], row["normal_stress_2"]) == pytest.approx((24.0, 8.0))
-    assert row["k"] == pytest.approx(TRUTH["stiffness"] / 3.0)
+    assert row["k"] == pytest.approx(EXACT_PARAMETERS["stiffness"] / 3.0)
 
 
 def test_a_free_stiffness_of_a_joint_fit_is_that_of_one_machine() -> None:
@@ -86,13 +88,13 @@ def test_a_free_stiffness_of_a_joint_fit_is_that_of_one_machine() -> None:
     free = ("a", "b", "slip_distance", "mu_star", "stiffness")
     fit = rsfstudy.fit(records, **OPTIONS | {"stiffness": 2e-3}, free=free, together=True)
     for name in ("a", "slip_distance", "stiffness"):
-        assert abs(off(fit.squeeze(), name, TRUTH[name])) < 3.5, name
+        assert abs(deviation_in_stderrs(fit.squeeze(), name, EXACT_PARAMETERS[name])) < 3.5, name
 
 
 def test_a_normal_stress_that_varies_within_the_window_is_refused() -> None:
     record = record_at(8.0, 1, "rising", later=8.4)
     fit = rsfstudy.fit(record, **OPTIONS).squeeze()
-    assert LABELS[int(fit.status)] == "not_applicable"
+    assert STATUS_LABELS[int(fit.status)] == "not_applicable"
     assert "normal stress varies from 8 to 8.4 MPa" in str(fit.message.values)
     assert "after=" in str(fit.message.values)
 
@@ -100,12 +102,12 @@ def test_a_normal_stress_that_varies_within_the_window_is_refused() -> None:
 def test_noise_of_normal_stress_is_no_change() -> None:
     record = record_at(8.0, 1, "noisy")
     sigma = record.columns["normal_stress"]
-    sigma = sigma * (1.0 + synthetic.correlated(len(sigma), 0.0, 0.02, 3))
+    sigma = sigma * (1.0 + synthetic.correlated_noise(len(sigma), 0.0, 0.02, 3))
     noisy = rsfstudy.read_record(
         {**record.columns, "normal_stress": 1e-6 * sigma}, name="noisy"
     ).with_steps([(40.0, 40.0, 1.0, 10.0)])
     fit = rsfstudy.fit(noisy, **OPTIONS).squeeze()
-    assert LABELS[int(fit.status)] == "ok"
+    assert STATUS_LABELS[int(fit.status)] == "ok"
 
 
 def test_a_normal_stress_that_is_not_compressive_is_refused() -> None:

@@ -82,7 +82,7 @@ def test_waves_and_mass_resist():
 def test_motions_tend_to_linear_theory_as_the_square_of_their_amplitude(fields):
     """What is left at two amplitudes falls by four; without that, they agree to the accuracy."""
     scene = Scene(**{**OSCILLATES, **fields})
-    linear = response_to_normal_stress(scene, scene.log_load_rate, 2.0 * math.pi / PERIOD)
+    linear = response_to_normal_stress(scene, scene.log_load_velocity, 2.0 * math.pi / PERIOD)
     large, small = (response(scene, amplitude) / linear - 1.0 for amplitude in (1e-3, 5e-4))
     assert abs(large / small) == pytest.approx(4.0, rel=0.1)
     assert abs(4.0 * small - large) / 3.0 < 0.02 * abs(large) + 2e-6

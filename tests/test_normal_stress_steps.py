@@ -7,14 +7,14 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from running import begun
+from running import start_point
 from scipy.optimize import brentq
 
 from rsfstudy import Scene
 from rsfstudy.analysis.after_step import reaches_norm
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.starting import starting
+from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.starting import initial_point
 
 
 @given(
@@ -33,15 +33,15 @@ def test_at_the_instant_of_a_step(step, alpha, inertia):
         normal_stress_step=step,
         load_velocity_ratio=1.0,
     )
-    point, ratio = begun(scene), 1.0 + step
+    point, ratio = start_point(scene), 1.0 + step
     assert point.spring_stress == 0.0
     assert point.normal_stress == ratio
     assert point.state == pytest.approx(-alpha * math.log(ratio), abs=1e-15)
     if inertia:
-        point = starting(scene)
+        point = initial_point(scene)
         assert point.log_slip_rate == 0.0
         stress = ratio * (scene.mu_star - alpha * math.log(ratio)) - scene.mu_star
-        assert point.friction == pytest.approx(stress, abs=1e-14)
+        assert point.frictional_stress == pytest.approx(stress, abs=1e-14)
     else:
         excess = scene.mu_star / ratio - scene.mu_star + alpha * math.log(ratio)
         assert point.log_slip_rate == pytest.approx(excess / scene.a, abs=1e-12)
@@ -74,4 +74,4 @@ def test_a_fall_of_normal_stress_triggers_beyond_its_closed_form(law, alpha):
     step = 1.0 / q - 1.0
     for share, reached in ((1.0 - 1e-6, False), (1.0 + 1e-6, True)):
         stepped = scene.with_(normal_stress_step=share * step)
-        assert reaches_norm(stepped, Accuracy(1e-9), Meter(100_000)) is reached
+        assert reaches_norm(stepped, Accuracy(1e-9), WorkMeter(100_000)) is reached

@@ -6,7 +6,7 @@ from pathlib import Path
 import nbformat
 import pytest
 from nbclient import NotebookClient
-from running import HANGS
+from running import HANG_TIMEOUT
 
 HERE = Path(__file__).parent.parent / "studies"
 NOTEBOOK, FITTING = HERE / "analysis.ipynb", HERE / "fitting.ipynb"
@@ -40,7 +40,9 @@ def executed(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("MPLBACKEND", raising=False)  # the kernel chooses its own
         patch.setenv("RSFSTUDY_OUTPUTS", str(outputs))
-        client = NotebookClient(notebook, timeout=HANGS, resources={"metadata": {"path": outputs}})
+        client = NotebookClient(
+            notebook, timeout=HANG_TIMEOUT, resources={"metadata": {"path": outputs}}
+        )
         return client.execute()
 
 
@@ -67,7 +69,9 @@ def test_fits_tell_what_their_notebook_says():
     notebook.cells.append(nbformat.v4.new_code_cell(CONCLUDED))
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("MPLBACKEND", raising=False)
-        client = NotebookClient(notebook, timeout=HANGS, resources={"metadata": {"path": HERE}})
+        client = NotebookClient(
+            notebook, timeout=HANG_TIMEOUT, resources={"metadata": {"path": HERE}}
+        )
         cells = client.execute().cells
     outputs = [output for cell in cells for output in cell.get("outputs", [])]
     assert sum("image/png" in output.get("data", {}) for output in outputs) == 2

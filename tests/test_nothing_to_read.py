@@ -114,13 +114,13 @@ def test_each_number_is_described_once(measure):
     assert own.keys() & vocabulary.QUANTITIES.keys() <= SHARED
     for name in (*measure.variables, *measure.inner_coordinates):
         nothing_said = Quantity(name, "", "1", name.replace("_", " "))
-        assert vocabulary.quantity(name, own) != nothing_said
+        assert vocabulary.find_quantity(name, own) != nothing_said
 
 
 @pytest.mark.parametrize("measure", every_measure(), ids=lambda measure: measure.name)
 def test_no_outcome_is_ok_without_a_number_that_has_an_error(measure, monkeypatch):
-    """Whatever `find` gives: each such number, and its error, is there and finite, or is left out
-    because the measure says that it may be. (Errors of 1 would be more than was asked for.)
+    """Whatever `compute` gives: each such number, and its error, is there and finite, or is left
+    out because the measure says that it may be. (Errors of 1 would be more than was asked for.)
     """
     whole = {
         name: np.full([len(measure.inner_coordinates[dim]) for dim in dims], 2.0 + number)
@@ -135,15 +135,15 @@ def test_no_outcome_is_ok_without_a_number_that_has_an_error(measure, monkeypatc
         scene = Scene(normal_stress="imposed", **oscillates)
 
     def ended(values) -> Status:
-        monkeypatch.setattr(type(measure), "find", lambda *_asked: Outcome(Status.OK, values))
+        monkeypatch.setattr(type(measure), "compute", lambda *_asked: Outcome(Status.OK, values))
         return measure(scene, Accuracy()).status
 
     assert ended(whole) is Status.OK
-    assert measure.headline in whole
-    assert set(measure.optional) <= set(measure.estimated)
-    for name in measure.estimated:
+    assert measure.primary_output in whole
+    assert set(measure.optional_outputs) <= set(measure.outputs_with_error)
+    for name in measure.outputs_with_error:
         for missing in (name, f"{name}_error"):
             assert ended({**whole, missing: whole[missing] * math.nan}) is Status.NOT_FINITE
         rest = {n: v for n, v in whole.items() if n not in (name, f"{name}_error")}
-        may_lack = name in measure.optional
+        may_lack = name in measure.optional_outputs
         assert ended(rest) is (Status.OK if may_lack else Status.NOT_FINITE)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from running import call, run, same_numbers
+from running import call_main, have_same_numbers, run
 
 import rsfstudy
 from rsfstudy.compute import provenance
@@ -37,15 +37,15 @@ def test_results_open_check_and_plot(name, older, tmp_path):
     assert "layout" not in dataset.attrs
     assert dataset.rsf.study.name == dataset.attrs["id"]
     assert not rsfstudy.check(dataset).moved.any()
-    drawn = call("plot", older / name, "--output", tmp_path)
+    drawn = call_main("plot", older / name, "--output", tmp_path)
     assert (drawn.returncode, drawn.stderr) == (0, "")
-    assert call("show", older / name).returncode == (name == "displacement_boundary.nc")
+    assert call_main("show", older / name).returncode == (name == "displacement_boundary.nc")
     assert rsfstudy.compare(dataset, dataset).agrees
 
 
 def test_a_range_was_a_spread():
     narrow = {"law": "slip", "normal_stress": "constant", "load_velocity_ratio": [0.5, 2.0]}
-    dataset = run(catalogue.load("rigid_response").with_(**narrow), rtol=1e-3)
+    dataset = run(catalogue.load_study("rigid_response").with_(**narrow), rtol=1e-3)
     ranged = dataset.rsf.study.reductions
     described = json.loads(dataset.attrs["declaration"])
     spread = described["reductions"][1]
@@ -56,11 +56,11 @@ def test_a_range_was_a_spread():
 
 def test_they_hold_what_they_held(older):
     narrowed = rsfstudy.open(older / "rate_step_boundary.nc")
-    assert contents.declaration(narrowed).overrides == {"b_over_a": [2.0, 3.0], "alpha": 0.4}
+    assert contents.read_declaration(narrowed).overrides == {"b_over_a": [2.0, 3.0], "alpha": 0.4}
     assert set(rsfstudy.check(narrowed).verdict) == {"not applicable", "reproduced"}
     failed = rsfstudy.open(older / "displacement_boundary.nc")
     assert (failed.status == int(Status.WORK_BUDGET_SPENT)).any()
-    same_numbers(rsfstudy.open(older / "tiny.nc"), rsfstudy.open(older / "tiny.zarr").load())
+    have_same_numbers(rsfstudy.open(older / "tiny.nc"), rsfstudy.open(older / "tiny.zarr").load())
 
 
 def test_they_are_computed_again_from_themselves(older):
@@ -72,9 +72,9 @@ def test_they_are_computed_again_from_themselves(older):
 def test_files_name_their_layout(tmp_path):
     rsfstudy.run("linear_stability", output=tmp_path, workers=0, progress=False, b_over_a=[2.0])
     words = ["simulate", "--set", "load_velocity_ratio=2", "--duration", "0.1", "--output"]
-    call(*words, tmp_path / "m.png")
+    call_main(*words, tmp_path / "m.png")
     for name in ("linear_stability.nc", "m.nc"):
-        assert xr.load_dataset(tmp_path / name).attrs["layout"] == contents.LAYOUT
+        assert xr.load_dataset(tmp_path / name).attrs["layout"] == contents.LAYOUT_VERSION
 
 
 def test_a_motion_opens_and_is_drawn(older):
@@ -90,9 +90,9 @@ def test_a_run_goes_on(older, tmp_path, monkeypatch):
     journal.write_bytes((older / "tiny.cells.sqlite").read_bytes())
     with contextlib.closing(sqlite3.connect(journal)) as db, db:
         (text,) = db.execute("SELECT json FROM fingerprint").fetchone()
-        now = json.dumps({**json.loads(text), **provenance.fingerprint(study)}, sort_keys=True)
+        now = json.dumps({**json.loads(text), **provenance.run_fingerprint(study)}, sort_keys=True)
         db.execute("UPDATE fingerprint SET json = ?", (now,))
-    monkeypatch.setattr("rsfstudy.compute.cells.computed", None)
+    monkeypatch.setattr("rsfstudy.compute.cells.compute_cell", None)
     resumed = run(study, output=tmp_path)
     assert np.array_equal(
         resumed.critical_stiffness, rsfstudy.open(older / "tiny.nc").critical_stiffness

@@ -25,11 +25,11 @@ class Own(Measure):
     """Gives b/a."""
 
     name = "own"
-    headline = "total"
+    primary_output = "total"
     variables = {"total": ()}  # noqa: RUF012
     typical_work = 1
 
-    def find(self, scene, accuracy, meter):
+    def compute(self, scene, accuracy, meter):
         meter.charge("any", 7)
         return Outcome(Status.OK, {"total": scene.b_over_a})
 
@@ -56,7 +56,7 @@ class Outputs(Measure):
     """Gives b/a, as a stress and along a dimension, and now and then its logarithm."""
 
     name = "outputs"
-    headline = "total"
+    primary_output = "total"
     outputs = (
         Output("total", "$Q$", "1", "heat per area", "sigma_*", error=True),
         Output("curve", dims=("x",)),
@@ -67,7 +67,7 @@ class Outputs(Measure):
     inner_coordinates = {"x": [1.0, 2.0]}  # noqa: RUF012
     typical_work = 1
 
-    def find(self, scene, accuracy, meter):
+    def compute(self, scene, accuracy, meter):
         ratio = scene.b_over_a
         values = {"total": ratio, "total_error": 0.0, "curve": np.ones(2), "slip_per_event": 1.0}
         if ratio > 2.0:
@@ -86,7 +86,11 @@ def test_a_measure_states_its_outputs_once(tmp_path):
         "logarithm_error": (),
         "slip_per_event": (),
     }
-    assert (*measure.estimated, *measure.optional) == ("total", "logarithm", "logarithm")
+    assert (*measure.outputs_with_error, *measure.optional_outputs) == (
+        "total",
+        "logarithm",
+        "logarithm",
+    )
     dataset = run(study(measure), output=tmp_path)
     assert (dataset.status == int(Status.OK)).all()
     np.testing.assert_array_equal(dataset.logarithm, [np.nan, np.log(3.0)])
@@ -132,7 +136,7 @@ def test_inner_coordinates_that_a_file_gives_back(values, tmp_path):
         variables = {"total": (), "curve": ("x",)}  # noqa: RUF012
         inner_coordinates = {"x": values}  # noqa: RUF012
 
-        def find(self, scene, accuracy, meter):
+        def compute(self, scene, accuracy, meter):
             return Outcome(Status.OK, {"total": 1.0, "curve": [3, 4]})
 
     run(study(Curve()), output=tmp_path)
@@ -148,11 +152,11 @@ def test_inner_coordinates_that_a_file_gives_back(values, tmp_path):
 def test_work_that_is_no_count(count, tmp_path):
     """Each cell ends as one that raised; the journal and the file hold it."""
 
-    def find(self, scene, accuracy, meter):
-        meter.spent = count
+    def compute(self, scene, accuracy, meter):
+        meter.evaluations = count
         return Outcome(Status.OK, {"total": 1.0})
 
-    run_with_failures(study(own(find=find)), output=tmp_path)
+    run_with_failures(study(own(compute=compute)), output=tmp_path)
     found = rsfstudy.open("own", tmp_path)
     assert found["status"].values.tolist() == [Status.CELL_RAISED] * 2
     assert "must be a whole number from 0 to 2**63 - 1" in found["message"].values[0]

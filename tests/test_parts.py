@@ -14,8 +14,8 @@ from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider import registry
-from rsfstudy.slider.fluid.dilatant import Dilatant
-from rsfstudy.slider.normal_stress.variable import Variable
+from rsfstudy.slider.fluid.dilatant import DilatantFluid
+from rsfstudy.slider.normal_stress.variable import VariableNormalStress
 from rsfstudy.slider.places import NORMAL_STRESS
 from rsfstudy.status import Status
 
@@ -38,8 +38,8 @@ def test_orbits_of_another_law_need_not_close_at_critical_stiffness():
 
 def test_a_part_owns_its_fields():
     """Each is described once, by the part."""
-    described = {quantity.name for quantity in registry.QUANTITIES}
-    assert described == set(registry.FIELDS)
+    described = {quantity.name for quantity in registry.FIELD_QUANTITIES}
+    assert described == set(registry.FIELD_NAMES)
     assert Scene(inertia=True, radiation_damping=0.0).inertia is True
     assert Scene(normal_stress="constant", alpha=None).alpha is None
 
@@ -50,22 +50,22 @@ def half_as_strong(friction, ratio, change, p):
 
 def test_every_part_states_its_equation():
     """In its own docstring or in those of its functions: the page of names shows them."""
-    for part in registry.OWNERS.values():
+    for part in registry.FIELD_OWNERS.values():
         functions = (one.__func__ for one in vars(part).values() if isinstance(one, staticmethod))
         stated = " ".join(inspect.getdoc(one) or "" for one in (part, *functions))
         assert part.name == "slider" or re.search("``[^`]+=[^`]+``", stated), part
 
 
 @dataclass(frozen=True, kw_only=True)
-class HalfEffect(Variable):
+class HalfEffect(VariableNormalStress):
     name = "half_effect"
     state_effect = staticmethod(half_as_strong)
 
 
 @dataclass(frozen=True, kw_only=True)
-class LeakyFault(Dilatant):
+class LeakyFault(DilatantFluid):
     name = "leaky"
-    auxiliary_rates = staticmethod(Dilatant.auxiliary_rates)
+    auxiliary_rates = staticmethod(DilatantFluid.auxiliary_rates)
 
 
 def test_a_part_with_equations_of_its_own_inherits_no_conclusions():
@@ -76,10 +76,10 @@ def test_a_part_with_equations_of_its_own_inherits_no_conclusions():
     assert own.critical_stiffness == pytest.approx(half.critical_stiffness, rel=1e-12)
     assert half.parts.normal_stress.coupling[1] == 0.2
     assert own.parts.normal_stress.coupling is None
-    assert own.parts.normal_stress.weakest(own) == -math.inf
+    assert own.parts.normal_stress.min_frictional_stress(own) == -math.inf
     told = LinearStability()(own, Accuracy()).values
     assert told["critical_stiffness"] == pytest.approx(half.critical_stiffness, rel=1e-9)
     assert math.isnan(told["critical_stiffness_explicit"])
     assert Triggers()(own, Accuracy()).status is Status.NOT_APPLICABLE
     assert LeakyFault().highest_pressure(0.0, (0.0, 0.0)) == math.inf
-    assert Dilatant().highest_pressure(0.0, (0.0, 0.0)) < math.inf
+    assert DilatantFluid().highest_pressure(0.0, (0.0, 0.0)) < math.inf

@@ -8,13 +8,13 @@ from rsfstudy.named_studies._bifurcation import Bifurcation
 
 from rsfstudy import Scene
 from rsfstudy.analysis import return_map
-from rsfstudy.analysis.approach import Approach, course
+from rsfstudy.analysis.approach import CycleSearch, follow_to_orbit
 from rsfstudy.analysis.cycles import Cycle
-from rsfstudy.analysis.return_map import ReturnMap, product, section
+from rsfstudy.analysis.return_map import ReturnMap, chain_derivatives, section_at
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.slider.stability import growth_rates
 from rsfstudy.status import Status
 
@@ -38,17 +38,17 @@ def quick(rtol: float) -> Accuracy:
 
 
 def came_to(scene: Scene, events: int = 64, rtol: float = 1e-7, **how):
-    return course(scene, quick(rtol), Meter(2_000_000, engine=COMPILED), events, **how)
+    return follow_to_orbit(scene, quick(rtol), WorkMeter(2_000_000, engine=COMPILED), events, **how)
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
 def test_the_multiplier_of_one_state_is_the_slope_of_its_return_map(law):
     """Which limit cycles have known all along, from two cycles in a row."""
     scene = Scene(law=law, stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
-    accuracy, meter = Accuracy(1e-8), Meter(2_000_000)
-    approach = Approach(scene, accuracy, meter)
-    assert approach.follow(300)
-    orbit = course(scene, accuracy, meter, 64).orbit
+    accuracy, meter = Accuracy(1e-8), WorkMeter(2_000_000)
+    approach = CycleSearch(scene, accuracy, meter)
+    assert approach.run(300)
+    orbit = follow_to_orbit(scene, accuracy, meter, 64).orbit
     assert orbit.period == 1
     multiplier, forgotten = orbit.multipliers
     assert multiplier.imag == 0.0
@@ -69,7 +69,7 @@ def test_close_to_critical_stiffness_a_multiplier_is_what_growth_leaves():
 
 
 def followed(scene: Scene, count: int) -> list[Cycle]:
-    return came_to(scene, count, 1e-9, to_its_end=True).seen
+    return came_to(scene, count, 1e-9, follow_all=True).cycles
 
 
 @pytest.mark.parametrize(
@@ -81,24 +81,27 @@ def test_periods(ratio, period):
     found = LimitCycle(phases=50)(scene, quick(1e-7))
     assert found.status is Status.OK
     assert found.values["period_events"] == period
-    orbit = came_to(scene).orbit.from_largest
+    orbit = came_to(scene).orbit.from_largest_event
     assert orbit.period == period
-    assert orbit.attracts
-    begin, end = map(section, (orbit.cycles[0].begin, orbit.cycles[-1].end))
+    assert orbit.is_attracting
+    begin, end = map(section_at, (orbit.cycles[0].start_point, orbit.cycles[-1].end_point))
     assert np.abs(end - begin).max() < 1e-6 * scene.a
     # the orbit is that of the whole period, and the numbers are those of its largest event
     assert found.values["time"][-1] == pytest.approx(
-        sum(cycle.interval for cycle in orbit.cycles), rel=1e-6
+        sum(cycle.recurrence_interval for cycle in orbit.cycles), rel=1e-6
     )
     largest = orbit.cycles[0]
     assert found.values["max_log10_slip_rate"] == pytest.approx(
-        largest.fastest / math.log(10.0), abs=1e-6
+        largest.max_log_slip_rate / math.log(10.0), abs=1e-6
     )
-    assert found.values["recurrence_interval"] == pytest.approx(largest.interval, rel=1e-6)
+    assert found.values["recurrence_interval"] == pytest.approx(
+        largest.recurrence_interval, rel=1e-6
+    )
     assert np.ptp(found.values["shear_stress"]) >= 0.99 * found.values["static_stress_drop"]
     # slip over the period is that of the load point; over an event, less what the spring keeps
     slips = [
-        cycle.interval - (cycle.end.spring_stress - cycle.begin.spring_stress) / scene.stiffness
+        cycle.recurrence_interval
+        - (cycle.end_point.spring_stress - cycle.start_point.spring_stress) / scene.stiffness
         for cycle in orbit.cycles
     ]
     assert found.values["slip_per_event"] == pytest.approx(slips[0], rel=1e-6)
@@ -107,10 +110,10 @@ def test_periods(ratio, period):
 
 def test_multipliers_of_a_period_are_those_of_all_its_events():
     orbit = came_to(slow(0.856)).orbit
-    whole = product(orbit.slopes)
+    whole = chain_derivatives(orbit.derivatives)
     size = len(whole)
-    assert whole == pytest.approx(np.linalg.multi_dot([e[:size] for e in orbit.slopes[::-1]]))
-    turned = orbit.from_largest.multipliers
+    assert whole == pytest.approx(np.linalg.multi_dot([e[:size] for e in orbit.derivatives[::-1]]))
+    turned = orbit.from_largest_event.multipliers
     assert turned[0] == pytest.approx(orbit.multipliers[0], rel=1e-5)
 
 
@@ -162,13 +165,13 @@ def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
     """
     scene, transient, events = slow(0.853), 24, 16
     found = Bifurcation(transient=transient, events=events)(scene, quick(1e-7)).values
-    seen = came_to(scene, transient + events, 1e-7, to_its_end=True).seen
-    by = ReturnMap(scene, quick(1e-7), Meter(2_000_000, engine=COMPILED))
-    monkeypatch.setattr(return_map, "STEP", 3e-5)
+    seen = came_to(scene, transient + events, 1e-7, follow_all=True).cycles
+    by = ReturnMap(scene, quick(1e-7), WorkMeter(2_000_000, engine=COMPILED))
+    monkeypatch.setattr(return_map, "DIFFERENCE_STEP", 3e-5)
     direction, grown = np.array([0.2, 1.0, -0.3]), []
     for cycle in seen:
-        begin = section(cycle.begin)
-        (slopes,) = by.slopes(begin, 1, scene.a * cycle.swing)
+        begin = section_at(cycle.start_point)
+        (slopes,) = by.compute_derivatives(begin, 1, scene.a * cycle.log_slip_rate_range)
         direction = slopes[: len(begin)] @ direction / np.linalg.norm(direction)
         grown.append(math.log(np.linalg.norm(direction)))
     expected = np.mean(grown[transient:])

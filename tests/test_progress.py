@@ -4,7 +4,7 @@ import io
 import itertools
 
 import pytest
-from running import call
+from running import call_main
 
 from rsfstudy.api import progress
 
@@ -18,7 +18,7 @@ class Terminal(io.StringIO):
 
 def told(stream: io.StringIO, monkeypatch, done: list[int], show: bool = True) -> str:
     monkeypatch.setattr("sys.stderr", stream)
-    with progress.shown("holds", show) as update:
+    with progress.show_progress("holds", show) as update:
         for count in done:
             update(count, done[-1])
     return stream.getvalue()
@@ -56,7 +56,7 @@ def test_quiet_is_quiet(stream, monkeypatch):
 
 
 def test_the_command_tells_it_on_the_standard_error(tmp_path):
-    ran = call(*RUN, "--set", "b_over_a=2,3", "--output", tmp_path)
+    ran = call_main(*RUN, "--set", "b_over_a=2,3", "--output", tmp_path)
     assert ran.returncode == 0, ran.stderr
     assert "rate_step_boundary: 2 of 2 cells after" in ran.stderr
     assert "cells after" not in ran.stdout

@@ -17,10 +17,10 @@ from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import ENGINES
-from rsfstudy.motion.events import Kind, maximum
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.events import EventKind, maximum
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.slider import loading
 from rsfstudy.slider.protocol import Protocol
 from rsfstudy.status import Status
@@ -49,7 +49,7 @@ def test_protocols_are_what_their_fields_say():
     stepped = Scene(**STIFF, velocity_steps=3, velocity_ratio=4.0, displacement_between_steps=8.0)
     rows = [{"velocity": v, "distance": 8.0} for v in (4.0, 1.0, 4.0)]
     same_motion(stepped, Scene(**STIFF, loading=protocol(rows)), 12.0)
-    assert protocol(rows).lasts == 2.0 + 8.0 + 2.0
+    assert protocol(rows).duration == 2.0 + 8.0 + 2.0
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -72,7 +72,7 @@ def test_a_segment_may_be_as_short_as_time_can_tell(engine, begins):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_step_may_end_where_its_clock_rounds_to_the_begin(engine, monkeypatch):
     """As that of slip may; here by a hold that is too short to be told. It changes nothing."""
-    monkeypatch.setattr(loading, "SHORTEST", 0.0)
+    monkeypatch.setattr(loading, "MIN_SEGMENT_DURATION", 0.0)
     ends = [
         simulate(Scene(**STIFF, load_velocity_ratio=2.0, **hold), duration=5.0, engine=engine)
         for hold in ({}, {"hold_time": 1e-300})
@@ -85,15 +85,15 @@ def test_a_step_may_end_where_its_clock_rounds_to_the_begin(engine, monkeypatch)
 def test_a_very_long_hold_ends_when_it_should(engine):
     """Its clock is slip, which tells time to 1e-7 by then; its end is told by the history."""
     scene = Scene(**STIFF, hold_time=1e10)
-    asked = follow(
+    asked = integrate_events(
         scene,
         Accuracy(engine=engine),
-        Meter(10**5, engine=engine),
+        WorkMeter(10**5, engine=engine),
         [maximum("spring_stress")],
         until=1e10 + 40.0,
     )
     events = list(asked)
-    (reload,) = (event for event in events if event.kind is Kind.SEGMENT)
+    (reload,) = (event for event in events if event.kind is EventKind.SEGMENT)
     assert reload.time == 1e10
     assert events[-1].time == 1e10 + 40.0
     motion = simulate(scene, duration=1e10 + 40.0, engine=engine)
@@ -119,7 +119,7 @@ def test_a_trajectory_tells_the_segments_of_its_protocol():
     motion = simulate(scene, duration=6.0, rtol=1e-4)
     told = json.loads(motion.attrs["scene"])
     assert told["segments"] == HOLDS
-    assert protocol(told["segments"], "held").history == scene.parts.loading.segments
+    assert protocol(told["segments"], "held").input_segments == scene.parts.loading.segments
     assert "segments" not in json.loads(simulate(Scene(hold_time=1.0), duration=0.1).attrs["scene"])
 
 
@@ -129,7 +129,7 @@ def test_protocols_are_pickled_by_their_segments(last):
     for protocol_number in range(2, pickle.HIGHEST_PROTOCOL + 1):
         again = pickle.loads(pickle.dumps(scene, protocol_number))
         assert again == scene
-        assert again.parts.loading.lasts == scene.parts.loading.lasts
+        assert again.parts.loading.duration == scene.parts.loading.duration
     assert cloudpickle.loads(cloudpickle.dumps(scene)) == scene
     assert copy.deepcopy(scene) == scene
     assert pickle.loads(pickle.dumps(Protocol)) is Protocol
@@ -165,6 +165,6 @@ def test_a_history_without_a_step_is_that_of_the_plain_scene(idle):
     for measure in (LimitCycle(phases=2), Bifurcation(transient=4, events=4)):
         found, expected = measure(idle, accuracy), measure(plain, accuracy)
         assert found.status is expected.status is Status.OK
-        assert found.values[measure.headline] == expected.values[measure.headline]
+        assert found.values[measure.primary_output] == expected.values[measure.primary_output]
     if len(idle.parts.loading.segments) == 1:
         assert Triggered()(idle, accuracy).values["unstable"] == 0.0

@@ -21,18 +21,18 @@ import click
 import numpy as np
 import pytest
 import xarray as xr
-from running import SMALL, call, run, study_of
+from running import SMALL_STUDY, call_main, run, study_of
 
 import rsfstudy
-from rsfstudy import Axis, Laboratory, Scene, Study, read_record
+from rsfstudy import Axis, Rig, Scene, Study, read_record
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.cli import command_line
 from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.files import journal
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.referee.problem import shipped
-from rsfstudy.slider.registry import FIELDS
+from rsfstudy.referee.problem import shipped_problems
+from rsfstudy.slider.registry import FIELD_NAMES
 
 JUNK = [
     None, True, -1, 0, 3, 1.5, float("nan"), float("inf"), 10**400, 1j, "", "other", "\0", "\udcff",
@@ -100,7 +100,7 @@ def calls(place: Path) -> dict[str, dict]:
     cycling = Scene(stiffness_ratio=0.8, normal_stress="constant")
     dataset, no_workers = rsfstudy.open(place / "lattice.nc"), {"workers": 0, "progress": False}
     return {
-        "cell": {"file": place / "lattice.nc", "place": {"law": "slip", "b_over_a": 2.0}},
+        "recompute_cell": {"file": place / "lattice.nc", "place": {"law": "slip", "b_over_a": 2.0}},
         "check": {"dataset": dataset},
         "compare": {"first": dataset, "second": dataset},
         "critical_step": {"scene": scene, "rtol": 1e-2, "engine": "compiled"},
@@ -117,7 +117,7 @@ def calls(place: Path) -> dict[str, dict]:
         "rerun": {"file": place / "lattice.nc", **no_workers},
         "run": {"study": LATTICE, "output": None, **no_workers},
         "simulate": {"scene": scene, **quick},
-        "picture": {"motion": xr.load_dataset(place / "motion.nc")},
+        "plot_motion": {"motion": xr.load_dataset(place / "motion.nc")},
         "to_si": {"dataset": dataset, "normal_stress": 5e6, "slip_distance": 1e-5},
     }
 
@@ -133,7 +133,7 @@ def functions() -> list[tuple[str, str]]:
         # a client, or a figure, of one's own may be anything
         if parameter not in ("client", "own", "workers", "progress")
         # fields of scenes are tried in what is made
-        and not (name == "run" and parameter in FIELDS)
+        and not (name == "run" and parameter in FIELD_NAMES)
         and kind.kind not in (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
     ]
 
@@ -152,7 +152,7 @@ MADE = {
     Scene: {},
     Axis: {"dimension": "b_over_a", "values": [1.0]},
     Study: {name: getattr(LATTICE, name) for name in ("name", "title", "base", "axes", "measure")},
-    Laboratory: RIG,
+    Rig: RIG,
     Claim: {**CLAIM, "tolerance": 1.0, "reason": ""},
 }
 
@@ -292,7 +292,7 @@ def commands(place: Path) -> dict[str, list[str]]:
             *("--noise", "white", "--slip-distance", "10 um"),
         ],
         "problems": ["referee"],
-        "verify": [str(shipped()[19].with_suffix(".csv"))],
+        "verify": [str(shipped_problems()[19].with_suffix(".csv"))],
     }
 
 
@@ -315,7 +315,7 @@ def test_junk_in_commands(name, parameter, place, tmp_path, monkeypatch):
         words = [word] if isinstance(parameter, click.Argument) else [parameter.opts[0], word]
         if isinstance(parameter, click.Argument):
             rest = rest[1:]
-        done = call(name, *words, *rest)
+        done = call_main(name, *words, *rest)
         assert done.returncode in (None, 0, 1, 2, 3), words
         assert done.stdout or done.stderr, words
         assert len(done.stderr) < 20_000, words
@@ -331,7 +331,7 @@ def test_output_that_cannot_hold_a_character(encoding, columns, words, tmp_path,
     run(LATTICE.with_(b_over_a=[2.0, 3.0]), output=tmp_path, command="rsfstudy run Größe ζ ✓")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", columns)
-    ran = call(*words, "lattice.nc", encoding=encoding)
+    ran = call_main(*words, "lattice.nc", encoding=encoding)
     assert (ran.returncode, ran.stderr) == (0, "")
     assert ran.stdout
 
@@ -359,11 +359,11 @@ def test_a_journal_of_other_things_is_refused(change, place, tmp_path):
     with contextlib.closing(sqlite3.connect(kept)) as db, db:
         db.executescript(change)
     answered(lambda: run(LATTICE, output=tmp_path))
-    answered(lambda: journal.timed(kept))
+    answered(lambda: journal.read_timings(kept))
 
 
 def test_a_store_with_a_link_is_refused(tmp_path):
-    run(SMALL, output=tmp_path, format="zarr")
+    run(SMALL_STUDY, output=tmp_path, format="zarr")
     array = tmp_path / "small.zarr" / "critical_velocity_ratio"
     array.rename(tmp_path / "elsewhere")
     array.symlink_to(tmp_path / "elsewhere")

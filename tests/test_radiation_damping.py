@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rsfstudy import Scene
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.equations import between_ruptures, relation_of
+from rsfstudy.slider.equations import equations_between_ruptures, friction_relation
 
 
 @given(
@@ -25,9 +25,9 @@ def test_friction_and_radiation_balance_the_spring(
 ):
     damping = math.exp(log_damping)
     scene = Scene(normal_stress="constant") if constant else Scene(alpha=alpha)
-    scene, strength = scene.with_(radiation_damping=damping), relation_of(scene)
-    point = between_ruptures(scene, clock=False).at((spring_stress, psi))
-    x, friction = point.log_slip_rate, point.friction
+    scene, strength = scene.with_(radiation_damping=damping), friction_relation(scene)
+    point = equations_between_ruptures(scene, clock=False).evaluate_point((spring_stress, psi))
+    x, friction = point.log_slip_rate, point.frictional_stress
     # rounding of the stresses, and of x times the slope of radiation in x
     radiated = damping * math.expm1(x)
     scale = 1.0 + abs(spring_stress) + abs(psi) + (1.0 + abs(x)) * abs(radiated)
@@ -41,7 +41,7 @@ def test_at_zero_strength_it_is_the_effect_absent(law, of):
     scene = Scene(law=law)
     critical = CriticalStep(of=of)
     absent, faint = (
-        critical(scene.with_(radiation_damping=damping), Accuracy()).values[critical.headline]
+        critical(scene.with_(radiation_damping=damping), Accuracy()).values[critical.primary_output]
         for damping in (0.0, 1e-17)
     )
     assert faint == pytest.approx(absent, rel=1e-8)

@@ -5,16 +5,16 @@ ramps of load point velocity, in stairs.
 import math
 
 import pytest
-from in_time import InTime
+from in_time import TimeDomainMotion
 
 from rsfstudy import Scene, simulate
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.events import Kind, settling
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.events import EventKind, approach_to_steady_state
+from rsfstudy.motion.meter import WorkMeter
 
 IMPOSED = {"law": "slowness", "normal_stress": "imposed", "alpha": 0.3, "stiffness_ratio": 3.0}
 SLIDERS = {
@@ -35,9 +35,9 @@ def test_where_stability_limits_steps_a_motion_ends_as_accurately_as_steps_do(ov
                   ramp_duration=30.5)  # fmt: skip
 
     def at_end(rtol: float, engine: str) -> tuple[float, float]:
-        meter = Meter(200_000, engine=engine)
+        meter = WorkMeter(200_000, engine=engine)
         accuracy = Accuracy(rtol, engine=engine)
-        *_, end = follow(scene, accuracy, meter, clock=True, until=over * 30.5)
+        *_, end = integrate_events(scene, accuracy, meter, with_time=True, until=over * 30.5)
         assert end.time == over * 30.5
         return end.point.log_slip_rate, end.point.spring_stress / scene.a
 
@@ -49,8 +49,8 @@ def test_where_stability_limits_steps_a_motion_ends_as_accurately_as_steps_do(ov
 
 def test_once_over_it_leaves_no_unknown():
     scene = Scene(**IMPOSED, **RAMP)
-    (during, first), (after, last) = scene.chains
-    assert (during.states, after.states) == (2, 1)
+    (during, first), (after, last) = scene.continuous_segments
+    assert (during.state_count, after.state_count) == (2, 1)
     assert [*first[0, :2], *last[0, :2]] == [0.0, 4.0, 4.0, math.inf]
     assert (
         after.numbers == Scene(**IMPOSED, normal_stress_step=0.1, load_velocity_ratio=1.0).numbers
@@ -60,9 +60,11 @@ def test_once_over_it_leaves_no_unknown():
 @pytest.mark.parametrize("slider", SLIDERS)
 def test_it_settles_once_over(slider):
     scene = Scene(**SLIDERS[slider], **RAMP)
-    accuracy, meter = Accuracy(1e-8, engine=COMPILED), Meter(10**5, engine=COMPILED)
-    *_earlier, end = follow(scene, accuracy, meter, [settling(1e-3, ends=True)], clock=True)
-    assert end.kind is Kind.SETTLED
+    accuracy, meter = Accuracy(1e-8, engine=COMPILED), WorkMeter(10**5, engine=COMPILED)
+    *_earlier, end = integrate_events(
+        scene, accuracy, meter, [approach_to_steady_state(1e-3, terminal=True)], with_time=True
+    )
+    assert end.kind is EventKind.SETTLED
     assert end.time > 4.0
     motion = simulate(scene, duration=12.0, engine=COMPILED)
     assert (motion.time == 4.0).any()
@@ -83,10 +85,13 @@ PLAIN = {"law": "slowness", "normal_stress": "constant", "stiffness_ratio": 3.0}
 def test_stairs_tend_to_a_ramp_of_velocity_as_the_square_of_their_number(change):
     """By equations in time, up to the end of the ramp and beyond it."""
     scene = Scene(**PLAIN, velocity_ramp=change, velocity_ramp_duration=4.0)
-    known, off = InTime(Scene(**PLAIN), velocity_ramp=change).solved([5.0])[0][0].f, []
+    known, off = (
+        TimeDomainMotion(Scene(**PLAIN), velocity_ramp=change).solve([5.0])[0][0].spring_stress,
+        [],
+    )
     for stairs in (64, 128):
         which = scene.with_(velocity_ramp_stairs=stairs)
-        *_earlier, end = follow(which, Accuracy(1e-9), Meter(10**6), until=5.0)
+        *_earlier, end = integrate_events(which, Accuracy(1e-9), WorkMeter(10**6), until=5.0)
         off.append(end.point.spring_stress - known)
     assert off[0] / off[1] == pytest.approx(4.0, rel=0.1)
     assert abs(off[1]) < 1e-4 * scene.a

@@ -11,14 +11,14 @@ import shutil
 from pathlib import Path
 
 import pytest
-from running import call, named_results
+from running import call_main, named_results
 
 import rsfstudy
 from rsfstudy import measures, reduce
 from rsfstudy.cli.command_line import cli
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.slider import laws
-from rsfstudy.slider.parts import names_of
+from rsfstudy.slider.parts import field_names
 
 ROOT = Path(__file__).parent.parent
 #: The README, and the pages that go on from it.
@@ -71,7 +71,7 @@ def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, m
     code = BLOCKS[number]
     if number == FILE:
         (tmp_path / "angle.py").write_text(code)
-        ran = call("run", "angle.py", "--serial")
+        ran = call_main("run", "angle.py", "--serial")
         assert ran.returncode == 0, ran.stdout + ran.stderr
         return
     if "outputs/rate_step_boundary.nc" in code:
@@ -131,7 +131,7 @@ def test_the_command_of_the_readme_fits_the_record(tmp_path, monkeypatch):
     assert here == there.replace("step.csv", "studies/pages/step.csv")
     lay_record(tmp_path)
     monkeypatch.chdir(tmp_path)
-    ran = call(*shlex.split(here)[1:])
+    ran = call_main(*shlex.split(here)[1:])
     assert ran.returncode == 0, ran.stderr
     assert {"fit.png", "fit.nc"} <= {file.name for file in tmp_path.iterdir()}
 
@@ -139,8 +139,8 @@ def test_the_command_of_the_readme_fits_the_record(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("base", "example", "written"),
     [
-        (laws.Law, laws.PARTS["slowness"], ("evolution", "numbers", "check")),
-        (measures.Measure, CriticalStep, ("find", "scales")),
+        (laws.Law, laws.BUILT_IN_PARTS["slowness"], ("evolution", "numbers", "check")),
+        (measures.Measure, CriticalStep, ("compute", "error_scales")),
         (reduce.Reduction, reduce.Reduction, ("__call__", "derivatives")),
     ],
 )
@@ -176,12 +176,12 @@ def test_every_study_is_listed():
 
 
 def test_every_law_is_listed():
-    for name, law in laws.PARTS.items():
+    for name, law in laws.BUILT_IN_PARTS.items():
         row = re.search(rf"^\| (?:`\w+`, )*`{name}`.*$", TEXT, re.MULTILINE)
         assert row, name
-        own = set(names_of(law)) - set(names_of(laws.Law))
+        own = set(field_names(law)) - set(field_names(laws.Law))
         assert all(f"`{field}`" in row[0] for field in own)
-    assert all(f"`{field}`" in TEXT for field in names_of(laws.Law) if field != "b_over_a")
+    assert all(f"`{field}`" in TEXT for field in field_names(laws.Law) if field != "b_over_a")
 
 
 def test_the_table_of_zeta_is_ours(tmp_path_factory):

@@ -7,13 +7,15 @@ import pytest
 import record_events as synthetic
 
 import rsfstudy
-from rsfstudy.errors import InvalidValue, NoAnswer
+from rsfstudy.errors import InvalidValue, NoResultWarning
 
 
 @pytest.mark.parametrize("kind", synthetic.KINDS)
 def test_drops_are_found_with_errors_that_cover(kind: str) -> None:
     """Of 18 drops at 95 %, three outside of their errors have a chance of 6 %."""
-    found = synthetic.score(synthetic.KINDS[kind](np.random.default_rng([1, *kind.encode()])))
+    found = synthetic.score_record(
+        synthetic.KINDS[kind](np.random.default_rng([1, *kind.encode()]))
+    )
     assert found.large > 0
     assert (found.found, found.false) == (found.large, 0)
     assert found.sizes >= found.matched - 3
@@ -21,7 +23,7 @@ def test_drops_are_found_with_errors_that_cover(kind: str) -> None:
 
 
 def test_a_drop_at_the_end_of_the_record_is_cut() -> None:
-    made = synthetic.cut(np.random.default_rng(3))
+    made = synthetic.cut_record(np.random.default_rng(3))
     found = rsfstudy.events(time=made.time, shear_stress=made.stress)
     assert found["cut"].values.tolist() == [0] * (len(made.begins) - 1) + [2]
     # up to the middle of the third drop, and from there on
@@ -35,7 +37,7 @@ def test_a_drop_at_the_end_of_the_record_is_cut() -> None:
 def test_a_short_drop_is_not_averaged_away() -> None:
     """The mean of many drops over five samples is right to within its error."""
     rng = np.random.default_rng(4)
-    made = synthetic.draw(rng, 0.01 * np.arange(8_000), size=(0.4, 0.4), lasts=(0.05, 0.05))
+    made = synthetic.draw_record(rng, 0.01 * np.arange(8_000), size=(0.4, 0.4), lasts=(0.05, 0.05))
     found = rsfstudy.events(time=made.time, shear_stress=made.stress)
     off = found.static_stress_drop.values - 0.4
     assert len(off) == len(made.begins)
@@ -43,7 +45,7 @@ def test_a_short_drop_is_not_averaged_away() -> None:
 
 
 def test_the_sign_of_shear_stress() -> None:
-    made = synthetic.whole(np.random.default_rng(5))
+    made = synthetic.sudden_drops(np.random.default_rng(5))
     positive = rsfstudy.events(time=made.time, shear_stress=made.stress)
     negative = rsfstudy.events(time=made.time, shear_stress=-made.stress)
     assert negative.attrs["sign_of_shear_stress"] == -1
@@ -60,17 +62,19 @@ def test_stress_that_varies_without_drops_is_reported() -> None:
     time = 0.02 * np.arange(10_000)
     wave = 5.0 + np.cos(2.0 * np.pi * time / 150.0)
     noise = np.random.default_rng(6).normal(size=len(time))
-    with pytest.warns(NoAnswer, match="no drop was found, although stress falls by 2.0"):
+    with pytest.warns(NoResultWarning, match="no drop was found, although stress falls by 2.0"):
         found = rsfstudy.events(time=time, shear_stress=wave + 0.02 * noise)
     assert found.sizes["event"] == 0
     assert "times the smallest drop" in found.attrs["comment"]
 
 
 def test_events_of_a_record_as_fits_read_it() -> None:
-    made = synthetic.whole(np.random.default_rng(7))
+    made = synthetic.sudden_drops(np.random.default_rng(7))
     columns = {"time": made.time, "displacement": made.time, "shear_stress": made.stress}
     record = rsfstudy.read_record(columns, normal_stress="8 MPa")
-    with pytest.warns(NoAnswer, match="no faster"):  # the displacement is that of the load point
+    with pytest.warns(
+        NoResultWarning, match="no faster"
+    ):  # the displacement is that of the load point
         found = rsfstudy.events(record)
     plain = rsfstudy.events(time=made.time, shear_stress=made.stress)
     np.testing.assert_allclose(found.static_stress_drop, plain.static_stress_drop, rtol=1e-6)

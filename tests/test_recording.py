@@ -13,11 +13,12 @@ from rsfstudy import Scene, protocol, simulate
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.events import Event, Kind
-from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.recording import READ, STATES, Recording, along_path
+from rsfstudy.motion.events import Event, EventKind
+from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.readings import sample_along_path
+from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLES, Recording
 from rsfstudy.status import Status
 
 RTOL = 1e-6
@@ -47,14 +48,16 @@ TIMES = np.array([0.0, 1e-9, 0.7, 0.7000001, 3.0, 3.5, 8.0, 8.0 + 1e-9, 10.0, 12
 
 def recorded(scene: Scene, engine: str, times: np.ndarray, until: float = math.inf):
     """What is recorded, and the events of the motion until it is, or ends."""
-    recording, events = Recording(at=times), list[Event]()
-    meter, accuracy = Meter(10**6, engine=engine), Accuracy(RTOL, engine=engine)
-    motion = follow(scene, accuracy, meter, clock=True, until=until, recording=recording)
+    recording, events = Recording(sample_times=times), list[Event]()
+    meter, accuracy = WorkMeter(10**6, engine=engine), Accuracy(RTOL, engine=engine)
+    motion = integrate_events(
+        scene, accuracy, meter, with_time=True, until=until, recording=recording
+    )
     for event in motion:
         events.append(event)
-        if event.kind is Kind.SAMPLED and math.isinf(until):
+        if event.kind is EventKind.SAMPLED and math.isinf(until):
             break
-    return recording.seen(scene), events
+    return recording.table(scene), events
 
 
 def row_of(scene: Scene, event: Event) -> list[float]:
@@ -62,11 +65,11 @@ def row_of(scene: Scene, event: Event) -> list[float]:
     point = event.point
     stresses = (
         scene.mu_star + point.spring_stress,
-        scene.mu_star + point.friction,
+        scene.mu_star + point.frictional_stress,
         point.normal_stress,
     )
     log_slip_rate = point.log_slip_rate / math.log(10.0)
-    return [event.slip, log_slip_rate, *stresses, point.state, point.reading]
+    return [event.slip, log_slip_rate, *stresses, point.state, point.apparent_friction]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -76,17 +79,22 @@ def test_values_are_those_of_motions_that_end_there(name, engine):
     scene = SCENES[name]
     table, events = recorded(scene, engine, TIMES, until=15.0)
     assert table[:, 0].tolist() == TIMES.tolist()
-    assert [event.kind for event in events].count(Kind.SAMPLED) == 1
-    assert [event.kind for event in events[-2:]] == [Kind.SAMPLED, Kind.END]
+    assert [event.kind for event in events].count(EventKind.SAMPLED) == 1
+    assert [event.kind for event in events[-2:]] == [EventKind.SAMPLED, EventKind.END]
     for time, row in zip(TIMES[1:], table[1:], strict=True):
-        meter, accuracy = Meter(10**6, engine=engine), Accuracy(RTOL, engine=engine)
-        *_, end = follow(scene, accuracy, meter, clock=True, until=time)
-        assert (end.kind, end.time) == (Kind.END, time)
-        states = list(end.point.psis[: len(row) - STATES])
+        meter, accuracy = WorkMeter(10**6, engine=engine), Accuracy(RTOL, engine=engine)
+        *_, end = integrate_events(scene, accuracy, meter, with_time=True, until=time)
+        assert (end.kind, end.time) == (EventKind.END, time)
+        states = list(end.point.psis[: len(row) - FIRST_STATE_COLUMN])
         expected = [*row_of(scene, end), *states]
         # relative to changes of one in ln V, and of a in stress and states; slip by that of stress
         scales = [1.0 + scene.a / scene.stiffness, 1.0, *[scene.a] * (len(expected) - 2)]
-        apart = np.abs([*row[1 : len(READ)], *row[STATES:]] - np.array(expected)) / scales
+        apart = (
+            np.abs(
+                [*row[1 : len(RECORDED_VARIABLES)], *row[FIRST_STATE_COLUMN:]] - np.array(expected)
+            )
+            / scales
+        )
         assert apart.max() < 30.0 * RTOL, (time, apart)
 
 
@@ -97,8 +105,8 @@ def test_the_end_of_a_segment_is_recorded_and_not_the_beginning_of_the_next(engi
     """
     scene = SCENES["protocol"]
     table, events = recorded(scene, engine, np.array([8.0, 8.0, 8.0 + 1e-12, 8.5]))
-    (begun,) = (event for event in events if event.kind is Kind.SEGMENT and event.time == 8.0)
-    spring_stress = table[:, READ.index("shear_stress")] - scene.mu_star
+    (begun,) = (event for event in events if event.kind is EventKind.SEGMENT and event.time == 8.0)
+    spring_stress = table[:, RECORDED_VARIABLES.index("shear_stress")] - scene.mu_star
     jump = -0.4 * scene.stiffness
     assert (
         spring_stress[0]
@@ -106,14 +114,14 @@ def test_the_end_of_a_segment_is_recorded_and_not_the_beginning_of_the_next(engi
         == pytest.approx(begun.point.spring_stress - jump, rel=1e-12)
     )
     assert spring_stress[2] == pytest.approx(begun.point.spring_stress, abs=1e-9 * scene.a)
-    assert events[-1].kind is Kind.SAMPLED
+    assert events[-1].kind is EventKind.SAMPLED
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_what_lies_beyond_the_end_is_not_recorded(engine):
     table, events = recorded(SCENES["one segment"], engine, np.array([1.0, 2.0, 3.0]), until=2.0)
     assert table[:, 0].tolist() == [1.0, 2.0]
-    assert [event.kind for event in events] == [Kind.START, Kind.END]
+    assert [event.kind for event in events] == [EventKind.START, EventKind.END]
 
 
 # ---- between the steps ---------------------------------------------------------------------------
@@ -130,10 +138,10 @@ def weights(scene: Scene) -> dict[str, float]:
 
 def exactly(scene: Scene, times: np.ndarray) -> dict[str, np.ndarray]:
     """The motion at times, a hundred times more accurate than any below."""
-    recording, accuracy = Recording(at=times), Accuracy(1e-11, 10**7, engine=COMPILED)
-    meter = Meter(10**7, engine=COMPILED)
-    list(follow(scene, accuracy, meter, until=float(times[-1]), recording=recording))
-    return dict(zip(READ, recording.seen(scene).T, strict=False))
+    recording, accuracy = Recording(sample_times=times), Accuracy(1e-11, 10**7, engine=COMPILED)
+    meter = WorkMeter(10**7, engine=COMPILED)
+    list(integrate_events(scene, accuracy, meter, until=float(times[-1]), recording=recording))
+    return dict(zip(RECORDED_VARIABLES, recording.table(scene).T, strict=False))
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-9])
@@ -188,12 +196,14 @@ def test_points_along_a_path_are_those_of_the_compiled_loop():
     """
     scene = Scene(law="slip", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
     recording, changes = Recording(), 0
-    for event in follow(scene, Accuracy(1e-6), Meter(20_000), clock=True, recording=recording):
-        changes += event.kind is Kind.REGIME
+    for event in integrate_events(
+        scene, Accuracy(1e-6), WorkMeter(20_000), with_time=True, recording=recording
+    ):
+        changes += event.kind is EventKind.REGIME
         if changes == 2:
             break
-    table = recording.seen(scene)
-    ours, theirs = along_path(table, 50), along_path(table, 50, engine=COMPILED)
+    table = recording.table(scene)
+    ours, theirs = sample_along_path(table, 50), sample_along_path(table, 50, engine=COMPILED)
     for name, values in ours.items():
         off = np.abs(theirs[name] - values) > 1e-11 * max(1.0, np.ptp(values))
         assert np.count_nonzero(off) <= 4, name

@@ -7,26 +7,26 @@ import pytest
 import xarray as xr
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from rsfstudy.named_studies.bounded_slip import Parting
-from rsfstudy.named_studies.stability_map import CyclingEdge
-from running import claimed
+from rsfstudy.named_studies.bounded_slip import PathSeparation
+from rsfstudy.named_studies.stability_map import CycleRegionEdge
+from running import example_claim
 from scipy.stats import linregress
 
-from rsfstudy.declare.claims import Claim, verdicts
+from rsfstudy.declare.claims import Claim, build_verdict_table
 from rsfstudy.errors import InvalidValue
 from rsfstudy.reduce import (
     Boundary,
-    DecadeFit,
+    ClosedFormRatio,
     Difference,
     Inverse,
     LinearFit,
-    OverClosedForm,
     PowerLaw,
     ProportionalFit,
     Range,
     Reduction,
     RelativeDifference,
-    reduced,
+    SemilogFit,
+    apply_reductions,
 )
 from rsfstudy.status import Status
 
@@ -55,7 +55,7 @@ def lattice(values, status=None) -> xr.Dataset:
 def test_fit_agrees_with_numpy(noise):
     """Slope and standard error against numpy's least squares with one column."""
     values = 1.0 + 0.7 * X + np.array(noise)
-    result = reduced(lattice(values), (FIT,))
+    result = apply_reductions(lattice(values), (FIT,))
     x, y = X[:3], values[:3] - 1.0
     (slope,), (residual,), _rank, _s = np.linalg.lstsq(x[:, None], y, rcond=None)
     assert float(result.zeta) == pytest.approx(slope, rel=1e-12)
@@ -69,12 +69,12 @@ def test_a_slope_per_decade_is_that_over_the_logarithm():
     """And a point at 0, which has none, is left out."""
     noise = np.array([0.02, -0.03, 0.01, 0.04, -0.02])
     values = 2.0 + 0.3 * np.log10(X) + noise
-    fit = DecadeFit(name="rate", of="critical_velocity_ratio", on="a_over_b_minus_a")
-    result, expected = reduced(lattice(values), (fit,)), linregress(np.log10(X), values)
+    fit = SemilogFit(name="rate", of="critical_velocity_ratio", on="a_over_b_minus_a")
+    result, expected = apply_reductions(lattice(values), (fit,)), linregress(np.log10(X), values)
     assert float(result.rate) == pytest.approx(expected.slope, rel=1e-12)
     assert float(result.rate_stderr) == pytest.approx(expected.stderr, rel=1e-12)
     moved = lattice(values).assign_coords(a_over_b_minus_a=("b_over_a", [0.0, *X[1:]]))
-    result, expected = reduced(moved, (fit,)), linregress(np.log10(X[1:]), values[1:])
+    result, expected = apply_reductions(moved, (fit,)), linregress(np.log10(X[1:]), values[1:])
     assert float(result.rate) == pytest.approx(expected.slope, rel=1e-12)
     assert int(result.rate_points) == 4
 
@@ -85,13 +85,13 @@ def test_the_exponent_of_a_power_law_is_the_slope_of_its_logarithms():
     """
     noise = np.array([1.02, 0.97, 1.01, 1.04, 0.98])
     fit = PowerLaw(name="n", of="critical_velocity_ratio", on="a_over_b_minus_a")
-    exact = reduced(lattice(3.0 * X**-1.25), (fit,))
+    exact = apply_reductions(lattice(3.0 * X**-1.25), (fit,))
     assert float(exact.n) == pytest.approx(-1.25, rel=1e-14)
-    result, logs = reduced(lattice(X**-1.25 * noise), (fit,)), np.log(X)
+    result, logs = apply_reductions(lattice(X**-1.25 * noise), (fit,)), np.log(X)
     expected = linregress(logs, -1.25 * logs + np.log(noise))
     assert float(result.n) == pytest.approx(expected.slope, rel=1e-12)
     assert float(result.n_stderr) == pytest.approx(expected.stderr, rel=1e-9)
-    lost = reduced(lattice([-1.0, *X[1:] ** -1.25]), (fit,))
+    lost = apply_reductions(lattice([-1.0, *X[1:] ** -1.25]), (fit,))
     assert (float(lost.n), int(lost.n_points)) == (pytest.approx(-1.25, rel=1e-14), 4)
 
 
@@ -114,11 +114,11 @@ def test_numbers_that_failures_leave_behind_reach_no_result(failure, place):
     """Through any number of reductions; what does not draw on them stays."""
     values = np.array([1.0 + X, 1.0 + 2.0 * X])
     row = ["reference", "other"].index(place[0])
-    clean = reduced(lattice(values), CHAIN)
+    clean = apply_reductions(lattice(values), CHAIN)
     assert float(clean.slope.sel(case="other")) == pytest.approx(1.0)
     codes = np.zeros(values.shape)
     values[row, place[1]], codes[row, place[1]] = 1e6, failure
-    result = reduced(lattice(values, codes), CHAIN)
+    result = apply_reductions(lattice(values, codes), CHAIN)
     for name in ("gain", "lowering"):
         assert np.isnan(result[name].sel(case="other")[1])
         assert "failed" in result[name].attrs["refused"]
@@ -127,7 +127,7 @@ def test_numbers_that_failures_leave_behind_reach_no_result(failure, place):
     for name in ("slope", "apart", "edge"):
         assert np.isnan(result[name].sel(case="other"))
         assert "failed" in result[name].attrs["refused"]
-    left_out = reduced(lattice(values, codes), CHAIN, despite_failures=True)
+    left_out = apply_reductions(lattice(values, codes), CHAIN, despite_failures=True)
     assert float(left_out.slope.sel(case="other")) == pytest.approx(1.0)
     assert int(left_out.slope_points.sel(case="other")) == 4
 
@@ -135,13 +135,13 @@ def test_numbers_that_failures_leave_behind_reach_no_result(failure, place):
 @pytest.mark.parametrize("name", ["critical_velocity_ratio", "status", "b_over_a"])
 def test_a_reduction_replaces_nothing(name):
     with pytest.raises(InvalidValue, match=f"would replace '{name}'"):
-        reduced(lattice(1.0 + X), (Range(name, "critical_velocity_ratio", "b_over_a"),))
+        apply_reductions(lattice(1.0 + X), (Range(name, "critical_velocity_ratio", "b_over_a"),))
 
 
 def test_failed_cells_outside_of_the_support_do_not_matter():
     codes = np.zeros(5)
     codes[4] = Status.INTEGRATION_FAILED
-    result = reduced(lattice(1.0 + 0.5 * X, codes), (FIT,))
+    result = apply_reductions(lattice(1.0 + 0.5 * X, codes), (FIT,))
     assert float(result.zeta) == pytest.approx(0.5)
     assert "refused" not in result.zeta.attrs
 
@@ -150,15 +150,15 @@ def test_relative_difference():
     compare = RelativeDifference(
         name="lowering", of="critical_velocity_ratio", along="case", reference="reference"
     )
-    result = reduced(lattice([2.0 * X, 1.5 * X]), (compare,))
+    result = apply_reductions(lattice([2.0 * X, 1.5 * X]), (compare,))
     np.testing.assert_allclose(result.lowering.sel(case="other"), 0.25, rtol=1e-15)
-    without = reduced(lattice([2.0 * X, 1.5 * X]).isel(case=[1]), (compare,))
+    without = apply_reductions(lattice([2.0 * X, 1.5 * X]).isel(case=[1]), (compare,))
     assert "lowering" not in without
 
 
 def test_a_range_without_points_gives_nothing():
     outside = lattice(1.0 + 0.5 * X).isel(b_over_a=[3, 4])
-    assert "zeta" not in reduced(outside, (FIT,))
+    assert "zeta" not in apply_reductions(outside, (FIT,))
 
 
 @settings(max_examples=30)
@@ -167,7 +167,7 @@ def test_linear_fit_agrees_with_scipy(slope, noise):
     values = 0.3 + slope * X + np.array(noise)
     assume(np.ptp(values) > 1e-6)  # the correlation of a constant is undefined
     fit = LinearFit(name="slope", of="critical_velocity_ratio", on="a_over_b_minus_a")
-    result, theirs = reduced(lattice(values), (fit,)), linregress(X, values)
+    result, theirs = apply_reductions(lattice(values), (fit,)), linregress(X, values)
     assert float(result.slope) == pytest.approx(theirs.slope, rel=1e-9, abs=1e-14)
     # theirs comes from 1 - r**2, which loses half of the digits
     assert float(result.slope_stderr) == pytest.approx(theirs.stderr, rel=1e-6, abs=3e-8)
@@ -175,7 +175,7 @@ def test_linear_fit_agrees_with_scipy(slope, noise):
 
 def claim(**fields) -> Claim:
     usual = {"variable": "critical_velocity_ratio", "where": {"a_over_b_minus_a": 1.0}}
-    return claimed(**usual | {"published": 2.0} | fields)
+    return example_claim(**usual | {"published": 2.0} | fields)
 
 
 @pytest.mark.parametrize(
@@ -192,15 +192,15 @@ def claim(**fields) -> Claim:
     ],
 )
 def test_verdicts(relation, value, verdict):
-    table = verdicts(lattice(np.full(5, value)), [claim(relation=relation)], {})
+    table = build_verdict_table(lattice(np.full(5, value)), [claim(relation=relation)], {})
     assert table.verdict[0] == verdict
     assert table.moved[0] == (verdict != "reproduced")
 
 
 def test_an_expected_difference_does_not_move():
     off = [claim(published=3.0, expected="differs", because="a misprint")]
-    assert not verdicts(lattice(np.full(5, 2.0)), off, {}).moved[0]
-    assert verdicts(lattice(np.full(5, 3.0)), off, {}).moved[0]
+    assert not build_verdict_table(lattice(np.full(5, 2.0)), off, {}).moved[0]
+    assert build_verdict_table(lattice(np.full(5, 3.0)), off, {}).moved[0]
 
 
 PENDING = lattice(np.full(5, 2.0), np.full(5, Status.PENDING))
@@ -214,16 +214,17 @@ PENDING = lattice(np.full(5, 2.0), np.full(5, Status.PENDING))
         (lattice(np.full(5, 9.0)), {}, {"stiffness_ratio": 1.1}, "not applicable"),
         (lattice(np.full(5, 9.0)), {}, {"b_over_a": [2.0]}, "differs"),
         (PENDING, {"variable": "status", "where": {"b_over_a": 2.0}}, {}, "undecided"),
-        (reduced(lattice(1.0 + X), (FIT,)), {"variable": "zeta", "where": {}, "published": 1.0},
-         {}, "reproduced"),
+        (apply_reductions(lattice(1.0 + X), (FIT,)),
+         {"variable": "zeta", "where": {}, "published": 1.0}, {}, "reproduced"),
         # it was reduced along an axis that is another
-        (reduced(lattice(1.0 + X), (FIT,)), {"variable": "zeta", "where": {}, "published": 1.0},
+        (apply_reductions(lattice(1.0 + X), (FIT,)),
+         {"variable": "zeta", "where": {}, "published": 1.0},
          {"b_over_a": [2.0]}, "not applicable"),
     ],
     ids=["dimensions", "no place", "scene", "axis", "not known yet", "reduced", "changed axis"],
 )  # fmt: skip
 def test_where_claims_apply(dataset, of, overrides, verdict):
-    table = verdicts(dataset, [claim(**of)], overrides)
+    table = build_verdict_table(dataset, [claim(**of)], overrides)
     assert table.verdict[0] == verdict
     assert table.moved[0] == (verdict in ("differs", "undecided"))
 
@@ -249,7 +250,7 @@ def answers(values, status=None) -> xr.Dataset:
 def test_the_bracket_holds_the_boundary_in_any_order_of_the_axis(edge, order):
     assume(edge not in V0)
     lattice = answers(edge < V0).isel(load_velocity_ratio=list(order))
-    result = reduced(lattice, (BOUNDARY,)).isel(row=0)
+    result = apply_reductions(lattice, (BOUNDARY,)).isel(row=0)
     assert float(result.edge_stable) < edge < float(result.edge_unstable)
     assert abs(float(result.edge) - edge) <= float(result.edge_error)
     assert float(result.edge_error) == pytest.approx(0.25)
@@ -257,14 +258,14 @@ def test_the_bracket_holds_the_boundary_in_any_order_of_the_axis(edge, order):
 
 
 def test_a_boundary_downward_has_its_unstable_side_below():
-    result = reduced(answers([1, 1, 0, 0, 0]), (BOUNDARY,)).isel(row=0)
+    result = apply_reductions(answers([1, 1, 0, 0, 0]), (BOUNDARY,)).isel(row=0)
     assert (float(result.edge_unstable), float(result.edge_stable)) == (1.5, 2.0)
     assert float(result.edge) == 1.75
 
 
 def test_rows_without_a_single_boundary_give_no_number_but_say_what_they_saw():
     lattice = answers([[0, 0, 0, 0, 0], [1, 1, 1, 1, 1], [0, 1, 0, 1, 1]])
-    result = reduced(lattice, (BOUNDARY,))
+    result = apply_reductions(lattice, (BOUNDARY,))
     assert result.edge.isnull().all()
     assert result.edge_crossings.values.tolist() == [0, 0, 3]
     assert float(result.edge_stable[0]) == 3.0
@@ -274,10 +275,10 @@ def test_rows_without_a_single_boundary_give_no_number_but_say_what_they_saw():
 
 def test_cells_without_an_answer_widen_the_bracket_and_failed_ones_refuse_it():
     left_out = answers([0, 0, np.nan, 1, 1], [0, 0, Status.NORM_BELOW_LOADING_RATE, 0, 0])
-    result = reduced(left_out, (BOUNDARY,)).isel(row=0)
+    result = apply_reductions(left_out, (BOUNDARY,)).isel(row=0)
     assert (float(result.edge_stable), float(result.edge_unstable)) == (1.5, 2.5)
     failed = answers([0, 0, np.nan, 1, 1], [0, 0, Status.WORK_BUDGET_SPENT, 0, 0])
-    result = reduced(failed, (BOUNDARY,)).isel(row=0)
+    result = apply_reductions(failed, (BOUNDARY,)).isel(row=0)
     assert np.isnan(result.edge)
     assert "failed" in result.edge.attrs["refused"]
 
@@ -291,7 +292,9 @@ def test_a_level_of_a_power_law_is_inverted(power, level):
         {"y": ("x", x**power), "status": ("x", np.zeros(9, np.int8))}, coords={"x": x}
     )
     level = min(level, 0.9 * 100.0**power)
-    found = reduced(dataset, (Inverse(name="at", of="y", on="x", levels=level, uncertainty=0.01),))
+    found = apply_reductions(
+        dataset, (Inverse(name="at", of="y", on="x", levels=level, uncertainty=0.01),)
+    )
     assert float(found["at"]) == pytest.approx(level ** (1.0 / power), rel=1e-9)
     assert float(found["at_error"]) == pytest.approx(float(found["at"]) * 0.01 / power, rel=0.02)
 
@@ -306,7 +309,7 @@ CURVED = {
 
 
 def inverted(x, y, level, errors=0.0):
-    found = reduced(
+    found = apply_reductions(
         xr.Dataset(
             {
                 "y": ("x", y),
@@ -361,25 +364,27 @@ def test_levels_by_label_and_levels_out_of_reach():
         coords={"x": x, "c": ["a", "b", "c"]},
     )
     levels = {"a": 10.0, "b": 1e3}
-    found = reduced(dataset, (Inverse(name="at", of="y", on="x", levels=levels, along="c"),))
+    found = apply_reductions(
+        dataset, (Inverse(name="at", of="y", on="x", levels=levels, along="c"),)
+    )
     assert float(found["at"].sel(c="a")) == pytest.approx(10.0)
     assert found["at"].sel(c=["b", "c"]).isnull().all()
 
 
 def test_over_a_closed_form():
     dataset = lattice(2.0 * (1.0 + X))
-    form = OverClosedForm(
+    form = ClosedFormRatio(
         name="over",
         of="critical_velocity_ratio",
         form="velocity_step_at_critical_stiffness",
     )
-    result = reduced(dataset, (form,))
+    result = apply_reductions(dataset, (form,))
     np.testing.assert_allclose(result.over, 2.0, rtol=1e-14)
     np.testing.assert_allclose(result.over_closed_form, 1.0 + X, rtol=1e-14)
     assert "Gu et al. (1984)" in result.over.attrs["comment"]
     assert "over" not in form(dataset.drop_vars("b_over_a"))
     with pytest.raises(InvalidValue, match="is no closed form"):
-        OverClosedForm(name="over", of="critical_velocity_ratio", form="net_weakenin")
+        ClosedFormRatio(name="over", of="critical_velocity_ratio", form="net_weakenin")
 
 
 def test_differences_and_spreads():
@@ -387,14 +392,14 @@ def test_differences_and_spreads():
     apart = Difference(
         name="apart", of="critical_velocity_ratio", along="case", reference="reference"
     )
-    np.testing.assert_allclose(reduced(dataset, (apart,)).apart.sel(case="other"), 2.0 * X)
+    np.testing.assert_allclose(apply_reductions(dataset, (apart,)).apart.sel(case="other"), 2.0 * X)
     spread = Range(
         name="spread", of="critical_velocity_ratio", over="a_over_b_minus_a", within=(0.25, 1.0)
     )
-    assert reduced(dataset, (spread,)).spread.values.tolist() == [0.75, 2.25]
+    assert apply_reductions(dataset, (spread,)).spread.values.tolist() == [0.75, 2.25]
     codes = np.zeros((2, 5))
     codes[1, 1] = Status.PENDING
-    refused = reduced(lattice([X, X], codes), (spread,))
+    refused = apply_reductions(lattice([X, X], codes), (spread,))
     assert np.isnan(refused.spread[1])
     assert float(refused.spread[0]) == 0.75
 
@@ -421,25 +426,25 @@ def loops(tilt: float) -> xr.Dataset:
 
 
 def test_where_paths_part_and_merge():
-    parting = Parting(name="paths", of="frictional_stress", along="inertia", tolerance=2e-3)
-    result = reduced(loops(0.0), (parting,))
+    parting = PathSeparation(name="paths", of="frictional_stress", along="inertia", tolerance=2e-3)
+    result = apply_reductions(loops(0.0), (parting,))
     assert float(result.paths_parting) == pytest.approx(4.0, abs=0.02)
     assert float(result.paths_merging) == pytest.approx(3.07, abs=0.03)
     assert float(result.paths_offset) == pytest.approx(0.0, abs=1e-3)
-    apart = reduced(loops(0.1), (parting,))
+    apart = apply_reductions(loops(0.1), (parting,))
     assert np.isnan(apart.paths_merging)
     assert float(apart.paths_offset) == pytest.approx(0.1, abs=1e-2)
     same = loops(0.0).isel(inertia=[0, 0]).assign_coords(inertia=[0, 1])
-    assert np.isnan(reduced(same, (parting,)).paths_parting)
+    assert np.isnan(apply_reductions(same, (parting,)).paths_parting)
 
 
 def test_reductions_of_reductions_keep_to_their_dimensions():
     dataset = lattice([X, 3.0 * X]).expand_dims(law=["slip", "slowness"]).copy()
     slope = ProportionalFit(name="slope", of="critical_velocity_ratio", on="a_over_b_minus_a")
     spread = Difference(name="apart", of="slope", along="case", reference="reference")
-    result = reduced(dataset.assign_coords(number=("law", [1.0, 2.0])), (slope, spread))
+    result = apply_reductions(dataset.assign_coords(number=("law", [1.0, 2.0])), (slope, spread))
     assert result.apart.dims == ("law", "case")
-    again = reduced(result, (Range(name="s", of="slope", over="number"),))
+    again = apply_reductions(result, (Range(name="s", of="slope", over="number"),))
     assert again.s.dims == ("case",)
 
 
@@ -468,12 +473,12 @@ def cycling(answers) -> xr.Dataset:
     )
 
 
-EDGE = CyclingEdge(name="edge", of="recurrence_interval")
+EDGE = CycleRegionEdge(name="edge", of="recurrence_interval")
 AS_THE_EIGENVALUES_SAY = [[1, 1, 1, 1, 0], [1, 1, 1, 0, 0], [1, 1, 0, 0, 0]]
 
 
 def test_the_edge_of_cycling_is_bracketed_beside_the_linear_boundary():
-    result = reduced(cycling(AS_THE_EIGENVALUES_SAY), (EDGE,))
+    result = apply_reductions(cycling(AS_THE_EIGENVALUES_SAY), (EDGE,))
     assert result.edge.values == pytest.approx([1.035, 0.935, 0.85])
     assert result.edge_error.values == pytest.approx([0.065, 0.035, 0.05])
     assert result.edge_unstable.values == pytest.approx([0.97, 0.9, 0.8])
@@ -488,7 +493,7 @@ def test_the_edge_of_cycling_is_bracketed_beside_the_linear_boundary():
 )
 def test_cells_on_the_wrong_side_of_the_linear_boundary_are_counted(row, crossings):
     """Above it, below it, and where the answer changes more than once, which is no edge."""
-    result = reduced(cycling([row] * 3), (EDGE,))
+    result = apply_reductions(cycling([row] * 3), (EDGE,))
     below = [critical > STIFFNESS for critical in (0.9998, 0.946, 0.851)]
     expected = int((np.array(below) != np.array(row, dtype=bool)).sum())
     assert int(result.edge_misplaced) == expected > 0
@@ -507,6 +512,6 @@ class Bare(Reduction):
 def test_a_reduction_keeps_the_attributes_of_coordinates():
     dataset = lattice([1.0, 2.0, 3.0, 4.0, 5.0])
     dataset["b_over_a"].attrs = {"long_name": "ratio of a user", "units": "1"}
-    found = reduced(dataset, (Bare("doubled", of="critical_velocity_ratio"),))
+    found = apply_reductions(dataset, (Bare("doubled", of="critical_velocity_ratio"),))
     assert found["b_over_a"].attrs == {"long_name": "ratio of a user", "units": "1"}
     assert found["doubled"].dims == ("b_over_a",)

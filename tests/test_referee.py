@@ -13,34 +13,39 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from referee_numbers import UNITS, by_second, columns
-from referee_page import MARK, PAGE, parts
-from referee_ways import agrees, stated
-from running import call
+from referee_numbers import UNITS, columns, second_way_rows
+from referee_page import PAGE, PROBLEMS_MARKER, all_sections
+from referee_ways import read_stated_problem, rounds_to
+from running import call_main
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.referee import ours, theirs
-from rsfstudy.referee.problem import Problem, read, shipped
-from rsfstudy.referee.verdict import ENOUGH, Verdict, known, verdict
+from rsfstudy.referee.problem import BenchmarkProblem, read_problem, shipped_problems
+from rsfstudy.referee.verdict import (
+    DEFAULT_REQUIRED_DIGITS,
+    AnswerComparison,
+    compare_answers,
+    known_answer,
+)
 
-NUMBERS = sorted(shipped())
+NUMBERS = sorted(shipped_problems())
 RSFMODEL = Path(__file__).with_name("rsfmodel")
 
 
-def of(number: int) -> Problem:
-    return read(shipped()[number])
+def of(number: int) -> BenchmarkProblem:
+    return read_problem(shipped_problems()[number])
 
 
 def answer_of(number: int) -> list[dict[str, str]]:
-    with shipped()[number].with_suffix(".csv").open() as file:
+    with shipped_problems()[number].with_suffix(".csv").open() as file:
         return [{k.split()[0]: v for k, v in row.items()} for row in csv.DictReader(file)]
 
 
 @functools.cache
 def second_way(number: int) -> list[dict]:
-    return by_second(stated(shipped()[number]))
+    return second_way_rows(read_stated_problem(shipped_problems()[number]))
 
 
 # ---- answers -------------------------------------------------------------------------------------
@@ -50,24 +55,26 @@ def second_way(number: int) -> list[dict]:
 def test_answers_are_those_of_a_second_way(number):
     """To their last digit; and each digit of each column, changed by two, is not."""
     problem, rows, others = of(number), answer_of(number), second_way(number)
-    assert [*rows[0]] == columns(stated(shipped()[number])) == [*problem.columns]
+    assert (
+        [*rows[0]] == columns(read_stated_problem(shipped_problems()[number])) == [*problem.columns]
+    )
     for name in problem.quantities:
         both = [(row[name], other[name]) for row, other in zip(rows, others, strict=True)]
-        assert all(agrees(text, value) for text, value in both)
+        assert all(rounds_to(text, value) for text, value in both)
         text, value = next(pair for pair in reversed(both) if pair[0] != "0")
         places = [i for i, x in enumerate(text.partition("e")[0]) if x.isdigit()]
         assert len(places) == problem.digits
         for place in places:
             # by two: the last digit may be off by a half as it is
             changed = text[:place] + str((int(text[place]) + 2) % 10) + text[place + 1 :]
-            assert not agrees(changed, value)
+            assert not rounds_to(changed, value)
 
 
 @pytest.mark.parametrize("number", NUMBERS)
 def test_files_of_problems_hold_all_that_they_are_asked_for(number):
     problem = of(number)
     assert problem.digits == (11 if number == 24 else 12)
-    text = shipped()[number].read_text()
+    text = shipped_problems()[number].read_text()
     assert problem.equations
     assert problem.conventions
     assert [f"{name} ({UNITS[name]})" for name in problem.columns] == problem.header
@@ -79,14 +86,14 @@ def test_files_of_problems_hold_all_that_they_are_asked_for(number):
 # ---- ours ----------------------------------------------------------------------------------------
 
 
-def told_of(table: ours.Table) -> dict[str, theirs.Reported]:
-    return {name: theirs.Reported(values, 0.0) for name, values in table.items()}
+def told_of(table: ours.AnswerTable) -> dict[str, theirs.ReportedQuantity]:
+    return {name: theirs.ReportedQuantity(values, 0.0) for name, values in table.items()}
 
 
-def digits_of_ours(number: int, rtol: float, engine: str) -> Verdict:
-    problem, answer = known(of(number), shipped()[number].with_suffix(".csv"))
-    table = ours.answer(problem, Accuracy(rtol, 5_000_000, engine=engine))
-    return verdict(problem, answer, told_of(table), 1.0)
+def digits_of_ours(number: int, rtol: float, engine: str) -> AnswerComparison:
+    problem, answer = known_answer(of(number), shipped_problems()[number].with_suffix(".csv"))
+    table = ours.compute_answer(problem, Accuracy(rtol, 5_000_000, engine=engine))
+    return compare_answers(problem, answer, told_of(table), 1.0)
 
 
 @pytest.mark.parametrize("number", NUMBERS)
@@ -139,7 +146,7 @@ PUBLISHED = {
 def test_published_curves_pass_to_the_last_place_that_is_written(number):
     """Eight decimals, of a file as it stands."""
     name, columns = PUBLISHED[number]
-    ran = call("verify", RSFMODEL / name, "--problem", number, "--columns", columns)
+    ran = call_main("verify", RSFMODEL / name, "--problem", number, "--columns", columns)
     assert (ran.returncode, ran.stderr) == (0, "")
     count = len(of(number).quantities)
     assert ran.stdout.count("to the last place that is written") == count
@@ -158,7 +165,8 @@ def test_published_curves_pass_to_the_last_place_that_is_written(number):
         (
             12,
             lambda told, p: {
-                "friction": told["friction"] + p.damping * told["slip_rate"] / p.rig.normal_stress
+                "friction": told["friction"]
+                + p.radiation_damping * told["slip_rate"] / p.rig.normal_stress
             },
             "friction is that of the spring",
         ),
@@ -167,7 +175,7 @@ def test_published_curves_pass_to_the_last_place_that_is_written(number):
 def test_conventions_of_what_is_told_explain_a_difference(number, wrong, explanation, tmp_path):
     told = told_by_second_way(number)
     file = filed(tmp_path / f"{number:02d}.csv", number, **wrong(told, of(number)))
-    ran = call("verify", file)
+    ran = call_main("verify", file)
     assert ran.returncode == 1
     assert explanation in " ".join(ran.stdout.split())
 
@@ -192,8 +200,12 @@ def test_conventions_of_the_problem_explain_a_difference(number, changes, explan
         other = replace(problem, **changes)
     else:
         other = replace(problem, parameters={**problem.parameters, **changes})
-    table = ours.answer(other, Accuracy(1e-8, engine=COMPILED))
-    found = verdict(*known(problem, shipped()[number].with_suffix(".csv")), told_of(table), ENOUGH)
+    table = ours.compute_answer(other, Accuracy(1e-8, engine=COMPILED))
+    found = compare_answers(
+        *known_answer(problem, shipped_problems()[number].with_suffix(".csv")),
+        told_of(table),
+        DEFAULT_REQUIRED_DIGITS,
+    )
     assert not found.passes
     assert explanation in found.explanation
 
@@ -210,7 +222,7 @@ def test_conventions_of_the_problem_explain_a_difference(number, changes, explan
 )
 def test_a_single_value_is_explained_by_usual_factors_only(wrong, explanation, tmp_path):
     rate = told_by_second_way(20)["growth_rate"]
-    ran = call("verify", filed(tmp_path / "20.csv", 20, growth_rate=wrong(rate)))
+    ran = call_main("verify", filed(tmp_path / "20.csv", 20, growth_rate=wrong(rate)))
     assert ran.returncode == 1
     assert explanation in " ".join(ran.stdout.split())
 
@@ -218,7 +230,9 @@ def test_a_single_value_is_explained_by_usual_factors_only(wrong, explanation, t
 @pytest.mark.parametrize("off", [3e-7, -3e-7])
 def test_a_factor_near_one_is_worded_by_its_difference_from_one(off, tmp_path):
     rate = told_by_second_way(2)["slip_rate"]
-    ran = call("verify", filed(tmp_path / "02.csv", 2, slip_rate=rate * (1.0 + off)), "--digits", 7)
+    ran = call_main(
+        "verify", filed(tmp_path / "02.csv", 2, slip_rate=rate * (1.0 + off)), "--digits", 7
+    )
     sign = "-" if off < 0.0 else "+"
     said = " ".join(ran.stdout.split())
     assert f"slip_rate is (1 {sign} 3e-07) times the known answer" in said
@@ -227,7 +241,9 @@ def test_a_factor_near_one_is_worded_by_its_difference_from_one(off, tmp_path):
 def test_digits_that_do_not_pass_are_not_rounded_up(tmp_path):
     """A relative difference of 1.05e-6 is 5.98 digits."""
     told = told_by_second_way(2)
-    ran = call("verify", filed(tmp_path / "02.csv", 2, slip_rate=told["slip_rate"] * (1 + 1.05e-6)))
+    ran = call_main(
+        "verify", filed(tmp_path / "02.csv", 2, slip_rate=told["slip_rate"] * (1 + 1.05e-6))
+    )
     assert ran.returncode == 1
     assert re.search(r"slip_rate +5\.9 digits", ran.stdout)
 
@@ -237,7 +253,7 @@ def test_the_number_of_rows_is_checked_before_columns_are_converted(tmp_path):
     told = told_by_second_way(15)
     header = [h.replace("friction (1)", "shear_stress (Pa)") for h in of(15).header]
     columns = [told[name][:-1] for name in of(15).columns]
-    ran = call("verify", write(tmp_path / "15.csv", header, columns))
+    ran = call_main("verify", write(tmp_path / "15.csv", header, columns))
     count = len(told["time"])
     said = " ".join(ran.stderr.split())
     assert (ran.returncode, f"number of rows = {count - 1}: must be {count}." in said) == (2, True)
@@ -246,7 +262,7 @@ def test_the_number_of_rows_is_checked_before_columns_are_converted(tmp_path):
 def test_where_they_part_is_told(tmp_path):
     rate = told_by_second_way(1)["slip_rate"]
     rate[25:] *= 1.001
-    ran = call("verify", filed(tmp_path / "01.csv", 1, slip_rate=rate))
+    ran = call_main("verify", filed(tmp_path / "01.csv", 1, slip_rate=rate))
     said = " ".join(ran.stdout.split())
     pattern = r"slip_rate 3\.0 digits, fewest at time = [234]\d s; they part at time = 25 s"
     assert re.search(pattern, said)
@@ -258,14 +274,14 @@ def test_where_they_part_is_told(tmp_path):
 def test_other_units_and_other_quantities_are_converted(tmp_path):
     told = told_by_second_way(12)
     p = of(12)
-    tau = p.rig.normal_stress * told["friction"] + p.damping * told["slip_rate"]
+    tau = p.rig.normal_stress * told["friction"] + p.radiation_damping * told["slip_rate"]
     header = ["t (min)", "tau", "logV", "theta", "u (um)"]
     columns = [told["time"] / 60.0, tau / 1e6, np.log10(told["slip_rate"]), told["theta"] / 3600.0]
     file = write(tmp_path / "mine.csv", header, [*columns, told["slip"] * 1e6])
     mapped = (
         "time=t (min), shear_stress=tau (MPa), log10_slip_rate=logV, theta=theta (h), slip=u (um)"
     )
-    ran = call("verify", file, "--problem", "12", "--columns", mapped)
+    ran = call_main("verify", file, "--problem", "12", "--columns", mapped)
     assert (ran.returncode, ran.stderr) == (0, "")
     assert "1 problem of 24, 1" in ran.stdout
 
@@ -285,9 +301,9 @@ def test_shear_stress_tells_friction_where_normal_stress_changes(number, tmp_pat
     }[number]
     header = [h.replace("friction (1)", "shear_stress (Pa)") for h in problem.header]
     columns = [told[n] * (sigma if n == "friction" else 1.0) for n in problem.columns]
-    found = theirs.read(write(tmp_path / "mine.csv", header, columns), problem)
-    answer = known(problem, shipped()[number].with_suffix(".csv"))
-    assert verdict(*answer, found, ENOUGH).digits > 11.0
+    found = theirs.read_answer(write(tmp_path / "mine.csv", header, columns), problem)
+    answer = known_answer(problem, shipped_problems()[number].with_suffix(".csv"))
+    assert compare_answers(*answer, found, DEFAULT_REQUIRED_DIGITS).digits > 11.0
 
 
 def test_shear_stress_beside_what_is_asked_for_is_left_alone(tmp_path):
@@ -295,21 +311,21 @@ def test_shear_stress_beside_what_is_asked_for_is_left_alone(tmp_path):
     told = told_by_second_way(13)
     header = [*of(13).header, "shear_stress (Pa)"]
     columns = [*(told[name] for name in of(13).columns), told["slip_rate"]]
-    found = theirs.read(write(tmp_path / "13.csv", header, columns), of(13))
+    found = theirs.read_answer(write(tmp_path / "13.csv", header, columns), of(13))
     assert [*found] == [*of(13).columns]
 
 
 def test_zeros_agree_in_nothing_and_overflows_are_refused(tmp_path):
     zeros = np.zeros(len(of(1).times))
-    ran = call("verify", filed(tmp_path / "01.csv", 1, friction=zeros))
+    ran = call_main("verify", filed(tmp_path / "01.csv", 1, friction=zeros))
     assert re.search(r"friction +0\.0 digits, fewest at", ran.stdout)
     assert ran.returncode == 1
     huge = filed(tmp_path / "01.csv", 1, slip_rate=zeros + 400.0)
     huge.write_text(huge.read_text().replace("slip_rate (m/s)", "log10_slip_rate (1)"))
-    ran = call("verify", huge)
+    ran = call_main("verify", huge)
     said = "line 2, column 3: log10_slip_rate = 400.0: must be a number, of 100 at most"
     assert (ran.returncode, said in " ".join(ran.stderr.split())) == (2, True)
-    ran = call("verify", huge, "--digits", "nan")
+    ran = call_main("verify", huge, "--digits", "nan")
     assert (ran.returncode, "--digits = nan" in ran.stderr) == (2, True)
 
 
@@ -329,14 +345,14 @@ def test_what_is_no_answer_is_refused(spoil, error, tmp_path):
     header, columns = spoil(of(1).header, [told[name] for name in of(1).columns])
     file = write(tmp_path / "01.csv", header, columns)
     with pytest.raises(InvalidValue, match=re.escape(error)):
-        theirs.read(file, of(1))
+        theirs.read_answer(file, of(1))
 
 
 def test_files_and_problems_that_are_not_there_are_said_so():
     """With the status of each: a file that cannot be read, and words that name no problem."""
-    ran = call("verify", "nowhere.csv", "--problem", "1", "--columns", "time=t (s)")
+    ran = call_main("verify", "nowhere.csv", "--problem", "1", "--columns", "time=t (s)")
     assert (ran.returncode, "cannot be read" in ran.stderr) == (1, True)
-    ran = call("verify", "nowhere.csv")
+    ran = call_main("verify", "nowhere.csv")
     assert (ran.returncode, "problem = 'no': is none" in ran.stderr) == (2, True)
 
 
@@ -377,7 +393,9 @@ NAGATA = _UNDAMPED.replace("mu_star", "stress_dependence = 0.5\nmu_star")
 STRESSED = _UNDAMPED.replace("mu_star", "alpha = 0.2\nmu_star") + 'normal_stress = "5.2 MPa"'
 
 
-@pytest.mark.parametrize("text", [STEP, TWO_STATES, NAGATA, STRESSED, shipped()[14].read_text()])
+@pytest.mark.parametrize(
+    "text", [STEP, TWO_STATES, NAGATA, STRESSED, shipped_problems()[14].read_text()]
+)
 def test_a_problem_of_ones_own(text, tmp_path):
     """Held against another formulation, which knows of nothing but SI units."""
     path = tmp_path / "mine.toml"
@@ -386,16 +404,20 @@ def test_a_problem_of_ones_own(text, tmp_path):
     plain = plain.replace(" MPa", "e6 Pa").replace("0.003e6 Pa/um", "3e9 Pa/m")
     plain = re.sub(r'"(\d+) um/s"', r'"\1e-6 m/s"', plain)
     (tmp_path / "plain.toml").write_text(plain)
-    rows = by_second({"times": [], "report": "series", **stated(tmp_path / "plain.toml")})
-    problem = read(path)
+    rows = second_way_rows(
+        {"times": [], "report": "series", **read_stated_problem(tmp_path / "plain.toml")}
+    )
+    problem = read_problem(path)
     told = [[row[name] for row in rows] for name in problem.columns]
     file = write(tmp_path / "mine.csv", problem.header, told)
-    ran = call("verify", file, "--problem", path)
+    ran = call_main("verify", file, "--problem", path)
     assert (ran.returncode, ran.stderr) == (0, "")
     assert re.search(r"1 problem of one's own, (8|9|10|11|12) digits", ran.stdout)
     given = {"slip_rate": rows[0]["slip_rate"] * 1.01}
     spoilt = [[{**row, **given}[name] for row in rows] for name in problem.columns]
-    assert call("verify", write(file, problem.header, spoilt), "--problem", path).returncode == 1
+    assert (
+        call_main("verify", write(file, problem.header, spoilt), "--problem", path).returncode == 1
+    )
 
 
 @pytest.mark.parametrize(
@@ -422,14 +444,14 @@ def test_what_is_no_problem_is_refused(old, new, error, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(STEP.replace(old, new, 1))
     with pytest.raises(InvalidValue, match=re.escape(error)):
-        read(path)
+        read_problem(path)
 
 
 def test_a_file_nested_without_end_is_refused(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text("title = " + "[" * 10_000)
     with pytest.raises(DataError, match="nested too deeply"):
-        read(path)
+        read_problem(path)
 
 
 def test_the_number_of_peaks_is_bounded(tmp_path):
@@ -439,7 +461,7 @@ def test_the_number_of_peaks_is_bounded(tmp_path):
     )
     path.write_text(re.sub(r"( 10, 20, 50\])", 'report = "peaks"\ncount = 1000000000000', text))
     with pytest.raises(InvalidValue, match="count = 1000000000000: must lie between 1 and 10,000"):
-        read(path)
+        read_problem(path)
 
 
 # ---- what is written -----------------------------------------------------------------------------
@@ -448,7 +470,7 @@ def test_the_number_of_peaks_is_bounded(tmp_path):
 def test_the_example_passes_a_third_with_plain_scipy(tmp_path):
     """Run as a stranger runs it; and all answers pass, with a figure."""
     place = tmp_path / "referee"
-    assert call("problems", place).returncode == 0
+    assert call_main("problems", place).returncode == 0
     text = (place / "example.py").read_text()
     assert "rsfstudy" not in text
     lines = [line for line in text.splitlines() if line and "import" not in line]
@@ -457,16 +479,16 @@ def test_the_example_passes_a_third_with_plain_scipy(tmp_path):
     assert (ran.returncode, ran.stderr) == (0, "")
     mine = sorted(place.glob("*.csv"))
     assert 3 * len(mine) >= len(NUMBERS)
-    ran = call("verify", *mine, "--figure", tmp_path / "figure.png")
+    ran = call_main("verify", *mine, "--figure", tmp_path / "figure.png")
     assert (ran.returncode, ran.stderr) == (0, "")
     assert re.search(rf"{len(mine)} problems of 24, (7|8|9) to 1[012] digits", ran.stdout)
     assert (tmp_path / "figure.png").stat().st_size > 10_000
-    ran = call("verify", *sorted((place / "answers").iterdir()))
+    ran = call_main("verify", *sorted((place / "answers").iterdir()))
     assert "24 problems of 24, 11 to 12 digits" in ran.stdout
     templates = sorted((place / "templates").iterdir())
     assert [t.name for t in templates] == [a.name for a in sorted((place / "answers").iterdir())]
-    assert call("verify", templates[0]).returncode == 2
-    again = call("problems", place)
+    assert call_main("verify", templates[0]).returncode == 2
+    again = call_main("problems", place)
     assert (again.returncode, " ".join(again.stderr.split())[-42:]) == (
         2,
         "there already. Name a new one: nothing is replaced."[-42:],
@@ -474,6 +496,6 @@ def test_the_example_passes_a_third_with_plain_scipy(tmp_path):
 
 
 def test_the_page_tells_of_every_problem_what_its_file_does():
-    assert PAGE.read_text().partition(MARK)[2] == "\n" + parts()
+    assert PAGE.read_text().partition(PROBLEMS_MARKER)[2] == "\n" + all_sections()
     for number in NUMBERS:
         assert f"### {number}. {of(number).title}" in PAGE.read_text()

@@ -11,11 +11,11 @@ from urllib.parse import unquote
 
 import pytest
 import xarray as xr
-from running import HANGS, call, claimed, run
+from running import HANG_TIMEOUT, call_main, example_claim, run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
-from rsfstudy.errors import DataError, InvalidValue, NoAnswer
+from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
 from rsfstudy.files import store
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.status import Status
@@ -63,7 +63,7 @@ class Page(HTMLParser):
 def written(tmp_path_factory):
     """A directory with all kinds of files, and what the command said of it."""
     place = tmp_path_factory.mktemp("results")
-    claim = claimed(statement=f"k {EVIL}", variable="critical_stiffness", tolerance=0.5,
+    claim = example_claim(statement=f"k {EVIL}", variable="critical_stiffness", tolerance=0.5,
                     relation="below", where={"law": "slip", "b_over_a": 2.0})  # fmt: skip
     axes = [Axis("law", ["slip", "slowness"]), Axis("b_over_a", [1.5, 2.0, 3.0])]
     study = Study(name="fine", title=f"Fine {EVIL}", base=Scene(), axes=axes,
@@ -72,7 +72,7 @@ def written(tmp_path_factory):
     other = fine.copy(deep=True)
     other["status"][0, 1], other["message"][0, 1] = int(Status.INTEGRATION_FAILED), EVIL
     other["critical_stiffness"][0, 1] = 7.0  # the claim moves
-    store.write(other, place / "failed here.nc")
+    store.write_dataset(other, place / "failed here.nc")
     motion = rsfstudy.simulate(
         Scene(load_velocity_ratio=2.0, normal_stress="constant"), duration=0.1
     )
@@ -84,7 +84,7 @@ def written(tmp_path_factory):
     shutil.rmtree(place / "zarr")
     shown = rsfstudy.plot(fine)
     shown.savefig(place / "fine.png", dpi=50)
-    ran = call("report", place)
+    ran = call_main("report", place)
     return place, ran, (place / "report.html").read_text()
 
 
@@ -166,19 +166,21 @@ def test_it_tells_answers_that_are_none_and_draws_what_is_in_other_units(tmp_pat
     study = Study(name="one", title="One", base=Scene(), axes=axes, measure=LinearStability())
     found = run(study)
     found.rsf.to_si(normal_stress=5e6, slip_distance=1e-5).to_netcdf(tmp_path / "si.nc")
-    store.write(found.assign(status=found.status * 0 + Status.LOCKED), tmp_path / "locked.nc")
+    store.write_dataset(
+        found.assign(status=found.status * 0 + Status.LOCKED), tmp_path / "locked.nc"
+    )
     scene = Scene(law="slowness", inertia=True, stiffness_ratio=0.8, load_velocity_ratio=2.0)
     cycle = rsfstudy.limit_cycle(scene, rtol=1e-3, engine="compiled")
     cycle.to_netcdf(tmp_path / "cycle.nc")
-    with pytest.warns(NoAnswer):
+    with pytest.warns(NoResultWarning):
         none = rsfstudy.limit_cycle(scene.with_(stiffness_ratio=1.5), engine="compiled")
     none.to_netcdf(tmp_path / "none.nc")
     text = rsfstudy.report(tmp_path).read_text()
     assert ' yellow">3 locked<' in text
     assert ' yellow">no limit cycle<' in text
     assert "no figure: there is no motion, and nothing to draw. no_limit_cycle: " in text
-    with plots.styled():
-        wide = f"--inches: {plots.size(2, 1)[0]:.3g}"
+    with plots.style_context():
+        wide = f"--inches: {plots.figure_size(2, 1)[0]:.3g}"
     assert [about["style"] for about in Page(text).all("img")] == [wide] * 3
 
 
@@ -200,7 +202,7 @@ def test_a_browser_shows_it_on_a_phone_and_on_a_desk(written, tmp_path):
         capture_output=True,
         text=True,
         check=True,
-        timeout=HANGS,
+        timeout=HANG_TIMEOUT,
     )
     (said,) = re.findall("CONSOLE.*", ran.stderr)  # of the frames; errors of the page would be more
     assert "looked" in said

@@ -10,21 +10,21 @@ import signal
 
 import psutil
 import pytest
-from faulty import declared
+from faulty import faulty_study
 from running import (
-    FAULTY,
-    HANGS,
-    SMALL,
-    asked_for,
-    call,
-    cells_in,
-    command,
-    ended,
+    FAULTY_STUDY_FILE,
+    HANG_TIMEOUT,
+    SMALL_STUDY,
+    call_main,
+    count_journal_cells,
+    have_same_numbers,
+    record_computed_cells,
     run,
     run_with_failures,
-    same_numbers,
-    until,
-    until_kept,
+    start_command,
+    wait_for_command,
+    wait_for_journal_cells,
+    wait_until,
 )
 
 import rsfstudy
@@ -38,7 +38,7 @@ CELLS = 30
 
 @functools.cache
 def uninterrupted():
-    return run(declared(cells=CELLS))
+    return run(faulty_study(cells=CELLS))
 
 
 class Held:
@@ -47,9 +47,9 @@ class Held:
     def __init__(self, output, gate, *options):
         self.output, self.gate, self.journal = output, gate, output / "faulty.cells.sqlite"
         gate.mkdir()
-        words = ("run", FAULTY, "--output", output, *options)
-        self.process = command(*words, FAULT_CELLS=str(CELLS), FAULT_GATE=str(gate))
-        until_kept(self.journal, self.process)
+        words = ("run", FAULTY_STUDY_FILE, "--output", output, *options)
+        self.process = start_command(*words, FAULT_CELLS=str(CELLS), FAULT_GATE=str(gate))
+        wait_for_journal_cells(self.journal, self.process)
 
     def let_through(self):
         (self.gate / "open").touch()
@@ -86,11 +86,11 @@ def held(tmp_path):
 
 def goes_on(output, already):
     """The same command again: only what is missing is computed, and the numbers are the same."""
-    with asked_for() as asked:
-        resumed = run(declared(cells=CELLS), output=output)
+    with record_computed_cells() as asked:
+        resumed = run(faulty_study(cells=CELLS), output=output)
     assert len(asked) == CELLS - already
-    same_numbers(resumed, uninterrupted())
-    same_numbers(rsfstudy.open("faulty", output), uninterrupted())
+    have_same_numbers(resumed, uninterrupted())
+    have_same_numbers(rsfstudy.open("faulty", output), uninterrupted())
     assert {"faulty.cells.sqlite", "faulty.nc"} == set(os.listdir(output)) - {"faulty.png"}
 
 
@@ -102,11 +102,11 @@ def test_the_driver_is_killed(held):
     run = held("--workers", "1")
     left = list(children(run.process).values())
     run.process.kill()
-    ended(run.process)
-    already = cells_in(run.journal)
+    wait_for_command(run.process)
+    already = count_journal_cells(run.journal)
     assert already == 1
     assert not (run.output / "faulty.nc").exists()
-    _gone, alive = psutil.wait_procs(left, timeout=HANGS)
+    _gone, alive = psutil.wait_procs(left, timeout=HANG_TIMEOUT)
     assert not alive
     goes_on(run.output, already)
 
@@ -116,11 +116,11 @@ def test_a_worker_is_killed(held):
     run = held("--workers", "1")
     run.workers()[0].kill()
     run.let_through()
-    code, out, said = ended(run.process)
+    code, out, said = wait_for_command(run.process)
     assert code == 0, out
     assert "warning: a worker ended: the cells it held (" in said
     assert len(said.splitlines()) == 1, said
-    same_numbers(rsfstudy.open("faulty", run.output), uninterrupted())
+    have_same_numbers(rsfstudy.open("faulty", run.output), uninterrupted())
 
 
 @pytest.mark.parametrize(
@@ -137,10 +137,10 @@ def test_a_signal_ends_a_run_in_order(options, number, status, why, held):
     left = list(children(run.process).values())
     os.killpg(run.process.pid, number)
     run.let_through()
-    code, _out, said = ended(run.process)
+    code, _out, said = wait_for_command(run.process)
     assert code == status
     assert f"error: faulty: {why}. " in said
-    assert not psutil.wait_procs(left, timeout=HANGS)[1]
+    assert not psutil.wait_procs(left, timeout=HANG_TIMEOUT)[1]
     assert f"of {CELLS} cells are finished and kept in" in said
     assert len(said.splitlines()) == 1, said
     partial = rsfstudy.open(run.output / "faulty.partial.nc")
@@ -158,22 +158,24 @@ def test_a_signal_ends_a_motion_with_one_line(tmp_path):
     rig = ("--normal-stress", "1 Pa", "--slip-distance", "10 um", "--reference-velocity", "1 um/s")
     cycles = ("--set", "stiffness_ratio=0.8", "--set", "inertia=true", "--set", "hold_time=1 s")
     for_ever = ("--duration", "1e15 s", "--budget", str(10**15))
-    process = command("simulate", *rig, *cycles, *for_ever, "--output", tmp_path / "motion.png")
+    process = start_command(
+        "simulate", *rig, *cycles, *for_ever, "--output", tmp_path / "motion.png"
+    )
     assert "unusual for a rig" in process.stderr.readline()
     process.terminate()
     process.terminate()
-    code, _out, said = ended(process)
+    code, _out, said = wait_for_command(process)
     assert (code, said) == (128 + signal.SIGTERM, "error: ended by SIGTERM\n")
     assert not list(tmp_path.iterdir())
 
 
 def test_ctrl_c_while_the_workers_start(tmp_path):
     """They never see it, and the run ends in order once they are there."""
-    words = ("run", FAULTY, "--workers", "1", "--output", tmp_path)
-    process = command(*words, FAULT="hangs")
-    until(lambda: any("spawn_main" in words for words in children(process)), process)
+    words = ("run", FAULTY_STUDY_FILE, "--workers", "1", "--output", tmp_path)
+    process = start_command(*words, FAULT="hangs")
+    wait_until(lambda: any("spawn_main" in words for words in children(process)), process)
     os.killpg(process.pid, signal.SIGINT)
-    code, _out, said = ended(process)
+    code, _out, said = wait_for_command(process)
     assert code == 1
     assert "0 of 4 cells are finished and kept in" in said
     assert len(said.splitlines()) == 1, said
@@ -187,13 +189,13 @@ def test_workers_that_cannot_start(tmp_path):
         dask.config.set({"distributed.worker.preload": ["no_such_module"]}),
         pytest.raises(RunError, match="faulty: a worker process could not be started"),
     ):
-        run(declared(), workers=1, output=tmp_path)
+        run(faulty_study(), workers=1, output=tmp_path)
     assert "No module named 'no_such_module'" in (tmp_path / "faulty.workers.log").read_text()
 
 
 def test_ctrl_c_in_the_middle_of_writing(tmp_path, monkeypatch):
     """The old file stays, nothing is left beside it, and no cell is computed again."""
-    study = declared(cells=CELLS)
+    study = faulty_study(cells=CELLS)
     run(study, output=tmp_path)
     old = (tmp_path / "faulty.nc").read_bytes()
 
@@ -211,9 +213,9 @@ def test_ctrl_c_in_the_middle_of_writing(tmp_path, monkeypatch):
 
 def test_what_a_killed_write_left_is_no_result(tmp_path):
     """It is not taken for one, and goes with the next."""
-    run(declared(cells=CELLS), output=tmp_path)
+    run(faulty_study(cells=CELLS), output=tmp_path)
     (tmp_path / ".faulty.nc.new").write_bytes(b"what a killed run left")
-    same_numbers(rsfstudy.open("faulty", tmp_path), uninterrupted())
+    have_same_numbers(rsfstudy.open("faulty", tmp_path), uninterrupted())
     goes_on(tmp_path, CELLS)
 
 
@@ -221,7 +223,7 @@ def test_fresh_leaves_no_half_transaction_behind(tmp_path):
     """SQLite would roll the old file's journal back into the new file."""
     (tmp_path / "faulty.cells.sqlite").write_bytes(b"")
     (tmp_path / "faulty.cells.sqlite-journal").write_bytes(b"what a killed run left")
-    same_numbers(run(declared(cells=CELLS), output=tmp_path, fresh=True), uninterrupted())
+    have_same_numbers(run(faulty_study(cells=CELLS), output=tmp_path, fresh=True), uninterrupted())
 
 
 @contextlib.contextmanager
@@ -239,28 +241,28 @@ def test_a_full_disk_while_cells_are_computed(tmp_path, monkeypatch):
     """The journal takes no more: the run ends with the reason, and goes on once there is room."""
     monkeypatch.setenv("FAULT_CELLS", "2000")
     with limited(100_000):
-        ran = call("run", FAULTY, "--serial", "--output", tmp_path)
+        ran = call_main("run", FAULTY_STUDY_FILE, "--serial", "--output", tmp_path)
     said = " ".join(ran.stderr.split())
     assert ran.returncode == 1
     assert "cannot add to" in said
     assert "the same command goes on from there" in said
-    kept = cells_in(tmp_path / "faulty.cells.sqlite")
+    kept = count_journal_cells(tmp_path / "faulty.cells.sqlite")
     assert 0 < kept < 2000
-    whole = run(declared(cells=2000))
-    same_numbers(run(declared(cells=2000), output=tmp_path), whole)
-    same_numbers(rsfstudy.open("faulty", tmp_path), whole)
+    whole = run(faulty_study(cells=2000))
+    have_same_numbers(run(faulty_study(cells=2000), output=tmp_path), whole)
+    have_same_numbers(rsfstudy.open("faulty", tmp_path), whole)
 
 
 def test_a_full_disk_while_the_result_is_written(tmp_path, monkeypatch):
     """The old result stays whole, and every cell is kept."""
-    run(declared(cells=4), output=tmp_path)
+    run(faulty_study(cells=4), output=tmp_path)
     old = (tmp_path / "faulty.nc").read_bytes()
-    study = declared(cells=CELLS)
+    study = faulty_study(cells=CELLS)
     run(study, output=tmp_path)
     (tmp_path / "faulty.nc").write_bytes(old)
     monkeypatch.setenv("FAULT_CELLS", str(CELLS))
     with limited(len(old) // 2):
-        ran = call("run", FAULTY, "--serial", "--output", tmp_path)
+        ran = call_main("run", FAULTY_STUDY_FILE, "--serial", "--output", tmp_path)
     said = " ".join(ran.stderr.split())
     assert ran.returncode == 1
     assert "Nothing was replaced" in said
@@ -272,18 +274,18 @@ def test_a_full_disk_while_the_result_is_written(tmp_path, monkeypatch):
 def test_a_longer_and_denser_axis_computes_only_new_cells(tmp_path):
     first = run(output=tmp_path)
     assert sorted(os.listdir(tmp_path)) == ["small.cells.sqlite", "small.nc"]
-    longer = SMALL.with_(b_over_a=[2.0, 2.25, 2.5, 3.0, 3.5])
-    with asked_for() as asked:
+    longer = SMALL_STUDY.with_(b_over_a=[2.0, 2.25, 2.5, 3.0, 3.5])
+    with record_computed_cells() as asked:
         extended = run(longer, output=tmp_path)
     assert sorted(cell.scene.b_over_a for cell in asked) == [2.25, 2.25, 3.5, 3.5]
-    same_numbers(extended.sel(b_over_a=[2.0, 2.5, 3.0]), first)
-    same_numbers(extended, run(longer))
+    have_same_numbers(extended.sel(b_over_a=[2.0, 2.5, 3.0]), first)
+    have_same_numbers(extended, run(longer))
 
 
 def test_two_runs_at_a_time_are_refused(tmp_path, monkeypatch):
     """The second, begun while the first computes a cell, is told; the first is not disturbed."""
-    monkeypatch.setattr(journal, "_WAIT", 0.1)
-    study, computed, refused = declared(cells=CELLS), cells.computed, list[bool]()
+    monkeypatch.setattr(journal, "_LOCK_TIMEOUT", 0.1)
+    study, computed, refused = faulty_study(cells=CELLS), cells.compute_cell, list[bool]()
 
     def meanwhile(*words, **options):
         for fresh in (False, True) if not refused else ():
@@ -292,10 +294,10 @@ def test_two_runs_at_a_time_are_refused(tmp_path, monkeypatch):
                 run(study, output=tmp_path, fresh=fresh)
         return computed(*words, **options)
 
-    monkeypatch.setattr(cells, "computed", meanwhile)
-    same_numbers(run(study, output=tmp_path), uninterrupted())
+    monkeypatch.setattr(cells, "compute_cell", meanwhile)
+    have_same_numbers(run(study, output=tmp_path), uninterrupted())
     assert refused == [False, True]
-    same_numbers(rsfstudy.open("faulty", tmp_path), uninterrupted())
+    have_same_numbers(rsfstudy.open("faulty", tmp_path), uninterrupted())
 
 
 @pytest.mark.parametrize("name", ["physics", "numpy", "scipy"])
@@ -303,19 +305,19 @@ def test_other_physics_or_versions_are_not_mixed(name, tmp_path, monkeypatch):
     from rsfstudy.compute import provenance
 
     run(output=tmp_path)
-    other = {**provenance.code(), name: "other"}
-    monkeypatch.setattr(provenance, "code", lambda *_used: other)
+    other = {**provenance.code_fingerprint(), name: "other"}
+    monkeypatch.setattr(provenance, "code_fingerprint", lambda *_used: other)
     with pytest.raises(DataError, match=f"{name}: .* there, other now"):
         run(output=tmp_path)
 
 
 def test_failures_are_tried_again(tmp_path):
     """A cell that failed has no answer: the next run computes it, and only it."""
-    failing = declared("raises", at=(2.5,))
+    failing = faulty_study("raises", at=(2.5,))
     status = run_with_failures(failing, output=tmp_path).status
     assert status.values.tolist() == [0, Status.CELL_RAISED, 0, 0]
-    assert cells_in(tmp_path / "faulty.cells.sqlite") == 4
-    with asked_for() as asked:
+    assert count_journal_cells(tmp_path / "faulty.cells.sqlite") == 4
+    with record_computed_cells() as asked:
         run_with_failures(failing, output=tmp_path)
     assert [cell.scene.b_over_a for cell in asked] == [2.5]
 
@@ -325,15 +327,15 @@ def test_failures_are_tried_again(tmp_path):
 
 def test_where_more_work_is_allowed_answers_are_kept_and_the_rest_is_tried_again(tmp_path):
     few = {"b_over_a": [2.0], "output": tmp_path}
-    spent = run_with_failures(SMALL, budget=300, **few)
+    spent = run_with_failures(SMALL_STUDY, budget=300, **few)
     assert (spent.status == int(Status.WORK_BUDGET_SPENT)).all()
     assert "--budget 1200 (budget=) allows more" in spent.message.values.flat[0]
-    answered = run(SMALL, budget=100_000, **few)
+    answered = run(SMALL_STUDY, budget=100_000, **few)
     assert (answered.status == int(Status.OK)).all()
-    again = run(SMALL, budget=200_000, **few)
-    same_numbers(again, answered)
+    again = run(SMALL_STUDY, budget=200_000, **few)
+    have_same_numbers(again, answered)
     assert (again.wall_time == answered.wall_time).all()  # not computed anew
     with pytest.raises(DataError, match="budget: 200000 there, 300 now"):
-        run(SMALL, budget=300, **few)
+        run(SMALL_STUDY, budget=300, **few)
     with pytest.raises(DataError, match="rtol: 1e-07 there, 1e-06 now"):
-        run(SMALL, budget=400_000, rtol=1e-6, **few)
+        run(SMALL_STUDY, budget=400_000, rtol=1e-6, **few)

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene, history, protocol, simulate
-from rsfstudy.errors import Incomplete
+from rsfstudy.errors import IncompleteWarning
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.events import Kind, maximum, minimum
-from rsfstudy.motion.meter import Meter
-from rsfstudy.motion.readings import watched
+from rsfstudy.motion.events import EventKind, maximum, minimum
+from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.readings import friction_event_quantity
 from rsfstudy.slider import stability
-from rsfstudy.slider.equations import relation_of
+from rsfstudy.slider.equations import friction_relation
 from rsfstudy.status import Status
 
 CONSTANT, VARIABLE = {"normal_stress": "constant"}, {"normal_stress": "variable"}
@@ -28,7 +28,7 @@ def test_slip_forward_is_what_it_is_without(stress):
     plain = Scene(stiffness_ratio=1.5, **stress)
     both_ways = plain.with_(regularised=True)
     for friction in (-0.2, 0.0, 0.1):
-        there, here = relation_of(both_ways)(friction), relation_of(plain)(friction)
+        there, here = friction_relation(both_ways)(friction), friction_relation(plain)(friction)
         assert there == pytest.approx(here, rel=1e-13, abs=1e-15)
     assert both_ways.critical_stiffness == pytest.approx(plain.critical_stiffness, rel=1e-9)
     step, other = (CriticalStep()(scene, Accuracy(1e-6)) for scene in (plain, both_ways))
@@ -45,12 +45,12 @@ def test_friction_is_odd_in_slip_rate():
     """Where stress is mirrored about zero, so is friction: same magnitude of slip rate."""
     scene = Scene(regularised=True, **CONSTANT)
     for above in (1e-6, 0.01, 0.3):
-        there, slope, *_ = relation_of(scene)(above - scene.mu_star)
-        mirrored, other_slope, *_ = relation_of(scene)(-above - scene.mu_star)
+        there, slope, *_ = friction_relation(scene)(above - scene.mu_star)
+        mirrored, other_slope, *_ = friction_relation(scene)(-above - scene.mu_star)
         assert mirrored == pytest.approx(there, rel=1e-12)
         assert other_slope == pytest.approx(-slope, rel=1e-12)
     # close to zero stress the fault is viscous: V = 2 V_* exp(-mu_*/a) tau/(a sigma)
-    value = relation_of(scene)(1e-9 - scene.mu_star)[0]
+    value = friction_relation(scene)(1e-9 - scene.mu_star)[0]
     linear = math.log(2e-9 / scene.a) - scene.mu_star / scene.a
     assert value / scene.a == pytest.approx(linear, rel=1e-9)
 
@@ -128,10 +128,10 @@ def test_slip_back_is_a_mirror_of_slip_forward(law):
 def test_stress_turns_first_where_slip_back_is_as_fast_as_the_load_point():
     fields = {"law": "slowness", "a": 0.01, "b_over_a": 1.4, "stiffness": 0.02, **CONSTANT}
     scene = Scene(**fields, regularised=True, loading=protocol([{"velocity": -1.0}]))
-    of = watched(scene)[0]
-    watches = [minimum(of, ends=True), maximum(of, ends=True)]
-    *_before, turn = follow(scene, Accuracy(1e-6), Meter(10**5), watches, until=100.0)
-    assert turn.kind is Kind.MINIMUM
+    of = friction_event_quantity(scene)[0]
+    watches = [minimum(of, terminal=True), maximum(of, terminal=True)]
+    *_before, turn = integrate_events(scene, Accuracy(1e-6), WorkMeter(10**5), watches, until=100.0)
+    assert turn.kind is EventKind.MINIMUM
     assert turn.point.log_slip_rate == pytest.approx(0.0, abs=1e-6)
     assert turn.point.spring_stress < -2.0 * scene.mu_star
 
@@ -139,5 +139,5 @@ def test_stress_turns_first_where_slip_back_is_as_fast_as_the_load_point():
 def test_a_motion_that_slips_back_says_so():
     hold = protocol([{"velocity": -1.0, "duration": 100.0}, {"velocity": 0.0}])
     scene = Scene(**CONSTANT, stiffness=0.02, regularised=True, loading=hold)
-    with pytest.warns(Incomplete, match="shear stress has gone to -"):
+    with pytest.warns(IncompleteWarning, match="shear stress has gone to -"):
         assert simulate(scene).attrs["status"] == "shear_stress_reversed"

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from running import called, run, study_of
+from running import run, run_command, study_of
 
 import rsfstudy
-from rsfstudy import Axis, Laboratory, Scene, Study
+from rsfstudy import Axis, Rig, Scene, Study
 from rsfstudy.api import summaries
 from rsfstudy.declare import catalogue, rigs
 from rsfstudy.errors import InvalidValue
@@ -23,17 +23,17 @@ STATED = {
     "reference_velocity": "1 um/s",
     "stiffness": "0.01 MPa/um",
 }
-RIG = Laboratory(**STATED)
+RIG = Rig(**STATED)
 LAW = {"law": "slowness", "normal_stress": "constant", "a": 0.01, "b_over_a": 1.4}
 #: Two roundings of each of a few factors.
 EXACT = 1e-14
 
 
-def study(*axes, laboratory=RIG, measure=None, **fields):
-    base = laboratory.scene(**{**LAW, **fields})
+def study(*axes, rig=RIG, measure=None, **fields):
+    base = rig.scene(**{**LAW, **fields})
     measure = measure or LinearStability()
     return Study(
-        name="of_rig", title="Of a rig", base=base, laboratory=laboratory, axes=axes,
+        name="of_rig", title="Of a rig", base=base, rig=rig, axes=axes,
         measure=measure,
     )  # fmt: skip
 
@@ -56,7 +56,7 @@ def test_a_quantity_varies_and_all_others_are_held(varied):
     fields = {"hold_time": "100 s", "initial_stress": "50 kPa", "load_velocity_ratio": 3.0}
     scenes = list(study(RIG.axis(varied, AXES[varied]), **fields).scenes())
     for value, scene in zip(AXES[varied], scenes, strict=True):
-        theirs = Laboratory(**STATED | {varied: value}).scene(**LAW, **fields)
+        theirs = Rig(**STATED | {varied: value}).scene(**LAW, **fields)
         assert numbers(scene) == pytest.approx(numbers(theirs), rel=EXACT)
         assert scene.load_velocity_ratio == 3.0
     if varied != "reference_velocity":
@@ -78,7 +78,7 @@ def test_fields_of_scenes_in_units():
         RIG.axis("hold_time", ["10 s", "2 min"]), RIG.axis("load_velocity", "1:100:3:log um/s")
     )
     assert [axis.units for axis in made.axes] == [{"hold_time": "s"}, {"load_velocity": "um/s"}]
-    assert made.axes[0].points == ["10 s", "120 s"]
+    assert made.axes[0].point_names == ["10 s", "120 s"]
     at = [(scene.hold_time, scene.load_velocity_ratio) for scene in made.scenes()]
     # D_c/V_* is 10 s
     expected = list(itertools.product([1.0, 12.0], [1.0, 10.0, 100.0]))
@@ -86,7 +86,7 @@ def test_fields_of_scenes_in_units():
 
 
 def test_rigs_as_an_axis():
-    rig20 = Laboratory(**STATED | {"normal_stress": "20 MPa", "slip_distance": "5 um"})
+    rig20 = Rig(**STATED | {"normal_stress": "20 MPa", "slip_distance": "5 um"})
     made = study(Axis("rig", {"5 MPa": RIG, "20 MPa": rig20}), hold_time="10 s")
     for scene, rig in zip(made.scenes(), (RIG, rig20), strict=True):
         assert numbers(scene) == pytest.approx(numbers(rig.scene(**LAW, hold_time="10 s")))
@@ -141,15 +141,15 @@ def test_results_survive_their_file(tmp_path):
 
 def test_overrides_in_units():
     made = study(*LATTICE, initial_stress="50 kPa")
-    assert made.with_(hold_time=["10 s", "1 min"]).axes[3].points == ["10 s", "60 s"]
+    assert made.with_(hold_time=["10 s", "1 min"]).axes[3].point_names == ["10 s", "60 s"]
     # plain numbers are in the units of their axis
-    assert made.with_(stiffness=[0.02]).axes[2].points == ["0.02 MPa/um"]
+    assert made.with_(stiffness=[0.02]).axes[2].point_names == ["0.02 MPa/um"]
     assert made.with_(slip_distance=["1 um", "2 um"]).dimensions[0] == "slip_distance"
-    assert made.with_(normal_stress=["2 MPa", "5 MPa"]).axes[0].points == ["2 MPa", "5 MPa"]
+    assert made.with_(normal_stress=["2 MPa", "5 MPa"]).axes[0].point_names == ["2 MPa", "5 MPa"]
     assert made.with_(normal_stress="constant").base == made.base
     one = made.with_(slip_distance="20 um")
-    assert one.laboratory.slip_distance == pytest.approx(2e-5)
-    theirs = Laboratory(**STATED | {"slip_distance": "20 um"})
+    assert one.rig.slip_distance == pytest.approx(2e-5)
+    theirs = Rig(**STATED | {"slip_distance": "20 um"})
     expected = theirs.scene(**LAW, initial_stress="50 kPa")
     assert numbers(one.base) == pytest.approx(numbers(expected), rel=EXACT)
     ramp = {"normal_stress": "imposed", "normal_stress_ramp": "1 MPa", "ramp_duration": "20 s"}
@@ -194,7 +194,7 @@ def cycles():
         RIG.axis("load_velocity", ["1 um/s", "10 um/s"]),
     )
     fields = {"period": "5 ms", "inertia": True}
-    made = study(*axes, laboratory=Laboratory(**SOFT), measure=LimitCycle(), **fields)
+    made = study(*axes, rig=Rig(**SOFT), measure=LimitCycle(), **fields)
     return run(made, engine="compiled", rtol=1e-5)
 
 
@@ -267,7 +267,7 @@ def test_figures_and_tables_show_units(cycles, capsys):
     texts = [axes.get_xlabel() + axes.get_ylabel() for axes in drawn.axes]
     assert any(r"Load point velocity" in text and r"($\mu$m/s)" in text for text in texts)
     assert any("(s)" in text for text in texts)
-    layout.show(tables.headline(cycles))
+    layout.print_piece(tables.headline_table(cycles))
     said = capsys.readouterr().out
     assert "recurrence interval of stick-slip, in s" in said
     interval = float(cycles.rsf.in_units()["recurrence_interval"][0, 0, 0])
@@ -279,7 +279,7 @@ def test_results_say_what_they_are_of(cycles):
     axis varies is not among them.
     """
 
-    of = summaries.origin(cycles)
+    of = summaries.describe_origin(cycles)
     assert {"a = 0.01", "b_over_a = 1.4"} <= set(of["fixed"].split(", "))
     # in units of the slider the stiffness goes with D_c and sigma_*
     assert not {"stiffness", "load_velocity_ratio"} & set(of["fixed"].replace(",", "").split())
@@ -287,11 +287,11 @@ def test_results_say_what_they_are_of(cycles):
     assert "slip_distance" not in of["laboratory"]
     scene = RIG.scene(**LAW, hold_time="10 s")
     motion = RIG.in_units(rsfstudy.simulate(scene, duration=1.0))
-    assert summaries.origin(motion)["laboratory"] == (
+    assert summaries.describe_origin(motion)["laboratory"] == (
         "normal_stress = 5 MPa, slip_distance = 10 um, reference_velocity = 1 um/s, "
         "stiffness = 0.01 MPa/um"
     )
-    assert "hold_time = 1" in summaries.origin(motion)["scene"].split(", ")
+    assert "hold_time = 1" in summaries.describe_origin(motion)["scene"].split(", ")
 
 
 # ---- the command line ----------------------------------------------------------------------------
@@ -305,9 +305,9 @@ OPTIONS = [
 
 def test_a_study_of_no_rig_is_put_on_one(tmp_path):
     """Axes are in units then, what they hold is what they held; new values are in units."""
-    studied = catalogue.load("slide_hold_slide")
-    rig = Laboratory(**{n: v for n, v in STATED.items() if n != "stiffness"})
-    there = rigs.on(studied, rig)
+    studied = catalogue.load_study("slide_hold_slide")
+    rig = Rig(**{n: v for n, v in STATED.items() if n != "stiffness"})
+    there = rigs.with_rig(studied, rig)
     assert [axis.units for axis in there.axes[1:]] == [{"stiffness": "MPa/um"}, {"hold_time": "s"}]
     # what is fitted is what was: D_c/V_* is 10 s
     assert [fit.within for fit in there.reductions] == [(1e5, 1e9)] * 2
@@ -318,7 +318,7 @@ def test_a_study_of_no_rig_is_put_on_one(tmp_path):
 
     words = ["run", "slide_hold_slide", *OPTIONS, "--set", "case=slip law"]
     words += ["--set", "stiffness=0.01 MPa/um", "--set", "hold_time=10 s,100 s"]
-    status, said = called([*words, "--serial", "--quiet", "--output", str(tmp_path)])
+    status, said = run_command([*words, "--serial", "--quiet", "--output", str(tmp_path)])
     assert status == 0, said
     results = rsfstudy.open(tmp_path / "slide_hold_slide.nc")
     assert results["hold_time"].values.tolist() == [10.0, 100.0]
@@ -330,11 +330,11 @@ def test_a_study_of_no_rig_is_put_on_one(tmp_path):
 def test_what_a_rig_states_of_its_dynamics_takes_the_place_of_that_of_a_study():
     """Of a study with mass on a rig that radiates, and of one that radiates on a rig with mass."""
     scales = {n: v for n, v in STATED.items() if n != "stiffness"}
-    radiates = Laboratory(**scales, shear_modulus="30 GPa", density="2700 kg/m^3")
-    swings = Laboratory(**scales, period="10 ms")
-    study = catalogue.load("limit_cycles")
+    radiates = Rig(**scales, shear_modulus="30 GPa", density="2700 kg/m^3")
+    swings = Rig(**scales, period="10 ms")
+    study = catalogue.load_study("limit_cycles")
     damped = replace(study, base=study.base.with_(inertia=False, radiation_damping=1e-4))
     for before, rig, mass in ((study, radiates, False), (damped, swings, True)):
-        there = rigs.on(before, rig).base
+        there = rigs.with_rig(before, rig).base
         assert there.has_mass is mass
         assert (there.radiation_damping == 0.0) is mass

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from faulty import declared
-from running import HANGS, OWN, SMALL, run, same_numbers
+from faulty import faulty_study
+from running import HANG_TIMEOUT, SMALL_STUDY, USER_MEASURE_SOURCE, have_same_numbers, run
 
 from rsfstudy import Scene, Study
 from rsfstudy.api import runs
@@ -22,16 +22,16 @@ from rsfstudy.status import Status
 
 def test_serial_workers_and_any_grouping_give_identical_bits(cluster, monkeypatch):
     serial = run()
-    same_numbers(run(client=cluster), serial)
+    have_same_numbers(run(client=cluster), serial)
     for size in (1, 4, 100):
-        monkeypatch.setattr(plan.Batches, "size", lambda _self, size=size: size)
-        same_numbers(run(client=cluster), serial)
-        same_numbers(run(), serial)
+        monkeypatch.setattr(plan.BatchIterator, "next_size", lambda _self, size=size: size)
+        have_same_numbers(run(client=cluster), serial)
+        have_same_numbers(run(), serial)
 
 
 def test_equal_scenes_are_computed_once():
     """phi means nothing at constant normal stress: the cells along it are one scene."""
-    doubled = SMALL.with_(phi=[55.0, 60.0], b_over_a=[2.0])
+    doubled = SMALL_STUDY.with_(phi=[55.0, 60.0], b_over_a=[2.0])
     dataset = run(doubled)
     assert dataset.sizes == {"phi": 2, "case": 2, "b_over_a": 1}
     constant = dataset.sel(case="constant")
@@ -44,7 +44,7 @@ class Profile(Measure):
     """A measure with an inner dimension."""
 
     name = "profile"
-    headline = "total"
+    primary_output = "total"
     typical_work = 1
 
     @property
@@ -55,18 +55,20 @@ class Profile(Measure):
     def inner_coordinates(self):
         return {"phase": np.linspace(0.0, 1.0, 4)}
 
-    def find(self, scene, accuracy, meter):
+    def compute(self, scene, accuracy, meter):
         return Outcome(Status.OK, {"total": scene.b_over_a, "curve": scene.b_over_a * np.arange(4)})
 
 
 def test_numbers_along_an_inner_dimension():
-    dataset = run(Study(name="s", title="t", base=Scene(), axes=SMALL.axes, measure=Profile()))
+    dataset = run(
+        Study(name="s", title="t", base=Scene(), axes=SMALL_STUDY.axes, measure=Profile())
+    )
     assert dataset.curve.dims == ("case", "b_over_a", "phase")
     np.testing.assert_array_equal(dataset.curve.isel(case=0, b_over_a=2), 3.0 * np.arange(4))
 
 
 def test_bad_cells_are_refused_before_any_work(tmp_path):
-    bad = SMALL.with_(phi=[30.0, 60.0])
+    bad = SMALL_STUDY.with_(phi=[30.0, 60.0])
     with pytest.raises(InvalidValue, match="phi=30.0"):
         run(bad, output=tmp_path)
     assert os.listdir(tmp_path) == []
@@ -76,9 +78,13 @@ def test_a_measure_of_a_script_reaches_the_workers(tmp_path):
     script = tmp_path / "script.py"
     runs = "rsfstudy.run(study, workers=1, output=None, progress=False, power=1)"
     guarded = f"if __name__ == '__main__':\n    print({runs}.total.values)"
-    script.write_text(f"import rsfstudy\n{OWN}\n{guarded}")
+    script.write_text(f"import rsfstudy\n{USER_MEASURE_SOURCE}\n{guarded}")
     ran = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=HANGS
+        [sys.executable, str(script)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=HANG_TIMEOUT,
     )
     assert ran.returncode == 0, ran.stderr
     assert ran.stdout == "[[2. 3.]]\n"
@@ -86,7 +92,7 @@ def test_a_measure_of_a_script_reaches_the_workers(tmp_path):
 
 UNGUARDED = f"""
 import rsfstudy
-{OWN}
+{USER_MEASURE_SOURCE}
 def main():
     print(rsfstudy.run(study, workers=1, output=None, progress=False).total.values)
 
@@ -99,7 +105,7 @@ def test_a_script_that_workers_would_run_again_is_told_what_to_write(call, tmp_p
     script = tmp_path / "script.py"
     script.write_text(UNGUARDED + call)
     words = [sys.executable, str(script)]
-    ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANGS)
+    ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANG_TIMEOUT)
     line = len(script.read_text().splitlines())
     assert ran.returncode == 1
     assert f"worker processes import script.py, and line {line} would run in each" in ran.stderr
@@ -109,7 +115,7 @@ def test_a_script_that_workers_would_run_again_is_told_what_to_write(call, tmp_p
 
 def test_code_that_workers_do_not_import_needs_no_guard():
     words = [sys.executable, "-c", UNGUARDED + "main()"]
-    ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANGS)
+    ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANG_TIMEOUT)
     assert (ran.returncode, ran.stdout.splitlines()[-1:]) == (0, [" [4. 9.]]"]), ran.stderr
 
 
@@ -119,7 +125,7 @@ import psutil
 from rsfstudy.compute import clusters
 
 if __name__ == "__main__":
-    with clusters.local_cluster(1, pathlib.Path(sys.argv[1])) as client:
+    with clusters.start_local_cluster(1, pathlib.Path(sys.argv[1])) as client:
         for child in psutil.Process().children():
             if "resource_tracker" in " ".join(child.cmdline()):
                 child.kill()
@@ -133,7 +139,7 @@ def test_a_lost_resource_tracker_causes_no_traceback(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(LOSES_TRACKER)
     words = [sys.executable, str(script), str(tmp_path / "workers.log")]
-    ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANGS)
+    ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANG_TIMEOUT)
     assert (ran.returncode, ran.stdout) == (0, "killed\n1\n"), ran.stderr
     assert "Traceback" not in ran.stderr
 
@@ -146,15 +152,15 @@ def test_accuracy_reaches_the_cells():
 
 def test_runs_share_processes_that_are_started_once(monkeypatch, tmp_path):
     """When the first cell is needed; a worker that dies is started again among them."""
-    started, start = [], workers.local_cluster
+    started, start = [], workers.start_local_cluster
     monkeypatch.setattr(
-        workers, "local_cluster", lambda n, file: (started.append(file), start(n, file))[1]
+        workers, "start_local_cluster", lambda n, file: (started.append(file), start(n, file))[1]
     )
     with workers.Workers(1, log=tmp_path / "workers.log") as where:
 
         def ran(name, fault=""):
-            study = replace(declared(fault, (3.0,) if fault else ()), name=name)
-            results = runs.prepared(study, runner.Keeping(output=tmp_path), where, False)()
+            study = replace(faulty_study(fault, (3.0,) if fault else ()), name=name)
+            results = runs.prepare_run(study, runner.OutputOptions(output=tmp_path), where, False)()
             return [Status(code).name for code in results["status"].values]
 
         assert not started
@@ -174,16 +180,18 @@ def test_processes_that_are_lost_are_started_anew(monkeypatch, tmp_path):
     def mapper(task, batches):
         if lost:
             raise RunError("the Dask scheduler is lost")
-        yield from workers.serial(task, batches)
+        yield from workers.compute_serially(task, batches)
 
     def start(_processes, file):
         started.append(file)
         return contextlib.nullcontext()
 
-    monkeypatch.setattr(workers, "local_cluster", start)
-    monkeypatch.setattr(workers, "on_client", lambda *_where: mapper)
+    monkeypatch.setattr(workers, "start_local_cluster", start)
+    monkeypatch.setattr(workers, "make_client_mapper", lambda *_where: mapper)
     with workers.Workers(1, log=tmp_path / "workers.log") as where:
-        begin = runs.prepared(declared(), runner.Keeping(output=tmp_path), where, False)
+        begin = runs.prepare_run(
+            faulty_study(), runner.OutputOptions(output=tmp_path), where, False
+        )
         with pytest.raises(RunError, match="is lost"):
             begin()
         lost.clear()

@@ -13,9 +13,9 @@ from scipy.special import gammaln
 from scipy.stats import lognorm, norm, truncnorm, uniform
 
 import rsfstudy
-from rsfstudy import Axis, Laboratory, Scene, Study, plots
+from rsfstudy import Axis, Rig, Scene, Study, plots
 from rsfstudy.compute import cells
-from rsfstudy.errors import Incomplete, InvalidValue
+from rsfstudy.errors import IncompleteWarning, InvalidValue
 from rsfstudy.files import restore
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
@@ -26,7 +26,7 @@ from rsfstudy.reduce import (
     SobolIndices,
     StandardDeviation,
     StatusShares,
-    reduced,
+    apply_reductions,
 )
 from rsfstudy.rig.reductions import InUnits
 from rsfstudy.status import Status
@@ -38,7 +38,7 @@ FIELDS = {
     "a": lambda d: np.exp(d["ln_a"]),
     "b_over_a": lambda d: 1.0 + np.exp(d["ln_net"] - d["ln_a"]),
 }
-RIG = Laboratory(
+RIG = Rig(
     normal_stress="5 MPa",
     slip_distance="10 um",
     reference_velocity="1 um/s",
@@ -70,7 +70,7 @@ def test_fields_are_functions_of_what_is_drawn():
     how = json.loads(found["sample"].attrs["drawn"])
     assert (how["method"], how["n"], how["seed"]) == ("sobol", 8, 3)
     assert how["of"]["ln_a"].startswith("norm(")
-    again = restore.study_of(found)
+    again = restore.rebuild_study(found)
     assert again.axes[1].describe() == samples.describe()
     assert list(again.scenes()) == list(study(Axis("law", ["slip", "slowness"]), samples).scenes())
 
@@ -83,7 +83,7 @@ def test_the_first_samples_are_a_sample_still():
         whole.axes[0].rows[n]["a"] for n in (2, 5)
     ]
     assert {row["a"] for row in whole.with_(a=0.012).axes[0].rows} == {0.012}
-    assert not whole.with_(a=0.012).axes[0].drawn
+    assert not whole.with_(a=0.012).axes[0].sampling_info
     with pytest.raises(InvalidValue, match="sample = 16.0: .* from 0 to 15"):
         whole.with_(sample=16)
     with pytest.raises(InvalidValue, match="a = .*all of its points take one value"):
@@ -124,7 +124,7 @@ def test_samples_for_sobol_indices_share_coordinates():
     assert (first == np.stack([b[:, 0], a[:, 1]], axis=1)).all()
     assert (second == np.stack([a[:, 0], b[:, 1]], axis=1)).all()
     assert (a != b).all()
-    assert axis.drawn["n"] == 16
+    assert axis.sampling_info["n"] == 16
 
 
 # ---- tables -------------------------------------------------------------------------------------
@@ -139,7 +139,7 @@ def test_the_rows_of_a_table_are_cases(table):
     found = run(study(Axis.cases(table)))
     assert found["case"].values.tolist() == [0, 1, 2]
     np.testing.assert_allclose(found["critical_stiffness"], [0.005, 0.0048, 0.005], rtol=1e-7)
-    assert restore.study_of(found).axes[0].rows == Axis("case", TABLE).rows
+    assert restore.rebuild_study(found).axes[0].rows == Axis("case", TABLE).rows
 
 
 def _with_units(tmp_path):
@@ -161,13 +161,13 @@ def test_a_table_in_units_of_a_rig(tmp_path):
     """K = k D_c/sigma_*, whatever the units are stated by."""
     base = RIG.scene(a=0.01, b_over_a=1.5, normal_stress="constant")
     for axis in _with_units(tmp_path):
-        declared = study(axis, base=base, laboratory=RIG)
+        declared = study(axis, base=base, rig=RIG)
         scenes = list(declared.scenes())
         assert [scene.stiffness for scene in scenes] == pytest.approx([0.001, 0.002], rel=1e-12)
         assert [scene.a for scene in scenes] == [0.01, 0.012]
         found = run(declared)
         assert found["slip_distance"].attrs["units"] in ("um", "m")
-        assert restore.study_of(found).describe() == declared.describe()
+        assert restore.rebuild_study(found).describe() == declared.describe()
 
 
 # ---- from a fit ----------------------------------------------------------------------------------
@@ -195,7 +195,7 @@ def test_the_estimates_that_uncertain_recurrence_states(fitted):
 
 
 def test_a_sample_beyond_what_is_meaningful_is_told_before_work_starts(monkeypatch):
-    monkeypatch.setattr(cells, "computed", None)
+    monkeypatch.setattr(cells, "compute_cell", None)
     drawn = {"a": norm(0.01, 0.01), "mu_star": norm(0.6, 0.3)}
     sampled = study(Axis("law", ["slip", "slowness"]), Axis.samples(drawn, 64, 1))
     rows = sampled.axes[1].rows
@@ -206,7 +206,7 @@ def test_a_sample_beyond_what_is_meaningful_is_told_before_work_starts(monkeypat
         run(sampled)
     lengths = Axis.samples({"slip_distance": norm(1.0, 1.0)}, 8, 1, units={"slip_distance": "um"})
     with pytest.raises(InvalidValue, match=r"slip_distance = .*positive, and \d of 8 are not"):
-        study(lengths, base=RIG.scene(a=0.01, b_over_a=1.5), laboratory=RIG)
+        study(lengths, base=RIG.scene(a=0.01, b_over_a=1.5), rig=RIG)
 
 
 # ---- what comes of it ---------------------------------------------------------------------------
@@ -236,7 +236,7 @@ def test_statistics_with_the_errors_of_sampling():
     which is known to 3 % of itself and is met to four times that.
     """
     values = RANDOM.normal(3.0, 0.5, (500, 200))
-    found = reduced(measured(values), STATISTICS)
+    found = apply_reductions(measured(values), STATISTICS)
     np.testing.assert_allclose(found["mean"], values.mean(axis=1), rtol=1e-13)
     np.testing.assert_allclose(found["sd"], values.std(axis=1, ddof=1), rtol=1e-12)
     np.testing.assert_allclose(found["low"], np.quantile(values, 0.2, axis=1), rtol=1e-12)
@@ -255,10 +255,10 @@ def test_the_error_of_a_standard_deviation_is_honest_of_few_samples(n):
     tells more than that of few, never less: up to a sixth more of three; 20,000 sets tell 2 %.
     """
     values = np.random.default_rng(5).normal(0.0, 1.0, (20_000, n))
-    found = reduced(measured(values), (StandardDeviation("sd", "y"),))
+    found = apply_reductions(measured(values), (StandardDeviation("sd", "y"),))
     c4 = np.sqrt(2.0 / (n - 1)) * np.exp(gammaln(n / 2) - gammaln((n - 1) / 2))
     assert 0.98 < float(found["sd_stderr"].mean()) / np.sqrt(1.0 - c4**2) < 1.2
-    pair = reduced(measured(values[:3, :2]), (StandardDeviation("sd", "y"),))
+    pair = apply_reductions(measured(values[:3, :2]), (StandardDeviation("sd", "y"),))
     assert np.isnan([pair["sd"], pair["sd_stderr"]]).all()
     assert pair["sd"].attrs["refused"] == "needs 3 samples with a number"
 
@@ -268,38 +268,40 @@ def test_failed_samples_are_refused_and_shares_tell_of_them():
     status[3], status[5:8] = Status.CELL_RAISED, Status.NO_LIMIT_CYCLE
     kinds = (*STATISTICS, Logarithm("log", "y"), StatusShares("share", "log"))
     lattice = measured(np.arange(20.0), status)
-    found = reduced(lattice, kinds)
+    found = apply_reductions(lattice, kinds)
     for name in ("mean", "sd", "low"):
         assert np.isnan([found[name], found[f"{name}_error"]]).all()
         assert found[name].attrs["refused"] == "samples failed or are missing"
-    for shares in (found, reduced(lattice, kinds, despite_failures=True)):
+    for shares in (found, apply_reductions(lattice, kinds, despite_failures=True)):
         told = shares["share"].to_series()
         assert told[told > 0.0].to_dict() == {
             "ok": 0.8, "no_limit_cycle": 0.15, "cell_raised": 0.05,
         }  # fmt: skip
         assert "refused" not in shares["share"].attrs
-    assert float(reduced(lattice, kinds, despite_failures=True)["mean"]) > 0.0
+    assert float(apply_reductions(lattice, kinds, despite_failures=True)["mean"]) > 0.0
     lattice["status"][0] = Status.PENDING
-    assert np.isnan(reduced(lattice, kinds)["share"]).all()
+    assert np.isnan(apply_reductions(lattice, kinds)["share"]).all()
 
 
 def test_a_run_warns_of_what_reductions_refuse():
     axis = Axis.samples({"b_over_a": norm(2.0, 0.1)}, 2, seed=1)
     means = (Mean("middle", "critical_displacement"),)
     study = study_of("few", CriticalStep("displacement_step"), axis, base=BASE, reductions=means)
-    with pytest.warns(Incomplete, match="2 of 2 cells failed: .*; no middle: samples failed or ar"):
+    with pytest.warns(
+        IncompleteWarning, match="2 of 2 cells failed: .*; no middle: samples failed or ar"
+    ):
         rsfstudy.run(study, workers=0, output=None, progress=False, budget=60, keep_going=True)
 
 
 def test_too_few_samples_for_a_quantile():
-    found = reduced(measured(np.arange(18.0)), (Quantile("q", "y", level=0.05),))
+    found = apply_reductions(measured(np.arange(18.0)), (Quantile("q", "y", level=0.05),))
     assert np.isnan(found["q"])
     assert found["q"].attrs["refused"] == "needs 19 samples with a number"
     for level in (1.0, "half"):
         with pytest.raises(InvalidValue, match=f"level = .*{level}.*: must be between 0 and 1"):
             Quantile("q", "y", level=level)
     with pytest.raises(InvalidValue, match="over = 'draw': is no dimension of y"):
-        reduced(measured(np.arange(18.0)), (Mean("m", "y", over="draw"),))
+        apply_reductions(measured(np.arange(18.0)), (Mean("m", "y", over="draw"),))
 
 
 def test_a_mean_over_other_scales_is_refused_and_told_in_units():
@@ -310,7 +312,9 @@ def test_a_mean_over_other_scales_is_refused_and_told_in_units():
         reference_velocity=((), 2e-6, {"units": "m s-1"}),
         reference_rate=("sample", 2.0 / np.array([5.0, 10.0, 30.0]), {"units": "s-1"}),
     )
-    found = reduced(lattice, (Mean("m", "y"), InUnits("t", "y", units="min"), Mean("mean_t", "t")))
+    found = apply_reductions(
+        lattice, (Mean("m", "y"), InUnits("t", "y", units="min"), Mean("mean_t", "t"))
+    )
     assert np.isnan(found["m"])
     assert found["m"].attrs["refused"] == "y is in units of D_c, which varies"
     assert found["t"].values * 60.0 == pytest.approx([5.0, 10.0, 30.0], rel=1e-14)
@@ -325,7 +329,7 @@ def saltelli(function, n, count=3, **more) -> xr.Dataset:
     axis = Axis.samples(dict.fromkeys(names, even), n, 5, method="saltelli", dimension="draw")
     drawn = {name: np.array([row[name] for row in axis.rows]) for name in names}
     found = measured(function(*drawn.values()), **more).rename(sample="draw")
-    found["draw"].attrs["drawn"] = json.dumps(axis.drawn)
+    found["draw"].attrs["drawn"] = json.dumps(axis.sampling_info)
     return found
 
 
@@ -336,7 +340,7 @@ def test_sobol_indices_of_a_function_that_has_them_in_closed_form():
     lattice = saltelli(
         lambda x, y, z: np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x), 1024
     )
-    found = reduced(lattice, (SobolIndices("share", "y", over="draw"),))
+    found = apply_reductions(lattice, (SobolIndices("share", "y", over="draw"),))
     alone = 0.5 * (1.0 + 0.1 * np.pi**4 / 5.0) ** 2
     second, crossed = 49.0 / 8.0, 0.01 * np.pi**8 * (1.0 / 18.0 - 1.0 / 50.0)
     variance = alone + second + crossed
@@ -355,7 +359,7 @@ def test_sobol_indices_of_a_function_that_has_them_in_closed_form():
 def test_sobol_indices_are_refused():
     of = (SobolIndices("share", "y", over="draw"),)
     lost = saltelli(lambda x, y, z: np.where(x > 3.0, np.nan, x), 64)
-    found = reduced(lost, of)
+    found = apply_reductions(lost, of)
     count = int(lost["y"].isnull().sum())
     assert np.isnan(found["share_total"]).all()
     why = f"{count} of 320 cells have no number, and the indices need all: narrower distributions"
@@ -363,10 +367,10 @@ def test_sobol_indices_are_refused():
     whole = saltelli(lambda x, y, z: x, 64)
     for part in (whole.isel(draw=slice(0, 310)), whole.isel(draw=slice(0, 15))):
         with pytest.raises(InvalidValue, match="over = 'draw': was not drawn for Sobol indices"):
-            reduced(part, of)
-    reduced(whole.isel(draw=slice(0, 160)), of)  # 32 points are a sample still
+            apply_reductions(part, of)
+    apply_reductions(whole.isel(draw=slice(0, 160)), of)  # 32 points are a sample still
     with pytest.raises(InvalidValue, match="over = 'sample': is no dimension of y"):
-        reduced(whole, (SobolIndices("share", "y"),))
+        apply_reductions(whole, (SobolIndices("share", "y"),))
 
 
 # ---- figures ------------------------------------------------------------------------------------
@@ -378,7 +382,7 @@ def test_samples_are_drawn_as_histograms_and_scatters():
     """
     laws = Axis("law", ["slip", "slowness"])
     found = run(study(laws, Axis.samples(LOGS, 256, 3, fields=FIELDS)), engine="compiled")
-    drawn = plots.figure(found)
+    drawn = plots.draw_figure(found)
     names = ("critical_stiffness", "a", "b_over_a")
     assert len(drawn.axes) == len(names) ** 2
     for place, axes in enumerate(drawn.axes):

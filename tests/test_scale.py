@@ -7,9 +7,9 @@ import os
 import numpy as np
 import pytest
 import xarray as xr
-from faulty import declared
-from running import SMALL, run, same_numbers
-from scale import apart
+from faulty import faulty_study
+from running import SMALL_STUDY, have_same_numbers, run
+from scale import measure_in_subprocess
 
 import rsfstudy
 from rsfstudy import plots
@@ -21,18 +21,18 @@ from rsfstudy.files import zarr_store
 @functools.cache
 def in_memory() -> xr.Dataset:
     """What the stores of the small lattice are held against."""
-    return run(SMALL)
+    return run(SMALL_STUDY)
 
 
 @pytest.mark.parametrize("format", ["netcdf", "zarr"])
 def test_the_driver_needs_less_than_a_kilobyte_a_cell(format):
     """Peak memory of a process that runs 15,000 cells, beyond that of one that has run 100."""
-    assert apart(15_000, 0, format)["bytes"] < 1000
+    assert measure_in_subprocess(15_000, 0, format)["bytes"] < 1000
 
 
 def test_few_batches_wait_on_the_scheduler(cluster, monkeypatch):
     """However many cells: what waits there fills its memory."""
-    monkeypatch.setattr(plan.Batches, "size", lambda _self: 1)
+    monkeypatch.setattr(plan.BatchIterator, "next_size", lambda _self: 1)
     waiting, most = set(), []
     submit = cluster.submit
 
@@ -43,26 +43,26 @@ def test_few_batches_wait_on_the_scheduler(cluster, monkeypatch):
         return future
 
     monkeypatch.setattr(cluster, "submit", counted)
-    run(declared(cells=60), client=cluster)
+    run(faulty_study(cells=60), client=cluster)
     assert len(most) == 60
     assert max(most) <= 4 + 2 * 2
 
 
 @pytest.mark.parametrize(
-    ("seconds", "size"), [(0.1, 3), (60.0, 1), (1e-6, plan.LARGEST_BATCH), (np.nan, 1), (0.0, 1)]
+    ("seconds", "size"), [(0.1, 3), (60.0, 1), (1e-6, plan.MAX_BATCH_SIZE), (np.nan, 1), (0.0, 1)]
 )
 def test_batches_are_sized_by_what_finished_cells_took(seconds, size):
     """A fraction of a second each, and small enough to lose."""
-    batches = plan.Batches(None, np.arange(100_000), workers=2)
-    assert batches.size() == 1
-    batches.learn(seconds)
-    assert batches.size() == size
+    batches = plan.BatchIterator(None, np.arange(100_000), workers=2)
+    assert batches.next_size() == 1
+    batches.record_time(seconds)
+    assert batches.next_size() == size
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 10, 999, 1000])
 def test_the_first_cells_are_a_sample_of_all(count):
     """Every cell once, and no two neighbours one after the other in a long list."""
-    order = plan.scattered(np.arange(count))
+    order = plan.scatter_cells(np.arange(count))
     assert sorted(order) == list(range(count))
     if count >= 10:
         assert (np.abs(np.diff(order)) > 1).all()
@@ -74,15 +74,15 @@ def test_the_first_cells_are_a_sample_of_all(count):
 @pytest.mark.parametrize("numbers", [3, 10**6])
 def test_a_zarr_store_holds_the_same_as_the_file(numbers, tmp_path, monkeypatch):
     """In pieces of one row, and in one; nothing but the store is left."""
-    monkeypatch.setattr(zarr_store, "_NUMBERS", numbers)
-    in_pieces = run(SMALL, output=tmp_path, format="zarr")
-    same_numbers(in_pieces.load().map(plain), in_memory())
+    monkeypatch.setattr(zarr_store, "_NUMBERS_PER_SLAB", numbers)
+    in_pieces = run(SMALL_STUDY, output=tmp_path, format="zarr")
+    have_same_numbers(in_pieces.load().map(plain), in_memory())
     assert sorted(os.listdir(tmp_path)) == ["small.cells.sqlite", "small.zarr"]
     alone = xr.open_dataset(tmp_path / "small.zarr", engine="zarr", consolidated=False)
     assert alone.attrs["completeness"] == "complete"
     assert alone.critical_velocity_ratio.attrs == in_memory().critical_velocity_ratio.attrs
     assert rsfstudy.check(tmp_path / "small.zarr").empty
-    assert plots.figure(rsfstudy.open(tmp_path / "small.zarr")).axes
+    assert plots.draw_figure(rsfstudy.open(tmp_path / "small.zarr")).axes
 
 
 def plain(values: xr.DataArray) -> xr.DataArray:
@@ -91,7 +91,7 @@ def plain(values: xr.DataArray) -> xr.DataArray:
 
 
 def test_reductions_and_claims_of_a_zarr_store(tmp_path, monkeypatch):
-    monkeypatch.setattr(zarr_store, "_NUMBERS", 100)
+    monkeypatch.setattr(zarr_store, "_NUMBERS_PER_SLAB", 100)
     options = {"workers": 0, "progress": False, "output": tmp_path, "b_over_a": [2.0, 3.0, 5.0]}
     store = rsfstudy.run("rate_step_boundary", format="zarr", **options)
     file = rsfstudy.run("rate_step_boundary", **options)
@@ -102,15 +102,15 @@ def test_reductions_and_claims_of_a_zarr_store(tmp_path, monkeypatch):
 
 
 def test_a_store_that_is_there_is_not_replaced(tmp_path):
-    run(SMALL, output=tmp_path, format="zarr")
+    run(SMALL_STUDY, output=tmp_path, format="zarr")
     with pytest.raises(DataError, match=r"small\.zarr is there already"):
-        run(SMALL, output=tmp_path, format="zarr")
+        run(SMALL_STUDY, output=tmp_path, format="zarr")
 
 
 def test_a_store_cut_short_is_not_taken_for_one(tmp_path, monkeypatch):
     """Interrupted between two pieces: nothing stays but the journal, and the command goes on."""
-    monkeypatch.setattr(zarr_store, "_NUMBERS", 3)
-    original, written = zarr_store.variables, []
+    monkeypatch.setattr(zarr_store, "_NUMBERS_PER_SLAB", 3)
+    original, written = zarr_store.build_variables, []
 
     def interrupted(*words):
         written.append(1)
@@ -119,17 +119,19 @@ def test_a_store_cut_short_is_not_taken_for_one(tmp_path, monkeypatch):
         return original(*words)
 
     with monkeypatch.context() as patch:
-        patch.setattr(zarr_store, "variables", interrupted)
+        patch.setattr(zarr_store, "build_variables", interrupted)
         with pytest.raises(rsfstudy.errors.RunError, match="6 of 6 cells are finished"):
-            run(SMALL, output=tmp_path, format="zarr")
+            run(SMALL_STUDY, output=tmp_path, format="zarr")
     assert os.listdir(tmp_path) == ["small.cells.sqlite"]
-    same_numbers(run(SMALL, output=tmp_path, format="zarr").load().map(plain), in_memory())
+    have_same_numbers(
+        run(SMALL_STUDY, output=tmp_path, format="zarr").load().map(plain), in_memory()
+    )
 
 
 @pytest.mark.parametrize("codec", ["numcodecs.pickle", "gzip"])
 def test_a_store_is_not_decoded_by_what_ours_are_not(codec, tmp_path):
     """It may run code of its own."""
-    run(SMALL, output=tmp_path, format="zarr")
+    run(SMALL_STUDY, output=tmp_path, format="zarr")
     file = tmp_path / "small.zarr" / "message" / "zarr.json"
     about = json.loads(file.read_text())
     about["codecs"].append({"name": codec, "configuration": {}})
@@ -139,16 +141,16 @@ def test_a_store_is_not_decoded_by_what_ours_are_not(codec, tmp_path):
 
 
 def test_a_file_and_a_store_of_one_name_are_told_apart(tmp_path):
-    run(SMALL, output=tmp_path, format="zarr")
+    run(SMALL_STUDY, output=tmp_path, format="zarr")
     assert rsfstudy.open("small", tmp_path).encoding["source"].endswith("small.zarr")
-    run(SMALL, output=tmp_path)
+    run(SMALL_STUDY, output=tmp_path)
     with pytest.raises(DataError, match=r"small\.nc and .*small\.zarr are both there"):
         rsfstudy.open("small", tmp_path)
-    same_numbers(rsfstudy.open(tmp_path / "small.nc"), in_memory())
+    have_same_numbers(rsfstudy.open(tmp_path / "small.nc"), in_memory())
 
 
 def test_a_chunk_that_is_damaged_or_lost_is_noticed(tmp_path):
-    run(SMALL, output=tmp_path, format="zarr")
+    run(SMALL_STUDY, output=tmp_path, format="zarr")
     chunk = tmp_path / "small.zarr" / "critical_velocity_ratio" / "c" / "0" / "0"
     whole = chunk.read_bytes()
     chunk.write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]))
@@ -167,4 +169,4 @@ def test_a_chunk_that_is_damaged_or_lost_is_noticed(tmp_path):
 def test_without_the_extra_it_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setattr(zarr_store.importlib.util, "find_spec", lambda _name: None)
     with pytest.raises(InvalidValue, match=r"pip install 'rsfstudy\[zarr\]'"):
-        run(SMALL, output=tmp_path, format="zarr")
+        run(SMALL_STUDY, output=tmp_path, format="zarr")

@@ -13,12 +13,12 @@ import rsfstudy
 from rsfstudy import Axis, Scene
 from rsfstudy.slider import laws, synonyms
 from rsfstudy.slider.parts import number
-from rsfstudy.slider.registry import FIELDS
+from rsfstudy.slider.registry import FIELD_NAMES
 
 
 def test_a_field_of_a_users_own_may_bear_any_name():
     @dataclasses.dataclass(frozen=True, kw_only=True)
-    class Renamed(laws.PARTS["slip"]):
+    class Renamed(laws.BUILT_IN_PARTS["slip"]):
         kappa: float = number(1.0, "$\\kappa$", "1", "a number of its own")
 
         name = "renamed"
@@ -27,11 +27,11 @@ def test_a_field_of_a_users_own_may_bear_any_name():
 
 
 def test_every_synonym_leads_to_a_field_or_law_that_is_there():
-    for name, remedy in synonyms._FIELDS.items():
-        assert name not in FIELDS
+    for name, remedy in synonyms._FIELD_HINTS.items():
+        assert name not in FIELD_NAMES
         if remedy.startswith("Write "):
-            assert re.match(r"Write (\w+)", remedy)[1] in FIELDS
-    assert set(synonyms._LAWS.values()) <= set(laws.PARTS)
+            assert re.match(r"Write (\w+)", remedy)[1] in FIELD_NAMES
+    assert set(synonyms._LAW_ALIASES.values()) <= set(laws.BUILT_IN_PARTS)
 
 
 def test_a_scene_cannot_be_changed():
@@ -93,7 +93,7 @@ def test_tab_completion_offers_what_users_call_and_nothing_else():
 
 def test_the_signature_of_a_scene_names_its_fields():
     stated = inspect.signature(Scene).parameters
-    assert tuple(stated) == (*FIELDS, "dynamics", "loading")
+    assert tuple(stated) == (*FIELD_NAMES, "dynamics", "loading")
     assert stated["law"].default == "slip"
     assert stated["a"].default == Scene().a
 

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene
-from rsfstudy.analysis.settling import is_attracted, settled_flag
+from rsfstudy.analysis.settling import settled_flag, settles_to_steady_sliding
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
-from rsfstudy.motion.events import Kind, rise, settling
-from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.parts import POSITIVE, Numbers, number
-from rsfstudy.slider.places import FLUID, LARGEST_SLOWNESS
+from rsfstudy.slider.places import FLUID, LARGEST_LOG_SLOWNESS
 from rsfstudy.slider.stability import largest_growth_rate
 from rsfstudy.status import Status
 
@@ -40,7 +40,7 @@ DECAYS = {**SLIDER, "stiffness_ratio": 1.1, "load_velocity_ratio": 300.0}
 def auxiliary_rates(log_slip_rate, states, fraction, p):
     """dE/dt = V**2 - c E, which acts on nothing, and no change of pore pressure."""
     energy, pressure = states
-    time = fraction * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS))
+    time = fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
     return fraction * math.exp(log_slip_rate) - p[FLUID] * time * energy, -time * pressure
 
 
@@ -104,15 +104,18 @@ def test_a_passive_unknown_does_not_end_a_damped_oscillation(engine):
 def test_no_motion_settles_where_small_changes_grow():
     """The distance from steady sliding falls by far more than the level after each rupture."""
     scene, accuracy = Scene(**CYCLES, fluid=Dissipation), Accuracy(1e-4)
-    growth = largest_growth_rate(scene, scene.log_load_rate)
+    growth = largest_growth_rate(scene, scene.log_load_velocity)
     assert growth is not None
     assert growth.is_positive
-    asked, kinds = (settling(0.5), rise("log_slip_rate", scene.log_load_rate)), []
-    for event in follow(scene, accuracy, Meter(accuracy.budget), asked):
+    asked, kinds = (
+        (approach_to_steady_state(0.5), rise("log_slip_rate", scene.log_load_velocity)),
+        [],
+    )
+    for event in integrate_events(scene, accuracy, WorkMeter(accuracy.budget), asked):
         kinds.append(event.kind)
-        if kinds.count(Kind.RISE) == 3:
+        if kinds.count(EventKind.RISE) == 3:
             break
-    assert Kind.SETTLED not in kinds
+    assert EventKind.SETTLED not in kinds
 
 
 def test_an_excluded_unknown_is_left_out_of_the_distance():
@@ -120,7 +123,7 @@ def test_an_excluded_unknown_is_left_out_of_the_distance():
     for fluid in (Dissipation, Excluded):
         scene = Scene(**CYCLES, fluid=fluid)
         system, p = scene.functions.between_ruptures, scene.numbers
-        point = system.point(start, system.rate(start, p), p)
+        point = system.point_function(start, system.path_rates(start, p), p)
         distance.append(point.distance_from_steady_state)
         steady = point.state + scene.b * point.log_slip_rate
     assert distance[0] > 5.0
@@ -161,12 +164,12 @@ def test_growth_of_zero_is_undecided(off, settles):
     outcome = LimitCycle(phases=2)(scene, Accuracy(1e-4))
     if settles:
         assert outcome.status is Status.NO_LIMIT_CYCLE
-        assert is_attracted(scene)
+        assert settles_to_steady_sliding(scene)
     else:
         assert outcome.status is Status.UNVERIFIED
         assert "undecided" in outcome.message
-        with pytest.raises(Halt, match="undecided"):
-            is_attracted(scene)
+        with pytest.raises(MotionStopped, match="undecided"):
+            settles_to_steady_sliding(scene)
 
 
 @pytest.mark.parametrize(("ratio", "flag"), [(0.99, 0.0), (1.0, math.nan), (1.2, 1.0)])

@@ -8,7 +8,7 @@ from scipy.special import lambertw
 
 from rsfstudy import Scene
 from rsfstudy.slider import stability
-from rsfstudy.slider.law_slopes import slopes_of_law
+from rsfstudy.slider.law_slopes import compute_law_slopes
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.parts import POSITIVE, Numbers, number
 from rsfstudy.slider.places import LAW
@@ -55,7 +55,7 @@ def test_critical_stiffness_of_a_law_that_bends_sharply(width, place):
     ours = stability.critical_stiffness(scene, log_slip_rate)
     steady = steady_sliding(scene, log_slip_rate)
     assert steady is not None
-    error = slopes_of_law(scene, steady).relative_error
+    error = compute_law_slopes(scene, steady).relative_error
     # the derivative is b/(b - a) = 2 times as large as its difference from a
     assert abs(ours / exact - 1.0) < 2.0 * error < 1e-8
 

@@ -9,20 +9,20 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from running import call, run, study_of
+from running import call_main, run, study_of
 from scipy.stats import norm, uniform
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.api.tables import answer, to_error
+from rsfstudy.api.tables import answer_table, format_to_error
 from rsfstudy.declare import catalogue
-from rsfstudy.declare.claims import Claim, verdicts
-from rsfstudy.declare.verdicts import Verdicts
-from rsfstudy.errors import Incomplete
+from rsfstudy.declare.claims import Claim, build_verdict_table
+from rsfstudy.declare.verdicts import VerdictTable
+from rsfstudy.errors import IncompleteWarning
 from rsfstudy.files import lattice, restore, store
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.quantity import symbol, table
+from rsfstudy.quantity import html_symbol, html_table
 from rsfstudy.reduce import SobolIndices
 from rsfstudy.status import Status
 
@@ -69,7 +69,7 @@ def test_verdicts_show_what_moved_and_are_a_table_of_pandas():
         Claim(id="C1", **about, **numbers),
         Claim(id="C2", **about, **numbers | {"published": 3.0}),
     ]
-    found = verdicts(xr.Dataset({"slope": 2.05}), claims, {})
+    found = build_verdict_table(xr.Dataset({"slope": 2.05}), claims, {})
     shown = rows(found._repr_html_())
     assert shown[1] == ["C1", "x < y", "2", "2.05", "0.1: rounded", "reproduced"]
     assert shown[2][5] == "differs, expected reproduced"
@@ -80,7 +80,7 @@ def test_verdicts_show_what_moved_and_are_a_table_of_pandas():
         ["C2", "x < y", "3", "2.05", "0.1", "differs, moved"],
     ]
     long = found.assign(claim="longer than a line " * 9)
-    assert max(map(len, repr(Verdicts(long)).splitlines())) <= 100
+    assert max(map(len, repr(VerdictTable(long)).splitlines())) <= 100
     assert type(found[found.moved]) is pd.DataFrame
     assert found[found.moved]["id"].tolist() == ["C2"]
 
@@ -99,22 +99,22 @@ def test_verdicts_show_what_moved_and_are_a_table_of_pandas():
     ],
 )
 def test_symbols_need_no_mathjax(formula, written):
-    assert symbol(formula) == written
+    assert html_symbol(formula) == written
 
 
 def test_texts_of_strangers_stay_texts():
-    assert "<script>" not in table(["<script>"], [["<script>"]], "<script>")
+    assert "<script>" not in html_table(["<script>"], [["<script>"]], "<script>")
 
 
 def test_the_accessor_shows_numbers_and_verdicts():
     """One line stands for claims of which none applies."""
-    declared = catalogue.load("linear_stability")
+    declared = catalogue.load_study("linear_stability")
     few = run(declared.with_(b_over_a=2.0, phi=[40]), rtol=1e-3).rsf._repr_html_()
     assert "11 claims not checked: other values or units have no published numbers" in few
     done = run(declared, rtol=1e-3)
     shown = rows(done.rsf._repr_html_())
     assert ["id", "claim", "published", "ours", "tolerance, and why", "verdict"] in shown
-    values = {f"{value:.8g}" for value in done[restore.headline(done)].values.flat}
+    values = {f"{value:.8g}" for value in done[restore.find_primary_output(done)].values.flat}
     assert len([row for row in shown if values & set(row)]) > 10
     scene = Scene(load_velocity_ratio=2.0, normal_stress="constant")
     motion = rsfstudy.simulate(scene, duration=0.1)
@@ -141,8 +141,8 @@ def map_of_stiffness():
 
 def told_of(dataset, tmp_path, monkeypatch) -> str:
     monkeypatch.setenv("COLUMNS", "120")
-    store.write(dataset, tmp_path / "it.nc")
-    return call("show", tmp_path / "it.nc").stdout
+    store.write_dataset(dataset, tmp_path / "it.nc")
+    return call_main("show", tmp_path / "it.nc").stdout
 
 
 @pytest.mark.parametrize("value", [36.815156940184394, -77608.42471489437, 3.152948907494519e-9])
@@ -150,7 +150,7 @@ def told_of(dataset, tmp_path, monkeypatch) -> str:
 def test_numbers_have_the_digits_that_their_errors_leave(value, share):
     """What is left out is a twentieth of the error at most; one digit less would be too few."""
     error = share * abs(value)
-    text = to_error(value, error)
+    text = format_to_error(value, error)
     assert abs(float(text) - value) <= 0.05 * error
     digits = len(re.sub(r"e.*|^[-0.]+|\.", "", text))
     assert digits <= math.ceil(-math.log10(share)) + 2
@@ -158,11 +158,11 @@ def test_numbers_have_the_digits_that_their_errors_leave(value, share):
 
 def test_an_answer_for_one_scene_has_units_and_words(tmp_path):
     scales = {"slip_distance": "10 um", "reference_velocity": "1 um/s", "period": "10 ms"}
-    rig = rsfstudy.Laboratory(normal_stress="100 MPa", stiffness="0.03 MPa/um", **scales)
+    rig = rsfstudy.Rig(normal_stress="100 MPa", stiffness="0.03 MPa/um", **scales)
     scene = rig.scene(law="slowness", a=0.01, b_over_a=1.4, load_velocity_ratio=10)
     cycle = rsfstudy.limit_cycle(scene, rtol=1e-4, engine="compiled")
     cycle = rig.in_units(cycle, stress="MPa", length="um")
-    shown = {row["number"]: row["value"] for row in answer(cycle).rows}
+    shown = {row["number"]: row["value"] for row in answer_table(cycle).rows}
     interval, units = shown["recurrence_interval"].split()
     left_out = abs(float(interval) - float(cycle.recurrence_interval))
     assert left_out <= 0.05 * float(cycle.recurrence_interval_error)
@@ -172,7 +172,8 @@ def test_an_answer_for_one_scene_has_units_and_words(tmp_path):
     assert "recurrence_interval_error" not in shown
     cycle.to_netcdf(tmp_path / "cycle.nc")
     assert (
-        "Limit cycle of a spring-slider, slowness law" in call("show", tmp_path / "cycle.nc").stdout
+        "Limit cycle of a spring-slider, slowness law"
+        in call_main("show", tmp_path / "cycle.nc").stdout
     )
 
 
@@ -187,7 +188,7 @@ def test_a_motion_by_a_law_that_is_not_known_is_shown(tmp_path):
         ([], "neither its stability nor its events: law = 'of_a_stranger'"),
         (["--study", tmp_path / "study.py"], "no event faster than 20 V_*"),
     ):
-        shown = call("show", tmp_path / "motion.nc", *study)
+        shown = call_main("show", tmp_path / "motion.nc", *study)
         assert shown.returncode == 0, shown.stderr
         assert told in " ".join(shown.stdout.split())
         assert "law = of_a_stranger" in shown.stdout
@@ -236,7 +237,7 @@ def test_indices_that_are_refused_say_why(tmp_path, monkeypatch):
     axis = Axis.samples(uncertain, 2, seed=1, method="saltelli")
     indices = SobolIndices("explained", "critical_velocity_ratio")
     study = study_of("refused", CriticalStep(), axis, reductions=[indices])
-    with pytest.warns(Incomplete, match="^no explained: . of 8 cells have no number, and"):
+    with pytest.warns(IncompleteWarning, match="^no explained: . of 8 cells have no number, and"):
         done = run(study, rtol=1e-4)
     why = "[1-7] of 8 cells have no number, and the indices need all: narrower"
     said = " ".join(told_of(done, tmp_path, monkeypatch).split())
@@ -246,9 +247,9 @@ def test_indices_that_are_refused_say_why(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("sizes", [{"x": 5}, {"x": 3, "y": 28}, {"x": 9, "y": 9, "z": 2, "u": 7}])
 def test_a_sample_has_both_ends_and_so_many_cells_at_most(sizes):
-    at = lattice.sample(sizes, 24)
+    at = lattice.thin_dimensions(sizes, 24)
     assert math.prod(map(len, at.values())) <= 24
     for name, size in sizes.items():
         assert at[name][0] == 0
         assert len(at[name]) == 1 or at[name][-1] == size - 1
-    assert len(lattice.sample({"x": 5}, 24)["x"]) == 5
+    assert len(lattice.thin_dimensions({"x": 5}, 24)["x"]) == 5

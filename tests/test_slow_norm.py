@@ -6,13 +6,13 @@ import re
 import pytest
 
 import rsfstudy
-from rsfstudy import Laboratory, Scene, Study
+from rsfstudy import Rig, Scene, Study
 from rsfstudy.cli import terminal
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 
-SHORT = Laboratory(
+SHORT = Rig(
     normal_stress="12 MPa", slip_distance="5 um", reference_velocity="1 um/s",
     stiffness="7.5 MPa/mm", period="5 ms",
 )  # fmt: skip
@@ -23,7 +23,7 @@ FALLS = {
 STUDY = Study(
     name="falls",
     title="Falls",
-    laboratory=SHORT,
+    rig=SHORT,
     base=SHORT.scene(**FALLS),
     axes=[SHORT.axis("normal_stress_step", ["-0.3 MPa", "-0.1 MPa"])],
     measure=Triggered(),
@@ -57,7 +57,7 @@ def test_a_norm_near_the_load_point_is_told_once(capsys):
     in_units = SHORT.in_units(found, stress="MPa", length="um")
     # 2 pi D_c 5e-4/T
     assert float(in_units.instability_slip_rate) == pytest.approx(math.pi, rel=1e-12)
-    terminal.results(in_units, "falls.nc")
+    terminal.print_results(in_units, "falls.nc")
     assert "3.142 um/s" in capsys.readouterr().out
     quiet = {"workers": 0, "output": None, "progress": False}
     with pytest.warns(UserWarning, match=re.escape(f"2 of 2 answers: {SLOW}")) as told:

@@ -119,7 +119,7 @@ def test_what_has_no_number_is_named(measure, fields, status, message):
     assert status.is_answer
     assert outcome.message
     assert message in outcome.message
-    assert not np.isfinite(outcome.values.get(measure.headline, math.nan)).any()
+    assert not np.isfinite(outcome.values.get(measure.primary_output, math.nan)).any()
 
 
 # ---- every law -----------------------------------------------------------------------------------
@@ -139,7 +139,7 @@ SLIDERS = [
     {"normal_stress": "variable", "inertia": True},
 ]
 #: Each law; and those of two states where one strengthens.
-LAWS = [{"law": law} for law in sorted(laws.PARTS)]
+LAWS = [{"law": law} for law in sorted(laws.BUILT_IN_PARTS)]
 LAWS += [
     {"law": law, "a": 0.01, "b1_over_a": 1.4, "b2_over_a": -0.6, "length_ratio": 50.0}
     for law in ("two_slip_states", "two_slowness_states")
@@ -159,9 +159,9 @@ def test_every_measure_answers_for_every_law(question, law, slider):
     measure, fields = QUESTIONS[question]
     scene = Scene(**law, **slider, **fields)
     # events of several states take their time
-    engine = COMPILED if question == "cycle" and scene.states > 1 else SCIPY
+    engine = COMPILED if question == "cycle" and scene.state_count > 1 else SCIPY
     found = measure(scene, Accuracy(1e-4, engine=engine))
     quasi_static = slider is SLIDERS[0]
     assert found.status in (CYCLES_END if question == "cycle" and quasi_static else CYCLES_END[:1])
     if found.status is Status.OK:
-        assert math.isfinite(found.values[measure.headline])
+        assert math.isfinite(found.values[measure.primary_output])

@@ -11,13 +11,13 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
-from rsfstudy.measures.linear_stability import growth, jacobian
+from rsfstudy.measures.linear_stability import compute_jacobian, max_growth_rate
 from rsfstudy.slider import closed_forms, laws, stability, steady
-from rsfstudy.slider.equations import by_displacement, normal_stress_at
+from rsfstudy.slider.equations import equations_by_displacement, normal_stress_at
 from rsfstudy.slider.laws.composite import lambert_w
 
 #: Laws with one b, by which steady friction is mu_* + (a - b) ln(V/V_*), as closed forms have it.
-WITH_ONE_B = {name: law for name, law in laws.PARTS.items() if issubclass(law, laws.Law)}
+WITH_ONE_B = {name: law for name, law in laws.BUILT_IN_PARTS.items() if issubclass(law, laws.Law)}
 PLAIN = sorted(name for name, law in WITH_ONE_B.items() if law.steady_states is None)
 LAWS = st.sampled_from(PLAIN)
 RATES, ANGLES, ALPHAS = st.floats(-30, 12), st.floats(50, 85), st.floats(0, 1)
@@ -97,14 +97,14 @@ def test_steady_stresses_satisfy_the_inclined_geometry(log_slip_rate, phi):
     mu_ss = scene.mu_star - (scene.b - scene.a) * log_slip_rate
     assume(mu_ss * cot_phi(scene) < 0.99)
     found = steady.steady_sliding(scene, log_slip_rate)
-    ratio = normal_stress_at(scene, found.friction)
-    assert ratio == pytest.approx(1.0 + cot_phi(scene) * found.friction, rel=1e-13)
-    assert scene.mu_star + found.friction == pytest.approx(mu_ss * ratio, rel=1e-11)
+    ratio = normal_stress_at(scene, found.frictional_stress)
+    assert ratio == pytest.approx(1.0 + cot_phi(scene) * found.frictional_stress, rel=1e-13)
+    assert scene.mu_star + found.frictional_stress == pytest.approx(mu_ss * ratio, rel=1e-11)
 
 
 def test_no_steady_state_below_the_slowest_rate():
     scene = Scene()
-    slowest = steady.slowest_steady(scene)
+    slowest = steady.min_steady_log_slip_rate(scene)
     mu_ss = scene.mu_star - (scene.b - scene.a) * slowest
     assert mu_ss * cot_phi(scene) == pytest.approx(1.0, rel=1e-9)
     assert steady.steady_sliding(scene, slowest + 1e-6) is not None
@@ -112,7 +112,7 @@ def test_no_steady_state_below_the_slowest_rate():
     assert math.isnan(stability.critical_stiffness(scene, slowest - 1.0))
     with pytest.raises(ValueError, match="no steady sliding"):
         stability.growth_rates(scene, slowest - 1.0)
-    assert steady.slowest_steady(Scene(normal_stress="constant")) == -math.inf
+    assert steady.min_steady_log_slip_rate(Scene(normal_stress="constant")) == -math.inf
 
 
 @pytest.mark.parametrize("period", [1e-3, 5.0, 1e4])
@@ -133,7 +133,7 @@ def test_growth_close_to_critical_stiffness(off, effects):
     scene = Scene(stiffness_ratio=1.0 + off, **effects)
     expected = -0.25 * (scene.b_over_a - 1.0) * off
     # central differences are right to 6e-10 of rates of order one
-    grows = growth(jacobian(by_displacement(scene), (0.0, 0.0)))
+    grows = max_growth_rate(compute_jacobian(equations_by_displacement(scene), (0.0, 0.0)))
     assert grows == pytest.approx(expected, rel=1e-5, abs=1e-9)
     assert grows * off < 0.0
 
@@ -173,10 +173,10 @@ def test_critical_stiffness_of_cut_offs(log_slip_rate, log_cutoff, b_over_a):
 def test_no_steady_sliding_below_the_slowest_by_laws_with_a_rate_of_their_own():
     for law in CUT_OFFS:
         scene = Scene(law=law)
-        slowest = steady.slowest_steady(scene)
+        slowest = steady.min_steady_log_slip_rate(scene)
         assert steady.steady_sliding(scene, slowest + 1e-6) is not None
         assert steady.steady_sliding(scene, slowest - 1e-6) is None
-        assert steady.slowest_steady(scene.with_(**CONSTANT)) == -math.inf
+        assert steady.min_steady_log_slip_rate(scene.with_(**CONSTANT)) == -math.inf
 
 
 @pytest.mark.parametrize("excess", [-0.02, -0.055, -0.1])

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import synthetic_records as synthetic
 
-from rsfstudy.analysis.fitting.record import by_steps
-from rsfstudy.analysis.fitting.steps import steps_of
+from rsfstudy.analysis.fitting.record import stepwise_loading
+from rsfstudy.analysis.fitting.steps import detect_velocity_steps
 
 UP = ((0.0, 1.0), (60.0, 10.0))
 MANY = ((0.0, 1.0), (60.0, 10.0), (70.0, 1.0), (130.0, 0.0), (200.0, 1.0), (260.0, 3.0))
@@ -21,65 +21,69 @@ def noisy(
 ) -> tuple[np.ndarray, np.ndarray]:
     """A record of a load point, with noise in um."""
     time = np.arange(0.0, ends, apart) + 0.3 * apart
-    moved = synthetic.load_point(loading, time)
-    return time, moved + synthetic.correlated(len(time), rho, size, seed=7)
+    moved = synthetic.load_point_displacement(loading, time)
+    return time, moved + synthetic.correlated_noise(len(time), rho, size, seed=7)
 
 
 @pytest.mark.parametrize("loading", [UP, MANY, ((0.0, 10.0), (20.0, 1.0)), ((0, 3.0), (40, 0.0))])
 @pytest.mark.parametrize(("rho", "size"), [(0.0, 0.0), (0.0, 0.02), (0.9, 0.05)])
 def test_steps_are_found(loading: Sequence[tuple[float, float]], rho: float, size: float) -> None:
     ends = loading[-1][0] + 60.0
-    found = steps_of(*noisy(loading, ends, 0.05, rho, size))
+    found = detect_velocity_steps(*noisy(loading, ends, 0.05, rho, size))
     assert len(found) == len(loading) - 1
     for step, (one, other) in zip(found, itertools.pairwise(loading), strict=True):
         # lines through hundreds of rows meet within two or so, at this much noise
-        assert step.begins == pytest.approx(other[0], abs=1e-6 if not size else 0.15)
-        assert step.ends == step.begins
-        assert step.before == pytest.approx(one[1], rel=0.03)
-        assert step.after == pytest.approx(other[1], rel=0.03)
+        assert step.start == pytest.approx(other[0], abs=1e-6 if not size else 0.15)
+        assert step.end == step.start
+        assert step.velocity_before == pytest.approx(one[1], rel=0.03)
+        assert step.velocity_after == pytest.approx(other[1], rel=0.03)
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.9, 0.99])
 def test_none_is_invented(rho: float) -> None:
     for seed in range(34):
         time = 0.1 * np.arange(2_000.0)
-        moved = 3.0 * time + synthetic.correlated(2_000, rho, 0.3, seed)
-        assert steps_of(time, moved) == ()
+        moved = 3.0 * time + synthetic.correlated_noise(2_000, rho, 0.3, seed)
+        assert detect_velocity_steps(time, moved) == ()
 
 
 def test_a_ramp_over_samples_is_a_ramp() -> None:
     time = 0.01 * np.arange(12_000.0)
     speed = np.interp(time, [60.0, 60.24, 60.3], [1.0, 2.0, 10.0])
     moved = np.concatenate([[0.0], np.cumsum(0.01 * speed[:-1])])
-    (step,) = steps_of(time, moved + synthetic.correlated(len(time), 0.0, 1e-3, 1))
-    assert (step.before, step.after) == pytest.approx((1.0, 10.0), rel=0.01)
-    assert 59.9 < step.begins < step.ends < 60.5
+    (step,) = detect_velocity_steps(
+        time, moved + synthetic.correlated_noise(len(time), 0.0, 1e-3, 1)
+    )
+    assert (step.velocity_before, step.velocity_after) == pytest.approx((1.0, 10.0), rel=0.01)
+    assert 59.9 < step.start < step.end < 60.5
     # displacement behind it is right: the lines before and behind meet in its middle
     meet = (moved[-1] - 10.0 * time[-1]) / (1.0 - 10.0)
-    assert 0.5 * (step.begins + step.ends) == pytest.approx(meet, abs=1e-3)
+    assert 0.5 * (step.start + step.end) == pytest.approx(meet, abs=1e-3)
 
 
 def test_sparse_and_dense_parts_of_a_record() -> None:
     time = np.concatenate([np.arange(0.0, 59.0, 0.1), np.arange(59.0, 75.0, 0.01)])
-    moved = synthetic.load_point(UP, time) + synthetic.correlated(len(time), 0.5, 0.01, 2)
-    (step,) = steps_of(time, moved)
-    assert step.begins == pytest.approx(60.0, abs=0.02)
-    assert (step.before, step.after) == pytest.approx((1.0, 10.0), rel=0.01)
+    moved = synthetic.load_point_displacement(UP, time) + synthetic.correlated_noise(
+        len(time), 0.5, 0.01, 2
+    )
+    (step,) = detect_velocity_steps(time, moved)
+    assert step.start == pytest.approx(60.0, abs=0.02)
+    assert (step.velocity_before, step.velocity_after) == pytest.approx((1.0, 10.0), rel=0.01)
 
 
 def test_a_million_rows() -> None:
     time = 0.001 * np.arange(1_000_000.0)
     loading = ((0.0, 1.0), (400.0, 10.0), (500.0, 0.0), (700.0, 1.0))
-    moved = synthetic.load_point(loading, time)
+    moved = synthetic.load_point_displacement(loading, time)
     moved += np.random.default_rng(8).normal(size=len(time)) * 0.02
-    found = steps_of(time, moved)
-    assert [step.begins for step in found] == pytest.approx([400.0, 500.0, 700.0], abs=0.01)
-    assert [step.after for step in found] == pytest.approx([10.0, 0.0, 1.0], rel=1e-3)
+    found = detect_velocity_steps(time, moved)
+    assert [step.start for step in found] == pytest.approx([400.0, 500.0, 700.0], abs=0.01)
+    assert [step.velocity_after for step in found] == pytest.approx([10.0, 0.0, 1.0], rel=1e-3)
 
 
 @pytest.mark.parametrize("moved", [np.zeros(100), np.arange(100.0), -np.arange(100.0)])
 def test_a_load_point_that_rests_or_keeps_moving(moved: np.ndarray) -> None:
-    assert steps_of(np.arange(100.0), moved) == ()
+    assert detect_velocity_steps(np.arange(100.0), moved) == ()
 
 
 def test_an_overshoot_is_one_step_through_its_pieces() -> None:
@@ -87,12 +91,14 @@ def test_an_overshoot_is_one_step_through_its_pieces() -> None:
     time = 0.05 * np.arange(4_000)
     speeds = np.interp(time, [80.0, 80.15, 80.2, 80.45, 80.5], [2.0, 2.0, 17.0, 17.0, 12.0])
     moved = np.concatenate([[0.0], np.cumsum(0.05 * speeds[:-1])])
-    (step,) = steps_of(time, moved + synthetic.correlated(len(time), 0.0, 0.01, 3))
-    assert (step.before, step.after) == pytest.approx((2.0, 12.0), rel=0.01)
-    assert 79.8 < step.begins < step.ends < 80.7
-    assert max(speed for _begins, speed in step.through) > 14.0
+    (step,) = detect_velocity_steps(
+        time, moved + synthetic.correlated_noise(len(time), 0.0, 0.01, 3)
+    )
+    assert (step.velocity_before, step.velocity_after) == pytest.approx((2.0, 12.0), rel=0.01)
+    assert 79.8 < step.start < step.end < 80.7
+    assert max(speed for _begins, speed in step.velocity_profile) > 14.0
     # displacement by the pieces of loading is the recorded one
-    pieces = by_steps(0.0, [step])
+    pieces = stepwise_loading(0.0, [step])
     speeds_of = pieces[:, 1]
     by_pieces = np.sum(np.diff(np.append(pieces[:, 0], time[-1])) * speeds_of)
     assert by_pieces == pytest.approx(moved[-1], abs=0.2)
@@ -101,7 +107,7 @@ def test_an_overshoot_is_one_step_through_its_pieces() -> None:
 def test_a_hold_and_a_return_are_no_overshoot() -> None:
     loading = ((0.0, 1.0), (60.0, 10.0), (61.0, 1.0), (120.0, 0.0), (121.0, 2.0))
     time, moved = noisy(loading, 200.0, 0.05, 0.0, 0.001)
-    assert [step.through for step in steps_of(time, moved)] == [()] * 4
+    assert [step.velocity_profile for step in detect_velocity_steps(time, moved)] == [()] * 4
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.9])
@@ -109,6 +115,8 @@ def test_noise_that_grows_is_no_step(rho: float) -> None:
     time, moved = noisy(((0.0, 2.0), (150.0, 20.0)), 300.0, 0.1, 0.0, 0.0)
     for seed in range(5):
         size = np.interp(time, [0.0, 290.0, 292.0, 300.0], [0.02, 0.02, 1.3, 8.5])
-        (step,) = steps_of(time, moved + size * synthetic.correlated(len(time), rho, 1.0, seed))
-        assert step.begins == pytest.approx(150.0, abs=0.1)
-        assert (step.before, step.after) == pytest.approx((2.0, 20.0), rel=0.01)
+        (step,) = detect_velocity_steps(
+            time, moved + size * synthetic.correlated_noise(len(time), rho, 1.0, seed)
+        )
+        assert step.start == pytest.approx(150.0, abs=0.1)
+        assert (step.velocity_before, step.velocity_after) == pytest.approx((2.0, 20.0), rel=0.01)

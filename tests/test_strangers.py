@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from running import FAULTY, called, claimed, run
+from running import FAULTY_STUDY_FILE, example_claim, run, run_command
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
@@ -37,7 +37,7 @@ TINY = Study(
         LinearFit(name="slope", of="critical_stiffness", on="log_load_velocity_ratio"),
     ],
     claims=[
-        claimed(
+        example_claim(
             variable="critical_stiffness",
             where={"case": "constant", "load_velocity_ratio": 1.0},
             published=0.0145,
@@ -113,7 +113,7 @@ def sealed(dataset, path: Path) -> str:
     """Written as by someone who meant it: the digest is right."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of xarray, on what it writes
-        store.write(dataset, path)
+        store.write_dataset(dataset, path)
     return str(path)
 
 
@@ -122,7 +122,7 @@ def refused(file, complaint) -> None:
     with pytest.raises(DataError, match=complaint):
         rsfstudy.open(file)
     for command_ in ("show", "check", "plot", "rerun"):
-        code, said = called([command_, file])
+        code, said = run_command([command_, file])
         assert code in (1, 2)
         assert said.startswith("error: ")
 
@@ -181,7 +181,7 @@ def test_a_rerun_refuses_what_makes_no_study_by_its_path(at, change, complaint, 
     rsfstudy.open(file)
     for again in (
         lambda: rsfstudy.rerun(file, workers=0, progress=False),
-        lambda: rsfstudy.cell(file, PLACE),
+        lambda: rsfstudy.recompute_cell(file, PLACE),
     ):
         with pytest.raises(DataError, match=complaint):
             again()
@@ -221,7 +221,7 @@ def nowhere(tmp_path, monkeypatch):
 )  # fmt: skip
 def test_a_path_that_is_no_results_file(command_, path, nowhere):
     """It is named, briefly."""
-    code, said = called([command_, path])
+    code, said = run_command([command_, path])
     assert code in (1, 2)
     assert said.startswith("error: ")
     assert path[:30].strip() in said
@@ -234,11 +234,11 @@ def test_a_pipe_is_not_waited_for(tmp_path, monkeypatch):
     for name in ("pipe.nc", "pipe.zarr", "pipe.py", ".faulty.nc.new", "faulty.cells.sqlite"):
         os.mkfifo(name)
     for words in (["show", "pipe.nc"], ["check", "pipe.zarr"], ["run", "pipe.py"]):
-        code, said = called(words)
+        code, said = run_command(words)
         assert code in (1, 2)
         assert "is no file, but a" in said
-    words = ["run", str(FAULTY), "--serial", "--quiet", "--fresh", "--output", "."]
-    code, said = called(words)
+    words = ["run", str(FAULTY_STUDY_FILE), "--serial", "--quiet", "--fresh", "--output", "."]
+    code, said = run_command(words)
     assert (code, "wrote" in said) == (0, True)
 
 

@@ -15,7 +15,7 @@ from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider import stability
-from rsfstudy.slider.equations import relation_of
+from rsfstudy.slider.equations import friction_relation
 from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant"}
@@ -27,7 +27,7 @@ SHEAR, C = st.floats(-0.5, 2.0), st.floats(0.01, 5.0)
 
 @given(SHEAR, C)
 def test_at_constant_normal_stress_the_state_loses_c_times_the_change_of_friction(g, c):
-    value, slope, shift, shift_slope = relation_of(Scene(stress_dependence=c, **CONSTANT))(g)
+    value, slope, shift, shift_slope = friction_relation(Scene(stress_dependence=c, **CONSTANT))(g)
     assert (value, slope) == pytest.approx(((1.0 + c) * g, 1.0 + c), rel=1e-15)
     assert (shift, shift_slope) == (c * g, c)
 
@@ -36,7 +36,7 @@ def test_at_constant_normal_stress_the_state_loses_c_times_the_change_of_frictio
 def test_it_is_the_integral_of_c_dtau_over_sigma(g, c, phi):
     """c/cot ln(1 + cot g), on top of what changes of normal stress take."""
     with_, without = (
-        relation_of(Scene(stress_dependence=x, phi=phi, alpha=0.3))(g) for x in (c, 0.0)
+        friction_relation(Scene(stress_dependence=x, phi=phi, alpha=0.3))(g) for x in (c, 0.0)
     )
     cot = cot_phi(Scene(phi=phi))
     extra = [one - other for one, other in zip(with_, without, strict=True)]
@@ -48,7 +48,7 @@ def test_it_is_the_integral_of_c_dtau_over_sigma(g, c, phi):
 def test_no_digits_are_lost_where_normal_stress_hardly_varies(g, tilt):
     """phi close to 90 degrees: c g (1 - cot g/2 + (cot g)**2/3), to the cube of 2e-3."""
     scene = Scene(stress_dependence=1.0, alpha=0.0, phi=90.0 - math.degrees(tilt))
-    shift, small = relation_of(scene)(g)[2], cot_phi(scene) * g
+    shift, small = friction_relation(scene)(g)[2], cot_phi(scene) * g
     series = g * (1.0 - small / 2.0 + small**2 / 3.0)
     assert shift == pytest.approx(series, rel=1e-15 + abs(small) ** 3)
 
@@ -109,7 +109,7 @@ def test_by_the_slip_law_all_motions_are_those_of_that_slider():
     other, accuracy = equivalent(scene), Accuracy(1e-8)
     for of, longer in (("load_velocity_ratio", 1.0), ("displacement_step", 2.5)):
         ours, theirs = (CriticalStep(of=of)(one, accuracy) for one in (scene, other))
-        name = CriticalStep(of=of).headline
+        name = CriticalStep(of=of).primary_output
         assert ours.status is theirs.status is Status.OK
         assert ours.values[name] == pytest.approx(longer * theirs.values[name], rel=1e-7)
     slipping = scene.with_(stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import synthetic_records as synthetic
 from scipy.integrate import solve_ivp
-from synthetic_records import off
+from synthetic_records import deviation_in_stderrs
 
 import rsfstudy
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.analysis.fitting.stress_steps import find_stress_steps
-from rsfstudy.status import LABELS
+from rsfstudy.status import STATUS_LABELS
 
 #: Parameters in um and s; the stiffness is that of the machine in MPa/um.
 TRUTH = {"a": 0.009, "b": 0.012, "slip_distance": 15.0, "alpha": 0.3, "mu_star": 0.55}
@@ -60,7 +60,7 @@ def stressed(seed: int = 1, size: float = 2e-5) -> Record:
         solved = solve_ivp(rates, (begins, ends), state, "LSODA", at, **options)
         tau[here], state = solved.y[0, : int(here.sum())], solved.y[:, -1]
     sigma = np.array([*map(sigma_at, time)])
-    friction = tau / sigma + synthetic.correlated(len(time), 0.3, size, seed)
+    friction = tau / sigma + synthetic.correlated_noise(len(time), 0.3, size, seed)
     columns = {
         "time": time,
         "displacement": VELOCITY * time,
@@ -76,12 +76,12 @@ def test_steps_and_ramps_of_normal_stress_are_found(rho: float, drift: float) ->
     time = 0.1 * np.arange(3_000)
     level = 8e6 * (1.0 + drift * time / time[-1])
     shape = np.interp(time, [99.9, 100.0, 200.0, 210.0], [1.0, 1.2, 1.2, 0.8])
-    noise = synthetic.correlated(len(time), rho, 0.01, 5)
+    noise = synthetic.correlated_noise(len(time), rho, 0.01, 5)
     first, second = find_stress_steps(time, level * (shape + noise))
-    assert (first.begins, first.ends) == pytest.approx((99.95, 99.95), abs=0.3)
-    assert first.after / first.before == pytest.approx(1.2, abs=0.03)
-    assert (second.begins, second.ends) == pytest.approx((200.0, 210.0), abs=1.5)
-    assert second.after / second.before == pytest.approx(0.8 / 1.2, abs=0.03)
+    assert (first.start, first.end) == pytest.approx((99.95, 99.95), abs=0.3)
+    assert first.stress_after / first.stress_before == pytest.approx(1.2, abs=0.03)
+    assert (second.start, second.end) == pytest.approx((200.0, 210.0), abs=1.5)
+    assert second.stress_after / second.stress_before == pytest.approx(0.8 / 1.2, abs=0.03)
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.9, 0.999])
@@ -89,7 +89,7 @@ def test_steps_and_ramps_of_normal_stress_are_found(rho: float, drift: float) ->
 def test_noise_and_drift_are_no_steps(rho: float, drift: float) -> None:
     time = 0.1 * np.arange(3_000)
     for seed in range(20):
-        noise = synthetic.correlated(len(time), rho, 0.02, seed)
+        noise = synthetic.correlated_noise(len(time), rho, 0.02, seed)
         assert find_stress_steps(time, 8e6 * (1.0 + drift * time / time[-1] + noise)) == []
 
 
@@ -116,14 +116,14 @@ def test_the_response_to_a_step_of_normal_stress_is_fitted(loading: str, stated:
     if stated:
         record = record.with_steps([(BEGINS, ENDS, VELOCITY, VELOCITY)])
     fit = rsfstudy.fit(record, **OPTIONS, free=FREE, loading=loading).squeeze()
-    assert LABELS[int(fit.status)] == "ok"
+    assert STATUS_LABELS[int(fit.status)] == "ok"
     for name in FREE:
-        assert abs(off(fit, name, TRUTH[name])) < 3.5, name
+        assert abs(deviation_in_stderrs(fit, name, TRUTH[name])) < 3.5, name
 
 
 def test_a_step_of_normal_stress_at_constant_normal_stress_is_refused() -> None:
     fit = rsfstudy.fit(stressed(), **OPTIONS).squeeze()
-    assert LABELS[int(fit.status)] == "not_applicable"
+    assert STATUS_LABELS[int(fit.status)] == "not_applicable"
     assert "normal stress varies from 6 to 7.5 MPa" in str(fit.message.values)
     assert "normal_stress=imposed" in str(fit.message.values)
 
@@ -132,6 +132,6 @@ def test_a_step_that_changes_nothing_is_an_answer() -> None:
     columns = {n: v for n, v in stressed().columns.items() if n != "normal_stress"}
     record = rsfstudy.read_record(columns).with_steps([(BEGINS, ENDS, VELOCITY, VELOCITY)])
     fit = rsfstudy.fit(record, **OPTIONS | {"stiffness": 5e-3}).squeeze()
-    assert LABELS[int(fit.status)] == "not_identified"
+    assert STATUS_LABELS[int(fit.status)] == "not_identified"
     guess = rsfstudy.fit(record, **OPTIONS | {"stiffness": 5e-3}, b_over_a=1e12).squeeze()
-    assert LABELS[int(guess.status)] != "cell_raised"
+    assert STATUS_LABELS[int(guess.status)] != "cell_raised"

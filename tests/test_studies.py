@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from compliance_checker.cf import util as cfutil
 from compliance_checker.runner import CheckSuite, ComplianceChecker
-from running import enough, named_results
+from running import named_results, reduced_study
 
 import rsfstudy
 from rsfstudy import plots
@@ -24,7 +24,7 @@ from rsfstudy.status import Status
 FLAGS = {"slip_mode", "status", "regime", "inertia", "regularised"}
 
 
-@pytest.fixture(scope="module", params=names.names())
+@pytest.fixture(scope="module", params=names.study_names())
 def result(request, tmp_path_factory):
     """What is enough of each study, and where its file is."""
     return named_results(request.param, tmp_path_factory)
@@ -32,7 +32,7 @@ def result(request, tmp_path_factory):
 
 def test_the_study_is_named_as_its_file(result):
     dataset, path = result
-    assert catalogue.load(path.stem).name == path.stem == dataset.attrs["id"]
+    assert catalogue.load_study(path.stem).name == path.stem == dataset.attrs["id"]
 
 
 def test_every_cell_is_answered(result):
@@ -43,7 +43,7 @@ def test_every_cell_is_answered(result):
 
 def test_every_verdict_is_the_expected_one(result):
     table = rsfstudy.check(result[0])
-    assert len(table) == len(enough(result[1].stem).claims)
+    assert len(table) == len(reduced_study(result[1].stem).claims)
     assert not table.moved.any(), table.to_string()
     assert not (table.verdict == "not applicable").any()
 
@@ -102,7 +102,7 @@ def called_for(claim, study, dataset) -> float:
 
 def test_claims_could_fail(result):
     """A claim with a tolerance larger than necessary must give the reason in `WIDE`."""
-    study = enough(result[1].stem)
+    study = reduced_study(result[1].stem)
     for claim in study.claims:
         named = f"{study.name} {claim.id}"
         most = called_for(claim, study, result[0])
@@ -196,13 +196,13 @@ def test_the_compliance_checker_reports_no_error(result, tmp_path, monkeypatch, 
 
 def test_the_declaration_in_the_file_is_the_study(result):
     found = json.loads(result[0].attrs["declaration"])
-    described = enough(result[1].stem).describe()
+    described = reduced_study(result[1].stem).describe()
     assert found == json.loads(json.dumps(described))
 
 
 def test_every_number_carries_status_error_and_work(result):
     dataset, _path = result
-    headline = catalogue.load(result[1].stem).measure.headline
+    headline = catalogue.load_study(result[1].stem).measure.primary_output
     for name in (headline, f"{headline}_error", "status", "rhs_evaluations", "wall_time"):
         assert name in dataset
     ok = dataset.status == int(Status.OK)
@@ -213,20 +213,20 @@ def test_every_number_carries_status_error_and_work(result):
 def test_what_is_reduced_carries_the_errors_of_its_cells(result):
     """A number has an error wherever what it was made of has."""
     dataset, path = result
-    for reduction in catalogue.load(path.stem).reductions:
+    for reduction in catalogue.load_study(path.stem).reductions:
         if reduction.name not in dataset or f"{reduction.of}_error" not in dataset:
             continue
-        if reduction.of_failures:  # a count of statuses
+        if reduction.uses_failed_cells:  # a count of statuses
             continue
         error = dataset[f"{reduction.name}_error"]
         assert (error >= 0.0).where(dataset[reduction.name].notnull(), True).all(), reduction.name
 
 
-@pytest.mark.parametrize("result", names.names()[::7], indirect=True, scope="module")
+@pytest.mark.parametrize("result", names.study_names()[::7], indirect=True, scope="module")
 def test_the_plain_plot_draws_any_lattice(result):
     foreign = json.loads(result[0].attrs["declaration"])
     foreign["plot"] = "lines"
-    figure = plots.figure(result[0].assign_attrs(declaration=json.dumps(foreign)))
+    figure = plots.draw_figure(result[0].assign_attrs(declaration=json.dumps(foreign)))
     assert figure.axes[0].has_data()
 
 

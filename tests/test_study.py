@@ -15,7 +15,7 @@ from rsfstudy.compute import cells
 from rsfstudy.compute.plan import Plan
 from rsfstudy.declare import catalogue, names
 from rsfstudy.errors import InvalidValue
-from rsfstudy.files.lattice import coordinates
+from rsfstudy.files.lattice import build_coordinates
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.linear_stability import LinearStability
@@ -105,7 +105,7 @@ def declared(**fields) -> Study:
 def test_a_zipped_axis_bears_its_own_values_whatever_the_first_cell_needs(order):
     case = Axis("case", {"weak": {"alpha": 0.25}, "strong": {"alpha": 0.5}})
     study = declared(axes=[Axis("normal_stress", order), case])
-    assert coordinates(study)["alpha"][1].tolist() == [0.25, 0.5]
+    assert build_coordinates(study)["alpha"][1].tolist() == [0.25, 0.5]
 
 
 def test_claims_on_a_point_apply_if_its_value_is_given_again():
@@ -150,7 +150,7 @@ def test_a_new_value_does_not_take_the_place_of_a_point_with_its_name():
     "values", [[0.25], [0.56], [0.25, 0.56], [0.56, 0.25], [0.56, 0.3], [np.float64(0.56), 0.3]]
 )
 def test_labels_of_existing_points_do_not_depend_on_the_list_of_values(values):
-    (axis, _other) = catalogue.load("rate_step_boundary").with_(alpha=values).axes
+    (axis, _other) = catalogue.load_study("rate_step_boundary").with_(alpha=values).axes
     assert axis.labels == ("constant normal stress", *(f"alpha = {value}" for value in values))
     assert [row.get("alpha") for row in axis.rows] == [None, *values]
 
@@ -213,20 +213,20 @@ MIXED = Study(
 )
 
 
-@pytest.mark.parametrize("name", ["mixed", *names.names()])
+@pytest.mark.parametrize("name", ["mixed", *names.study_names()])
 def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
     """What is sent are the name of each cell and what it changes of scene and measure; of large
     lattices, a sample of the cells.
     """
-    study = MIXED if name == "mixed" else catalogue.load(name)
+    study = MIXED if name == "mixed" else catalogue.load_study(name)
     plan = Plan(study)
     numbers = np.unique(np.linspace(0, study.size - 1, 72).astype(int))
     task = cells.Task(study.base, study.measure, study.accuracy)
-    monkeypatch.setattr(cells, "_received", lambda _sent: task)
-    monkeypatch.setattr(cells, "_HAND_OVER", np.inf)
-    monkeypatch.setattr(task.layout, "finished", lambda *finished: finished)
-    monkeypatch.setattr(cells, "computed", lambda _task, cell: (cell, 0.0))
-    found = pickle.loads(cells.on_worker(b"", cells.packed(plan, numbers)))
+    monkeypatch.setattr(cells, "_load_task", lambda _sent: task)
+    monkeypatch.setattr(cells, "_HAND_OVER_INTERVAL", np.inf)
+    monkeypatch.setattr(task.packing, "pack_cell", lambda *finished: finished)
+    monkeypatch.setattr(cells, "compute_cell", lambda _task, cell: (cell, 0.0))
+    found = pickle.loads(cells.compute_batch(b"", cells.pack_batch(plan, numbers)))
     for place, (key, cell, _seconds) in zip(numbers.tolist(), found, strict=True):
         scene, changes = study.cell(place)
         assert plan.keys[place].tobytes() == key

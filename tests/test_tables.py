@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from running import call, named_results
+from running import call_main, named_results
 from test_shown import rows as of_html
 
 import rsfstudy
@@ -14,7 +14,7 @@ from rsfstudy.cli import layout, terminal
 from rsfstudy.declare import catalogue, names
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
-from rsfstudy.wording import settings
+from rsfstudy.wording import format_overrides
 
 WIDTHS = (40, 80)
 
@@ -39,7 +39,7 @@ def pieces(table: Table) -> set[str]:
     found = {word for head in table.rows[0] for word in head.split()}
     for row in table.rows:
         for head, text in row.items():
-            found |= set(text.split() if head in table.prose else [text])
+            found |= set(text.split() if head in table.wrappable else [text])
     return found
 
 
@@ -48,25 +48,33 @@ def in_one_piece(piece: str, lines: list[str]) -> bool:
     return any(f" {piece} " in f" {line} " for line in lines)
 
 
-@pytest.mark.parametrize("name", names.names())
+@pytest.mark.parametrize("name", names.study_names())
 def test_results_of_every_study(name, printed, tmp_path_factory):
     dataset, _path = named_results(name, tmp_path_factory)
-    shown = [tables.headline(dataset), *tables.reductions(dataset), tables.held(dataset)]
-    shown += [tables.claims(runs.check(dataset))]
+    shown = [
+        tables.headline_table(dataset),
+        *tables.reduction_tables(dataset),
+        tables.contents_table(dataset),
+    ]
+    shown += [tables.claims_table(runs.check(dataset))]
     for table in (table for table in shown if table.rows):
         for width in WIDTHS:
-            lines = printed(width, layout.show, table)
+            lines = printed(width, layout.print_piece, table)
             assert not [piece for piece in pieces(table) if not in_one_piece(piece, lines)]
 
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_declarations_of_every_study(width, printed, tmp_path):
     """The points of their axes are there, each in one piece."""
-    for name in names.names():
-        study = catalogue.load(name)
-        lines = printed(width, terminal.declaration, study, tmp_path)
+    for name in names.study_names():
+        study = catalogue.load_study(name)
+        lines = printed(width, terminal.print_declaration, study, tmp_path)
         for axis in study.axes:
-            shown = axis.points if len(axis) <= 40 else [*axis.points[:10], *axis.points[-3:]]
+            shown = (
+                axis.point_names
+                if len(axis) <= 40
+                else [*axis.point_names[:10], *axis.point_names[-3:]]
+            )
             words = {word for point in shown for word in f"{point},".split()}
             last = str(shown[-1]).split()[-1]
             assert not [w for w in words if not in_one_piece(w, lines) and w != f"{last},"]
@@ -75,27 +83,29 @@ def test_declarations_of_every_study(width, printed, tmp_path):
 def test_where_no_cell_has_a_number_the_status_is_explained():
     dataset = xr.Dataset({"status": ("x", [3, 3]), "rhs_evaluations": ("x", [5, 5])})
     why = Status.NO_LIMIT_CYCLE.meaning
-    assert tables.tally(dataset) == f"2 no_limit_cycle ({why}); 10 right-hand sides"
+    assert tables.format_status_counts(dataset) == f"2 no_limit_cycle ({why}); 10 right-hand sides"
     one = dataset.assign(status=("x", [0, 3]))
-    assert tables.tally(one) == "1 ok, 1 no_limit_cycle; 10 right-hand sides"
+    assert tables.format_status_counts(one) == "1 ok, 1 no_limit_cycle; 10 right-hand sides"
 
 
 def test_a_relation_stays_with_its_number(printed):
     row = {"id": "C1", "claim": "a long sentence " * 9, "published": "< 1", "ours": "-4.56032e-07"}
     for width in range(16, 121):
-        lines = printed(width, layout.show, Table([row, row], prose={"claim"}))
+        lines = printed(width, layout.print_piece, Table([row, row], wrappable={"claim"}))
         assert sum(in_one_piece("< 1", [line]) for line in lines) == 2
         assert sum(in_one_piece("-4.56032e-07", [line]) for line in lines) == 2
 
 
 def test_what_is_wider_than_the_terminal_is_there_to_its_last_character(printed):
     path = "/a/very/long/path" * 9
-    lines = printed(40, layout.show, {"file": path})
+    lines = printed(40, layout.print_piece, {"file": path})
     assert path in "".join("".join(lines).split())
 
 
 def test_a_column_of_numbers_ends_at_one_place(printed):
-    lines = printed(80, layout.show, Table([{"a": "x", "n": "1"}, {"a": "yy", "n": "-10.5"}]))
+    lines = printed(
+        80, layout.print_piece, Table([{"a": "x", "n": "1"}, {"a": "yy", "n": "-10.5"}])
+    )
     found = [line.rstrip() for line in lines[2:4]]
     width = len(found[0])  # which depends on the version of rich
     assert found == ["x" + "1".rjust(width - 1), "yy" + "-10.5".rjust(width - 2)]
@@ -105,16 +115,16 @@ def test_notebooks_show_the_same_claims(tmp_path_factory):
     dataset, _path = named_results("rate_step_boundary", tmp_path_factory)
     found = rsfstudy.check(dataset)
     shown = of_html(found._repr_html_())
-    told = tables.claims(found).rows
+    told = tables.claims_table(found).rows
     assert [list(row.values()) for row in told] == [list(row) for row in shown[1:]]
-    assert call("check", _path).returncode == 0
+    assert call_main("check", _path).returncode == 0
 
 
 def test_a_cell_is_told_in_a_line_for_each_number_beside_that_of_its_file(printed):
     orbit, other = np.linspace(0.0, 2.0, 400), np.linspace(0.0, 3.0, 400)
     there = xr.Dataset({"interval": 1.5, "orbit": ("phase", other)})
     now = Outcome(Status.OK, {"interval": 1.5, "orbit": orbit})
-    told = printed(80, terminal.outcome, Scene(), now, there)
+    told = printed(80, terminal.print_outcome, Scene(), now, there)
     lines = [" ".join(line.split()) for line in told]
     assert "interval 1.5 same" in lines
     assert "orbit 400 values, 0 to 2 400 values, 0 to 3" in lines
@@ -124,4 +134,4 @@ def test_overrides_are_told_with_the_digits_a_reader_wants():
     """Labels and names with digits stay as they are."""
     given = {"hold_time": ["464.15888336127773 s", "1e4 s"], "case": "alpha = 0.56", "a": 0.01}
     told = "hold_time=464.159 s,1e4 s, case=alpha = 0.56, a=0.01"
-    assert settings(given) == told
+    assert format_overrides(given) == told

@@ -11,11 +11,11 @@ from running import cell_key
 from rsfstudy import Scene, history, simulate
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.events import Kind, settling
-from rsfstudy.motion.meter import Meter
-from rsfstudy.slider.laws import PARTS as LAWS
+from rsfstudy.motion.events import EventKind, approach_to_steady_state
+from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.slider.laws import BUILT_IN_PARTS as LAWS
 
 IMPOSED = {"normal_stress": "imposed", "alpha": 0.3}
 #: A train that begins later, with a jump, and ends with another.
@@ -170,9 +170,9 @@ def test_the_amplitude_does_not_drift(rtol):
     """After 300 periods it is off by less than the accuracy, and no more than after 30."""
     scene, off = Scene(**SLIDERS["imposed"], **OSCILLATES), []
     for periods in (30, 300):
-        meter = Meter(10**6, engine=COMPILED)
+        meter = WorkMeter(10**6, engine=COMPILED)
         accuracy = Accuracy(rtol, 10**6, engine=COMPILED)
-        *_earlier, end = follow(scene, accuracy, meter, until=8.0 * periods)
+        *_earlier, end = integrate_events(scene, accuracy, meter, until=8.0 * periods)
         _psi, ahead, relief = end.point.psis
         off.append(abs(math.hypot(ahead, relief) / 0.02 - 1.0))
         # the clock itself drifts by the accuracy in each period at most
@@ -183,10 +183,13 @@ def test_the_amplitude_does_not_drift(rtol):
 
 @pytest.mark.parametrize("slider", SLIDERS)
 def test_it_never_settles(slider):
-    scene, watches = Scene(**SLIDERS[slider], **OSCILLATES), [settling(0.9, ends=True)]
-    accuracy, meter = Accuracy(1e-6, engine=COMPILED), Meter(10**5, engine=COMPILED)
-    *_earlier, end = follow(scene, accuracy, meter, watches, until=40.0)
-    assert (end.kind, end.time) == (Kind.END, 40.0)
+    scene, watches = (
+        Scene(**SLIDERS[slider], **OSCILLATES),
+        [approach_to_steady_state(0.9, terminal=True)],
+    )
+    accuracy, meter = Accuracy(1e-6, engine=COMPILED), WorkMeter(10**5, engine=COMPILED)
+    *_earlier, end = integrate_events(scene, accuracy, meter, watches, until=40.0)
+    assert (end.kind, end.time) == (EventKind.END, 40.0)
 
 
 def test_faster_than_free_oscillation_with_mass():

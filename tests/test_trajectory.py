@@ -8,13 +8,13 @@ from conftest import cot_phi
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.errors import Incomplete, NoAnswer
+from rsfstudy.errors import IncompleteWarning, NoResultWarning
 from rsfstudy.motion.engines import COMPILED, ENGINES
 
 
 def test_steady_sliding_stays_steady():
     """Without a step, slip is load point displacement and everything else rests."""
-    with pytest.warns(NoAnswer, match=r"nothing is stepped.*load_velocity_ratio"):
+    with pytest.warns(NoResultWarning, match=r"nothing is stepped.*load_velocity_ratio"):
         motion = rsfstudy.simulate(Scene(), duration=20.0)
     np.testing.assert_allclose(motion.slip, motion.time, atol=1e-12)
     np.testing.assert_allclose(motion.log10_slip_rate, 0.0, atol=1e-12)
@@ -54,12 +54,14 @@ def test_time_is_an_index_though_stress_jumps():
 
 
 def test_a_motion_that_cannot_go_on_says_why_and_keeps_what_it_has():
-    with pytest.warns(Incomplete, match=r"after .* of 1000 D_c/V_\*: work_budget_spent \("):
+    with pytest.warns(IncompleteWarning, match=r"after .* of 1000 D_c/V_\*: work_budget_spent \("):
         cut = rsfstudy.simulate(Scene(load_velocity_ratio=1.2), duration=1e3, budget=500)
     assert cut.attrs["status"] == "work_budget_spent"
     assert cut.sizes["time"] > 10
     assert cut.attrs["message"].endswith("--budget 2000 (budget=) allows more")
-    with pytest.warns(Incomplete, match="after 0 of 50 .*: normal_stress_lost .*takes normal"):
+    with pytest.warns(
+        IncompleteWarning, match="after 0 of 50 .*: normal_stress_lost .*takes normal"
+    ):
         opened = rsfstudy.simulate(Scene(displacement_step=-110.0))
     assert opened.attrs["status"] == "normal_stress_lost"
     assert opened.sizes["time"] == 0
@@ -72,7 +74,7 @@ PULSE = {"law": "slowness", "normal_stress": "constant", "b_over_a": 1.5, "hold_
 @pytest.mark.parametrize("engine", ENGINES)
 def test_beyond_the_norm_without_mass_or_damping_it_is_no_physics(engine):
     """From where slip rate passes 5e-4 over T V_*/(2 pi D_c) on; in all units."""
-    with pytest.warns(NoAnswer, match="beyond the instability norm from .*neither mass nor"):
+    with pytest.warns(NoResultWarning, match="beyond the instability norm from .*neither mass nor"):
         motion = rsfstudy.simulate(Scene(**PULSE), duration=150.0, engine=engine)
     assert motion.attrs["status"] == "ok"
     since = float(motion.instability_time)
@@ -109,9 +111,9 @@ def test_a_motion_that_begins_beyond_the_norm_says_so():
     """And where the load point alone passes it, what is a million times faster is beyond it."""
     # ln V jumps by K d/a = 15, and K > b takes it down again
     jump = Scene(**PULSE | {"hold_time": 0.0}, displacement_step=3.0, stiffness_ratio=10.0)
-    with pytest.warns(NoAnswer, match="from 0 D_c"):
+    with pytest.warns(NoResultWarning, match="from 0 D_c"):
         rsfstudy.simulate(jump, duration=1.0, rtol=1e-3)
-    with pytest.warns(NoAnswer, match="from 114"):
+    with pytest.warns(NoResultWarning, match="from 114"):
         motion = rsfstudy.simulate(Scene(**PULSE, reference_rate=0.1), duration=150.0)
     at = motion.sel(time=float(motion.instability_time), method="nearest")
     # samples are a few tenths of a power of ten apart

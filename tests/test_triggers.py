@@ -8,14 +8,14 @@ import pytest
 from rsfstudy.named_studies._triggers import TRIGGERS, Triggers
 
 from rsfstudy import Scene
-from rsfstudy.analysis.overdamped import levels_of_rise, rises_to_load_point
+from rsfstudy.analysis.overdamped import monotone_rise_events, rises_monotonically
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import follow
+from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.events import Kind, maximum, settling
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.events import EventKind, approach_to_steady_state, maximum
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.status import Status
 
 #: Waves carry away all that the spring gives: to follow V up to V_0 takes 4,000,000 right-hand
@@ -48,34 +48,34 @@ def test_what_is_said_to_rise_to_the_load_point_does(law, normal_stress, ratio):
     slope = {"phi": 70.0} if normal_stress == "variable" else {}
     damped = {"radiation_damping": 1e-3, "load_velocity_ratio": 2e3, "stiffness_ratio": ratio}
     scene = Scene(law=law, b_over_a=1.7, normal_stress=normal_stress, **effect, **slope, **damped)
-    accuracy, meter = Accuracy(1e-7, 10**6, engine=COMPILED), Meter(10**6, engine=COMPILED)
-    levels = levels_of_rise(scene)
+    accuracy, meter = Accuracy(1e-7, 10**6, engine=COMPILED), WorkMeter(10**6, engine=COMPILED)
+    levels = monotone_rise_events(scene)
     told = [False]
-    for event in follow(
-        scene, accuracy, meter, [maximum("log_slip_rate"), settling(1e-3), *levels]
+    for event in integrate_events(
+        scene, accuracy, meter, [maximum("log_slip_rate"), approach_to_steady_state(1e-3), *levels]
     ):
-        if event.watch in levels and not told[-1]:
-            told.append(rises_to_load_point(scene, event.point))
-        assert not (event.kind is Kind.MAXIMUM and told[-1])
-        assert event.point.log_slip_rate <= scene.log_load_rate or not told[-1]
-        if event.kind is Kind.SETTLED:
+        if event.specification in levels and not told[-1]:
+            told.append(rises_monotonically(scene, event.point))
+        assert not (event.kind is EventKind.MAXIMUM and told[-1])
+        assert event.point.log_slip_rate <= scene.log_load_velocity or not told[-1]
+        if event.kind is EventKind.SETTLED:
             break
     assert told[-1]
     # and most of the way is left then
-    assert event.point.log_slip_rate > scene.log_load_rate - 0.1
+    assert event.point.log_slip_rate > scene.log_load_velocity - 0.1
 
 
 def test_a_slider_that_waves_do_not_hold_back_is_not_asked():
     for fields in ({}, {"inertia": True}, {"law": "two_slip_states", "radiation_damping": 1e-3}):
-        assert levels_of_rise(Scene(**fields, load_velocity_ratio=1e3)) == []
+        assert monotone_rise_events(Scene(**fields, load_velocity_ratio=1e3)) == []
 
 
 def test_oscillations_do_not_rise_to_the_load_point():
     """Near critical stiffness they overshoot it."""
     scene = Scene(stiffness_ratio=1.1, load_velocity_ratio=1.1, radiation_damping=1e-12)
-    start = next(follow(scene, Accuracy(1e-6), Meter(10**5)))
-    assert start.point.log_slip_rate < scene.log_load_rate
-    assert not rises_to_load_point(scene, start.point)
+    start = next(integrate_events(scene, Accuracy(1e-6), WorkMeter(10**5)))
+    assert start.point.log_slip_rate < scene.log_load_velocity
+    assert not rises_monotonically(scene, start.point)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

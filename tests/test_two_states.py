@@ -18,7 +18,7 @@ from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.measures.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.slider import laws, stability
 from rsfstudy.slider.parts import number
 from rsfstudy.slider.places import LAW
@@ -144,10 +144,10 @@ def test_growth_confirms_a_threshold_close_to_another(mass):
 def test_below_a_window_of_instability_motions_settle(ratio, margin):
     scene = Scene(law="two_slip_states", stiffness_ratio=ratio, load_velocity_ratio=1.2, **WINDOW)
     assert after_step.stability_margin(scene) == pytest.approx(margin, rel=1e-9)
-    assert after_step.settles(scene) is (margin > 0.0)
+    assert after_step.is_linearly_stable(scene) is (margin > 0.0)
     if ratio == 0.2:
         assert LimitCycle(phases=2)(scene, Accuracy(1e-4)).status is Status.NO_LIMIT_CYCLE
-        small = after_step.reaches_norm(scene, Accuracy(1e-4), Meter(2_000_000))
+        small = after_step.reaches_norm(scene, Accuracy(1e-4), WorkMeter(2_000_000))
         assert not small
 
 
@@ -177,7 +177,7 @@ class ThreeSlipStates(laws.Law):
     third: float = number(1.0, "", "1", "first over third slip distance")
 
     name = "three_slip_states"
-    states = 3
+    state_count = 3
     evolutions = staticmethod(evolutions)
     steady_states = staticmethod(steady_states)
 

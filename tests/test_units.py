@@ -11,11 +11,11 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from rsfstudy import Laboratory, read_protocol
+from rsfstudy import Rig, read_protocol
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.units import _KNOWN, factor, in_si
+from rsfstudy.rig.units import _KNOWN_UNITS, convert_to_si, unit_factor
 
-RIG = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
+RIG = Rig(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
 
 
 @pytest.mark.parametrize(
@@ -35,24 +35,24 @@ RIG = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocit
     ],
 )
 def test_usual_units(text, units, value):
-    assert in_si("x", text, units) == pytest.approx(value, rel=1e-15)
+    assert convert_to_si("x", text, units) == pytest.approx(value, rel=1e-15)
 
 
 def test_other_units_need_pint(monkeypatch):
     monkeypatch.setitem(sys.modules, "pint", None)
     with pytest.raises(InvalidValue, match=r"known here. Install pint .*units.*or give a number"):
-        in_si("normal_stress", "725 psi", "Pa")
+        convert_to_si("normal_stress", "725 psi", "Pa")
 
 
 def test_quantities_of_pint():
     registry = pint.get_application_registry()
-    assert in_si("x", "725 psi", "Pa") == pytest.approx(725 * 6894.757293168361, rel=1e-12)
-    assert in_si("x", registry.Quantity(3.0, "MPa/um"), "Pa/m") == pytest.approx(3e12)
-    assert in_si("x", "1 furlong/fortnight", "m/s") == pytest.approx(1.663e-4, rel=1e-3)
+    assert convert_to_si("x", "725 psi", "Pa") == pytest.approx(725 * 6894.757293168361, rel=1e-12)
+    assert convert_to_si("x", registry.Quantity(3.0, "MPa/um"), "Pa/m") == pytest.approx(3e12)
+    assert convert_to_si("x", "1 furlong/fortnight", "m/s") == pytest.approx(1.663e-4, rel=1e-3)
     with pytest.raises(InvalidValue, match="another kind than m"):
-        in_si("x", registry.Quantity(3.0, "MPa"), "m")
+        convert_to_si("x", registry.Quantity(3.0, "MPa"), "m")
     with pytest.raises(InvalidValue, match="pint does not know.*Write it as in"):
-        in_si("x", "3 bananas", "m")
+        convert_to_si("x", "3 bananas", "m")
 
 
 #: Units of stress, of those known here and of those that pint knows.
@@ -71,7 +71,7 @@ WRONG = (
 def read(text):
     """What a text of stress is in Pa, or None where it is refused."""
     try:
-        return in_si("x", text, "Pa")
+        return convert_to_si("x", text, "Pa")
     except InvalidValue:
         return None
 
@@ -86,12 +86,12 @@ def test_what_is_not_one_number_and_one_unit_is_refused(text):
     assert (read(text), read_without_pint(text)) == (None, None)
 
 
-@pytest.mark.parametrize("name", sorted(_KNOWN))
+@pytest.mark.parametrize("name", sorted(_KNOWN_UNITS))
 def test_units_that_both_know_are_the_same(name):
     """But for the roundings of pint on its way to base units, a few of 1.1e-16."""
     registry = pint.get_application_registry()
     quantity = registry.Quantity(1.0, registry.parse_units(name)).to_base_units()
-    size, exponents = _KNOWN[name]
+    size, exponents = _KNOWN_UNITS[name]
     assert quantity.magnitude == pytest.approx(size, rel=1e-15)
     of = {"[mass]": exponents[0], "[length]": exponents[1], "[time]": exponents[2]}
     assert dict(quantity.dimensionality) == {n: e for n, e in of.items() if e}
@@ -107,7 +107,7 @@ NUMBERS = st.one_of(
 def product(number, unit):
     """A number of units in Pa, of exact factors: rounded once, and without bound where it is."""
     try:
-        return float(Fraction(repr(float(number))) * factor("x", unit, "Pa"))
+        return float(Fraction(repr(float(number))) * unit_factor("x", unit, "Pa"))
     except OverflowError:
         return math.inf
 

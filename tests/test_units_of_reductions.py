@@ -5,28 +5,28 @@ import pytest
 import xarray as xr
 from running import run, study_of
 
-from rsfstudy import Laboratory
+from rsfstudy import Rig
 from rsfstudy.api import tables
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import (
     Boundary,
-    DecadeFit,
+    ClosedFormRatio,
     Difference,
     Inverse,
     LinearFit,
     Mean,
-    OverClosedForm,
     PowerLaw,
     ProportionalFit,
     Quantile,
     Range,
     RelativeDifference,
+    SemilogFit,
     StandardDeviation,
-    reduced,
+    apply_reductions,
 )
-from rsfstudy.reduce.base import stated_by
+from rsfstudy.reduce.base import read_quantities
 from rsfstudy.rig.reductions import InUnits
-from rsfstudy.rig.scales import in_units_of_rig
+from rsfstudy.rig.scales import convert_to_display_units
 
 X = np.geomspace(1.0, 30.0, 12)
 
@@ -67,7 +67,7 @@ KINDS = {
     LinearFit("per_speed", OF, on="speed"): "s (um/s)-1",
     LinearFit("rise", "falling", on="length"): "1 (um)-1",
     ProportionalFit("displacement_slope", OF, on="number"): "s",
-    DecadeFit("per_decade", OF, on="speed"): "s",
+    SemilogFit("per_decade", OF, on="speed"): "s",
     PowerLaw("exponent", OF, on="speed"): "1",
     Difference("lowering", OF, **ALONG): "s",
     RelativeDifference("separation", OF, **ALONG): "1",
@@ -79,7 +79,7 @@ KINDS = {
     Boundary("edge", "above", on="speed"): "um/s",
     Inverse("reached", "falling", on="length", levels=0.1): "um",
     Difference("steeper", "zeta", **ALONG): "s (um)-1",
-    OverClosedForm("ratio", "above", form="displacement_step"): "1",
+    ClosedFormRatio("ratio", "above", form="displacement_step"): "1",
 }
 
 
@@ -87,8 +87,11 @@ def test_what_is_made_of_a_lattice_in_units_is_that_of_numbers_in_units():
     """To rounding: each kind is homogeneous in its variable and its coordinate. So are the errors
     and misfits that come with it.
     """
-    made, dataset = reduced(lattice(), tuple(KINDS)), lattice().assign_coords(a=0.01)
-    ours, theirs = in_units_of_rig(made), reduced(in_units_of_rig(dataset), tuple(KINDS))
+    made, dataset = apply_reductions(lattice(), tuple(KINDS)), lattice().assign_coords(a=0.01)
+    ours, theirs = (
+        convert_to_display_units(made),
+        apply_reductions(convert_to_display_units(dataset), tuple(KINDS)),
+    )
     assert {r.name: ours[r.name].attrs["units"] for r in KINDS} == {
         r.name: units for r, units in KINDS.items()
     }
@@ -97,22 +100,22 @@ def test_what_is_made_of_a_lattice_in_units_is_that_of_numbers_in_units():
         np.testing.assert_allclose(ours[name], theirs[name], rtol=1e-10, err_msg=str(name))
     # the names of others do not lend their words
     assert made["static_slope"].attrs["long_name"] == "static slope"
-    assert stated_by(made)["static_slope"].scale == "D_c/V_*"
+    assert read_quantities(made)["static_slope"].scale == "D_c/V_*"
     assert ours["zeta_misfit"].attrs["units"] == "s"
 
 
 def test_a_slope_is_told_in_units_of_the_rig_beside_its_name():
     with_units = (InUnits("slope_in_min", "static_slope", units="min"),)
-    made = reduced(lattice(), (LinearFit("static_slope", OF, on="number"), *with_units))
+    made = apply_reductions(lattice(), (LinearFit("static_slope", OF, on="number"), *with_units))
     expected = made["static_slope"] * 5.0 / 60.0  # D_c/V_* is 5 s
     np.testing.assert_allclose(made["slope_in_min"], expected, rtol=1e-14)
 
 
 def test_a_law_that_holds_a_number_stays_one_of_numbers():
     """As V_0/V_* = 1 + zeta a/(b - a)."""
-    made = reduced(lattice(), (ProportionalFit("zeta", OF, on="number", minus=1.0),))
+    made = apply_reductions(lattice(), (ProportionalFit("zeta", OF, on="number", minus=1.0),))
     assert "scale" not in made["zeta"].attrs | made["zeta_misfit"].attrs
-    np.testing.assert_array_equal(in_units_of_rig(made)["zeta"], made["zeta"])
+    np.testing.assert_array_equal(convert_to_display_units(made)["zeta"], made["zeta"])
 
 
 @pytest.mark.parametrize(
@@ -131,32 +134,30 @@ def test_cells_of_several_scales_make_a_number_that_says_so(kind, across):
         "slip_distance": (across, sizes, {"units": "m"}),
         "reference_rate": (across, 2e-6 / sizes, {"units": "s-1"}),
     }
-    made = reduced(lattice(**scales), (kind,))
+    made = apply_reductions(lattice(**scales), (kind,))
     assert "scale" not in made["r"].attrs
     assert made["r"].attrs["comment"].endswith("; of cells in units of D_c, which varies")
-    np.testing.assert_array_equal(in_units_of_rig(made)["r"], made["r"])
+    np.testing.assert_array_equal(convert_to_display_units(made)["r"], made["r"])
     # along the other dimension each result has one scale
     other = {"law": "x", "x": "law"}[across]
     kept = Range("r", OF, over=other) if other == "x" else Difference("r", OF, "law", "slip")
-    assert reduced(lattice(**scales), (kept,))["r"].attrs["scale"] == "D_c/V_*"
+    assert apply_reductions(lattice(**scales), (kept,))["r"].attrs["scale"] == "D_c/V_*"
 
 
 def test_tables_tell_them():
-    rig = Laboratory(
+    rig = Rig(
         normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s",
         stiffness="0.01 MPa/um",
     )  # fmt: skip
     fields = {"law": "slip", "normal_stress": "variable", "alpha": 0.5, "a": 0.01, "b_over_a": 1.4}
     fits = (
         LinearFit("static_slope", "critical_stiffness", on="load_velocity_ratio"),
-        DecadeFit("per_decade", "critical_stiffness", on="load_velocity_ratio"),
+        SemilogFit("per_decade", "critical_stiffness", on="load_velocity_ratio"),
     )
     axis, base = rig.axis("load_velocity", "1:100:3:log um/s"), rig.scene(**fields)
-    of_rig = run(
-        study_of("of", LinearStability(), axis, base=base, laboratory=rig, reductions=fits)
-    )
-    slope, decade = (list(table.rows[0]) for table in tables.reductions(of_rig))
+    of_rig = run(study_of("of", LinearStability(), axis, base=base, rig=rig, reductions=fits))
+    slope, decade = (list(table.rows[0]) for table in tables.reduction_tables(of_rig))
     assert slope[0] == "static_slope (MPa/um/(um/s))"
     assert slope[2] == "largest misfit (MPa/um)"
     assert decade[:2] == ["per_decade (MPa/um)", "standard error"]
-    assert any(line.endswith(" MPa/um") for line in tables.in_short(of_rig))
+    assert any(line.endswith(" MPa/um") for line in tables.summarise_in_lines(of_rig))

@@ -52,14 +52,14 @@ class Known(Measure):
 
     relative_to: float = 1.0
     name: ClassVar[str] = "known_to_a_hundredth"
-    headline = "known"
+    primary_output = "known"
     variables: ClassVar[Mapping] = dict.fromkeys(("known", "known_error", "mean", "mean_error"), ())
     typical_work = 1
 
-    def scales(self, scene, values):
+    def error_scales(self, scene, values):
         return {"known": self.relative_to} if self.relative_to else {}
 
-    def find(self, scene, accuracy, meter):
+    def compute(self, scene, accuracy, meter):
         values = {"known": 2.0, "known_error": 0.01, "mean": 1.0, "mean_error": 1.0}
         return Outcome(Status.OK, values, "as it is")
 
@@ -91,7 +91,7 @@ def test_every_number_with_a_numerical_error_is_held_to_what_was_asked(measure, 
     for rtol in (1e-4, 1e-7):
         outcome = measure(scene, Accuracy(rtol, engine=COMPILED))
         assert outcome.status is Status.OK, outcome.message
-        scales = measure.scales(scene, outcome.values)
+        scales = measure.error_scales(scene, outcome.values)
         assert set(scales) == names - RESOLVED_OTHERWISE
         for name, scale in scales.items():
             assert math.isfinite(scale)

@@ -13,17 +13,17 @@ import xarray as xr
 from running import run, study_of
 
 import rsfstudy
-from rsfstudy import Accuracy, Axis, Claim, Figure, Laboratory, Panel, Scene, Study
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Rig, Scene, Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.quantity import Output
 from rsfstudy.reduce import LinearFit, ProportionalFit, Reduction
-from rsfstudy.slider.laws import Law, LawOfStates
+from rsfstudy.slider.laws import Law, LawBase
 from rsfstudy.slider.normal_stress import NormalStress
-from rsfstudy.slider.parts import number, numbers_of
+from rsfstudy.slider.parts import collect_numbers, number
 from rsfstudy.slider.places import LAW
 from rsfstudy.status import Status
 
@@ -87,7 +87,7 @@ def test_a_reduction_that_returns_no_dataset_is_refused():
         (Panel, {"colour": "x"}, None),
         (Figure, {"panel": []}, "panels"),
         (Accuracy, {"rtoll": 1e-3}, "rtol"),
-        (Laboratory, {"normal_stres": "5 MPa"}, "normal_stress"),
+        (Rig, {"normal_stres": "5 MPa"}, "normal_stress"),
     ],
 )
 def test_an_unknown_keyword_is_reported_with_the_valid_ones(kind, wrong, meant):
@@ -153,7 +153,7 @@ def test_fields_of_a_law_follow_b_in_the_order_of_their_declaration():
 
 def test_numbers_that_a_law_returns_itself_are_not_repeated():
     law = Further(speed=math.e, slowness=3.0, offset=7.0)
-    found = numbers_of(law, Scene(a=0.01, stiffness=0.01))
+    found = collect_numbers(law, Scene(a=0.01, stiffness=0.01))
     assert found[:-1] == pytest.approx((0.02, 1.0, 9.0, 7.0))
     assert math.isnan(found[-1])
 
@@ -165,14 +165,14 @@ def test_fields_of_other_parts_are_passed_too():
         name = "soft"
 
     @dataclass(frozen=True, kw_only=True)
-    class States(LawOfStates):
+    class States(LawBase):
         third: float = number(0.25, "$t$", "1", "third")
         name = "states"
 
     scene = Scene()
-    assert numbers_of(Stress(), scene) == (0.5,)
+    assert collect_numbers(Stress(), scene) == (0.5,)
     # not the fields of all laws, which have places of their own
-    assert numbers_of(States(), scene) == (0.25,)
+    assert collect_numbers(States(), scene) == (0.25,)
 
 
 # ---- measures that follow a motion --------------------------------------------------------------
@@ -183,10 +183,10 @@ class PeakFriction(Measure):
     """Largest friction after a step, as the page on own studies reads it."""
 
     name: ClassVar[str] = "peak_friction"
-    headline, typical_work = "peak_friction", 500
+    primary_output, typical_work = "peak_friction", 500
     outputs = (Output("peak_friction", r"$\mu_p$", "1", "largest friction after the step"),)
 
-    def find(self, scene, accuracy, meter):
+    def compute(self, scene, accuracy, meter):
         motion = rsfstudy.simulate(scene, duration=5.0, accuracy=accuracy, meter=meter)
         peak = float(motion.friction_coefficient.max())
         return Outcome(Status.OK, {"peak_friction": peak})
@@ -205,20 +205,20 @@ def test_a_motion_within_a_measure_counts_as_work_of_its_cell():
 
 
 def test_a_motion_within_a_measure_keeps_to_the_budget_of_its_cell():
-    with pytest.warns(rsfstudy.errors.Incomplete, match="work_budget_spent 2"):
+    with pytest.warns(rsfstudy.errors.IncompleteWarning, match="work_budget_spent 2"):
         found = run(PEAKS, budget=40)
     assert (found.status == int(Status.WORK_BUDGET_SPENT)).all()
     assert found.peak_friction.isnull().all()
 
 
 def test_several_motions_of_one_meter_report_their_own_work():
-    accuracy, meter = Accuracy(1e-3), Meter(100_000)
+    accuracy, meter = Accuracy(1e-3), WorkMeter(100_000)
     scene = STEPPED.with_(load_velocity_ratio=2.0)
     motions = [rsfstudy.simulate(scene, accuracy=accuracy, meter=meter) for _ in range(2)]
     first, second = (motion.attrs["rhs_evaluations"] for motion in motions)
-    assert first == second == meter.spent / 2
+    assert first == second == meter.evaluations / 2
     for given in ({"meter": meter}, {"accuracy": accuracy}, {"accuracy": 1e-3, "meter": meter}):
-        with pytest.raises(InvalidValue, match="must be an Accuracy and a Meter.*meter=meter"):
+        with pytest.raises(InvalidValue, match="must be an Accuracy and a WorkMeter.*meter=meter"):
             rsfstudy.simulate(scene, **given)
 
 

@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 import synthetic_records as synthetic
-from synthetic_records import TRUTH, off
+from synthetic_records import EXACT_PARAMETERS, deviation_in_stderrs
 
 import rsfstudy
 from rsfstudy.analysis.fitting.record import Record
-from rsfstudy.analysis.fitting.straight import find_straight_start
+from rsfstudy.analysis.fitting.straight import find_linear_start
 from rsfstudy.errors import InvalidValue
-from rsfstudy.status import LABELS
+from rsfstudy.status import STATUS_LABELS
 
 LOADING = ((0.0, 2.0), (150.0, 20.0))
 OPTIONS: dict[str, Any] = {
     "laws": ["slowness"],
-    "stiffness": TRUTH["stiffness"],
+    "stiffness": EXACT_PARAMETERS["stiffness"],
     "slip_distance": 8.0,
     "noise": "ar1",
     "engine": "compiled",
@@ -28,9 +28,11 @@ OPTIONS: dict[str, Any] = {
 def run_in(seed: int = 1, depth: float = 0.5) -> Record:
     """Make a record in which friction rises by `depth` over some 25 um before a velocity step."""
     times = np.append(np.arange(0.0, 150.0, 0.5), np.arange(150.0, 159.0, 0.05))
-    moved = synthetic.load_point(LOADING, times)
-    friction = synthetic.motion("slowness", times, LOADING)[0] - depth * np.exp(-moved / 25.0)
-    friction += synthetic.correlated(len(times), 0.5, 1e-4, seed)
+    moved = synthetic.load_point_displacement(LOADING, times)
+    friction = synthetic.friction_and_sensitivities("slowness", times, LOADING)[0] - depth * np.exp(
+        -moved / 25.0
+    )
+    friction += synthetic.correlated_noise(len(times), 0.5, 1e-4, seed)
     columns = {"time": times, "displacement": moved, "friction": friction}
     return rsfstudy.read_record(columns).with_steps([(150.0, 150.0, 2.0, 20.0)])
 
@@ -38,7 +40,7 @@ def run_in(seed: int = 1, depth: float = 0.5) -> Record:
 def test_a_window_begins_where_friction_has_become_straight() -> None:
     fit = rsfstudy.fit(run_in(), **OPTIONS).squeeze()
     for name in ("a", "b", "slip_distance"):
-        assert abs(off(fit, name, TRUTH[name])) < 3.5, name
+        assert abs(deviation_in_stderrs(fit, name, EXACT_PARAMETERS[name])) < 3.5, name
     assert float(fit.mu_star) == pytest.approx(0.6, abs=1e-3)
     assert 80.0 < float(fit.window_begins) < 260.0
     assert "friction is not a straight line before" in str(fit.message.values)
@@ -48,24 +50,24 @@ def test_a_window_begins_where_friction_has_become_straight() -> None:
 def test_correlated_noise_is_straight(rho: float) -> None:
     time = np.arange(400.0)
     for seed in range(30):
-        friction = 0.6 + 1e-5 * time + synthetic.correlated(len(time), rho, 1e-3, seed)
+        friction = 0.6 + 1e-5 * time + synthetic.correlated_noise(len(time), rho, 1e-3, seed)
         columns = {"time": time, "displacement": time, "friction": friction}
-        assert find_straight_start(Record(columns, f"seed_{seed}"), 0.0, 400.0) == 0.0
+        assert find_linear_start(Record(columns, f"seed_{seed}"), 0.0, 400.0) == 0.0
 
 
 def test_outliers_do_not_cut_the_window() -> None:
     time = np.arange(400.0)
     for seed in range(10):
-        friction = 0.6 + 1e-5 * time + synthetic.correlated(len(time), 0.5, 1e-4, seed)
+        friction = 0.6 + 1e-5 * time + synthetic.correlated_noise(len(time), 0.5, 1e-4, seed)
         friction[[40, 97, 220]] += [0.02, -0.02, 0.02]
         record = Record({"time": time, "displacement": time, "friction": friction}, f"seed_{seed}")
-        assert find_straight_start(record, 0.0, 400.0) == 0.0
+        assert find_linear_start(record, 0.0, 400.0) == 0.0
 
 
 def test_stated_extents_that_are_cut_are_reported() -> None:
     record = run_in(depth=0.0)
     fit = rsfstudy.fit(record, **OPTIONS, before="400 um", after="500 um").squeeze()
-    assert LABELS[int(fit.status)] == "ok"
+    assert STATUS_LABELS[int(fit.status)] == "ok"
     message = str(fit.message.values)
     assert "before= is cut from 400 to 300 um" in message
     assert "after= is cut from 500 to 179 um by the end of the record" in message
@@ -85,5 +87,5 @@ def test_negative_friction_is_refused_with_the_remedy() -> None:
     record = run_in(depth=0.0)
     negative = rsfstudy.read_record({**record.columns, "friction": -record.columns["friction"]})
     fit = rsfstudy.fit(negative, **OPTIONS).squeeze()
-    assert LABELS[int(fit.status)] == "not_applicable"
+    assert STATUS_LABELS[int(fit.status)] == "not_applicable"
     assert "reverse it with a scale of -1" in str(fit.message.values)

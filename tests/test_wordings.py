@@ -22,14 +22,14 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from running import call
+from running import call_main
 from scipy.stats import norm
 
 import rsfstudy
-from rsfstudy import Axis, Laboratory, Scene
+from rsfstudy import Axis, Rig, Scene
 from rsfstudy.declare import catalogue
 from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.names import names
+from rsfstudy.declare.names import study_names
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
@@ -38,10 +38,10 @@ from rsfstudy.motion import engines
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantity import Output
 from rsfstudy.reduce import Reduction
-from rsfstudy.rig.units import in_si
-from rsfstudy.slider.numbers import Slider
-from rsfstudy.slider.parts import RULES, is_flag, names_of
-from rsfstudy.slider.registry import OWNERS, SLOTS
+from rsfstudy.rig.units import convert_to_si
+from rsfstudy.slider.numbers import SliderParameters
+from rsfstudy.slider.parts import RULES, field_names, is_boolean_field
+from rsfstudy.slider.registry import FIELD_OWNERS, SLOTS
 
 WORDINGS = Path(__file__).with_name("wordings.txt")
 
@@ -65,19 +65,19 @@ NO_NUMBERS = {"0.01": "must be a number", True: "must be a number", math.nan: "m
 
 def calling(part: type) -> dict[str, Any]:
     """Fields that call a part into a scene."""
-    if part is Slider:
+    if part is SliderParameters:
         return {}
-    if part.called_by:
-        return {part.called_by: True if is_flag(part, part.called_by) else 1.0}
+    if part.selected_by:
+        return {part.selected_by: True if is_boolean_field(part, part.selected_by) else 1.0}
     slot = next(slot for slot in SLOTS if part in slot.choices.values())
-    return {slot.name: part.name} if not slot.callers and part.name != slot.default else {}
+    return {slot.name: part.name} if not slot.selectors and part.name != slot.default else {}
 
 
 def broken() -> Iterator[tuple[dict[str, Any], str, str]]:
     """A scene with one wrong value, the field, and the rule that it breaks."""
-    for name, part in OWNERS.items():
+    for name, part in FIELD_OWNERS.items():
         wrong = {"yes": "must be true or false"}
-        if not is_flag(part, name):
+        if not is_boolean_field(part, name):
             rule = part.__dataclass_fields__[name].metadata["rule"]
             wrong = NO_NUMBERS | dict.fromkeys(BREAKING[rule], rule)
         for value, rule in wrong.items():
@@ -103,8 +103,8 @@ def foreign() -> Iterator[tuple[dict[str, Any], str]]:
         for part in slot.choices.values():
             for other in slot.choices.values():
                 calls = calling(other)
-                for name in sorted({*names_of(part)} - {*names_of(other), part.called_by}):
-                    if OWNERS[name] is part:
+                for name in sorted({*field_names(part)} - {*field_names(other), part.selected_by}):
+                    if FIELD_OWNERS[name] is part:
                         yield {**calls, name: 0.5}, name
 
 
@@ -144,7 +144,12 @@ def fitted(**options) -> xr.Dataset:
 
 def own(**declared) -> Measure:
     """A measure of a user's own, that declares something else."""
-    usual = {"name": "own", "headline": "total", "variables": {"total": ()}, "typical_work": 1}
+    usual = {
+        "name": "own",
+        "primary_output": "total",
+        "variables": {"total": ()},
+        "typical_work": 1,
+    }
     return type("Own", (Measure,), usual | declared)()
 
 
@@ -160,21 +165,28 @@ def members(base: type) -> Iterator[type]:
 
 
 #: A rig.
-RIG = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
+RIG = Rig(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
 
 
 @functools.cache
 def known() -> dict[str, Any]:
     """What calls are made of: what is public, every measure and reduction, and a few words."""
-    for name in names():
-        catalogue.load(name)
+    for name in study_names():
+        catalogue.load_study(name)
     kinds = [*members(Measure), *members(Reduction)]
     return (
         {name: getattr(rsfstudy, name) for name in rsfstudy.__all__}
         | {kind.__name__: kind for kind in kinds if kind.__module__.startswith("rsfstudy.")}
         | {"inf": math.inf, "nan": math.nan, "np": np, "pd": pd, "norm": norm, "xr": xr}
         | {"Accuracy": Accuracy, "Output": Output}
-        | {"study": study, "claim": claim, "csv": csv, "fitted": fitted, "RIG": RIG, "in_si": in_si}
+        | {
+            "study": study,
+            "claim": claim,
+            "csv": csv,
+            "fitted": fitted,
+            "RIG": RIG,
+            "in_si": convert_to_si,
+        }
         | {"own": own, "measuring": measuring, "Elasticities": Elasticities}
         | {"SimpleNamespace": SimpleNamespace}
         | {"lattice": lambda **options: rsfstudy.run(study(Axis("b_over_a", [2.0])), **options)}
@@ -185,9 +197,9 @@ def answered(asked: str) -> str:
     """The message with which a call, or a command, is refused: before anything is written."""
     with contextlib.ExitStack() as stack:
         for slot in SLOTS:  # other tests have named parts of their own
-            stack.enter_context(mock.patch.dict(slot.own, clear=True))
+            stack.enter_context(mock.patch.dict(slot.user_parts, clear=True))
         if asked.startswith("rsfstudy "):
-            ended = call(*shlex.split(asked)[1:])
+            ended = call_main(*shlex.split(asked)[1:])
             assert ended.returncode == 2
             return re.sub("^.*?rror: ", "", " ".join(ended.stderr.split()))
         refused = stack.enter_context(pytest.raises(InvalidValue))
@@ -205,7 +217,7 @@ def kept() -> dict[str, str]:
 @pytest.mark.parametrize(("asked", "message"), kept().items())
 def test_a_message_is_worded_as_it_was_read(asked, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(engines, "_OWN", {})  # steppers that other tests have made known
+    monkeypatch.setattr(engines, "_USER_STEPPERS", {})  # steppers that other tests have made known
     assert answered(asked) == message
     assert set(os.listdir(tmp_path)) <= {"record.csv"}
 

@@ -7,42 +7,42 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rsfstudy.analysis.critical_path import CriticalPath
-from rsfstudy.analysis.held import excess_of_peak
-from rsfstudy.analysis.overdamped import levels_of_rise, rises_to_load_point
+from rsfstudy.analysis.held import peak_excess
+from rsfstudy.analysis.overdamped import monotone_rise_events, rises_monotonically
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import along, follow
-from rsfstudy.motion.events import Kind, maximum, minimum, rise, settling
-from rsfstudy.motion.handover import mass_acts
-from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.starting import on_slow_manifold, starting
+from rsfstudy.motion.course import events_along, integrate_events
+from rsfstudy.motion.events import EventKind, approach_to_steady_state, maximum, minimum, rise
+from rsfstudy.motion.handover import inertia_matters
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
+from rsfstudy.motion.starting import initial_point, manifold_point
 from rsfstudy.slider import stability, steady
-from rsfstudy.slider.equations import IN_RUPTURE, without_mass
+from rsfstudy.slider.equations import RUPTURE_REGIME, equations_without_mass
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Part of the critical stiffness below it, and decay per slip in D_c, that no motion can tell from
 #: none.
-_NEUTRAL = 1e-9
+_NEUTRAL_TOLERANCE = 1e-9
 #: Swings this small follow linear theory.
-_LINEAR = 0.05
+_MAX_LINEAR_AMPLITUDE = 0.05
 #: Factor from one orbit to the next larger one when growth is slow; limit cycles closer together
 #: than that may be leapt over. Leaps are shortened where they would land beyond the norm.
-_LEAP, _SHORTEST_LEAP = 1.3, 1.002
+_LEAP_FACTOR, _MIN_LEAP_FACTOR = 1.3, 1.002
 
 #: Peaks in a row that must be the same for a cycle of several states to repeat: next to a cycle
 #: that motions leave, they would not stay.
-_IN_A_ROW = 4
+_REQUIRED_REPEATS = 4
 #: How much higher in ln V a motion is taken to rise that is followed up to the norm only.
-_HIGHER = 1.0
+_OVERSHOOT_BEYOND_NORM = 1.0
 #: Part of the farthest distance from steady sliding at which a motion has come to it.
-_CLOSE = 1e-3
+_STEADY_FRACTION = 1e-3
 
-_TOP = maximum("log_slip_rate")
+_PEAK_EVENT = maximum("log_slip_rate")
 
 
 @dataclass(frozen=True)
-class _Steady(steady.Steady):
+class _SteadySliding(steady.SteadySliding):
     """Steady sliding at the load point velocity, and the margin of its stability.
 
     It is neutral at constant normal stress and critical stiffness: every orbit then closes (Gu et
@@ -50,11 +50,11 @@ class _Steady(steady.Steady):
     errors would make peaks grow.
     """
 
-    margin: float
+    stability_margin: float
 
     @property
-    def stable(self) -> bool:
-        return self.margin >= -_NEUTRAL
+    def is_stable(self) -> bool:
+        return self.stability_margin >= -_NEUTRAL_TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -64,17 +64,17 @@ class _Orbit:
     """
 
     peaks: tuple[float, ...]
-    reached: bool
-    slow_growth_at: Point | None = None
-    top_at_start: float = -math.inf
+    reached_norm: bool
+    slow_growth_point: Point | None = None
+    initial_log_slip_rate: float = -math.inf
 
 
-def reaches_norm(scene: Scene, accuracy: Accuracy, meter: Meter) -> bool:
+def reaches_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> bool:
     """True if the slip rate reaches the norm after the step (see `excess_over_norm`)."""
     return excess_over_norm(scene, accuracy, meter) >= 0.0
 
 
-def excess_over_norm(scene: Scene, accuracy: Accuracy, meter: Meter) -> float:
+def excess_over_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> float:
     """Excess of the motion after the step, which is followed until it is certain whether its slip
     rate reaches the instability norm: negative where it does not.
 
@@ -91,41 +91,43 @@ def excess_over_norm(scene: Scene, accuracy: Accuracy, meter: Meter) -> float:
 
     Raises
     ------
-    Halt
+    MotionStopped
         With `no_steady_state` where the load point velocity has none, or as `motion` does.
     """
-    if scene.log_load_rate == -math.inf:
-        return excess_of_peak(scene, accuracy, meter)
-    steady = _steady(scene)
-    norm, heavy = scene.log_norm_rate, mass_acts(scene, accuracy)
-    if orbits_may_close(scene) and abs(steady.margin) < accuracy.rtol:
-        top = _top_of_closed_orbit(scene, accuracy, meter)
+    if scene.log_load_velocity == -math.inf:
+        return peak_excess(scene, accuracy, meter)
+    steady = _steady_sliding(scene)
+    norm, heavy = scene.log_instability_rate, inertia_matters(scene, accuracy)
+    if may_have_closed_orbits(scene) and abs(steady.stability_margin) < accuracy.rtol:
+        top = _max_of_closed_orbit(scene, accuracy, meter)
         if not heavy or top < min(norm, -math.log(scene.inertial_time) - 7.0):
             return top - norm
-    first = _orbit(scene, steady, None, accuracy, meter, heavy=heavy)
-    reached = first.reached
-    if first.slow_growth_at is not None:
-        at = first.slow_growth_at
-        reached = _grows_to_the_norm(scene, steady, at, accuracy, meter, heavy=heavy)
-    excess = _excess(first, norm, heavy=heavy)
+    first = _follow_orbit(scene, steady, None, accuracy, meter, with_inertia=heavy)
+    reached = first.reached_norm
+    if first.slow_growth_point is not None:
+        at = first.slow_growth_point
+        reached = _grows_to_norm(scene, steady, at, accuracy, meter, with_inertia=heavy)
+    excess = _compute_excess(first, norm, with_inertia=heavy)
     return max(excess, 1e-12) if reached else min(excess, -1e-12)
 
 
-def friction_acts_alone(scene: Scene) -> bool:
+def has_frictional_damping_only(scene: Scene) -> bool:
     """True if effective normal stress is constant once the loading has changed it, and only
     friction damps.
     """
-    varies = scene.parts.normal_stress.follows_friction or scene.parts.fluid.effects
-    return not varies and not scene.dynamics.damping(0.0)
+    varies = scene.parts.normal_stress.depends_on_shear_stress or scene.parts.fluid.effects
+    return not varies and not scene.dynamics.radiated_stress_slope(0.0)
 
 
-def orbits_may_close(scene: Scene) -> bool:
+def may_have_closed_orbits(scene: Scene) -> bool:
     """True if every orbit closes at critical stiffness."""
     law = scene.parts.law
-    return law.orbits_close and not law.feels_stress and friction_acts_alone(scene)
+    return (
+        law.has_closed_orbits and not law.depends_on_stress and has_frictional_damping_only(scene)
+    )
 
 
-def ratio_after(scene: Scene) -> float:
+def stiffness_ratio_after_step(scene: Scene) -> float:
     """``k/[k_cr(V_*) sigma/sigma_*]``: stiffness over the critical one at V_* and at the normal
     stress sigma after the step, where friction acts alone: critical stiffness is in proportion to
     normal stress.
@@ -133,23 +135,23 @@ def ratio_after(scene: Scene) -> float:
     return scene.stiffness_ratio / (1.0 + scene.imposed_normal_stress)
 
 
-def neutral(scene: Scene, within: float) -> bool:
+def is_neutral(scene: Scene, tolerance: float) -> bool:
     """True if stiffness is so close to the critical one, both at V_* and at the load point
     velocity, that growth and decay cannot be told apart: by most laws it is critical at every rate
     or at none, where friction acts alone. Where all orbits close at critical stiffness, that is
     known; with the load point held there are none.
     """
-    off = abs(ratio_after(scene) - 1.0)
-    known = scene.log_load_rate == -math.inf or (off == 0.0 and orbits_may_close(scene))
-    close = friction_acts_alone(scene) and off < within and not known
-    return close and abs(stability_margin(scene)) < within
+    off = abs(stiffness_ratio_after_step(scene) - 1.0)
+    known = scene.log_load_velocity == -math.inf or (off == 0.0 and may_have_closed_orbits(scene))
+    close = has_frictional_damping_only(scene) and off < tolerance and not known
+    return close and abs(stability_margin(scene)) < tolerance
 
 
-def settles(scene: Scene) -> bool:
+def is_linearly_stable(scene: Scene) -> bool:
     """True if steady sliding at the scene's load point velocity is linearly stable; a held load
     point is.
     """
-    return stability_margin(scene) >= -_NEUTRAL
+    return stability_margin(scene) >= -_NEUTRAL_TOLERANCE
 
 
 def stability_margin(scene: Scene) -> float:
@@ -161,184 +163,212 @@ def stability_margin(scene: Scene) -> float:
     ----------
     Rice and Ruina (1983), J. Appl. Mech. 50, 343-349.
     """
-    return math.inf if scene.log_load_rate == -math.inf else _steady(scene).margin
+    return (
+        math.inf
+        if scene.log_load_velocity == -math.inf
+        else _steady_sliding(scene).stability_margin
+    )
 
 
-def _top_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: Meter) -> float:
+def _max_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> float:
     """Highest ln V of an orbit that closes: at the nearer of its peaks, before the start or after
     it.
 
     A motion that starts slowing down comes from its peak; there it is followed against time,
     instead of around an orbit that may lead down to 1e-40 V_* and lose all digits on the way.
     """
-    begin = starting(scene)
-    equations, start = without_mass(scene, clock=False), (begin.spring_stress, begin.psi)
-    rising, norm = equations.at(start).growth > 0.0, scene.log_norm_rate
-    specs = (_TOP, minimum("log_slip_rate"), rise("log_slip_rate", norm))
-    for event in along(equations, start, accuracy.solver, meter, specs, backward=not rising):
-        if event.kind is Kind.RISE:
-            return norm + _HIGHER
+    begin = initial_point(scene)
+    equations, start = equations_without_mass(scene, clock=False), (begin.spring_stress, begin.psi)
+    rising, norm = (
+        equations.evaluate_point(start).log_slip_rate_derivative > 0.0,
+        scene.log_instability_rate,
+    )
+    specs = (_PEAK_EVENT, minimum("log_slip_rate"), rise("log_slip_rate", norm))
+    for event in events_along(
+        equations, start, accuracy.local_tolerance, meter, specs, backward=not rising
+    ):
+        if event.kind is EventKind.RISE:
+            return norm + _OVERSHOOT_BEYOND_NORM
         if (
-            event.watch is not None
+            event.specification is not None
             or event.point.log_slip_rate >= norm
-            or event.point.growth == 0.0
+            or event.point.log_slip_rate_derivative == 0.0
         ):
             return event.point.log_slip_rate
     raise AssertionError("a motion never ends by itself")
 
 
-def _shrinks_at_the_norm(scene: Scene, accuracy: Accuracy, meter: Meter) -> bool:
+def _shrinks_at_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> bool:
     """True if the orbit that touches the norm peaks lower the next time: paths cannot cross, so
     that none inside of it ever reaches the norm.
     """
-    path = CriticalPath.of(scene, meter.engine)
-    misfit = path.misfit_of_cycle(accuracy.solver, meter)
-    return misfit is not None and misfit < -100.0 * accuracy.solver
+    path = CriticalPath.of_scene(scene, meter.engine)
+    misfit = path.cycle_misfit(accuracy.local_tolerance, meter)
+    return misfit is not None and misfit < -100.0 * accuracy.local_tolerance
 
 
-def _grows_to_the_norm(
-    scene: Scene, steady: _Steady, at: Point, accuracy: Accuracy, meter: Meter, *, heavy: bool
+def _grows_to_norm(
+    scene: Scene,
+    steady: _SteadySliding,
+    start: Point,
+    accuracy: Accuracy,
+    meter: WorkMeter,
+    *,
+    with_inertia: bool,
 ) -> bool:
     """Leap from a slowly growing orbit to larger ones, until one shrinks or grows up to the norm.
 
     An orbit counts as grown to the norm only if its first peak was below it.
     """
-    if not heavy and _shrinks_at_the_norm(scene, accuracy, meter):
+    if not with_inertia and _shrinks_at_norm(scene, accuracy, meter):
         return False
-    leap = _LEAP
+    leap = _LEAP_FACTOR
     while True:
         spring_stress, *psis = (
             rest + leap * (current - rest)
             for rest, current in zip(
-                (steady.spring_stress, *steady.psis), (at.spring_stress, *at.psis), strict=True
+                (steady.spring_stress, *steady.psis),
+                (start.spring_stress, *start.psis),
+                strict=True,
             )
         )
-        beyond = on_slow_manifold(scene, spring_stress, tuple(psis))
-        orbit = _orbit(scene, steady, beyond, accuracy, meter, heavy=heavy)
-        if orbit.reached and len(orbit.peaks) == 1 and leap > _SHORTEST_LEAP:
+        beyond = manifold_point(scene, spring_stress, tuple(psis))
+        orbit = _follow_orbit(scene, steady, beyond, accuracy, meter, with_inertia=with_inertia)
+        if orbit.reached_norm and len(orbit.peaks) == 1 and leap > _MIN_LEAP_FACTOR:
             leap = math.sqrt(leap)
-        elif orbit.slow_growth_at is None:
-            return orbit.reached
+        elif orbit.slow_growth_point is None:
+            return orbit.reached_norm
         else:
-            at = orbit.slow_growth_at
+            start = orbit.slow_growth_point
 
 
-def _orbit(
+def _follow_orbit(
     scene: Scene,
-    steady: _Steady,
+    steady: _SteadySliding,
     start: Point | None,
     accuracy: Accuracy,
-    meter: Meter,
+    meter: WorkMeter,
     *,
-    heavy: bool,
+    with_inertia: bool,
 ) -> _Orbit:
     """Follow one orbit until it is certain how it goes on, or found to grow too slowly to
     follow.
     """
-    norm = scene.log_norm_rate
-    specs = [_TOP] if heavy else [_TOP, rise("log_slip_rate", norm)]
-    levels = levels_of_rise(scene) if steady.stable else []
-    specs += [settling(_CLOSE), *levels] if steady.stable else []
-    planar, repeating = scene.states == 1, _Repeating(scene, steady, accuracy)
+    norm = scene.log_instability_rate
+    specs = [_PEAK_EVENT] if with_inertia else [_PEAK_EVENT, rise("log_slip_rate", norm)]
+    levels = monotone_rise_events(scene) if steady.is_stable else []
+    specs += [approach_to_steady_state(_STEADY_FRACTION), *levels] if steady.is_stable else []
+    planar, repeating = scene.state_count == 1, _RepetitionDetector(scene, steady, accuracy)
     peaks: list[float] = []
     at_start = -math.inf
-    for event in follow(scene, accuracy, meter, specs, start=start):
+    for event in integrate_events(scene, accuracy, meter, specs, start=start):
         top = event.point.log_slip_rate
-        if event.kind is Kind.START:
-            if start is None and event.point.growth <= 0.0:
+        if event.kind is EventKind.START:
+            if start is None and event.point.log_slip_rate_derivative <= 0.0:
                 # no peak of an orbit to compare others with
                 at_start = top
                 if top >= norm:
-                    return _Orbit((), reached=True, top_at_start=top)
-            elif top >= norm and not heavy:
-                return _Orbit((top,), reached=True)
-        elif event.watch in levels:
-            if rises_to_load_point(scene, event.point):
-                return _Orbit(tuple(peaks), reached=False, top_at_start=at_start)
-        elif event.kind is Kind.RISE:
-            return _Orbit((*peaks, norm + _HIGHER), reached=True)
-        elif event.kind is Kind.SETTLED:
-            return _Orbit(tuple(peaks), reached=False, top_at_start=at_start)
-        elif event.kind is Kind.MAXIMUM:
+                    return _Orbit((), reached_norm=True, initial_log_slip_rate=top)
+            elif top >= norm and not with_inertia:
+                return _Orbit((top,), reached_norm=True)
+        elif event.specification in levels:
+            if rises_monotonically(scene, event.point):
+                return _Orbit(tuple(peaks), reached_norm=False, initial_log_slip_rate=at_start)
+        elif event.kind is EventKind.RISE:
+            return _Orbit((*peaks, norm + _OVERSHOOT_BEYOND_NORM), reached_norm=True)
+        elif event.kind is EventKind.SETTLED:
+            return _Orbit(tuple(peaks), reached_norm=False, initial_log_slip_rate=at_start)
+        elif event.kind is EventKind.MAXIMUM:
             peaks.append(top)
             if top >= norm:
-                return _Orbit(tuple(peaks), reached=True)
+                return _Orbit(tuple(peaks), reached_norm=True)
             if not planar:
-                if repeating.has(event.point):
-                    return _Orbit(tuple(peaks), reached=False)
+                if repeating.update(event.point):
+                    return _Orbit(tuple(peaks), reached_norm=False)
                 continue
-            if len(peaks) > 1 and _stops_growing(peaks, steady, accuracy):
-                return _Orbit(tuple(peaks), reached=False)
+            if len(peaks) > 1 and _has_stopped_growing(peaks, steady, accuracy):
+                return _Orbit(tuple(peaks), reached_norm=False)
             slow = len(peaks) > 1 and peaks[-1] - peaks[-2] < 0.2 * (norm - top)
-            if slow and not steady.stable and event.regime != IN_RUPTURE:
+            if slow and not steady.is_stable and event.regime != RUPTURE_REGIME:
                 return _Orbit(tuple(peaks), False, event.point)
     raise AssertionError("a motion never ends by itself")
 
 
-class _Repeating:
+class _RepetitionDetector:
     """True if a motion of several states has come to a cycle that repeats, or as close to rest as
     the tolerance lets it: at some peaks in a row its unknowns are the same, as far as numbers tell.
     Where steady sliding is unstable, and growth too small to be measured, the motion goes on.
     """
 
-    def __init__(self, scene: Scene, steady: _Steady, accuracy: Accuracy) -> None:
-        self._steady, self._slack = steady, 30.0 * accuracy.solver * scene.a
-        self._before, self._same = (math.inf,) * (1 + scene.states), 0
+    def __init__(self, scene: Scene, steady: _SteadySliding, accuracy: Accuracy) -> None:
+        self._steady, self._tolerance = steady, 30.0 * accuracy.local_tolerance * scene.a
+        self._previous, self._repeat_count = (math.inf,) * (1 + scene.state_count), 0
 
-    def has(self, peak: Point) -> bool:
+    def update(self, peak: Point) -> bool:
         """True if it has at this peak."""
         current = (peak.spring_stress, *peak.psis)
-        change = max(abs(x - y) for x, y in zip(current, self._before, strict=True))
+        change = max(abs(x - y) for x, y in zip(current, self._previous, strict=True))
         linear = (
-            peak.log_slip_rate - self._steady.log_slip_rate < _LINEAR and not self._steady.stable
+            peak.log_slip_rate - self._steady.log_slip_rate < _MAX_LINEAR_AMPLITUDE
+            and not self._steady.is_stable
         )
-        self._same = self._same + 1 if change < self._slack and not linear else 0
-        self._before = current
-        return self._same == _IN_A_ROW
+        self._repeat_count = (
+            self._repeat_count + 1 if change < self._tolerance and not linear else 0
+        )
+        self._previous = current
+        return self._repeat_count == _REQUIRED_REPEATS
 
 
-def _stops_growing(peaks: Sequence[float], steady: _Steady, accuracy: Accuracy) -> bool:
+def _has_stopped_growing(
+    peaks: Sequence[float], steady: _SteadySliding, accuracy: Accuracy
+) -> bool:
     """True if the last peak is no higher than the one before, as far as numbers tell. Too small to
     be measured, growth has the sign that linear theory gives it.
     """
-    slack = 100.0 * accuracy.solver
-    linear = peaks[-1] - steady.log_slip_rate < _LINEAR and not steady.stable
+    slack = 100.0 * accuracy.local_tolerance
+    linear = peaks[-1] - steady.log_slip_rate < _MAX_LINEAR_AMPLITUDE and not steady.is_stable
     return peaks[-1] - peaks[-2] <= (-slack if linear else slack)
 
 
-def _excess(orbit: _Orbit, norm: float, *, heavy: bool) -> float:
+def _compute_excess(orbit: _Orbit, norm: float, *, with_inertia: bool) -> float:
     """Excess that changes sign at the boundary, as far as this orbit shows it."""
-    if heavy:
-        highest = max((orbit.top_at_start, *orbit.peaks))
+    if with_inertia:
+        highest = max((orbit.initial_log_slip_rate, *orbit.peaks))
         return highest - norm if highest > -math.inf else -norm
     if len(orbit.peaks) > 1:
         return orbit.peaks[1] - orbit.peaks[0]
     return orbit.peaks[0] - norm if orbit.peaks else -1.0
 
 
-def _steady(scene: Scene) -> _Steady:
-    """Steady sliding at the load point velocity of the scene; `Halt` if there is none."""
-    load = scene.log_load_rate
+def _steady_sliding(scene: Scene) -> _SteadySliding:
+    """Steady sliding at the load point velocity of the scene; `MotionStopped` if there is none."""
+    load = scene.log_load_velocity
     sliding = steady.steady_sliding(scene, load)
     if sliding is None:
-        raise Halt(
+        raise MotionStopped(
             Status.NO_STEADY_STATE,
             f"no steady state exists at V_0/V_* = {math.exp(load):.3g}: phi < atan(mu_ss)",
         )
     law = scene.parts.law
-    at_every_rate = orbits_may_close(scene) and law.scale_free and not law.regularised
+    at_every_rate = may_have_closed_orbits(scene) and law.scale_free and not law.regularised
     if at_every_rate and not scene.has_mass and not scene.parts.loading.unknowns:
-        margin = ratio_after(scene) - 1.0
+        margin = stiffness_ratio_after_step(scene) - 1.0
     else:
         critical = stability.critical_stiffness(scene, load)
         margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
-    if margin < -_NEUTRAL and scene.states > 1 and _decays(scene):
+    if (
+        margin < -_NEUTRAL_TOLERANCE
+        and scene.state_count > 1
+        and _is_stable_to_small_perturbations(scene)
+    ):
         margin = -margin
-    return _Steady(**vars(sliding), margin=margin)
+    return _SteadySliding(**vars(sliding), stability_margin=margin)
 
 
-def _decays(scene: Scene) -> bool:
+def _is_stable_to_small_perturbations(scene: Scene) -> bool:
     """True if small changes of steady sliding decay, which those of several states may do below the
     critical stiffness.
     """
-    return bool(stability.growth_rates(scene, scene.log_load_rate)[0].real < -_NEUTRAL)
+    return bool(
+        stability.growth_rates(scene, scene.log_load_velocity)[0].real < -_NEUTRAL_TOLERANCE
+    )

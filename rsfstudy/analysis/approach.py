@@ -35,68 +35,74 @@ from operator import sub
 
 import numpy as np
 
-from rsfstudy.analysis.cycles import LN10, NUMBERS, Cycle, cycles, more_events
-from rsfstudy.analysis.return_map import CLOSED, Orbit, ReturnMap, section
+from rsfstudy.analysis.cycles import (
+    LN10,
+    PRIMARY_OUTPUT_COUNT,
+    Cycle,
+    iterate_cycles,
+    more_events_remedy,
+)
+from rsfstudy.analysis.return_map import CLOSURE_TOLERANCE, Orbit, ReturnMap, section_at
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.stability import critical_stiffness
 from rsfstudy.status import Status
 
 #: Part of their distance to the limit that cycles keep each time: above the first they are leapt
 #: ahead of, above the second they approach none.
-_SLOW_APPROACH, _DIVERGES = 0.03, 0.98
+_MIN_CONTRACTION_TO_LEAP, _MAX_CONTRACTION = 0.03, 0.98
 #: Longest leap, as a part of the swing of ln V.
-_NEAR = 0.1
+_MAX_LEAP_FRACTION = 0.1
 #: Most cycles of a period that is looked for.
-LONGEST = 16
+MAX_PERIOD = 16
 #: Accuracy at which cycles are closed, where no better one is asked for: differences lose digits.
-_FINE = 1e-7
+_MAX_CLOSING_RTOL = 1e-7
 #: Cycles after which a motion is first looked at.
-_FIRST_LOOK = 8
+_MIN_CYCLES_TO_TEST = 8
 #: Size of a multiplier from which an orbit repels beyond doubt, and how far off its like a cycle is
 #: that repeats none, over how far ln V swings.
-_REPELS, _OFF = 1.01, 0.02
+_REPELLING_MULTIPLIER, _MAX_RECURRENCE_MISFIT = 1.01, 0.02
 #: Part by which stiffness differs from the critical one where swings take for ever to grow or to
 #: die out.
-_CRITICAL = 1e-5
+_CRITICAL_STIFFNESS_TOLERANCE = 1e-5
 
 
-class Approach:
+class CycleSearch:
     """Convergence to the limit cycle of a scene with one state.
 
     Parameters
     ----------
     scene : Scene
     accuracy : Accuracy
-    meter : Meter
+    meter : WorkMeter
         Counter of the work of the motion.
 
     Attributes
     ----------
-    seen : list of Cycle
-        Cycles so far. The last one is the limit cycle after ``follow`` has returned True.
+    cycles : list of Cycle
+        Cycles so far. The last one is the limit cycle after ``run`` has returned True.
     """
 
-    def __init__(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> None:
+    def __init__(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> None:
         self._scene, self._accuracy, self._meter = scene, accuracy, meter
-        self._by = ReturnMap(scene, accuracy, meter)
-        self._noise = accuracy.solver * scene.a
+        self._return_map = ReturnMap(scene, accuracy, meter)
+        self._noise = accuracy.local_tolerance * scene.a
         self._work = 0
-        self.seen: list[Cycle] = []
+        self.cycles: list[Cycle] = []
         #: The columns b and c of P', derivatives of the image by spring stress and by state; and
         #: whether they are known.
-        self._slopes, self._known = 2 * ([0.0] * (2 + NUMBERS),), False
+        self._derivatives, self._has_derivatives = 2 * ([0.0] * (2 + PRIMARY_OUTPUT_COUNT),), False
         #: The section s where the last cycle begins, its image P(s), and dP, by how much that
         #: differs from the image before.
-        self._begin, self._image = (0.0, 0.0), [0.0] * (2 + NUMBERS)
-        self._changes = self._image
+        self._section, self._image = (0.0, 0.0), [0.0] * (2 + PRIMARY_OUTPUT_COUNT)
+        self._image_change = self._image
         #: What is left from s to the fixed point, and P' times that: what it changes of the image.
-        self._ahead, self._implied = self._begin, self._image
+        self._correction, self._image_correction = self._section, self._image
         #: What was left to go along the map where the motion leapt last.
-        self._left_at_leap = np.inf
+        self._distance_at_leap = np.inf
 
-    def follow(self, events: int) -> bool:
+    def run(self, max_events: int) -> bool:
         """Follow cycles until the motion reaches the limit cycle.
 
         Returns
@@ -106,167 +112,184 @@ class Approach:
 
         Raises
         ------
-        Halt
+        MotionStopped
             With ``work_budget_spent`` if no cycle repeats within ``events`` cycles.
         """
         start = None
         while True:
-            spent = self._meter.spent
-            for cycle in cycles(self._scene, self._accuracy, self._meter, start):
+            spent = self._meter.evaluations
+            for cycle in iterate_cycles(self._scene, self._accuracy, self._meter, start):
                 if cycle is None:
                     return False
-                self._work, spent = self._meter.spent - spent, self._meter.spent
-                self.seen.append(cycle)
-                self._learn()
-                if self._repeats():
+                self._work, spent = self._meter.evaluations - spent, self._meter.evaluations
+                self.cycles.append(cycle)
+                self._update_derivatives()
+                if self._has_converged():
                     return True
-                if len(self.seen) >= events:
-                    remedy = self._hopeless or more_events(events)
-                    text = f"no cycle repeats within {events} events; {remedy}"
-                    raise Halt(Status.WORK_BUDGET_SPENT, text)
-                if self._may_leap():
-                    self._left_at_leap = abs(cycle.end.spring_stress - cycle.begin.spring_stress)
-                    start = self._by.point(section(cycle.begin) + np.array(self._ahead))
+                if len(self.cycles) >= max_events:
+                    remedy = self._critical_stiffness_text or more_events_remedy(max_events)
+                    text = f"no cycle repeats within {max_events} events; {remedy}"
+                    raise MotionStopped(Status.WORK_BUDGET_SPENT, text)
+                if self._should_leap():
+                    self._distance_at_leap = abs(
+                        cycle.end_point.spring_stress - cycle.start_point.spring_stress
+                    )
+                    start = self._return_map.point_at(
+                        section_at(cycle.start_point) + np.array(self._correction)
+                    )
                     break
 
     @property
-    def _hopeless(self) -> str:
+    def _critical_stiffness_text(self) -> str:
         """Explanation if the stiffness is critical; otherwise an empty string."""
-        critical = critical_stiffness(self._scene, self._scene.log_load_rate)
+        critical = critical_stiffness(self._scene, self._scene.log_load_velocity)
         off = abs(self._scene.stiffness / critical - 1.0) if critical else math.inf
-        if off > _CRITICAL:
+        if off > _CRITICAL_STIFFNESS_TOLERANCE:
             return ""
         return f"stiffness is critical to {off:.0e}: swings take for ever to grow or to die out"
 
     @property
     def orbit(self) -> Orbit:
         """The last cycle and its correction to the limit cycle."""
-        last, slopes = self.seen[-1:], np.array(self._slopes).T
-        return Orbit(tuple(last), (slopes,), np.array(self._ahead), self._accuracy, self._work)
+        last, slopes = self.cycles[-1:], np.array(self._derivatives).T
+        return Orbit(tuple(last), (slopes,), np.array(self._correction), self._accuracy, self._work)
 
     @property
-    def _return(self) -> float:
+    def _contraction_ratio(self) -> float:
         """Trace of the derivative A of the map.
 
         The trace is the ratio of successive distances to the limit cycle. The other eigenvalue of A
         is zero, because the motion forgets one direction.
         """
-        return self._slopes[0][0] + self._slopes[1][1]
+        return self._derivatives[0][0] + self._derivatives[1][1]
 
-    def _learn(self) -> None:
+    def _update_derivatives(self) -> None:
         """Update the derivatives and the distance to the fixed point.
 
         The derivatives follow from the last two cycles, unless numerical errors dominate their
         difference. The module docstring contains the formulas.
         """
-        last = self.seen[-1]
-        begin, end = last.begin, last.end
+        last = self.cycles[-1]
+        begin, end = last.start_point, last.end_point
         start = begin.spring_stress, begin.psi
-        image = [end.spring_stress, end.psi, *last.numbers()]
+        image = [end.spring_stress, end.psi, *last.primary_outputs()]
         changes = list(map(sub, image, self._image))
-        if len(self.seen) > 1:
-            by_stress, by_state = map(sub, start, self._begin)
-            if abs(by_stress) > (1000.0 if self._known else 1.0) * self._noise:
-                self._known = True
+        if len(self.cycles) > 1:
+            by_stress, by_state = map(sub, start, self._section)
+            if abs(by_stress) > (1000.0 if self._has_derivatives else 1.0) * self._noise:
+                self._has_derivatives = True
                 # the motion passes a section without a change of spring stress
-                (_none, way), passed = self._by.along(begin)
+                (_none, way), passed = self._return_map.motion_direction(begin)
                 along = [change / way for change in passed]
                 pairs = zip(changes, along, strict=True)
-                self._slopes = [(x - by_state * y) / by_stress for x, y in pairs], along
-        self._begin, self._image, self._changes = start, image, changes
-        off, kept = list(map(sub, image, start)), 1.0 - min(self._return, _DIVERGES)
-        returned = self._by_slopes(off)
-        self._ahead = off[0] + returned[0] / kept, off[1] + returned[1] / kept
-        self._implied = self._by_slopes(self._ahead)
+                self._derivatives = [(x - by_state * y) / by_stress for x, y in pairs], along
+        self._section, self._image, self._image_change = start, image, changes
+        off, kept = (
+            list(map(sub, image, start)),
+            1.0 - min(self._contraction_ratio, _MAX_CONTRACTION),
+        )
+        returned = self._predict_image_change(off)
+        self._correction = off[0] + returned[0] / kept, off[1] + returned[1] / kept
+        self._image_correction = self._predict_image_change(self._correction)
 
-    def _by_slopes(self, move: Sequence[float]) -> list[float]:
+    def _predict_image_change(self, move: Sequence[float]) -> list[float]:
         """Compute the change of the image due to a change of the section."""
         by_stress, by_state = move
-        return [x * by_stress + y * by_state for x, y in zip(*self._slopes, strict=True)]
+        return [x * by_stress + y * by_state for x, y in zip(*self._derivatives, strict=True)]
 
-    def _repeats(self) -> bool:
+    def _has_converged(self) -> bool:
         """Return True if all further cycles would be the same.
 
         The cycles repeat if the derivatives imply so, or if the last two cycles agree.
         """
         allowed = [0.3 * self._accuracy.rtol * abs(number) for number in self._image[2:]]
-        if self._known and self._return < _DIVERGES and _within(self._implied[2:], allowed):
+        if (
+            self._has_derivatives
+            and self._contraction_ratio < _MAX_CONTRACTION
+            and _are_within_tolerance(self._image_correction[2:], allowed)
+        ):
             return True
-        if len(self.seen) < 2 or self.seen[-2].end != self.seen[-1].begin:
+        if len(self.cycles) < 2 or self.cycles[-2].end_point != self.cycles[-1].start_point:
             return False
-        if self._wavers():
+        if self._alternates():
             return True
-        left = min(max(self._return, 0.0), _DIVERGES)
+        left = min(max(self._contraction_ratio, 0.0), _MAX_CONTRACTION)
         left = max(1.0, left / (1.0 - left))
-        return _within([change * left for change in self._changes[2:]], allowed)
+        return _are_within_tolerance([change * left for change in self._image_change[2:]], allowed)
 
-    def _wavers(self) -> bool:
+    def _alternates(self) -> bool:
         """Return True if the last two cycles alternate around the limit cycle.
 
         Only numerical errors cause such an alternation. In a plane, trajectories cannot cross, so
         exact cycles approach the limit cycle from one side.
         """
         before, last = (
-            cycle.end.spring_stress - cycle.begin.spring_stress for cycle in self.seen[-2:]
+            cycle.end_point.spring_stress - cycle.start_point.spring_stress
+            for cycle in self.cycles[-2:]
         )
-        near = CLOSED * self._accuracy.rtol * self._scene.a * self.seen[-1].swing
+        near = (
+            CLOSURE_TOLERANCE
+            * self._accuracy.rtol
+            * self._scene.a
+            * self.cycles[-1].log_slip_rate_range
+        )
         return before * last <= 0.0 and abs(last) <= near
 
-    def _may_leap(self) -> bool:
+    def _should_leap(self) -> bool:
         """Return True if the motion should leap to the fixed point.
 
         The motion does not leap if the next cycle would come as close, or if the fixed point is far
         away, because the motion may then settle to steady sliding. It does not leap again if the
         last leap did not reduce the distance, because leaps may repeat in a loop.
         """
-        cycle = self.seen[-1]
-        left = abs(cycle.end.spring_stress - cycle.begin.spring_stress)
-        if not 10.0 * self._noise <= left < 0.5 * self._left_at_leap:
+        cycle = self.cycles[-1]
+        left = abs(cycle.end_point.spring_stress - cycle.start_point.spring_stress)
+        if not 10.0 * self._noise <= left < 0.5 * self._distance_at_leap:
             return False
-        if not _SLOW_APPROACH < self._return < _DIVERGES:
+        if not _MIN_CONTRACTION_TO_LEAP < self._contraction_ratio < _MAX_CONTRACTION:
             return False
-        slowest, fastest = self._implied[-2:]
-        return LN10 * abs(fastest - slowest) < _NEAR * cycle.swing
+        slowest, fastest = self._image_correction[-2:]
+        return LN10 * abs(fastest - slowest) < _MAX_LEAP_FRACTION * cycle.log_slip_rate_range
 
 
-def _within(changes: Sequence[float], allowed: Sequence[float]) -> bool:
+def _are_within_tolerance(changes: Sequence[float], tolerances: Sequence[float]) -> bool:
     """Return True if no change exceeds its tolerance."""
-    return all(abs(change) <= most for change, most in zip(changes, allowed, strict=True))
+    return all(abs(change) <= most for change, most in zip(changes, tolerances, strict=True))
 
 
 @dataclass(frozen=True)
-class Course:
+class EventSequence:
     """Cycles of a motion, and the orbit that the motion approaches.
 
     Attributes
     ----------
-    seen : list of Cycle
+    cycles : list of Cycle
         Cycles of the motion (the events of ``measures.limit_cycle``).
     orbit : Orbit or None
         Periodic orbit that the motion approaches. None if no orbit was found.
-    open : bool
+    may_still_converge : bool
         True if the motion may still approach a periodic orbit, as far as its cycles show.
     """
 
-    seen: list[Cycle]
+    cycles: list[Cycle]
     orbit: Orbit | None
-    open: bool
+    may_still_converge: bool
 
 
-def course(
-    scene: Scene, accuracy: Accuracy, meter: Meter, events: int, *, to_its_end: bool = False
-) -> Course | None:
+def follow_to_orbit(
+    scene: Scene, accuracy: Accuracy, meter: WorkMeter, max_events: int, *, follow_all: bool = False
+) -> EventSequence | None:
     """Follow a motion until it approaches an attracting periodic orbit.
 
     Parameters
     ----------
     scene : Scene
     accuracy : Accuracy
-    meter : Meter
-    events : int
+    meter : WorkMeter
+    max_events : int
         Largest number of cycles.
-    to_its_end : bool
-        If True, follow all ``events`` cycles even if an orbit is found earlier.
+    follow_all : bool
+        If True, follow all ``max_events`` cycles even if an orbit is found earlier.
 
     Returns
     -------
@@ -274,54 +297,60 @@ def course(
         None if the motion settles to steady sliding.
     """
     seen, orbit, repels = list[Cycle](), None, False
-    fine = accuracy.at(min(accuracy.rtol, _FINE))
-    look = min(_FIRST_LOOK, events)
-    for cycle in cycles(scene, accuracy, meter, None):
+    fine = accuracy.with_rtol(min(accuracy.rtol, _MAX_CLOSING_RTOL))
+    look = min(_MIN_CYCLES_TO_TEST, max_events)
+    for cycle in iterate_cycles(scene, accuracy, meter, None):
         if cycle is None:
             return None
         seen.append(cycle)
         if len(seen) == look and not orbit:
-            look = min(2 * look, events)
+            look = min(2 * look, max_events)
             found, off = None, math.inf
-            for counted in _counted(scene):
-                period, off = recurrence(scene, seen, counted)
-                if off < _OFF:
+            for counted in _compared_states(scene):
+                period, off = find_recurrence(scene, seen, counted)
+                if off < _MAX_RECURRENCE_MISFIT:
                     by = ReturnMap(scene, fine, meter, counted=counted)
-                    found = by.orbit(section(cycle.end), period, cycle.swing)
+                    found = by.find_orbit(
+                        section_at(cycle.end_point), period, cycle.log_slip_rate_range
+                    )
                     break
-            repels = off >= _OFF or (found is not None and abs(found.multipliers[0]) > _REPELS)
-            orbit = found if found is not None and found.attracts else None
-        if len(seen) == events or (orbit and not to_its_end):
+            repels = off >= _MAX_RECURRENCE_MISFIT or (
+                found is not None and abs(found.multipliers[0]) > _REPELLING_MULTIPLIER
+            )
+            orbit = found if found is not None and found.is_attracting else None
+        if len(seen) == max_events or (orbit and not follow_all):
             break
-    return Course(seen, orbit, open=not repels or _on_its_way(seen))
+    return EventSequence(seen, orbit, may_still_converge=not repels or _may_still_converge(seen))
 
 
-def _on_its_way(seen: Sequence[Cycle]) -> bool:
+def _may_still_converge(cycles: Sequence[Cycle]) -> bool:
     """Return True if a motion may still approach a periodic orbit.
 
     A motion with few cycles may still do so. A motion with many cycles may do so if the range of ln
     V or a state increases, or decreases, from each cycle to the next.
     """
-    if len(seen) < _FIRST_LOOK:
+    if len(cycles) < _MIN_CYCLES_TO_TEST:
         return True
-    latest = [(cycle.swing, *cycle.end.psis) for cycle in seen[len(seen) // 2 :]]
+    latest = [
+        (cycle.log_slip_rate_range, *cycle.end_point.psis) for cycle in cycles[len(cycles) // 2 :]
+    ]
     changes = np.diff(latest, axis=0)
     return bool(((changes > 0.0).all(axis=0) | (changes < 0.0).all(axis=0)).any())
 
 
-def _counted(scene: Scene) -> tuple[tuple[int, ...], ...]:
+def _compared_states(scene: Scene) -> tuple[tuple[int, ...], ...]:
     """Return the sets of states that are compared to detect a repeating cycle.
 
     The first set contains all states that count for the distance from steady sliding. The second
     set contains the states of the law only, because a slow unknown of the fluid may approach its
     cycle long after the law has.
     """
-    of_law = tuple(range(scene.parts.law.states))
-    return tuple(dict.fromkeys((scene.functions.friction.counted, of_law)))
+    of_law = tuple(range(scene.parts.law.state_count))
+    return tuple(dict.fromkeys((scene.functions.friction.distance_indices, of_law)))
 
 
-def recurrence(
-    scene: Scene, seen: Sequence[Cycle], counted: Sequence[int] | None = None
+def find_recurrence(
+    scene: Scene, cycles: Sequence[Cycle], compared_states: Sequence[int] | None = None
 ) -> tuple[int, float]:
     """Find the number of cycles after which a motion nearly repeats itself.
 
@@ -332,8 +361,8 @@ def recurrence(
     Parameters
     ----------
     scene : Scene
-    seen : sequence of Cycle
-    counted : sequence of int, optional
+    cycles : sequence of Cycle
+    compared_states : sequence of int, optional
         Indices of the states to compare. By default, all states are compared except those that a
         part lists in ``excluded_from_distance``.
 
@@ -344,12 +373,14 @@ def recurrence(
     off : float
         The difference after ``period`` cycles, or infinity if there are too few cycles.
     """
-    if len(seen) < 4:
+    if len(cycles) < 4:
         return 1, math.inf
-    places = list(scene.functions.friction.counted if counted is None else counted)
-    states = np.array([cycle.end.psis for cycle in seen])[:, places]
-    latest, scale = states[len(states) // 2 :], scene.a * seen[-1].swing
-    longest = min(LONGEST, len(latest) // 2)
+    places = list(
+        scene.functions.friction.distance_indices if compared_states is None else compared_states
+    )
+    states = np.array([cycle.end_point.psis for cycle in cycles])[:, places]
+    latest, scale = states[len(states) // 2 :], scene.a * cycles[-1].log_slip_rate_range
+    longest = min(MAX_PERIOD, len(latest) // 2)
     off = np.array(
         [np.abs(latest[count:] - latest[:-count]).max() for count in range(1, longest + 1)]
     )

@@ -11,92 +11,100 @@ from dataclasses import dataclass, replace
 
 from rsfstudy.analysis.after_step import stability_margin
 from rsfstudy.analysis.critical_path import CriticalPath
-from rsfstudy.analysis.search_of_steps import LOOSE, Steps
-from rsfstudy.motion.accuracy import Accuracy, error_between
-from rsfstudy.motion.handover import error_of_slow_manifold
-from rsfstudy.motion.meter import TIGHTEST, Meter
+from rsfstudy.analysis.search_of_steps import LOOSE_TOLERANCE, StepFamily
+from rsfstudy.motion.accuracy import Accuracy, estimate_error
+from rsfstudy.motion.handover import slow_manifold_error
+from rsfstudy.motion.meter import MIN_LOCAL_TOLERANCE, WorkMeter
 
 #: Part of the accuracy asked for to which the errors of two paths may agree by chance.
-_BY_CHANCE = 0.004
+_COINCIDENCE_FLOOR = 0.004
 
 #: Most local tolerances by which a path is followed.
-_MOST_PATHS = 5
+_MAX_PATHS = 5
 
 
 @dataclass(frozen=True)
-class Boundary:
+class StepBoundary:
     """A boundary in step size with its numerical error, both before verification.
 
     Attributes
     ----------
     size, relative_error : float
         Size of the step (see `Steps`), and its error over that.
-    by_motions, of_cycle : bool
+    from_motions, from_cycle : bool
         Whether motions have found it, or whether a limit cycle is what touches the norm.
     """
 
     size: float
     relative_error: float
-    by_motions: bool = False
-    of_cycle: bool = False
+    from_motions: bool = False
+    from_cycle: bool = False
 
 
-def from_critical_path(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boundary | None:
+def find_by_critical_path(
+    steps: StepFamily, accuracy: Accuracy, meter: WorkMeter
+) -> StepBoundary | None:
     """Boundary from the critical path, unless smaller steps may be unstable, at once or when the
     motion comes back; None where there is no such path.
     """
-    boundary = _boundary(steps, steps.sizes_on_path, accuracy, meter)
-    if boundary is None or not steps.smaller_ones_decay(boundary.size):
+    boundary = _find_boundary(steps, steps.find_path_sizes, accuracy, meter)
+    if boundary is None or not steps.smaller_steps_decay(boundary.size):
         return None
     # by laws whose orbits close at critical stiffness no motion goes beyond where it comes back
-    if steps.scene.parts.law.orbits_close:
+    if steps.scene.parts.law.has_closed_orbits:
         return boundary
     scene = steps.scene_at(boundary.size)
-    if scene.log_load_rate == -math.inf:
+    if scene.log_load_velocity == -math.inf:
         return boundary
-    return None if CriticalPath.of(scene, meter.engine).goes_beyond(LOOSE, meter) else boundary
+    return (
+        None
+        if CriticalPath.of_scene(scene, meter.engine).exceeds_norm_on_return(LOOSE_TOLERANCE, meter)
+        else boundary
+    )
 
 
-def from_touching_cycle(steps: Steps, accuracy: Accuracy, meter: Meter) -> Boundary | None:
+def find_by_touching_cycle(
+    steps: StepFamily, accuracy: Accuracy, meter: WorkMeter
+) -> StepBoundary | None:
     """Boundary where the motion ends in a limit cycle that touches the norm: where larger steps
     make steady sliding less stable, and the largest unstable.
     """
     small, large = (
-        stability_margin(steps.scene_at(size)) for size in (steps.smallest, steps.largest)
+        stability_margin(steps.scene_at(size)) for size in (steps.min_size, steps.max_size)
     )
     if large >= 0.0 or small - large < 10.0 * accuracy.rtol:
         return None
-    boundary = _boundary(steps, steps.sizes_of_cycle, accuracy, meter)
+    boundary = _find_boundary(steps, steps.find_cycle_sizes, accuracy, meter)
     # a cycle attracts little: the two errors may have much in common
     error = 5.0 * boundary.relative_error if boundary else math.nan
-    return boundary and replace(boundary, relative_error=error, of_cycle=True)
+    return boundary and replace(boundary, relative_error=error, from_cycle=True)
 
 
-def _boundary(
-    steps: Steps,
-    sizes_by: Callable[[Iterable[float], Meter], Iterator[float]],
+def _find_boundary(
+    steps: StepFamily,
+    find_sizes: Callable[[Iterable[float], WorkMeter], Iterator[float]],
     accuracy: Accuracy,
-    meter: Meter,
-) -> Boundary | None:
+    meter: WorkMeter,
+) -> StepBoundary | None:
     """A boundary with the error that a second, smaller tolerance tells, and a third where that is
     more than asked for: a path takes so few steps that one whose error is taken for too small
     decides. None where there is none within the steps of the search.
     """
     boundary = None
-    of_path = error_of_slow_manifold(steps.scene) if steps.scene.has_mass else 0.0
-    for size, refined in itertools.pairwise(sizes_by(_tolerances(accuracy), meter)):
-        if not steps.smallest <= size <= steps.largest:
+    of_path = slow_manifold_error(steps.scene) if steps.scene.has_mass else 0.0
+    for size, refined in itertools.pairwise(find_sizes(_decreasing_tolerances(accuracy), meter)):
+        if not steps.min_size <= size <= steps.max_size:
             break
-        error = error_between(size, refined, _BY_CHANCE * accuracy.rtol) / size
-        boundary = Boundary(size, error + of_path)
-        if error <= steps.allowed(size, accuracy.rtol):
+        error = estimate_error(size, refined, _COINCIDENCE_FLOOR * accuracy.rtol) / size
+        boundary = StepBoundary(size, error + of_path)
+        if error <= steps.size_tolerance(size, accuracy.rtol):
             break
     return boundary
 
 
-def _tolerances(accuracy: Accuracy) -> Iterator[float]:
+def _decreasing_tolerances(accuracy: Accuracy) -> Iterator[float]:
     """Local tolerances of paths, one a tenth of the other."""
-    for _ in range(_MOST_PATHS):
-        if accuracy.solver > TIGHTEST:
-            yield accuracy.solver
+    for _ in range(_MAX_PATHS):
+        if accuracy.local_tolerance > MIN_LOCAL_TOLERANCE:
+            yield accuracy.local_tolerance
         accuracy = accuracy.refined()

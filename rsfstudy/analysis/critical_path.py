@@ -22,16 +22,17 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from typing import NamedTuple
 
-from rsfstudy.motion.engines import SCIPY, of_floats
-from rsfstudy.motion.events import Event, EventSpecification, Kind, fall, maximum, rise
-from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.roots import root_of
-from rsfstudy.motion.running import Runner
-from rsfstudy.motion.starting import point_of
-from rsfstudy.slider.equations import between_ruptures
-from rsfstudy.slider.friction import Friction
+from rsfstudy.motion.engine_factory import scalar_function
+from rsfstudy.motion.engines import SCIPY
+from rsfstudy.motion.events import Event, EventKind, EventSpecification, fall, maximum, rise
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
+from rsfstudy.motion.roots import build_root_finder
+from rsfstudy.motion.running import MotionDriver
+from rsfstudy.motion.starting import build_point_function
+from rsfstudy.slider.equations import equations_between_ruptures
+from rsfstudy.slider.friction import FrictionFunctions
 from rsfstudy.slider.parts import Function, Numbers
-from rsfstudy.slider.places import LOAD_VELOCITY, LOG_LOAD_RATE, STIFFNESS, A, B
+from rsfstudy.slider.places import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS, A, B
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -39,9 +40,9 @@ from rsfstudy.status import Status
 #: Right-hand sides, at a tolerance of 1e-5, after which a path that has not come back to a start is
 #: given up.
 _PATH_BUDGET = 1_500
-_SLOWEST = -230.0  # ln(V/V_*): 10^-100
+_MIN_LOG_SLIP_RATE = -230.0  # ln(V/V_*): 10^-100
 #: How far above the norm in ln V a path is that touches it from there.
-_ABOVE = 1e-6
+_NORM_OFFSET = 1e-6
 
 
 class CriticalPath(NamedTuple):
@@ -51,78 +52,80 @@ class CriticalPath(NamedTuple):
     ----------
     log_norm_rate : float
         ln(V/V_*) of the norm.
-    weakest, radiated : float
+    min_frictional_stress, radiated_stress : float
         Frictional stress at which normal stress vanishes, and stress that waves carry away at the
         norm, over sigma_*.
-    begin : tuple of float
+    initial_state : tuple of float
         Spring stress and state just after the step.
-    p : tuple of float
+    parameters : tuple of float
         Numbers of the scene.
-    tangency_of, point_of : callable
-        ``(x, weakest, p) -> (g, Psi)`` (see `_tangency`); ``(state, p) -> Point``.
-    runner : Runner
+    solve_tangency, evaluate_point : callable
+        ``(x, weakest, p) -> (g, Psi)`` (see `_build_tangency_solver`); ``(state, p) -> Point``.
+    driver : MotionDriver
     engine : str
         What follows it.
-    planar : bool
+    is_planar : bool
         Whether there is one state, as there must be for a path that touches the norm.
     """
 
     log_norm_rate: float
-    weakest: float
-    radiated: float
-    begin: Numbers
-    p: Numbers
-    tangency_of: Function
-    point_of: Function
-    runner: Runner
+    min_frictional_stress: float
+    radiated_stress: float
+    initial_state: Numbers
+    parameters: Numbers
+    solve_tangency: Function
+    evaluate_point: Function
+    driver: MotionDriver
     engine: str
-    planar: bool
+    is_planar: bool
 
     @classmethod
-    def of(cls, scene: Scene, engine: str = SCIPY) -> CriticalPath:
+    def of_scene(cls, scene: Scene, engine: str = SCIPY) -> CriticalPath:
         """The critical path of a scene, followed by an engine."""
-        slow, x = between_ruptures(scene, clock=False), scene.log_norm_rate
-        weakest = scene.parts.normal_stress.weakest(scene)
-        begin = (scene.spring_stress_step, *(0.0,) * scene.states)
-        tangency, planar = _tangency(scene.functions.friction), scene.states == 1
+        slow, x = equations_between_ruptures(scene, clock=False), scene.log_instability_rate
+        weakest = scene.parts.normal_stress.min_frictional_stress(scene)
+        begin = (scene.spring_stress_step, *(0.0,) * scene.state_count)
+        tangency, planar = _build_tangency_solver(scene.functions.friction), scene.state_count == 1
         return cls(
             x,
             weakest,
-            scene.dynamics.radiated(x),
+            scene.dynamics.radiated_stress(x),
             begin,
-            slow.p,
-            of_floats(tangency, engine, x, x, slow.p) if planar else tangency,
-            point_of(slow.rate, slow.point),
-            Runner(slow, engine=engine),
+            slow.parameters,
+            scalar_function(tangency, engine, x, x, slow.parameters) if planar else tangency,
+            build_point_function(slow.rate_function, slow.point_function),
+            MotionDriver(slow, engine=engine),
             engine,
             planar,
         )
 
-    def under(self, load_velocity: float) -> CriticalPath:
+    def with_load_velocity(self, load_velocity: float) -> CriticalPath:
         """The critical path where the step is to another load point velocity, over V_*."""
-        p = list(self.p)
+        p = list(self.parameters)
         p[LOAD_VELOCITY] = load_velocity
-        p[LOG_LOAD_RATE] = math.log(abs(load_velocity)) if load_velocity else -math.inf
-        return self._replace(p=tuple(p))
+        p[LOG_LOAD_VELOCITY] = math.log(abs(load_velocity)) if load_velocity else -math.inf
+        return self._replace(parameters=tuple(p))
 
     @property
-    def tangency(self) -> tuple[float, float] | None:
+    def tangency_point(self) -> tuple[float, float] | None:
         """Spring stress over sigma_*, and state, (f, Psi), at which ln V rests at the norm; None
         where it never can, or where there are several states and the path is none in a plane.
 
         f is frictional stress there, and what waves carry away.
         """
-        if not self.planar:
+        if not self.is_planar:
             return None
-        g, psi = self.tangency_of(self.log_norm_rate, (1.0 - 1e-6) * self.weakest, self.p)
-        return None if math.isnan(g) else (g + self.radiated, psi)
+        g, psi = self.solve_tangency(
+            self.log_norm_rate, (1.0 - 1e-6) * self.min_frictional_stress, self.parameters
+        )
+        return None if math.isnan(g) else (g + self.radiated_stress, psi)
 
-    def start(
+    def find_start(
         self,
         tolerance: float,
-        meter: Meter,
+        meter: WorkMeter,
         crossing: tuple[str, float],
-        accepts: Callable[[Point], bool],
+        is_start: Callable[[Point], bool],
     ) -> Point | None:
         """Follow the path back to a start.
 
@@ -130,11 +133,11 @@ class CriticalPath(NamedTuple):
         ----------
         tolerance : float
             Local error per step.
-        meter : Meter
+        meter : WorkMeter
             Charged with the work.
         crossing : tuple of str and float
             Quantity and level that a start is at.
-        accepts : callable
+        is_start : callable
             Whether a point there is a start of the kind sought.
 
         Returns
@@ -142,18 +145,20 @@ class CriticalPath(NamedTuple):
         Point or None
             None where the path touches the norm from above or never comes by.
         """
-        above = rise("log_slip_rate", self.log_norm_rate + _ABOVE, ends=True, waits=True)
-        lost = fall("log_slip_rate", _SLOWEST, ends=True, waits=True)
+        above = rise(
+            "log_slip_rate", self.log_norm_rate + _NORM_OFFSET, terminal=True, may_defer=True
+        )
+        lost = fall("log_slip_rate", _MIN_LOG_SLIP_RATE, terminal=True, may_defer=True)
         specs = (above, lost, rise(*crossing), fall(*crossing))
-        for event in self._events(tolerance, meter, specs, backward=True):
-            if event.watch in specs[2:] and accepts(event.point):
+        for event in self._iterate_events(tolerance, meter, specs, backward=True):
+            if event.specification in specs[2:] and is_start(event.point):
                 return event.point
         return None
 
-    def _events(
+    def _iterate_events(
         self,
         tolerance: float,
-        meter: Meter,
+        meter: WorkMeter,
         specs: Sequence[EventSpecification],
         *,
         backward: bool,
@@ -161,60 +166,62 @@ class CriticalPath(NamedTuple):
         """The path from where it touches the norm, as far as there is one; by a method of order
         eight, which gets no more than what is left.
         """
-        start = self.tangency
+        start = self.tangency_point
         if start is None:
             return
         enough = round(_PATH_BUDGET * math.pow(1e-5 / tolerance, 0.125))
         try:
-            yield from self.runner.run(
-                start, meter, specs, tolerance, backward=backward, p=self.p, budget=enough
+            yield from self.driver.run(
+                start, meter, specs, tolerance, backward=backward, p=self.parameters, budget=enough
             )
-        except Halt as halt:
+        except MotionStopped as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
 
-    def misfit(self, tolerance: float, meter: Meter) -> float | None:
+    def start_misfit(self, tolerance: float, meter: WorkMeter) -> float | None:
         """Psi/a on the path where it passes the slip rate of the start: zero after the critical
         step, because a step that starts from steady sliding at V_* leaves Psi = 0.
 
         None where the path never passes that slip rate as the motion of this scene would.
         """
-        given = self.begin, self.p
-        begin = of_floats(self.point_of, self.engine, *given)(*given)
-        if begin.growth == 0.0:
+        given = self.initial_state, self.parameters
+        begin = scalar_function(self.evaluate_point, self.engine, *given)(*given)
+        if begin.log_slip_rate_derivative == 0.0:
             return None
-        start = self.start(
+        start = self.find_start(
             tolerance,
             meter,
             ("log_slip_rate", begin.log_slip_rate),
-            lambda point: point.growth * begin.growth > 0.0,
+            lambda point: point.log_slip_rate_derivative * begin.log_slip_rate_derivative > 0.0,
         )
-        return None if start is None else start.psi / self.p[A]
+        return None if start is None else start.psi / self.parameters[A]
 
-    def misfit_of_cycle(self, tolerance: float, meter: Meter) -> float | None:
+    def cycle_misfit(self, tolerance: float, meter: WorkMeter) -> float | None:
         """Height in ln V, above the norm, of the peak of the motion one orbit after it has touched
         the norm; zero where a limit cycle touches it.
 
         None where the motion does not come back.
         """
-        for event in self._coming_back(tolerance, meter):
-            if event.kind is Kind.MAXIMUM:
+        for event in self._iterate_return_events(tolerance, meter):
+            if event.kind is EventKind.MAXIMUM:
                 return event.point.log_slip_rate - self.log_norm_rate
         return None
 
-    def goes_beyond(self, tolerance: float, meter: Meter) -> bool:
+    def exceeds_norm_on_return(self, tolerance: float, meter: WorkMeter) -> bool:
         """True if the motion that touches the norm goes beyond it when it comes back, so that
         others may reach it by their second peak.
         """
-        beyond = rise("log_slip_rate", self.log_norm_rate + _ABOVE)
-        for event in self._coming_back(tolerance, meter, beyond):
-            if event.kind in (Kind.RISE, Kind.MAXIMUM):
+        beyond = rise("log_slip_rate", self.log_norm_rate + _NORM_OFFSET)
+        for event in self._iterate_return_events(tolerance, meter, beyond):
+            if event.kind in (EventKind.RISE, EventKind.MAXIMUM):
                 # a step may pass the norm and come back
-                return event.kind is Kind.RISE or event.point.log_slip_rate > self.log_norm_rate
+                return (
+                    event.kind is EventKind.RISE or event.point.log_slip_rate > self.log_norm_rate
+                )
         return False
 
-    def _coming_back(
-        self, tolerance: float, meter: Meter, *specs: EventSpecification
+    def _iterate_return_events(
+        self, tolerance: float, meter: WorkMeter, *specs: EventSpecification
     ) -> Iterator[Event]:
         """Events, peaks among them, of the motion that has touched the norm and fallen below
         V_0.
@@ -223,16 +230,16 @@ class CriticalPath(NamedTuple):
         asked = (
             *specs,
             maximum("log_slip_rate"),
-            fall("log_slip_rate", self.p[LOG_LOAD_RATE], waits=True),
+            fall("log_slip_rate", self.parameters[LOG_LOAD_VELOCITY], may_defer=True),
         )
-        for event in self._events(tolerance, meter, asked, backward=False):
+        for event in self._iterate_events(tolerance, meter, asked, backward=False):
             if fallen:
                 yield event
-            fallen = fallen or event.kind is Kind.FALL
+            fallen = fallen or event.kind is EventKind.FALL
 
 
 @cache
-def _tangency(friction: Friction) -> Function:
+def _build_tangency_solver(friction: FrictionFunctions) -> Function:
     """``(x, weakest, p) -> (g, Psi)``: frictional stress above the weakest, and the state, where
     ln(V/V_*) = x is stationary; NaN where it never is.
 
@@ -247,11 +254,11 @@ def _tangency(friction: Friction) -> Function:
     def acceleration(g: float, at: tuple[float, Numbers]) -> float:
         x, p = at
         value, slope, shift, _shift_slope = strength(g, (0.0,), p)
-        pull = p[STIFFNESS] * math.expm1(p[LOG_LOAD_RATE] - x)
+        pull = p[STIFFNESS] * math.expm1(p[LOG_LOAD_VELOCITY] - x)
         (change,) = evolutions(x, (value - shift - p[A] * x,), 0.0, 1.0, p)
         return float(slope * pull - change)
 
-    root = root_of(acceleration)
+    root = build_root_finder(acceleration)
 
     def tangency(x: float, weakest: float, p: Numbers) -> tuple[float, float]:
         at = x, p

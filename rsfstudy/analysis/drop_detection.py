@@ -22,26 +22,28 @@ from scipy.signal import find_peaks
 from scipy.stats import norm
 
 #: Probability of a false detection in a record of Gaussian noise.
-CHANCE = 1e-4
+FALSE_DETECTION_PROBABILITY = 1e-4
 #: Shortest windows in samples, and samples of a record for each sample of the longest window.
-SHORTEST, SAMPLES = 4, 100
+MIN_WINDOW, SAMPLES_PER_WINDOW = 4, 100
+#: Smallest number of samples of a record.
+MIN_SAMPLES = MIN_WINDOW * SAMPLES_PER_WINDOW
 #: Standard deviations by which a drop must exceed the threshold to be missed once in 1,000.
-FOUND = 3.1
+DETECTION_MARGIN = 3.1
 #: Scaled difference down to which a drop extends from its peak, in standard deviations.
-_FOLLOWED = 2.0
+_EXTENT_THRESHOLD = 2.0
 #: Fraction of the values in the shortest interval, from which the noise is estimated.
-_SHARE = 0.4
+_MODE_FRACTION = 0.4
 #: Ratio of standard deviation to median absolute deviation of Gaussian noise.
-_NORMAL = 1.4826
+_SD_PER_MAD = 1.4826
 #: A record is resampled if its sampling intervals differ by more than this factor.
-_UNEVEN = 3.0
+_MAX_INTERVAL_RATIO = 3.0
 #: A window covers only a part of a drop if the score of a window 2 or 4 times as long is larger by
 #: this factor. The score is the scaled difference divided by the square root of the window length.
-_PARTIAL = 1.4
+_PARTIAL_SCORE_RATIO = 1.4
 #: Index of the shortest window from which the correlation of the noise is estimated: 16 samples.
-_LEAST_SCALE = 2
+_CORRELATION_SCALE_INDEX = 2
 #: Peaks are separate if the minimum between them is lower by this fraction of the lower peak.
-_SEPARATE = 0.5
+_MIN_RELATIVE_PROMINENCE = 0.5
 
 
 class Candidate(NamedTuple):
@@ -49,21 +51,21 @@ class Candidate(NamedTuple):
 
     Attributes
     ----------
-    begins, ends : float
+    start, end : float
         Times between which stress falls, at the resolution of the window.
     window : float
         Length of the window, in units of time.
-    error : float
+    difference_stderr : float
         Standard error of the difference between two window means.
-    correlation : float
+    correlation_factor : float
         Factor by which the correlation of the noise increases the standard error of a mean.
     """
 
-    begins: float
-    ends: float
+    start: float
+    end: float
     window: float
-    error: float
-    correlation: float
+    difference_stderr: float
+    correlation_factor: float
 
 
 class Detection(NamedTuple):
@@ -73,26 +75,26 @@ class Detection(NamedTuple):
     ----------
     candidates : list of Candidate
         Drops in order of time.
-    noise : float
+    noise_sd : float
         Standard deviation of the noise.
-    smallest : float
+    detectable_drop : float
         Size of a drop that is missed once in 1,000 records.
-    variation : float
+    max_decrease : float
         Largest decrease of the moving average of stress.
     """
 
     candidates: list[Candidate]
-    noise: float
-    smallest: float
-    variation: float
+    noise_sd: float
+    detectable_drop: float
+    max_decrease: float
 
 
-def spread(values: np.ndarray) -> float:
+def robust_sd(values: np.ndarray) -> float:
     """Estimate the standard deviation from the median absolute deviation."""
-    return _NORMAL * float(np.median(np.abs(values - np.median(values))))
+    return _SD_PER_MAD * float(np.median(np.abs(values - np.median(values))))
 
 
-def quantum_of(values: np.ndarray) -> float:
+def find_resolution(values: np.ndarray) -> float:
     """Return the smallest nonzero difference between successive samples.
 
     Returns
@@ -104,7 +106,7 @@ def quantum_of(values: np.ndarray) -> float:
     return float(steps[steps > 0.0].min(initial=math.inf))
 
 
-def most_frequent(values: np.ndarray) -> tuple[float, float]:
+def estimate_mode(values: np.ndarray) -> tuple[float, float]:
     """Estimate the mean and standard deviation of the most frequent values.
 
     The function finds the shortest interval that contains 40 % of the values. The interval is then
@@ -116,14 +118,14 @@ def most_frequent(values: np.ndarray) -> tuple[float, float]:
     mean, standard_deviation : float
     """
     ordered = np.sort(values)
-    count = max(int(_SHARE * len(ordered)), 1)
+    count = max(int(_MODE_FRACTION * len(ordered)), 1)
     widths = ordered[count:] - ordered[:-count]
     first = int(np.argmin(widths))
     middle = 0.5 * float(ordered[first] + ordered[first + count])
-    return middle, float(widths[first]) / (2.0 * float(norm.ppf(0.5 + 0.5 * _SHARE)))
+    return middle, float(widths[first]) / (2.0 * float(norm.ppf(0.5 + 0.5 * _MODE_FRACTION)))
 
 
-def falls(values: np.ndarray, window: int) -> np.ndarray:
+def window_mean_decreases(values: np.ndarray, window: int) -> np.ndarray:
     """Compute the difference of window means before and after each sample.
 
     Parameters
@@ -153,32 +155,32 @@ def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
     -------
     Detection
     """
-    t, s = _even(time, stress)
+    t, s = _resample_evenly(time, stress)
     apart = float(t[-1] - t[0]) / (len(t) - 1)
-    windows = [SHORTEST]
-    while 2 * windows[-1] * SAMPLES <= len(s):
+    windows = [MIN_WINDOW]
+    while 2 * windows[-1] * SAMPLES_PER_WINDOW <= len(s):
         windows.append(2 * windows[-1])
-    quantum = min(quantum_of(stress), float(np.ptp(stress)))
-    looks = float(norm.isf(CHANCE / (len(s) * len(windows))))
-    scales = [_Scale(s, window, looks, quantum) for window in windows]
+    quantum = min(find_resolution(stress), float(np.ptp(stress)))
+    looks = float(norm.isf(FALSE_DETECTION_PROBABILITY / (len(s) * len(windows))))
+    scales = [_WindowScale(s, window, looks, quantum) for window in windows]
     found: list[Candidate] = []
     for number, scale in enumerate(scales):
-        for first, last in scale.peaks(scales[number + 1 : number + 3]):
+        for first, last in scale.find_peaks_of_scale(scales[number + 1 : number + 3]):
             begins, ends = float(t[max(first - 1, 0)]), float(t[min(last, len(t) - 1)])
             length = scale.window * apart
             reach = length if found else 0.0
-            if any(begins < one.ends + reach and one.begins - reach < ends for one in found):
+            if any(begins < one.end + reach and one.start - reach < ends for one in found):
                 continue
-            wider = min(max(number + 1, _LEAST_SCALE), len(scales) - 1)
-            correlation = scales[wider].correlation
+            wider = min(max(number + 1, _CORRELATION_SCALE_INDEX), len(scales) - 1)
+            correlation = scales[wider].correlation_factor
             found.append(Candidate(begins, ends, length, scale.spread, correlation))
-    best = min(scales, key=lambda scale: scale.smallest)
+    best = min(scales, key=lambda scale: scale.detectable_drop)
     means = np.convolve(s, np.full(best.window, 1.0 / best.window), "valid")
     variation = float((np.maximum.accumulate(means) - means).max())
-    return Detection(sorted(found), scales[-1].noise, best.smallest, variation)
+    return Detection(sorted(found), scales[-1].noise_sd, best.detectable_drop, variation)
 
 
-def _even(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _resample_evenly(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Resample a record to even intervals if its sampling intervals vary.
 
     The new sampling interval is chosen such that half of the record duration was sampled at this
@@ -186,14 +188,14 @@ def _even(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     intervals are interpolated.
     """
     gaps = np.diff(time)
-    if gaps.max() < _UNEVEN * gaps.min():
+    if gaps.max() < _MAX_INTERVAL_RATIO * gaps.min():
         return time, stress
     ordered = np.sort(gaps)
     sums = np.cumsum(ordered)
     apart = float(ordered[np.searchsorted(sums, 0.5 * sums[-1])])
     bins = np.floor((time - time[0]) / apart + 1e-9).astype(int)
     count = int(bins[-1]) + 1
-    if not SHORTEST * SAMPLES <= count <= 4 * len(time):
+    if not MIN_WINDOW * SAMPLES_PER_WINDOW <= count <= 4 * len(time):
         return time, stress
     samples = np.bincount(bins, minlength=count)
     has = samples > 0
@@ -204,7 +206,7 @@ def _even(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return even, np.interp(even, t, s)
 
 
-class _Scale:
+class _WindowScale:
     """Differences of window means for one window length.
 
     Parameters
@@ -220,28 +222,28 @@ class _Scale:
     """
 
     def __init__(self, stress: np.ndarray, window: int, looks: float, quantum: float) -> None:
-        change = falls(stress, window)
-        self.window, self.samples = window, len(stress)
-        self.usual, spread = most_frequent(change)
+        change = window_mean_decreases(stress, window)
+        self.window, self.sample_count = window, len(stress)
+        self.typical_decrease, decrease_sd = estimate_mode(change)
         # if there is no noise, the resolution determines the spread
-        self.spread = max(spread, quantum / math.sqrt(6.0 * window))
+        self.spread = max(decrease_sd, quantum / math.sqrt(6.0 * window))
         # allow for the error of the spread, which is estimated from few independent windows
         surely = 1.0 + 2.33 / math.sqrt(len(stress) / (2.0 * window))
         self.threshold = max(looks * surely * self.spread, 2.0 * quantum)
-        self.smallest = self.threshold + FOUND * self.spread
-        self.net = change - max(0.0, self.usual)
-        lag = most_frequent(stress[window:] - stress[:-window])[1]
-        self.noise = max(lag / math.sqrt(2.0), quantum / math.sqrt(12.0))
+        self.detectable_drop = self.threshold + DETECTION_MARGIN * self.spread
+        self.excess_decrease = change - max(0.0, self.typical_decrease)
+        lag = estimate_mode(stress[window:] - stress[:-window])[1]
+        self.noise_sd = max(lag / math.sqrt(2.0), quantum / math.sqrt(12.0))
         # between white noise and noise that is constant within a window
-        ratio = self.spread / (self.noise or 1.0) / math.sqrt(2.0 / window)
-        self.correlation = min(max(ratio, 1.0), math.sqrt(window))
+        ratio = self.spread / (self.noise_sd or 1.0) / math.sqrt(2.0 / window)
+        self.correlation_factor = min(max(ratio, 1.0), math.sqrt(window))
 
-    def score(self, places: np.ndarray) -> np.ndarray:
+    def compute_score(self, indices: np.ndarray) -> np.ndarray:
         """Compute the scaled difference divided by the square root of the window.
 
         Parameters
         ----------
-        places : ndarray of int
+        indices : ndarray of int
             Indices of samples.
 
         Returns
@@ -249,17 +251,19 @@ class _Scale:
         ndarray
             The values are 0 for samples too close to the ends of the record.
         """
-        at = places - self.window
-        inside = (at >= 0) & (at < len(self.net))
-        net = np.where(inside, self.net[np.clip(at, 0, len(self.net) - 1)], 0.0)
+        at = indices - self.window
+        inside = (at >= 0) & (at < len(self.excess_decrease))
+        net = np.where(
+            inside, self.excess_decrease[np.clip(at, 0, len(self.excess_decrease) - 1)], 0.0
+        )
         return np.asarray(net / (self.spread or 1.0) / math.sqrt(self.window))
 
-    def peaks(self, longer: list[_Scale]) -> list[tuple[int, int]]:
+    def find_peaks_of_scale(self, longer_scales: list[_WindowScale]) -> list[tuple[int, int]]:
         """Find the drops that are detected best with this window.
 
         Parameters
         ----------
-        longer : list of _Scale
+        longer_scales : list of _Scale
             Scales with longer windows. Drops that stand out more with a longer window are skipped.
 
         Returns
@@ -268,13 +272,18 @@ class _Scale:
             For each drop, the index of the first sample after its beginning, and the index of the
             first sample after its end.
         """
-        padded = np.concatenate([[0.0], self.net, [0.0]])  # so that peaks may be at the ends
+        padded = np.concatenate(
+            [[0.0], self.excess_decrease, [0.0]]
+        )  # so that peaks may be at the ends
         peaks, about = find_peaks(padded, height=self.threshold, prominence=0.0)
-        peaks = peaks[about["prominences"] > _SEPARATE * padded[peaks]]
+        peaks = peaks[about["prominences"] > _MIN_RELATIVE_PROMINENCE * padded[peaks]]
         places = peaks - 1 + self.window
-        better = [scale.score(places) > _PARTIAL * self.score(places) for scale in longer]
+        better = [
+            scale.compute_score(places) > _PARTIAL_SCORE_RATIO * self.compute_score(places)
+            for scale in longer_scales
+        ]
         complete = ~np.any(better, axis=0) if better else np.ones(len(peaks), dtype=bool)
-        least = min(_FOLLOWED * self.spread, self.threshold)
+        least = min(_EXTENT_THRESHOLD * self.spread, self.threshold)
         below = np.flatnonzero(padded <= least)
         found = []
         for peak in peaks[complete].tolist():

@@ -9,18 +9,37 @@ import numpy as np
 from rsfstudy.analysis.drop_detection import Candidate, Detection, detect_drops
 from rsfstudy.analysis.drop_fit import Drop, fit_drop
 
+#: Scale, heading in tables and description of each quantity of an event.
+EVENT_QUANTITIES = {
+    "time": ("D_c/V_*", "time", "time at which the event begins"),
+    "duration": ("D_c/V_*", "duration", "duration of the event"),
+    "interval": ("D_c/V_*", "interval", "time since the event before began"),
+    "peak_log10_slip_rate": ("", "lg V_max/V_*", "decimal logarithm of peak slip rate over V_star"),
+    "peak_slip_rate": ("V_*", "peak rate", "peak slip rate"),
+    "slip": ("D_c", "slip", "slip during the event"),
+    "stress_before": ("sigma_*", "", "highest shear stress before the event"),
+    "stress_after": ("sigma_*", "", "lowest shear stress after the event"),
+    "static_stress_drop": ("sigma_*", "static drop", "highest less lowest shear stress"),
+    "dynamic_stress_drop": (
+        "sigma_*",
+        "dynamic drop",
+        "highest shear stress less that at peak slip rate",
+    ),
+}
+#: Values of an event with their errors by name, and the flag for the missing part of the event.
+EventNumbers = tuple[dict[str, tuple[float, float]], int]
 #: Smallest fitted drop, in half widths of its 95 % interval.
-_DIFFERS = 1.0
+_MIN_RELATIVE_SIZE = 1.0
 
 
-class FoundDrop(NamedTuple):
+class FittedCandidate(NamedTuple):
     """A fitted drop, and the candidate from which it was fitted."""
 
     drop: Drop
     candidate: Candidate
 
 
-def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FoundDrop], Detection]:
+def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedCandidate], Detection]:
     """Find and fit the drops of stress in a record.
 
     If two fitted drops overlap, their candidates are merged and fitted again as one drop.
@@ -31,54 +50,54 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FoundDrop], D
 
     Returns
     -------
-    drops : list of FoundDrop
+    drops : list of FittedCandidate
         Drops in order of time.
     detection : Detection
     """
     detection = detect_drops(time, stress)
     candidates = detection.candidates
     while True:
-        found = _fitted(time, stress, candidates, detection)
-        merged = _merged(found)
+        found = _fit_candidates(time, stress, candidates, detection)
+        merged = _merge_overlapping(found)
         if len(merged) == len(candidates):
             break
         candidates = merged
-    sure = [of for of in found if _size(of.drop) > _DIFFERS * of.drop.drop_error]
+    sure = [of for of in found if _drop_size(of.drop) > _MIN_RELATIVE_SIZE * of.drop.drop_error]
     if sure:  # slow drops increase the noise estimate of long windows
-        residual = float(np.median([of.drop.residual for of in sure]))
-        detection = detection._replace(noise=min(detection.noise, residual))
+        residual = float(np.median([of.drop.residual_sd for of in sure]))
+        detection = detection._replace(noise_sd=min(detection.noise_sd, residual))
     return sure, detection
 
 
-def _size(drop: Drop) -> float:
-    return drop.before - drop.after
+def _drop_size(drop: Drop) -> float:
+    return drop.stress_before - drop.stress_after
 
 
-def _fitted(
+def _fit_candidates(
     time: np.ndarray, stress: np.ndarray, candidates: list[Candidate], detection: Detection
-) -> list[FoundDrop]:
+) -> list[FittedCandidate]:
     """Fit each candidate, limited to the interval between its neighbours."""
-    ends = [float(time[0]), *(one.ends for one in candidates)]
-    begins = [*(one.begins for one in candidates[1:]), float(time[-1])]
+    ends = [float(time[0]), *(one.end for one in candidates)]
+    begins = [*(one.start for one in candidates[1:]), float(time[-1])]
     return [
-        FoundDrop(fit_drop(time, stress, one, room, detection.noise), one)
+        FittedCandidate(fit_drop(time, stress, one, room, detection.noise_sd), one)
         for one, room in zip(candidates, zip(ends, begins, strict=False), strict=False)
     ]
 
 
-def _merged(found: list[FoundDrop]) -> list[Candidate]:
+def _merge_overlapping(found: list[FittedCandidate]) -> list[Candidate]:
     """Merge the candidates of overlapping drops."""
     merged: list[Candidate] = []
     reached = -np.inf
     for drop, candidate in found:
-        if merged and drop.begins < reached:
+        if merged and drop.start < reached:
             last = merged[-1]
             window = max(last.window, candidate.window)
-            error = min(last.error, candidate.error)
-            correlation = max(last.correlation, candidate.correlation)
-            ends = max(last.ends, candidate.ends)
-            merged[-1] = Candidate(last.begins, ends, window, error, correlation)
+            error = min(last.difference_stderr, candidate.difference_stderr)
+            correlation = max(last.correlation_factor, candidate.correlation_factor)
+            ends = max(last.end, candidate.end)
+            merged[-1] = Candidate(last.start, ends, window, error, correlation)
         else:
             merged.append(candidate)
-        reached = max(reached, drop.ends)
+        reached = max(reached, drop.end)
     return merged

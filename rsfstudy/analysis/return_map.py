@@ -33,13 +33,18 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
-from rsfstudy.analysis.cycles import NUMBERS, SMALLEST_SWING, Cycle, cycles
+from rsfstudy.analysis.cycles import (
+    MIN_LOG_SLIP_RATE_RANGE,
+    PRIMARY_OUTPUT_COUNT,
+    Cycle,
+    iterate_cycles,
+)
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.handover import limits, weight_of_mass
-from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.handover import inertia_weight, switch_thresholds
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.motion.recording import Recording
-from rsfstudy.motion.starting import at_rate, beginning, check_start
-from rsfstudy.slider.equations import without_mass
+from rsfstudy.motion.starting import check_start, unevaluated_point, with_slip_rate
+from rsfstudy.slider.equations import equations_without_mass
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
@@ -47,13 +52,13 @@ from rsfstudy.status import Status
 
 #: Step of the differences that give the derivative of the map, over how far ln V swings: its slopes
 #: bend over a hundredth of a swing.
-STEP = 1e-4
-_WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
+DIFFERENCE_STEP = 1e-4
+_DIFFERENCE_WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
 #: How far off an orbit is looked for, over how far ln V swings, and most steps to it.
-_NEAR, _TRIES = 0.1, 12
+_MAX_ORBIT_DISTANCE, _MAX_ITERATIONS = 0.1, 12
 #: How nearly its cycles must close an orbit, in the accuracy asked for: what they do not is
 #: corrected to first order.
-CLOSED = 0.3
+CLOSURE_TOLERANCE = 0.3
 
 
 @dataclass(frozen=True)
@@ -64,24 +69,24 @@ class Orbit:
     ----------
     cycles : tuple of Cycle
         Successive cycles.
-    slopes : tuple of ndarray
+    derivatives : tuple of ndarray
         For each cycle, the derivatives of the section at its end and of its headline numbers with
         respect to the section at its beginning, of shape (1 + states + numbers, 1 + states).
-    ahead : ndarray
+    section_correction : ndarray
         Vector from the section at which the cycles begin to the section of the closed orbit.
     accuracy : Accuracy
         Accuracy with which the cycles were computed.
-    work : int
+    evaluations : int
         Number of right-hand-side evaluations.
     recording : Recording or None
         Recording along the cycles, which may extend beyond their end.
     """
 
     cycles: tuple[Cycle, ...]
-    slopes: tuple[np.ndarray, ...]
-    ahead: np.ndarray
+    derivatives: tuple[np.ndarray, ...]
+    section_correction: np.ndarray
     accuracy: Accuracy
-    work: int
+    evaluations: int
     recording: Recording | None = None
 
     @property
@@ -90,56 +95,60 @@ class Orbit:
         return len(self.cycles)
 
     @property
-    def begin(self) -> np.ndarray:
+    def start_section(self) -> np.ndarray:
         """Section at which the orbit begins."""
-        return np.asarray(section(self.cycles[0].begin) + self.ahead)
+        return np.asarray(section_at(self.cycles[0].start_point) + self.section_correction)
 
     @cached_property
-    def implied(self) -> np.ndarray:
+    def output_corrections(self) -> np.ndarray:
         """Corrections of the numbers of the first cycle for the closure error."""
-        return np.asarray(self.slopes[0][len(self.ahead) :] @ self.ahead)
+        return np.asarray(
+            self.derivatives[0][len(self.section_correction) :] @ self.section_correction
+        )
 
     @cached_property
-    def numbers(self) -> np.ndarray:
+    def primary_outputs(self) -> np.ndarray:
         """Headline numbers of the first cycle, corrected for the closure error."""
-        return np.asarray(np.array(self.cycles[0].numbers()) + self.implied)
+        return np.asarray(np.array(self.cycles[0].primary_outputs()) + self.output_corrections)
 
     @property
     def multipliers(self) -> np.ndarray:
         """Complex Floquet multipliers in order of decreasing absolute value."""
-        found = np.linalg.eigvals(product(self.slopes)).astype(complex)
+        found = np.linalg.eigvals(chain_derivatives(self.derivatives)).astype(complex)
         return np.asarray(found[np.argsort(-np.abs(found), kind="stable")])
 
     @property
-    def attracts(self) -> bool:
+    def is_attracting(self) -> bool:
         """True if the orbit attracts nearby motions."""
         return bool(abs(self.multipliers[0]) < 1.0)
 
     @property
-    def from_largest(self) -> Orbit:
+    def from_largest_event(self) -> Orbit:
         """The same orbit, starting with the cycle that has the highest slip rate."""
-        at = max(range(self.period), key=lambda place: self.cycles[place].fastest)
+        at = max(range(self.period), key=lambda place: self.cycles[place].max_log_slip_rate)
         if not at:
             return self
         return replace(
             self,
             cycles=self.cycles[at:] + self.cycles[:at],
-            slopes=self.slopes[at:] + self.slopes[:at],
-            ahead=product(self.slopes[:at]) @ self.ahead,
+            derivatives=self.derivatives[at:] + self.derivatives[:at],
+            section_correction=chain_derivatives(self.derivatives[:at]) @ self.section_correction,
         )
 
 
-def section(point: Point) -> np.ndarray:
+def section_at(point: Point) -> np.ndarray:
     """Return the section at a point: spring stress and states."""
     return np.array((point.spring_stress, *point.psis))
 
 
-def image_of(cycle: Cycle) -> np.ndarray:
+def cycle_image(cycle: Cycle) -> np.ndarray:
     """Return the section at the end of a cycle, followed by its headline numbers."""
-    return np.array((cycle.end.spring_stress, *cycle.end.psis, *cycle.numbers()))
+    return np.array(
+        (cycle.end_point.spring_stress, *cycle.end_point.psis, *cycle.primary_outputs())
+    )
 
 
-def product(slopes: Sequence[np.ndarray]) -> np.ndarray:
+def chain_derivatives(slopes: Sequence[np.ndarray]) -> np.ndarray:
     """Return the derivative of the section over several successive cycles.
 
     Returns
@@ -154,7 +163,7 @@ def product(slopes: Sequence[np.ndarray]) -> np.ndarray:
     return together
 
 
-_unit = lru_cache(np.eye)
+_identity_matrix = lru_cache(np.eye)
 
 
 class ReturnMap:
@@ -165,7 +174,7 @@ class ReturnMap:
     scene : Scene
         A scene with a moving load point.
     accuracy : Accuracy
-    meter : Meter
+    meter : WorkMeter
         Counter of the work of the motions.
     recorded : bool
         If True, record the motions along an orbit. Otherwise only the ends of the cycles are kept.
@@ -178,43 +187,47 @@ class ReturnMap:
         self,
         scene: Scene,
         accuracy: Accuracy,
-        meter: Meter,
+        meter: WorkMeter,
         *,
         recorded: bool = False,
         counted: Sequence[int] | None = None,
     ) -> None:
         self.scene, self.accuracy, self._meter = scene, accuracy, meter
-        self._recorded = recorded
-        places = scene.functions.friction.counted if counted is None else counted
+        self._with_recording = recorded
+        places = scene.functions.friction.distance_indices if counted is None else counted
         #: Places in a section of the unknowns that count for the distance.
-        self._counted = [0, *(1 + place for place in places)]
+        self._compared_unknowns = [0, *(1 + place for place in places)]
 
-    def point(self, at: np.ndarray) -> Point:
+    def point_at(self, section: np.ndarray) -> Point:
         """Return the point of the slider at a section.
 
         The point lies on the slow manifold, or at V_0 if inertia is important there.
 
         Raises
         ------
-        Halt
+        MotionStopped
             If the spring stress is incompatible with friction of forward slip.
         """
-        spring_stress, *psis = at.tolist()
+        spring_stress, *psis = section.tolist()
         scene, states = self.scene, tuple(psis)
-        x, friction, _shift = scene.functions.balance(spring_stress, states, scene.numbers)
-        point = beginning(scene, spring_stress, states, x, friction)
+        x, friction, _shift = scene.functions.balance_function(spring_stress, states, scene.numbers)
+        point = unevaluated_point(scene, spring_stress, states, x, friction)
         check_start(self.scene, point)
-        return at_rate(self.scene, point, self.scene.log_load_rate) if self._acts(point) else point
+        return (
+            with_slip_rate(self.scene, point, self.scene.log_load_velocity)
+            if self._inertia_matters_at(point)
+            else point
+        )
 
-    def _acts(self, point: Point) -> bool:
+    def _inertia_matters_at(self, point: Point) -> bool:
         """Return True if the effect of inertia exceeds that on the slow manifold."""
         if not self.scene.has_mass:
             return False
-        inertial_stress = point.spring_stress - point.friction
-        given = limits(self.scene, self.accuracy)
-        return weight_of_mass(point.log_slip_rate, inertial_stress, given) >= 1.0
+        inertial_stress = point.spring_stress - point.frictional_stress
+        given = switch_thresholds(self.scene, self.accuracy)
+        return inertia_weight(point.log_slip_rate, inertial_stress, given) >= 1.0
 
-    def cycles(
+    def follow_cycles(
         self, start: np.ndarray, count: int, recording: Recording | None = None
     ) -> list[Cycle]:
         """Follow a number of cycles from a section.
@@ -227,19 +240,21 @@ class ReturnMap:
         """
         seen = list[Cycle]()
         try:
-            moving = cycles(self.scene, self.accuracy, self._meter, self.point(start), recording)
+            moving = iterate_cycles(
+                self.scene, self.accuracy, self._meter, self.point_at(start), recording
+            )
             for cycle in moving:
-                if cycle is None or cycle.swing < SMALLEST_SWING:
+                if cycle is None or cycle.log_slip_rate_range < MIN_LOG_SLIP_RATE_RANGE:
                     break
                 seen.append(cycle)
                 if len(seen) == count:
                     break
-        except Halt as halt:
+        except MotionStopped as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
         return seen
 
-    def image(self, start: np.ndarray) -> np.ndarray | None:
+    def compute_image(self, start: np.ndarray) -> np.ndarray | None:
         """Return the section one cycle later, and the numbers of the cycle.
 
         Returns
@@ -247,10 +262,12 @@ class ReturnMap:
         ndarray, shape (1 + states + numbers,), or None
             None if the motion does not complete a cycle.
         """
-        seen = self.cycles(start, 1)
-        return image_of(seen[0]) if seen else None
+        seen = self.follow_cycles(start, 1)
+        return cycle_image(seen[0]) if seen else None
 
-    def slopes(self, start: np.ndarray, count: int, scale: float) -> tuple[np.ndarray, ...]:
+    def compute_derivatives(
+        self, start: np.ndarray, count: int, scale: float
+    ) -> tuple[np.ndarray, ...]:
         """Compute the derivatives of successive cycles by finite differences.
 
         Parameters
@@ -267,18 +284,21 @@ class ReturnMap:
         tuple of ndarray
             The tuple is shorter than ``count`` if the motion does not complete all cycles.
         """
-        found, step = list[np.ndarray](), STEP * math.sqrt(self.accuracy.refinement) * scale
+        found, step = (
+            list[np.ndarray](),
+            DIFFERENCE_STEP * math.sqrt(self.accuracy.refinement) * scale,
+        )
         current: np.ndarray | None = start
         for number in range(count):
-            slopes = None if current is None else self._slopes(current, step)
+            slopes = None if current is None else self._differentiate_cycle(current, step)
             if current is None or slopes is None:
                 break
             found.append(slopes)
-            after = self.image(current) if number < count - 1 else None
+            after = self.compute_image(current) if number < count - 1 else None
             current = None if after is None else after[: len(current)]
         return tuple(found)
 
-    def along(self, point: Point) -> tuple[Numbers, Numbers]:
+    def motion_direction(self, point: Point) -> tuple[Numbers, Numbers]:
         """Return the direction of the motion at a section, and its effect.
 
         A displacement of the start along the motion changes only the time of the cycle, if the
@@ -292,36 +312,44 @@ class ReturnMap:
             Corresponding change of the section and of the numbers of the cycle.
         """
         scene, states = self.scene, len(point.psis)
-        spring_stress = point.friction + scene.dynamics.radiated(scene.log_load_rate)
-        rates = without_mass(scene, clock=True).rates((spring_stress, *point.psis, 0.0))
-        rest = (0.0,) * (NUMBERS - 1)
+        spring_stress = point.frictional_stress + scene.dynamics.radiated_stress(
+            scene.log_load_velocity
+        )
+        rates = equations_without_mass(scene, clock=True).evaluate_rates(
+            (spring_stress, *point.psis, 0.0)
+        )
+        rest = (0.0,) * (PRIMARY_OUTPUT_COUNT - 1)
         return (0.0, *rates[1:-1]), (*(0.0,) * (1 + states), -rates[-1], *rest)
 
-    def _slopes(self, start: np.ndarray, step: float) -> np.ndarray | None:
+    def _differentiate_cycle(self, start: np.ndarray, step: float) -> np.ndarray | None:
         """Compute the derivatives of one cycle by differences of order four.
 
         The derivative along the motion follows from the rates of the motion.
         """
-        point = self.point(start)
-        way, passed = self.along(point)
+        point = self.point_at(start)
+        way, passed = self.motion_direction(point)
         directions = np.linalg.qr(np.column_stack([way, np.eye(len(start))]))[0]
         columns = list[np.ndarray]()
         for unit in directions.T:
-            if not columns and not self._acts(point):
+            if not columns and not self._inertia_matters_at(point):
                 columns.append(np.array(passed) / (unit @ way))
                 continue
-            slope = np.zeros(len(start) + NUMBERS)
-            for number, weight in _WEIGHTS:
-                ahead = self.image(start + number * step * unit)
-                behind = self.image(start - number * step * unit)
+            slope = np.zeros(len(start) + PRIMARY_OUTPUT_COUNT)
+            for number, weight in _DIFFERENCE_WEIGHTS:
+                ahead = self.compute_image(start + number * step * unit)
+                behind = self.compute_image(start - number * step * unit)
                 if ahead is None or behind is None:
                     return None
                 slope += weight * (ahead - behind) / step
             columns.append(slope)
         return np.asarray(np.column_stack(columns) @ directions.T)
 
-    def orbit(
-        self, start: np.ndarray, count: int, swing: float, reach: float = _NEAR
+    def find_orbit(
+        self,
+        start: np.ndarray,
+        count: int,
+        log_slip_rate_range: float,
+        max_distance: float = _MAX_ORBIT_DISTANCE,
     ) -> Orbit | None:
         """Find a periodic orbit close to a section.
 
@@ -332,9 +360,9 @@ class ReturnMap:
         count : int
             Number of cycles of the orbit. The orbit that is found may repeat after a divisor of
             this number.
-        swing : float
+        log_slip_rate_range : float
             Range of ln V.
-        reach : float
+        max_distance : float
             Largest distance of the orbit from ``start``, relative to ``a`` times the range of ln V.
 
         Returns
@@ -342,19 +370,21 @@ class ReturnMap:
         Orbit or None
             None if no orbit is found.
         """
-        scale = self.scene.a * swing
-        slopes = self.slopes(start, count, scale)
-        found = self._solve(start, slopes, scale, reach) if len(slopes) == count else None
+        scale = self.scene.a * log_slip_rate_range
+        slopes = self.compute_derivatives(start, count, scale)
+        found = (
+            self._close_orbit(start, slopes, scale, max_distance) if len(slopes) == count else None
+        )
         if found is None:
             return None
         count = self._cycles_until_repeat(found.cycles, scale)
-        if np.abs(found.begin - start).max() > 10.0 * self.accuracy.rtol * scale:
-            slopes = self.slopes(found.begin, count, scale)
+        if np.abs(found.start_section - start).max() > 10.0 * self.accuracy.rtol * scale:
+            slopes = self.compute_derivatives(found.start_section, count, scale)
         if len(slopes) < count:
             return None
-        return replace(found, cycles=found.cycles[:count], slopes=slopes[:count])
+        return replace(found, cycles=found.cycles[:count], derivatives=slopes[:count])
 
-    def again(self, known: Orbit) -> Orbit | None:
+    def refine(self, orbit: Orbit) -> Orbit | None:
         """Compute a known orbit at the accuracy of this map.
 
         Returns
@@ -362,12 +392,17 @@ class ReturnMap:
         Orbit or None
             None if the orbit does not close.
         """
-        if known.accuracy == self.accuracy:
-            return known
-        return self._solve(known.begin, known.slopes, self.scene.a * known.cycles[0].swing, _NEAR)
+        if orbit.accuracy == self.accuracy:
+            return orbit
+        return self._close_orbit(
+            orbit.start_section,
+            orbit.derivatives,
+            self.scene.a * orbit.cycles[0].log_slip_rate_range,
+            _MAX_ORBIT_DISTANCE,
+        )
 
-    def _solve(
-        self, start: np.ndarray, slopes: Sequence[np.ndarray], scale: float, reach: float
+    def _close_orbit(
+        self, start: np.ndarray, slopes: Sequence[np.ndarray], scale: float, max_distance: float
     ) -> Orbit | None:
         """Solve for an orbit with as many cycles as there are derivatives.
 
@@ -377,44 +412,47 @@ class ReturnMap:
         Returns
         -------
         Orbit or None
-            None if there is no orbit within ``reach`` of the section.
+            None if there is no orbit within ``max_distance`` of the section.
         """
-        at, enough, last = start, CLOSED * self.accuracy.rtol * scale, math.inf
-        jacobian, move = product(slopes) - _unit(len(start)), None
-        for _ in range(_TRIES):
-            spent, recording = self._meter.spent, Recording() if self._recorded else None
-            seen = self.cycles(at, len(slopes), recording)
+        at, enough, last = start, CLOSURE_TOLERANCE * self.accuracy.rtol * scale, math.inf
+        jacobian, move = chain_derivatives(slopes) - _identity_matrix(len(start)), None
+        for _ in range(_MAX_ITERATIONS):
+            spent, recording = (
+                self._meter.evaluations,
+                Recording() if self._with_recording else None,
+            )
+            seen = self.follow_cycles(at, len(slopes), recording)
             if len(seen) < len(slopes):
                 return None
-            off = section(seen[-1].end) - at
+            off = section_at(seen[-1].end_point) - at
             if move is not None:
                 jacobian += off[:, None] * move / (move @ move)
             move = -dgesv(jacobian, off)[2]
-            size = self._size(move, at, scale)
+            size = self._scaled_norm(move, at, scale)
             # as close as asked for, or as errors of the motion let it come
             if size <= enough or 0.5 * last <= size <= 100.0 * enough:
-                work = self._meter.spent - spent
+                work = self._meter.evaluations - spent
                 return Orbit(tuple(seen), tuple(slopes), move, self.accuracy, work, recording)
             at, last = at + move, size
-            if not np.abs((at - start)[self._counted]).max() <= reach * scale:
+            if not np.abs((at - start)[self._compared_unknowns]).max() <= max_distance * scale:
                 return None
         return None
 
-    def _size(self, move: np.ndarray, at: np.ndarray, scale: float) -> float:
+    def _scaled_norm(self, move: np.ndarray, at: np.ndarray, scale: float) -> float:
         """Return the largest component of a change of a section.
 
         The unknowns of a fluid may have large values. If such a value exceeds the scale of the
         states, the change is divided by the ratio of the value to the scale.
         """
-        changes, first = np.abs(move), 1 + self.scene.parts.law.states
+        changes, first = np.abs(move), 1 + self.scene.parts.law.state_count
         changes[first:] /= np.maximum(1.0, np.abs(at[first:]) / scale)
         return float(changes.max())
 
     def _cycles_until_repeat(self, cycles: Sequence[Cycle], scale: float) -> int:
         """Return the number of cycles after which an orbit repeats itself."""
-        begin = section(cycles[0].begin)
+        begin = section_at(cycles[0].start_point)
         for count in range(1, len(cycles)):
-            apart = self._size(section(cycles[count - 1].end) - begin, begin, scale)
+            apart = self._scaled_norm(section_at(cycles[count - 1].end_point) - begin, begin, scale)
             if len(cycles) % count == 0 and apart < 1e-4 * scale:
                 return count
         return len(cycles)

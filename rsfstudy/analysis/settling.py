@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from rsfstudy.motion.meter import Halt
+from rsfstudy.motion.meter import MotionStopped
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.stability import largest_growth_rate
 from rsfstudy.status import Status
 
 
-def is_attracted(scene: Scene) -> bool:
+def settles_to_steady_sliding(scene: Scene) -> bool:
     """Return True if steady sliding at the load point velocity is stable.
 
     Parameters
@@ -20,16 +20,16 @@ def is_attracted(scene: Scene) -> bool:
 
     Raises
     ------
-    Halt
+    MotionStopped
         With ``unverified`` if the largest growth rate of small perturbations is zero within its
         error, and with ``no_steady_state`` if steady sliding does not exist.
     """
-    growth = largest_growth_rate(scene.acting(-1), scene.log_load_rate)
+    growth = largest_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
     if growth is None:
         text = f"no steady state exists at V_0/V_* = {scene.load_velocity:.3g}"
-        raise Halt(Status.NO_STEADY_STATE, text)
+        raise MotionStopped(Status.NO_STEADY_STATE, text)
     if growth.is_undecided:
-        raise Halt(
+        raise MotionStopped(
             Status.UNVERIFIED,
             "the motion comes close to steady sliding, but it is undecided if it settles: the "
             f"growth rate of small changes is {growth.value:.1e} per D_c of slip, with an error of "
@@ -56,7 +56,7 @@ def settled_flag(scene: Scene, *, is_flat: bool) -> float:
     """
     if not is_flat:
         return 0.0
-    growth = largest_growth_rate(scene, scene.log_load_rate)
+    growth = largest_growth_rate(scene, scene.log_load_velocity)
     if growth is not None and growth.is_undecided:
         return math.nan
     return 0.0 if growth is not None and growth.is_positive else 1.0

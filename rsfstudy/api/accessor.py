@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 from xarray.backends import BackendEntrypoint
 
+from rsfstudy._deprecation import renamed_members
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError, InvalidValue
 
@@ -21,16 +22,17 @@ if TYPE_CHECKING:
 
     from rsfstudy import plots
     from rsfstudy.declare.study import Study
-    from rsfstudy.rig.laboratory import Laboratory
+    from rsfstudy.rig.laboratory import Rig
     from rsfstudy.slider.scene import Scene
 
-_FOREIGN = (
+_FOREIGN_DATASET = (
     "the dataset is not of rsfstudy: it has neither the attribute 'scene' nor 'declaration'. "
     "Take it from rsfstudy.simulate, critical_step, limit_cycle, run or open, or from a file of "
     "theirs, with its attributes."
 )
 
 
+@renamed_members
 @xr.register_dataset_accessor("rsf")  # type: ignore[no-untyped-call]
 class Accessor:
     """What a dataset of rsfstudy says of itself: a motion, the answer for one scene, or the results
@@ -50,8 +52,8 @@ class Accessor:
         """Return an HTML table of the dataset and the verdicts of its claims."""
         from rsfstudy.api import report
 
-        self._must_be_ours()
-        return report.html(self._dataset)
+        self._require_rsfstudy_dataset()
+        return report.dataset_html(self._dataset)
 
     @property
     @error_boundary
@@ -67,14 +69,14 @@ class Accessor:
         from rsfstudy.api import fit_results, scenes
 
         if fit_results.is_fit(self._dataset):
-            return fit_results.scene(self._dataset)
+            return fit_results.fitted_scene(self._dataset)
         if self._is_study:
-            return self.study.scene(scenes.cell(self._dataset, self.study))
-        return scenes.described(self._dataset)
+            return self.study.scene(scenes.selected_cell_number(self._dataset, self.study))
+        return scenes.described_scene(self._dataset)
 
     @property
     @error_boundary
-    def laboratory(self) -> Laboratory:
+    def rig(self) -> Rig:
         """The rig of one fit of a record, whose scales are those of ``.scene``: the slip distance
         and the stiffness of the fit, velocity and mean normal stress before the step. It turns
         motions of that scene into its units, as in ``rig.in_units(motion, length="um")``.
@@ -88,7 +90,7 @@ class Accessor:
         """
         from rsfstudy.api import fit_results
 
-        return fit_results.laboratory(self._dataset)
+        return fit_results.fitted_rig(self._dataset)
 
     @property
     @error_boundary
@@ -104,13 +106,16 @@ class Accessor:
         """
         from rsfstudy.files import contents, loadings, restore
 
-        self._must_be_of_a_study()
-        declared, about = contents.declaration(self._dataset), contents.provenance(self._dataset)
-        if restore.has_own_code(self._dataset):
+        self._require_study()
+        declared, about = (
+            contents.read_declaration(self._dataset),
+            contents.read_provenance(self._dataset),
+        )
+        if restore.has_user_code(self._dataset):
             rule = "has code of a user's own, and code is never taken from a dataset"
             remedy = f"Import the study from the file that declares it. {about['declared_in']}"
             raise InvalidValue("study", declared.name, rule, remedy=remedy.strip())
-        return restore.from_declaration(declared, loadings.held(self._dataset))
+        return restore.study_from_declaration(declared, loadings.read_loadings(self._dataset))
 
     @error_boundary
     def to_si(self, **scales: Any) -> xr.Dataset:
@@ -123,7 +128,7 @@ class Accessor:
         """
         from rsfstudy.api.one_scene import to_si
 
-        self._must_be_ours()
+        self._require_rsfstudy_dataset()
         return to_si(self._dataset, **scales)
 
     @error_boundary
@@ -141,10 +146,10 @@ class Accessor:
         InvalidValue
             For units of another kind, and for results that hold no scales: those of no rig.
         """
-        from rsfstudy.rig.scales import in_units, scales_of
+        from rsfstudy.rig.scales import convert_units, read_scales
 
-        self._must_be_ours()
-        return in_units(self._dataset, scales_of(self._dataset), stress, length, time)
+        self._require_rsfstudy_dataset()
+        return convert_units(self._dataset, read_scales(self._dataset), stress, length, time)
 
     @error_boundary
     def check(self) -> pd.DataFrame:
@@ -153,8 +158,8 @@ class Accessor:
         """
         from rsfstudy.api import runs
 
-        self._must_be_of_a_study()
-        self._must_be_whole("claims are held against")
+        self._require_study()
+        self._require_all_cells("claims are held against")
         return runs.check(self._dataset)
 
     @error_boundary
@@ -166,15 +171,15 @@ class Accessor:
         ----------
         *what, **how
             As of `rsfstudy.plot` for the results of a study (`variable`, `style`), and as of
-            `rsfstudy.picture` for a motion or a cycle (`laboratory`, `against`).
+            `rsfstudy.plot_motion` for a motion or a cycle (`rig`, `against`).
         """
         from rsfstudy.api import runs
-        from rsfstudy.plots._motion import picture
+        from rsfstudy.plots._motion import plot_motion
 
         if self._is_study:
-            self._must_be_whole("figures show")
+            self._require_all_cells("figures show")
             return runs.plot(self._dataset, *what, **how)
-        return picture(self._dataset, *what, **how)
+        return plot_motion(self._dataset, *what, **how)
 
     @error_boundary
     def events(self, slip_rate: float | None = None) -> xr.Dataset:
@@ -202,11 +207,11 @@ class Accessor:
         InvalidValue
             For a slip rate that is not positive and finite.
         """
-        from rsfstudy.api.motion_events import of_motion
+        from rsfstudy.api.motion_events import find_motion_events
 
         if self._is_study:
             raise DataError("the dataset is of a study: events are told of a motion of one scene")
-        return of_motion(self._dataset, slip_rate, lambda: self.scene)
+        return find_motion_events(self._dataset, slip_rate, lambda: self.scene)
 
     @error_boundary
     def slip_mode(self, stick_slip_from: Any) -> xr.DataArray:
@@ -232,14 +237,14 @@ class Accessor:
             For a dataset without limit cycles.
         """
         from rsfstudy.measures.limit_cycle import SLIP_MODES
-        from rsfstudy.rig.units import factor, in_si
+        from rsfstudy.rig.units import convert_to_si, unit_factor
 
-        least = in_si("stick_slip_from", stick_slip_from, "m/s")
+        least = convert_to_si("stick_slip_from", stick_slip_from, "m/s")
         if "slip_mode" not in self._dataset:
             raise DataError("slip_mode is not there: the dataset is of no limit cycles")
         there = self._dataset if "max_slip_rate" in self._dataset else self.to_si()
         peak = there["max_slip_rate"]
-        fast = peak * float(factor("max_slip_rate", peak.attrs["units"], "m/s")) >= least
+        fast = peak * float(unit_factor("max_slip_rate", peak.attrs["units"], "m/s")) >= least
         modes, slow = self._dataset["slip_mode"], SLIP_MODES.index("slow_slip")
         return modes.where(~(modes >= slow), slow + fast).assign_attrs(modes.attrs)
 
@@ -256,11 +261,11 @@ class Accessor:
         """
         from rsfstudy.api.exchange import to_dataframe
 
-        self._must_be_ours()
+        self._require_rsfstudy_dataset()
         return to_dataframe(self._dataset)
 
     @error_boundary
-    def table(self) -> pd.DataFrame:
+    def fit_table(self) -> pd.DataFrame:
         """One row a fit of a record, with the columns that laboratories use; lengths in um.
 
         Returns
@@ -276,10 +281,10 @@ class Accessor:
         """
         from rsfstudy.api import fit_results
 
-        return fit_results.table(self._dataset)
+        return fit_results.fit_table(self._dataset)
 
     @error_boundary
-    def draw(self, n: int, seed: int = 0) -> xr.Dataset:
+    def sample_parameters(self, n: int, seed: int = 0) -> xr.Dataset:
         """Samples of the parameters of one fit, as its errors let them be.
 
         Parameters
@@ -301,7 +306,7 @@ class Accessor:
         """
         from rsfstudy.api import fit_results
 
-        return fit_results.draw(self._dataset, n, seed)
+        return fit_results.sample_parameters(self._dataset, n, seed)
 
     @error_boundary
     def failures(self) -> pd.DataFrame:
@@ -320,32 +325,34 @@ class Accessor:
         from rsfstudy.status import Status
 
         if self._is_study:
-            axes = [axis["dimension"] for axis in contents.declaration(self._dataset).axes]
-            return tables.cells(self._dataset, self._dataset["status"] != int(Status.OK), axes)
+            axes = [axis["dimension"] for axis in contents.read_declaration(self._dataset).axes]
+            return tables.cells_frame(
+                self._dataset, self._dataset["status"] != int(Status.OK), axes
+            )
         ended = {name: self._dataset.attrs.get(name, "") for name in ("status", "message")}
         rows = [] if ended["status"] == Status.OK.label else [ended]
         return pd.DataFrame(rows, columns=list(ended))
 
     @property
     def _is_study(self) -> bool:
-        self._must_be_ours()
+        self._require_rsfstudy_dataset()
         return "declaration" in self._dataset.attrs
 
-    def _must_be_ours(self) -> None:
+    def _require_rsfstudy_dataset(self) -> None:
         if not {"scene", "declaration"} & set(self._dataset.attrs):
-            raise DataError(_FOREIGN)
+            raise DataError(_FOREIGN_DATASET)
 
-    def _must_be_whole(self, what: str) -> None:
+    def _require_all_cells(self, what: str) -> None:
         """Refuse results of which cells were selected."""
         from rsfstudy.files import contents
 
-        axes = [axis["dimension"] for axis in contents.declaration(self._dataset).axes]
+        axes = [axis["dimension"] for axis in contents.read_declaration(self._dataset).axes]
         selected = [name for name in axes if name not in self._dataset["status"].dims]
         if selected:
             text = f"{what} all results of a study, and of these {', '.join(selected)} is selected"
             raise DataError(f"{text}. Ask the dataset as it was opened.")
 
-    def _must_be_of_a_study(self) -> None:
+    def _require_study(self) -> None:
         if not self._is_study:
             raise DataError("the dataset is of one scene: no study made it. Ask for its scene.")
 

@@ -11,48 +11,31 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.analysis.drop_detection import SAMPLES, SHORTEST, Detection
-from rsfstudy.analysis.drop_slip import moves_with_drops, numbers_of, place_of
-from rsfstudy.analysis.drops import find_drops
+from rsfstudy.analysis.drop_detection import MIN_SAMPLES, Detection
+from rsfstudy.analysis.drop_slip import read_drops
+from rsfstudy.analysis.drops import EVENT_QUANTITIES, EventNumbers
 from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.compute import provenance
 from rsfstudy.error_boundary import error_boundary, user_stacklevel
-from rsfstudy.errors import InvalidValue, NoAnswer
+from rsfstudy.errors import InvalidValue, NoResultWarning
 from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.rig.table import read_table
-from rsfstudy.rig.units import factor, in_si
+from rsfstudy.rig.units import convert_to_si, unit_factor
 
-#: The numbers of an event, each with its error, and which part of it is missing, by its flag.
-Found = tuple[dict[str, tuple[float, float]], int]
-#: Of each quantity of an event what it is measured in, its heading in tables, and what it is.
-QUANTITIES = {
-    "time": ("D_c/V_*", "time", "time at which the event begins"),
-    "duration": ("D_c/V_*", "duration", "duration of the event"),
-    "interval": ("D_c/V_*", "interval", "time since the event before began"),
-    "peak_log10_slip_rate": ("", "lg V_max/V_*", "decimal logarithm of peak slip rate over V_star"),
-    "peak_slip_rate": ("V_*", "peak rate", "peak slip rate"),
-    "slip": ("D_c", "slip", "slip during the event"),
-    "stress_before": ("sigma_*", "", "highest shear stress before the event"),
-    "stress_after": ("sigma_*", "", "lowest shear stress after the event"),
-    "static_stress_drop": ("sigma_*", "static drop", "highest less lowest shear stress"),
-    "dynamic_stress_drop": (
-        "sigma_*",
-        "dynamic drop",
-        "highest shear stress less that at peak slip rate",
-    ),
-}
 #: What quantities are measured in: as these variables, by their scales.
-_MEASURED_AS = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
+_REFERENCE_VARIABLES = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
 #: Quantities that are read from displacement.
-_OF_SLIP = ("slip", "peak_slip_rate", "dynamic_stress_drop")
+_SLIP_QUANTITIES = ("slip", "peak_slip_rate", "dynamic_stress_drop")
 #: What part of an event is missing, by its flag.
-_CUT = ("whole", "begins_before", "lasts_beyond", "both")
+_CUT_MEANINGS = ("whole", "begins_before", "lasts_beyond", "both")
 
 #: Falls of stress, in smallest drops, from which it is suspect that no drop is found.
-_SUSPECT = 10.0
+_SUSPICIOUS_VARIATION = 10.0
 
 
-def catalogue(found: Sequence[Found], about: Mapping[str, Mapping[Any, Any]]) -> xr.Dataset:
+def build_catalogue(
+    found: Sequence[EventNumbers], about: Mapping[str, Mapping[Any, Any]]
+) -> xr.Dataset:
     """Events as a dataset, in the units of what they were read from."""
     rows = [numbers for numbers, _cut in found]
     for row, earlier in zip(rows, [{}, *rows], strict=False):
@@ -60,37 +43,37 @@ def catalogue(found: Sequence[Found], about: Mapping[str, Mapping[Any, Any]]) ->
         row["interval"] = time - before, error + unsure
     number = {"long_name": "number of the event", "units": "1"}
     dataset = xr.Dataset(coords={"event": ("event", np.arange(len(rows)), number)})
-    for name, (scale, _heading, words) in QUANTITIES.items():
+    for name, (scale, _heading, words) in EVENT_QUANTITIES.items():
         if rows and name not in rows[0]:
             continue
         values, errors = np.array([row[name] for row in rows]).reshape(-1, 2).T
-        units = _units(scale, about)
+        units = _unit_attributes(scale, about)
         dataset[name] = "event", values, {"long_name": words, **units}
         of_error = {"long_name": f"error estimate of {words}", **units}
         dataset[f"{name}_error"] = "event", errors, of_error
     flags = {
         "long_name": "what of the event the record leaves out",
-        "flag_values": np.arange(len(_CUT), dtype=np.int8),
-        "flag_meanings": " ".join(_CUT),
+        "flag_values": np.arange(len(_CUT_MEANINGS), dtype=np.int8),
+        "flag_meanings": " ".join(_CUT_MEANINGS),
     }
     dataset["cut"] = "event", np.array([cut for _numbers, cut in found], dtype=np.int8), flags
     return with_cf_encoding(
         dataset.assign_attrs(
             title="Catalogue of events",
             Conventions="CF-1.11",
-            **provenance.attributes("rsfstudy.events"),
+            **provenance.provenance_attributes("rsfstudy.events"),
         )
     )
 
 
-def _units(scale: str, about: Mapping[str, Mapping[Any, Any]]) -> dict[str, str]:
+def _unit_attributes(scale: str, about: Mapping[str, Mapping[Any, Any]]) -> dict[str, str]:
     """Return the attributes ``units`` and ``scale`` of a quantity of an event.
 
     Times, slips and stresses have the units of the variable from which they were read. A slip
     rate is in units of slip over units of time. All other quantities are dimensionless.
     """
-    if scale in _MEASURED_AS:
-        source = about[_MEASURED_AS[scale]]
+    if scale in _REFERENCE_VARIABLES:
+        source = about[_REFERENCE_VARIABLES[scale]]
         return {key: str(source[key]) for key in ("units", "scale") if key in source}
     if not scale or "scale" in about["slip"]:
         return {"units": "1", **({"scale": scale} if scale else {})}
@@ -180,7 +163,7 @@ def events(
 
     Warns
     -----
-    NoAnswer
+    NoResultWarning
         If displacement does not move faster during the drops. Then ``slip``, ``peak_slip_rate`` and
         ``dynamic_stress_drop`` are NaN, and the attribute ``comment`` of ``slip`` gives the reason.
         The function also warns if no drop is found although stress falls by more than ten times
@@ -191,15 +174,15 @@ def events(
         table = {n: of for n, of in read_table(record).items() if n in given}
         record = xr.Dataset({n: (n, of.values, {"units": of.units}) for n, of in table.items()})
     if isinstance(record, Record):
-        record = _stress_of(record)
+        record = _record_to_dataset(record)
     if record is not None:
         if not hasattr(record, "data_vars"):
             remedy = "Pass a Dataset, a Record, the path of a CSV file, or arrays by name."
             raise InvalidValue("record", record, "is no record of stress", remedy=remedy)
         given = {name: record.get(name) for name in given}
-    times, stress = (_samples(name, given[name]) for name in ("time", "shear_stress"))
+    times, stress = (_check_samples(name, given[name]) for name in ("time", "shear_stress"))
     moved = given["displacement"]
-    moves = None if moved is None else _samples("displacement", moved)
+    moves = None if moved is None else _check_samples("displacement", moved)
     for name, samples in (("shear_stress", stress), ("displacement", moves)):
         if samples is not None and len(samples) != len(times):
             rule = f"must hold as many samples as time, which holds {len(times)}"
@@ -207,68 +190,60 @@ def events(
     if not (np.diff(times) > 0.0).all():
         late = int(np.argmax(np.diff(times) <= 0.0)) + 1
         raise InvalidValue("time", times[late], f"must increase, and does not at sample {late}")
-    direction = _sign(stress, sign)
+    direction = _stress_sign(stress, sign)
     stress = direction * stress
     about = {name: dict(getattr(values, "attrs", {})) for name, values in given.items()}
     if stiffness is not None:
         if moves is None:
             raise InvalidValue("stiffness", stiffness, "needs the displacement of the load point")
-        moves = moves - stress / _stiffness(stiffness, about)
-    found, detection = find_drops(times, stress)
-    ends = [-math.inf, *(of.drop.ends for of in found)]
-    begins = [*(of.drop.begins for of in found[1:]), math.inf]
-    rooms = [*zip(ends, begins, strict=False)][: len(found)]
-    places = [place_of(times, *of) for of in zip(found, rooms, strict=True)]
-    each = zip(found, places, rooms, strict=True)
-    rows = [numbers_of(times, stress, moves, *of) for of in each]
-    runs_on = moves is not None and stiffness is None and not moves_with_drops(times, moves, places)
-    for row in rows if runs_on else ():
-        row[0].update(dict.fromkeys(_OF_SLIP, (math.nan, math.nan)))
-    dataset = catalogue(rows, about | {"slip": about["displacement"]})
-    if rows and runs_on:
+        moves = moves - stress / _parse_stiffness(stiffness, about)
+    rows, detection, is_slip = read_drops(times, stress, moves, check_slip=stiffness is None)
+    for row in rows if not is_slip else ():
+        row[0].update(dict.fromkeys(_SLIP_QUANTITIES, (math.nan, math.nan)))
+    dataset = build_catalogue(rows, about | {"slip": about["displacement"]})
+    if rows and not is_slip:
         why = "displacement moves no faster during the drops of stress than before and after"
         dataset["slip"].attrs["comment"] = why
         remedy = "Give stiffness='0.05 MPa/um', that of the rig, or math.inf if it is the fault's"
         warnings.warn(
-            f"slip has no number: {why}. {remedy}", NoAnswer, stacklevel=user_stacklevel()
+            f"slip has no number: {why}. {remedy}", NoResultWarning, stacklevel=user_stacklevel()
         )
     units = {key: value for key, value in about["shear_stress"].items() if key == "units"}
     dataset["noise"] = (
         (),
-        detection.noise,
+        detection.noise_sd,
         {"long_name": "standard deviation of the noise", **units},
     )
     words = "smallest drop of shear stress that is missed once in 1,000 records"
-    dataset["smallest_drop"] = ((), detection.smallest, {"long_name": words, **units})
+    dataset["smallest_drop"] = ((), detection.detectable_drop, {"long_name": words, **units})
     dataset.attrs["sign_of_shear_stress"] = int(direction)
-    if not rows and (text := _warn_of_nothing(detection)):
+    if not rows and (text := _warn_if_no_drop(detection)):
         dataset.attrs["comment"] = text
     return dataset
 
 
-def _stiffness(stated: Any, about: Mapping[str, Mapping[Any, Any]]) -> float:
+def _parse_stiffness(stated: Any, about: Mapping[str, Mapping[Any, Any]]) -> float:
     """Shear stress over displacement, in the units of the record."""
     if isinstance(stated, str):
         stress, length = (about[n].get("units") for n in ("shear_stress", "displacement"))
         if not (stress and length):
             remedy = "Give it as a number in the units of the record."
             raise InvalidValue("stiffness", stated, "the record states no units", remedy=remedy)
-        ours = factor("shear_stress", stress, "Pa") / factor("displacement", length, "m")
-        return _stiffness(in_si("stiffness", stated, "Pa/m") / float(ours), about)
+        ours = unit_factor("shear_stress", stress, "Pa") / unit_factor("displacement", length, "m")
+        return _parse_stiffness(convert_to_si("stiffness", stated, "Pa/m") / float(ours), about)
     if not stated > 0.0:
         raise InvalidValue("stiffness", stated, "must be positive")
     return float(stated)
 
 
-def _samples(name: str, values: Any) -> np.ndarray:
+def _check_samples(name: str, values: Any) -> np.ndarray:
     """Samples of a record, checked."""
     try:
         samples = np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise InvalidValue(name, values, "must be numbers") from error
-    least = SHORTEST * SAMPLES
-    if samples.ndim != 1 or len(samples) < least:
-        rule = f"must be a list of {least} samples at least, which tell the noise"
+    if samples.ndim != 1 or len(samples) < MIN_SAMPLES:
+        rule = f"must be a list of {MIN_SAMPLES} samples at least, which tell the noise"
         raise InvalidValue(name, samples.shape, rule)
     if not np.isfinite(samples).all():
         late = int(np.argmin(np.isfinite(samples)))
@@ -276,7 +251,7 @@ def _samples(name: str, values: Any) -> np.ndarray:
     return samples
 
 
-def _stress_of(record: Record) -> xr.Dataset:
+def _record_to_dataset(record: Record) -> xr.Dataset:
     """Return time, displacement and shear stress of a record as a dataset.
 
     Shear stress is in MPa. If the record has no normal stress, friction is returned in place of
@@ -295,7 +270,7 @@ def _stress_of(record: Record) -> xr.Dataset:
     return xr.Dataset(data)
 
 
-def _sign(stress: np.ndarray, stated: int | None) -> float:
+def _stress_sign(stress: np.ndarray, stated: int | None) -> float:
     """Return the sign of shear stress in the direction of slip.
 
     If the user does not pass a sign, the sign is -1 if all samples are negative, and 1 otherwise.
@@ -307,7 +282,7 @@ def _sign(stress: np.ndarray, stated: int | None) -> float:
     return float(stated)
 
 
-def _warn_of_nothing(detection: Detection) -> str:
+def _warn_if_no_drop(detection: Detection) -> str:
     """Warn if no drop is found although stress falls far more than the smallest drop.
 
     Returns
@@ -315,13 +290,14 @@ def _warn_of_nothing(detection: Detection) -> str:
     str
         The text of the warning. The string is empty if no warning was issued.
     """
-    if not detection.variation > _SUSPECT * detection.smallest:
+    if not detection.max_decrease > _SUSPICIOUS_VARIATION * detection.detectable_drop:
         return ""
     text = (
-        f"no drop was found, although stress falls by {detection.variation:.4g} in all, "
-        f"{detection.variation / detection.smallest:.0f} times the smallest drop that can be "
-        f"detected ({detection.smallest:.4g}): it falls for most of the record or too slowly"
+        f"no drop was found, although stress falls by {detection.max_decrease:.4g} in all, "
+        f"{detection.max_decrease / detection.detectable_drop:.0f} times the smallest drop "
+        f"that can be detected ({detection.detectable_drop:.4g}): it falls for most of the record "
+        "or too slowly"
     )
     remedy = "Select a part of the record, or pass sign=-1 if shear stress is negative"
-    warnings.warn(f"{text}. {remedy}.", NoAnswer, stacklevel=user_stacklevel())
+    warnings.warn(f"{text}. {remedy}.", NoResultWarning, stacklevel=user_stacklevel())
     return text

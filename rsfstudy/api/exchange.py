@@ -17,10 +17,10 @@ import xarray as xr
 from rsfstudy.api.trajectory import simulate
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import comparison
-from rsfstudy.quantity import units_and_scale
-from rsfstudy.rig.laboratory import Laboratory
-from rsfstudy.rig.scales import SCALES
-from rsfstudy.wording import flags_of
+from rsfstudy.quantity import units_or_scale
+from rsfstudy.rig.laboratory import Rig
+from rsfstudy.rig.scales import SCALES_ATTRIBUTE
+from rsfstudy.wording import read_flag_meanings
 
 
 def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
@@ -46,10 +46,10 @@ def to_csv(dataset: xr.Dataset, path: Path) -> None:
     """
     table = to_dataframe(dataset)
     for name in table if "status" in dataset else ():
-        if flags := flags_of(dataset[name].attrs):
+        if flags := read_flag_meanings(dataset[name].attrs):
             table[name] = table[name].map(flags)
     headed = {
-        n: f"{n} ({units_and_scale(dataset[n].attrs) or 1})"
+        n: f"{n} ({units_or_scale(dataset[n].attrs) or 1})"
         for n in table
         if table[n].dtype.kind in "iuf"
     }
@@ -77,14 +77,14 @@ def to_mat(dataset: xr.Dataset, path: Path) -> None:
         if values.dtype.kind in "OUT":
             data[name] = np.array(values.tolist(), dtype=object)
     about = {
-        "units": {name: units_and_scale(dataset[name].attrs) for name in data},
+        "units": {name: units_or_scale(dataset[name].attrs) for name in data},
         "dimensions": {name: " ".join(map(str, dataset[name].dims)) for name in data},
         "attributes": dataset.attrs,
     }
     savemat(path, about | data, long_field_names=True, oned_as="column")
 
 
-def rerun(motion: xr.Dataset) -> pd.DataFrame:
+def rerun_motion(motion: xr.Dataset) -> pd.DataFrame:
     """Compute a motion again, and compare it with what its file holds.
 
     Parameters
@@ -113,7 +113,7 @@ def rerun(motion: xr.Dataset) -> pd.DataFrame:
             f"simulate`) without times; this is of one scene ({title}). With the options that made "
             f"it, {call}, rtol={about.get('rtol', '...')}) computes it anew."
         )
-    if SCALES in about and "laboratory" not in about:
+    if SCALES_ATTRIBUTE in about and "laboratory" not in about:
         raise DataError(
             "it is in units of no rig: keep motions as simulate gives them, or by a rig"
         )
@@ -129,5 +129,5 @@ def rerun(motion: xr.Dataset) -> pd.DataFrame:
     if "laboratory" in about:
         units = {"stress": "shear_stress", "length": "slip", "time": "time"}
         units = {of: str(motion[name].attrs["units"]) for of, name in units.items()}
-        ours = Laboratory(**json.loads(about["laboratory"])).in_units(ours, **units)
-    return comparison.of_motions(motion, ours)
+        ours = Rig(**json.loads(about["laboratory"])).in_units(ours, **units)
+    return comparison.compare_motions(motion, ours)

@@ -13,22 +13,27 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.analysis.fitting.joint import of_window, plain
-from rsfstudy.analysis.fitting.model import LOGARITHMIC, PARAMETERS, fields_of, parameters_of
-from rsfstudy.analysis.fitting.noise import LAGS
-from rsfstudy.analysis.fitting.validity import SIGNIFICANT
+from rsfstudy.analysis.fitting.joint import strip_window_number, window_values
+from rsfstudy.analysis.fitting.model import (
+    LOGARITHMIC_PARAMETERS,
+    PARAMETERS,
+    parameters_to_fields,
+    scene_to_parameters,
+)
+from rsfstudy.analysis.fitting.noise import LAG_COUNT
+from rsfstudy.analysis.fitting.validity import SIGNIFICANCE_LEVEL
 from rsfstudy.api.tables import Table
 from rsfstudy.compute import provenance
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.files import contents
 from rsfstudy.netcdf import with_cf_encoding
-from rsfstudy.rig.laboratory import Laboratory
+from rsfstudy.rig.laboratory import Rig
 from rsfstudy.slider.scene import Scene
-from rsfstudy.status import LABELS, Status
-from rsfstudy.wording import counted
+from rsfstudy.status import STATUS_LABELS, Status
+from rsfstudy.wording import pluralize
 
 #: What laboratories call parameters, where not as they are called here.
-_CALLED = {
+_LABORATORY_NAMES = {
     "slip_distance": "Dc",
     "slip_distance_2": "Dc2",
     "mu_star": "mu_0",
@@ -36,17 +41,17 @@ _CALLED = {
     "trend1": "trend",
 }
 #: Most fits beside each other.
-_BESIDE = 3
+_MAX_FITS_PER_TABLE = 3
 #: What is told of a fit in short.
-_IN_SHORT = ("a", "b", "b1", "b2", "Dc")
+_SUMMARY_PARAMETERS = ("a", "b", "b1", "b2", "Dc")
 #: How fits end that have numbers.
-_ANSWERS = (Status.OK.label, Status.NOT_IDENTIFIED.label)
+_ANSWER_LABELS = (Status.OK.label, Status.NOT_IDENTIFIED.label)
 #: Error over the number beyond which neither is printed.
-_BOUNDLESS = 1e4
+_MAX_RELATIVE_ERROR = 1e4
 #: Difference of criteria that decides between laws.
-_DECIDES = 10.0
+_DECISIVE_AIC_DIFFERENCE = 10.0
 #: Mark of standard errors that are not valid.
-_MARK = "*"
+_INVALID_ERROR_MARK = "*"
 
 
 def is_fit(dataset: xr.Dataset) -> bool:
@@ -54,7 +59,7 @@ def is_fit(dataset: xr.Dataset) -> bool:
     return "rows_fitted" in dataset
 
 
-def cells(dataset: xr.Dataset) -> list[xr.Dataset]:
+def split_fits(dataset: xr.Dataset) -> list[xr.Dataset]:
     """The fits that a dataset holds, one by one; of several windows, that of the whole one."""
     if not is_fit(dataset):
         raise DataError("the dataset holds no fit: it is not what rsfstudy.fit gives")
@@ -65,22 +70,22 @@ def cells(dataset: xr.Dataset) -> list[xr.Dataset]:
     return [dataset.isel(dict(zip(dims, at, strict=True))) for at in np.ndindex(*sizes)]
 
 
-def _only(dataset: xr.Dataset) -> xr.Dataset:
+def _single_fit(dataset: xr.Dataset) -> xr.Dataset:
     """The one fit that a dataset holds."""
-    found = cells(dataset)
+    found = split_fits(dataset)
     if len(found) != 1:
         remedy = "Select one first, as in dataset.sel(law='slip')."
         raise InvalidValue("dataset", len(found), "holds several fits", remedy=remedy)
     return found[0]
 
 
-def place(one: xr.Dataset) -> dict[str, Any]:
+def record_and_step(one: xr.Dataset) -> dict[str, Any]:
     """Record and step of a fit, where there are several."""
     found = {n: one[n].item() for n in ("record", "step") if n in one.coords}
     return {n: value if n == "record" else int(value) for n, value in found.items()}
 
 
-def shown(one: xr.Dataset) -> dict[str, str]:
+def parameter_headings(one: xr.Dataset) -> dict[str, str]:
     """Return the column headings of the fitted parameters, in the order of the table.
 
     Returns
@@ -91,12 +96,12 @@ def shown(one: xr.Dataset) -> dict[str, str]:
     """
     names, found = [*map(str, one["parameter"].values), "a_minus_b"], {}
     for short in dict.fromkeys(("a", "b", "b1", "b2", "a_minus_b", *PARAMETERS)):
-        for name in (n for n in names if plain(n) == short):
-            found[name] = _CALLED.get(short, short) + name.removeprefix(short)
+        for name in (n for n in names if strip_window_number(n) == short):
+            found[name] = _LABORATORY_NAMES.get(short, short) + name.removeprefix(short)
     return found
 
 
-def table(dataset: xr.Dataset) -> pd.DataFrame:
+def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
     """Return a table with one row per fit and the column names used in laboratories.
 
     Lengths are in um. The columns ``<name>_std`` contain standard errors. If the status of a row is
@@ -107,26 +112,26 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
     stiffness divided by this normal stress, in 1/um. Parameters that were not free are NaN.
     """
     rows = []
-    for one in cells(dataset):
-        row: dict[str, Any] = dict(place(one))
-        for name, short in shown(one).items():
+    for one in split_fits(dataset):
+        row: dict[str, Any] = dict(record_and_step(one))
+        for name, short in parameter_headings(one).items():
             row[short] = one[name].item()
             row[f"{short}_std"] = one[f"{name}_stderr"].item()
             if f"{name}_windows" in one:
                 row[f"{short}_windows"] = one[f"{name}_windows"].item()
         row |= {"V0": one["velocity_before"].item(), "V1": one["velocity_after"].item()}
         row |= {"law": one["law"].item() if "law" in one.coords else ""}
-        row |= _normal_stresses(one)
+        row |= _normal_stresses_in_mpa(one)
         if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
             row["k"] = one["window_stiffness"].item()
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
         row["R2"], row["criterion"] = one["r_squared"].item(), one["criterion"].item()
-        row["p_value"], row["status"] = one["whiteness"].item(), status(one)
+        row["p_value"], row["status"] = one["whiteness"].item(), status_label(one)
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def _normal_stresses(one: xr.Dataset) -> dict[str, float]:
+def _normal_stresses_in_mpa(one: xr.Dataset) -> dict[str, float]:
     """Return the normal stress before each step in MPa.
 
     If the fit has one step, the key is ``normal_stress``. If the fit has several steps, there is
@@ -138,14 +143,14 @@ def _normal_stresses(one: xr.Dataset) -> dict[str, float]:
     return {n.replace("_before", ""): stress for n, stress in known.items()}
 
 
-def status(one: xr.Dataset) -> str:
+def status_label(one: xr.Dataset) -> str:
     """Label of the status of a fit."""
-    return LABELS[int(one["status"])]
+    return STATUS_LABELS[int(one["status"])]
 
 
-def draw(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
-    """Samples of the parameters of one fit, as `Accessor.draw` says."""
-    one = _only(dataset)
+def sample_parameters(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
+    """Samples of the parameters of one fit, as `Accessor.sample_parameters` says."""
+    one = _single_fit(dataset)
     if not isinstance(n, int) or n < 1:
         raise InvalidValue("n", n, "must be a whole number, 1 or more")
     has = one["covariance"].notnull().any("other_parameter").values  # of other laws: NaN
@@ -153,8 +158,8 @@ def draw(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
     at = np.array([one[name].item() for name in names])
     covariance = one["covariance"].values[np.ix_(has, has)]
     if not (has.any() and np.isfinite(covariance).all()):
-        raise InvalidValue("dataset", status(one), "has no covariance to draw from")
-    logs = np.array([name in LOGARITHMIC for name in names])
+        raise InvalidValue("dataset", status_label(one), "has no covariance to draw from")
+    logs = np.array([name in LOGARITHMIC_PARAMETERS for name in names])
     scales = np.where(logs, at, 1.0)
     rng = np.random.default_rng(seed)
     degrees = one["degrees_of_freedom"].item()
@@ -173,44 +178,42 @@ def draw(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
     about = {
         "title": "Samples of the parameters of a fit",
         "Conventions": "CF-1.11",
-        **provenance.attributes("dataset.rsf.draw"),
+        **provenance.provenance_attributes("dataset.rsf.draw"),
     }
     return with_cf_encoding(xr.Dataset(data, {"draw": ("draw", np.arange(n), number)}, about))
 
 
-def scene(dataset: xr.Dataset) -> Scene:
+def fitted_scene(dataset: xr.Dataset) -> Scene:
     """The scene of one fit, with the parameters that it found and the velocity step that it is of,
     in units of its slip distance and of the velocity before the step.
     """
-    one = _only(dataset)
+    one = _single_fit(dataset)
     plain = json.loads(dataset.attrs["declaration"])
-    first = contents.scene(plain["base"], {})
+    first = contents.build_scene(plain["base"], {})
     if "law" in one.coords:
         first = first.with_(law=str(one["law"].item()))
     distances = (
         float(plain["measure"][f"{n}_guess"]) for n in ("slip_distance", "slip_distance_2")
     )
-    values = parameters_of(first, *distances)
+    values = scene_to_parameters(first, *distances)
     found = {n: one[n].item() for n in map(str, one["parameter"].values)}
     if "window_stiffness" in one:
         values["stiffness"] = one["window_stiffness"].item()
-    values |= {n: value for n, value in of_window(found, 1).items() if n in values}
+    values |= {n: value for n, value in window_values(found, 1).items() if n in values}
     before, after = one["velocity_before"].item(), one["velocity_after"].item()
-    return first.with_(**fields_of(values, before), load_velocity_ratio=after / before)
+    return first.with_(**parameters_to_fields(values, before), load_velocity_ratio=after / before)
 
 
-def laboratory(dataset: xr.Dataset) -> Laboratory:
-    """The rig of one fit, as `Accessor.laboratory` says."""
-    one, slider = _only(dataset), scene(dataset)
+def fitted_rig(dataset: xr.Dataset) -> Rig:
+    """The rig of one fit, as `Accessor.rig` says."""
+    one, slider = _single_fit(dataset), fitted_scene(dataset)
     stress = one["normal_stress_before"].item() if "normal_stress_before" in one else math.nan
     if not stress > 0.0:
-        remedy = (
-            "Read the record with normal_stress=, or make a rsfstudy.Laboratory that states it."
-        )
+        remedy = "Read the record with normal_stress=, or make a rsfstudy.Rig that states it."
         raise InvalidValue("normal_stress", None, "is not in the record", remedy=remedy)
     velocity = one["velocity_before"].item() * 1e-6
     distance = velocity / slider.reference_rate
-    return Laboratory(
+    return Rig(
         normal_stress=stress,
         slip_distance=distance,
         reference_velocity=velocity,
@@ -221,66 +224,77 @@ def laboratory(dataset: xr.Dataset) -> Laboratory:
 # ---- as it is printed and shown -----------------------------------------------------------------
 
 
-def answered(dataset: xr.Dataset) -> bool:
+def all_answered(dataset: xr.Dataset) -> bool:
     """Return True if each fit has verified values and valid standard errors.
 
     The status ``not_identified`` counts as answered.
     """
-    return all(status(one) in _ANSWERS for one in cells(dataset))
+    return all(status_label(one) in _ANSWER_LABELS for one in split_fits(dataset))
 
 
-def told(dataset: xr.Dataset) -> Iterator[Table | str]:
+def fit_summary(dataset: xr.Dataset) -> Iterator[Table | str]:
     """All fits, and what is to be said of each; of several steps one row each in the end."""
     places: dict[str, list[xr.Dataset]] = {}
-    for one in cells(dataset):
-        where = ", ".join(f"{n} {value}" for n, value in place(one).items())
+    for one in split_fits(dataset):
+        where = ", ".join(f"{n} {value}" for n, value in record_and_step(one).items())
         places.setdefault(where, []).append(one)
-    measure: Any = contents.declaration(dataset).measure
+    measure: Any = contents.read_declaration(dataset).measure
     together = ", ".join(f"step {step} of {record}" for record, step in measure.get("together", ()))
     for where, fits in places.items():
         if together:
             yield f"together: {together}; the window is that of the first"
-        for first in range(0, len(fits), _BESIDE):
-            yield _table(where, fits[first : first + _BESIDE])
+        for first in range(0, len(fits), _MAX_FITS_PER_TABLE):
+            yield _parameter_table(where, fits[first : first + _MAX_FITS_PER_TABLE])
         for one in fits:
             yield from _remarks(one)
-        yield from _choice(fits)
+        yield from _law_comparison(fits)
     if len(places) > 1:
-        yield Table([_row(one) for fits in places.values() for one in fits], "Of all:")
+        yield Table([_summary_row(one) for fits in places.values() for one in fits], "Of all:")
 
 
-def _choice(fits: Sequence[xr.Dataset]) -> Iterator[str]:
+def _law_comparison(fits: Sequence[xr.Dataset]) -> Iterator[str]:
     """Which law explains a record best, and whether by enough."""
     known = [(one["criterion"].item(), str(one["law"].item())) for one in fits]
     known = sorted(pair for pair in known if math.isfinite(pair[0]))
     if len(known) > 1:
         (best, law), (next_best, _other) = known[:2]
         by = next_best - best
-        enough = "decides" if by >= _DECIDES else f"does not decide: {_DECIDES:g} would"
+        enough = (
+            "decides"
+            if by >= _DECISIVE_AIC_DIFFERENCE
+            else f"does not decide: {_DECISIVE_AIC_DIFFERENCE:g} would"
+        )
         yield f"{law} explains the record best; its criterion is lower by {by:.1f}, which {enough}"
 
 
-def _row(one: xr.Dataset) -> dict[str, str]:
+def _summary_row(one: xr.Dataset) -> dict[str, str]:
     """Row of a fit in the table of all."""
-    few = {n: with_error(one, name) for name, n in shown(one).items() if n in _IN_SHORT}
-    at = {n: str(value) for n, value in place(one).items()}
-    return {**at, "law": str(one["law"].item()), **few, "status": status(one)}
+    few = {
+        n: format_with_stderr(one, name)
+        for name, n in parameter_headings(one).items()
+        if n in _SUMMARY_PARAMETERS
+    }
+    at = {n: str(value) for n, value in record_and_step(one).items()}
+    return {**at, "law": str(one["law"].item()), **few, "status": status_label(one)}
 
 
-def _table(where: str, fits: Sequence[xr.Dataset]) -> Table:
-    columns = {str(one["law"].item()): _column(one) for one in fits}
+def _parameter_table(where: str, fits: Sequence[xr.Dataset]) -> Table:
+    columns = {str(one["law"].item()): _parameter_column(one) for one in fits}
     headings = next(iter(columns.values()))
     rows = [{"parameter": h, **{law: c[h] for law, c in columns.items()}} for h in headings]
-    windows = (_window(one) for one in fits if np.isfinite(one["rows_fitted"].item()))
+    windows = (_describe_window(one) for one in fits if np.isfinite(one["rows_fitted"].item()))
     return Table(rows, "\n".join(filter(None, (where, next(windows, "")))))
 
 
-def _column(one: xr.Dataset) -> dict[str, str]:
+def _parameter_column(one: xr.Dataset) -> dict[str, str]:
     """The parameters of a fit, how well it explains its rows, and the noise that is left."""
-    found = {n + _units(plain(name)): with_error(one, name) for name, n in shown(one).items()}
+    found = {
+        n + _bracketed_units(strip_window_number(name)): format_with_stderr(one, name)
+        for name, n in parameter_headings(one).items()
+    }
     if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
-        found["k" + _units("stiffness")] = f"{one['window_stiffness'].item():.6g}"
-    stresses = [f"{stress:.6g}" for stress in _normal_stresses(one).values()]
+        found["k" + _bracketed_units("stiffness")] = f"{one['window_stiffness'].item():.6g}"
+    stresses = [f"{stress:.6g}" for stress in _normal_stresses_in_mpa(one).values()]
     if stresses:
         found["normal stress (MPa)"] = ", ".join(stresses)
     quality = dict.fromkeys(("R2", "criterion", "noise", "worth"), "-")
@@ -291,12 +305,12 @@ def _column(one: xr.Dataset) -> dict[str, str]:
             "R2": f"{one['r_squared'].item():.4f}",
             "criterion": f"{one['criterion'].item():.1f}",
             "noise": f"{process}, sd {one['noise_size'].item():.2g}",
-            "worth": counted(round(one["effective_samples"].item()), "independent row"),
+            "worth": pluralize(round(one["effective_samples"].item()), "independent row"),
         }
-    return found | quality | {"status": status(one)}
+    return found | quality | {"status": status_label(one)}
 
 
-def _units(name: str) -> str:
+def _bracketed_units(name: str) -> str:
     """Units of a parameter, in brackets behind its name."""
     units = PARAMETERS[name].units if name in PARAMETERS else "1"
     if units.startswith("um-"):
@@ -304,7 +318,7 @@ def _units(name: str) -> str:
     return "" if units == "1" else f" ({units})"
 
 
-def _window(one: xr.Dataset) -> str:
+def _describe_window(one: xr.Dataset) -> str:
     """The step and the window of a fit."""
     speeds = (one[n].item() for n in ("velocity_before", "velocity_after"))
     ends = (one[n].item() for n in ("window_begins", "window_ends"))
@@ -315,21 +329,21 @@ def _window(one: xr.Dataset) -> str:
     )
 
 
-def with_error(one: xr.Dataset, name: str) -> str:
+def format_with_stderr(one: xr.Dataset, name: str) -> str:
     """Format a value with its standard error, rounded to two digits of the error.
 
     An asterisk marks a standard error that is not valid.
     """
-    text = _rounded(one[name].item(), one[f"{name}_stderr"].item())
-    is_marked = " +- " in text and status(one) == Status.ERRORS_NOT_VALID.label
-    return text + _MARK * is_marked
+    text = _format_rounded(one[name].item(), one[f"{name}_stderr"].item())
+    is_marked = " +- " in text and status_label(one) == Status.ERRORS_NOT_VALID.label
+    return text + _INVALID_ERROR_MARK * is_marked
 
 
-def _rounded(value: float, error: float) -> str:
+def _format_rounded(value: float, error: float) -> str:
     """Format a value with its standard error, rounded to two digits of the error."""
     if not math.isfinite(value):
         return "-"
-    if error > _BOUNDLESS * abs(value) > 0.0:
+    if error > _MAX_RELATIVE_ERROR * abs(value) > 0.0:
         return "not told"
     if not (math.isfinite(error) and error > 0.0):
         return f"{value:.6g} +- {error:g}"
@@ -350,11 +364,11 @@ def _remarks(one: xr.Dataset) -> Iterator[str]:
     posterior, and the result of the autocorrelation test.
     """
     law, message = one["law"].item(), str(one["message"].item())
-    if status(one) == Status.ERRORS_NOT_VALID.label:
-        yield f"{law}: standard errors marked by {_MARK} are not valid: {message}"
+    if status_label(one) == Status.ERRORS_NOT_VALID.label:
+        yield f"{law}: standard errors marked by {_INVALID_ERROR_MARK} are not valid: {message}"
     elif message:
-        yield f"{law}: {status(one).replace('_', ' ')}: {message}"
-    short = shown(one)
+        yield f"{law}: {status_label(one).replace('_', ' ')}: {message}"
+    short = parameter_headings(one)
     spreads = ((short[n], one[f"{n}_windows"].item()) for n in short if f"{n}_windows" in one)
     if each := ", ".join(f"{n} {value:.2g}" for n, value in spreads if not math.isnan(value)):
         yield f"{law}: among windows parameters differ by {each}"
@@ -368,6 +382,10 @@ def _remarks(one: xr.Dataset) -> Iterator[str]:
         yield f"{law}: 95 % of the posterior: {each} (autocorrelation time {time})"
     p_value = one["whiteness"].item()
     if math.isfinite(p_value):
-        verdict = "are still autocorrelated" if p_value < SIGNIFICANT else "show no autocorrelation"
-        last = min(LAGS + int(one["noise_order"]), int(one["rows_fitted"]) // 4)
+        verdict = (
+            "are still autocorrelated"
+            if p_value < SIGNIFICANCE_LEVEL
+            else "show no autocorrelation"
+        )
+        last = min(LAG_COUNT + int(one["noise_order"]), int(one["rows_fitted"]) // 4)
         yield f"{law}: whitened residuals {verdict} up to lag {last} (p = {p_value:.2g})"

@@ -12,10 +12,10 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.analysis.fitting import filters
-from rsfstudy.analysis.fitting.model import check_free, of_law
+from rsfstudy.analysis.fitting.model import check_free_parameters, parameters_of_law
 from rsfstudy.analysis.fitting.record import Record
-from rsfstudy.analysis.fitting.steps import Step, noise_variance
-from rsfstudy.analysis.fitting.window import Window
+from rsfstudy.analysis.fitting.steps import LoadingStep, noise_variance
+from rsfstudy.analysis.fitting.window import FitWindow
 from rsfstudy.api import runs
 from rsfstudy.axes.axis import Axis
 from rsfstudy.declare.study import Study
@@ -26,35 +26,46 @@ from rsfstudy.measures.fit import Fit
 from rsfstudy.motion.accuracy import DEFAULT_RTOL, Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
 from rsfstudy.reduce import Range
-from rsfstudy.rig.laboratory import Laboratory
-from rsfstudy.rig.quantities import is_friction
-from rsfstudy.rig.units import in_si
+from rsfstudy.rig.laboratory import Rig
+from rsfstudy.rig.quantities import is_friction_stiffness
+from rsfstudy.rig.units import convert_to_si
 from rsfstudy.slider.scene import Scene
 
 #: What is looked for unless something else is asked for, of those that any of the laws has.
-FREE = ("a", "b", "b1", "b2", "slip_distance", "slip_distance_2", "mu_star", "trend1")
+DEFAULT_FREE_PARAMETERS = (
+    "a",
+    "b",
+    "b1",
+    "b2",
+    "slip_distance",
+    "slip_distance_2",
+    "mu_star",
+    "trend1",
+)
 #: Those of which a law has its own, and what is said of them.
-_EFFECTS = ("b", "b1", "b2")
-_STATES = "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
+_EVOLUTION_EFFECTS = ("b", "b1", "b2")
+_STATE_PARAMETERS_REMEDY = (
+    "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
+)
 #: Slip distance to begin with, as part of the load point displacement that is fitted after a step.
-_GUESS = 0.05
+_SLIP_DISTANCE_GUESS_SHARE = 0.05
 #: Largest number of windows.
-_MOST_WINDOWS = 1000
+_MAX_WINDOWS = 1000
 #: Jumps of displacement back, relative to its noise and to its changes nearby, and to its extent,
 #: that are a new zero; and rows from which noise is known.
-_JUMPS, _LEAST_JUMP, _FEW_ROWS = 10.0, 0.01, 20
+_RESET_JUMP_FACTOR, _MIN_RESET_SHARE, _MIN_ROWS_FOR_NOISE = 10.0, 0.01, 20
 #: Shortest of several windows, as a part of what follows a step.
-_SHORTEST = 0.5
+_SHORTEST_WINDOW_SHARE = 0.5
 #: First guesses of a scene: those of a record take their place.
-_SCENE = {"a": 0.01, "mu_star": 0.6, "normal_stress": "constant"}
-_ONE = {"b_over_a": 1.2}
-_TWO = {"b1_over_a": 0.9, "b2_over_a": 0.3, "length_ratio": 10.0}
+_INITIAL_SCENE = {"a": 0.01, "mu_star": 0.6, "normal_stress": "constant"}
+_ONE_STATE_EFFECTS = {"b_over_a": 1.2}
+_TWO_STATE_EFFECTS = {"b1_over_a": 0.9, "b2_over_a": 0.3, "length_ratio": 10.0}
 
 
 @error_boundary
 def fit(
     record: Record | Sequence[Record],
-    rig: Laboratory | None = None,
+    rig: Rig | None = None,
     *,
     laws: Sequence[str] = ("slip", "slowness"),
     free: Sequence[str] = (),
@@ -83,7 +94,7 @@ def fit(
     ----------
     record : Record or sequence of Record
         As `rsfstudy.read_record` gives it.
-    rig : Laboratory, optional
+    rig : Rig, optional
         Its stiffness is that of the machine, its slip distance the first guess.
     laws : sequence of str
         State evolution laws, a fit by each.
@@ -150,7 +161,7 @@ def fit(
         the window. Lengths are in um, rates in um/s. ``status`` is ``not_identified`` if the record
         does not constrain a parameter, and ``errors_not_valid`` if the values stand but their
         standard errors do not; ``message`` gives the reason. ``dataset.rsf.table()``,
-        ``.rsf.plot()``, ``.rsf.scene``, ``.rsf.laboratory`` and ``.rsf.draw()`` say more.
+        ``.rsf.plot()``, ``.rsf.scene``, ``.rsf.rig`` and ``.rsf.sample_parameters()`` say more.
 
     Raises
     ------
@@ -161,7 +172,7 @@ def fit(
 
     Warns
     -----
-    Incomplete
+    IncompleteWarning
         Where a fit failed.
 
     Examples
@@ -178,21 +189,21 @@ def fit(
         if not isinstance(one, Record):
             remedy = "Make one by rsfstudy.read_record."
             raise InvalidValue("record", one, "is no record", remedy=remedy)
-    records = tuple(_with_normal_stress(one, rig) for one in records)
-    numbers = _numbers(records, steps)
-    guess = _guess(records[0], rig, numbers[0], slip_distance)
+    records = tuple(_with_rig_normal_stress(one, rig) for one in records)
+    numbers = _step_numbers(records, steps)
+    guess = _guess_slip_distance(records[0], rig, numbers[0], slip_distance)
     if "alpha" in scene:
         scene = {"normal_stress": "imposed", **scene}
     if "alpha" in free:
-        _check_stressed(records, loading, numbers)
+        _check_normal_stress_changes(records, loading, numbers)
         scene = {"normal_stress": "imposed", **scene}
-    ratio, machine = _stiffness(rig, stiffness, free, records)
+    ratio, machine = _initial_stiffness(rig, stiffness, free, records)
     if machine:
         _check_compressive(records, numbers)
-        ratio = machine / Window(records[0], numbers[0]).normal_stress
-    first = _first_scene(laws, scene, ratio * guess)
-    sought = _of_laws(free, laws, first)
-    there = tuple((one.name, n) for one in records for n in numbers if n <= len(one.found))
+        ratio = machine / FitWindow(records[0], numbers[0]).normal_stress
+    first = _initial_scene(laws, scene, ratio * guess)
+    sought = _free_parameters(free, laws, first)
+    there = tuple((one.name, n) for one in records for n in numbers if n <= len(one.loading_steps))
     measure = Fit(
         records=records,
         free=sought,
@@ -200,8 +211,8 @@ def fit(
         slip_distance_2_guess=10.0 * guess,
         step=numbers[0],
         together=there if together else (),
-        before=_micrometres("before", before),
-        after=_micrometres("after", after),
+        before=_to_micrometres("before", before),
+        after=_to_micrometres("after", after),
         noise=noise,
         loading=loading,
         filter=_describe_filter(averaging, low_pass),
@@ -214,11 +225,11 @@ def fit(
     if len(numbers) > 1 and not together:
         axes.append(Axis("step", list(numbers)))
     reductions = []
-    if not isinstance(windows, int) or not 1 <= windows <= _MOST_WINDOWS:
-        rule = f"must be a whole number from 1 to {_MOST_WINDOWS:,}"
+    if not isinstance(windows, int) or not 1 <= windows <= _MAX_WINDOWS:
+        rule = f"must be a whole number from 1 to {_MAX_WINDOWS:,}"
         raise InvalidValue("windows", windows, rule)
     if windows > 1:
-        axes.append(Axis("part", np.linspace(1.0, _SHORTEST, windows).tolist()))
+        axes.append(Axis("part", np.linspace(1.0, _SHORTEST_WINDOW_SHARE, windows).tolist()))
         reductions = [Range(f"{n}_windows", n, over="part") for n in measure.parameters]
     chosen: Any = engine
     if engine is None:
@@ -238,14 +249,14 @@ def fit(
     )
 
 
-def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]:
+def _step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]:
     """Numbers of the steps to fit, from 1: those stated, or all.
 
     Steps that lie outside of their record are refused, and a load point that does not move forward.
     """
     for record in records:
         _check_displacement(record)
-    count = max(len(one.found) for one in records)
+    count = max(len(one.loading_steps) for one in records)
     if not count:
         remedy = "State them: record.with_steps([(begins, ends, before, after)])."
         rule = "has no step of load point velocity or normal stress"
@@ -256,7 +267,7 @@ def _numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]
             rule = f"is not the number of a step: the record has {count}"
             raise InvalidValue("steps", number, rule)
         for record in records:
-            for step in record.found[number - 1 : number]:
+            for step in record.loading_steps[number - 1 : number]:
                 _check_step(record, number, step)
     return numbers
 
@@ -269,10 +280,12 @@ def _check_displacement(record: Record) -> None:
     time, moved = record.time, record.columns["displacement"]
     jumps = np.diff(moved)
     row = int(np.argmin(jumps))
-    noise = math.sqrt(noise_variance(time, moved)) if len(time) > _FEW_ROWS else 0.0
+    noise = math.sqrt(noise_variance(time, moved)) if len(time) > _MIN_ROWS_FOR_NOISE else 0.0
     beside = np.abs(np.delete(jumps[max(row - 5, 0) : row + 6], min(row, 5))).max(initial=0.0)
-    back = -float(jumps[row]) > max(_JUMPS * beside, _JUMPS * noise, _LEAST_JUMP * np.ptp(moved))
-    if record.stated is None and back:
+    back = -float(jumps[row]) > max(
+        _RESET_JUMP_FACTOR * beside, _RESET_JUMP_FACTOR * noise, _MIN_RESET_SHARE * np.ptp(moved)
+    )
+    if record.specified_steps is None and back:
         rule = f"falls back between two rows at {time[row + 1]:g} s in {record.name}, as a load "
         rule += "point does that is set to zero again"
         remedy = f"Fit its parts, as in record.window({time[0]:g}, {time[row]:g}), or add the "
@@ -280,24 +293,31 @@ def _check_displacement(record: Record) -> None:
         raise InvalidValue("displacement", f"{jumps[row]:.4g} um", rule, remedy=remedy)
 
 
-def _check_step(record: Record, number: int, step: Step) -> None:
+def _check_step(record: Record, number: int, step: LoadingStep) -> None:
     time, moved = record.time, record.columns["displacement"]
-    if not time[0] < step.begins <= step.ends < time[-1]:
+    if not time[0] < step.start <= step.end < time[-1]:
         rule = f"is stated outside of {record.name}, {time[0]:g} to {time[-1]:g} s"
         remedy = "State steps in s, by the clock of the record: record.with_steps([...])."
         raise InvalidValue(f"step {number}", tuple(step), rule, remedy=remedy)
-    if min(step.before, step.after) < 0.0 or not moved[-1] > np.interp(step.ends, time, moved):
-        told = f"{step.before:.4g} um/s before step {number}, {step.after:.4g} um/s after it"
+    if min(step.velocity_before, step.velocity_after) < 0.0 or not moved[-1] > np.interp(
+        step.end, time, moved
+    ):
+        told = (
+            f"{step.velocity_before:.4g} um/s before step {number}, "
+            f"{step.velocity_after:.4g} um/s after it"
+        )
         rule = "must grow: a load point moves forward"
         remedy = "Reverse its sign, or say which column is which: --columns (columns=)."
         raise InvalidValue("displacement", told, rule, remedy=remedy)
 
 
-def _check_stressed(records: Sequence[Record], loading: str, numbers: Sequence[int]) -> None:
+def _check_normal_stress_changes(
+    records: Sequence[Record], loading: str, numbers: Sequence[int]
+) -> None:
     """Raise ``InvalidValue`` if alpha is fitted but normal stress is constant."""
     for record in records:
         stress = record.columns.get("normal_stress", np.zeros(1))
-        steps = [record.found[n - 1] for n in numbers if n <= len(record.found)]
+        steps = [record.loading_steps[n - 1] for n in numbers if n <= len(record.loading_steps)]
         by_steps = loading == "steps" and any(step.stress_ratio != 1.0 for step in steps)
         if not by_steps and not (loading == "recorded" and np.ptp(stress) > 0.0):
             rule = "needs a normal stress that changes: "
@@ -307,19 +327,19 @@ def _check_stressed(records: Sequence[Record], loading: str, numbers: Sequence[i
             raise InvalidValue("free", "alpha", rule, remedy=remedy)
 
 
-def _guess(record: Record, rig: Laboratory | None, number: int, stated: Any) -> float:
+def _guess_slip_distance(record: Record, rig: Rig | None, number: int, stated: Any) -> float:
     """Slip distance to begin with, in um."""
     if stated is not None:
-        return _micrometres("slip_distance", stated)
+        return _to_micrometres("slip_distance", stated)
     if rig is not None:
         return float(rig.slip_distance * 1e6)
-    begins = record.found[number - 1].begins
+    begins = record.loading_steps[number - 1].start
     moved = record.columns["displacement"]
-    return float(_GUESS * (moved[-1] - np.interp(begins, record.time, moved)))
+    return float(_SLIP_DISTANCE_GUESS_SHARE * (moved[-1] - np.interp(begins, record.time, moved)))
 
 
-def _stiffness(
-    rig: Laboratory | None, stated: Any, free: Sequence[str], records: Sequence[Record]
+def _initial_stiffness(
+    rig: Rig | None, stated: Any, free: Sequence[str], records: Sequence[Record]
 ) -> tuple[float, float]:
     """Return the initial stiffness of the fit, in the units that the user chose.
 
@@ -339,11 +359,11 @@ def _stiffness(
         remedy = "Give --stiffness (stiffness=), as in '1.6e-3 /um', "
         remedy += "or look for it: --free (free=)."
         raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
-    over_stress = isinstance(stated, Real) or is_friction(stated)
+    over_stress = isinstance(stated, Real) or is_friction_stiffness(stated)
     if isinstance(stated, Real):
         found = float(stated)
     else:
-        found = in_si("stiffness", stated, "1/m" if over_stress else "Pa/m") * 1e-6
+        found = convert_to_si("stiffness", stated, "1/m" if over_stress else "Pa/m") * 1e-6
     if not found > 0.0:
         raise InvalidValue("stiffness", stated, "must be positive")
     if over_stress:
@@ -360,9 +380,9 @@ def _check_compressive(records: Sequence[Record], numbers: Sequence[int]) -> Non
     """Raise ``InvalidValue`` if the normal stress before a step is not positive."""
     for record in records:
         for number in numbers:
-            if number > len(record.found):
+            if number > len(record.loading_steps):
                 continue
-            stress = Window(record, number).normal_stress
+            stress = FitWindow(record, number).normal_stress
             if not stress > 0.0:
                 rule = f"must be positive before step {number} of {record.name}, in Pa"
                 remedy = "Compression is positive: reverse the sign, as in columns={"
@@ -370,7 +390,7 @@ def _check_compressive(records: Sequence[Record], numbers: Sequence[int]) -> Non
                 raise InvalidValue("normal_stress", stress, rule, remedy=remedy)
 
 
-def _with_normal_stress(record: Record, rig: Laboratory | None) -> Record:
+def _with_rig_normal_stress(record: Record, rig: Rig | None) -> Record:
     """Return the record with the normal stress of the rig if it has none of its own."""
     if rig is None or "normal_stress" in record.columns:
         return record
@@ -378,26 +398,28 @@ def _with_normal_stress(record: Record, rig: Laboratory | None) -> Record:
     return replace(record, columns={**record.columns, "normal_stress": stress})
 
 
-def _first_scene(laws: Sequence[str], stated: Mapping[str, Any], stiffness: float) -> Scene:
-    effects = _TWO if str(laws[0]).startswith("two_") else _ONE
-    return Scene(**{**_SCENE, **effects, "law": laws[0], "stiffness": stiffness, **stated})
+def _initial_scene(laws: Sequence[str], stated: Mapping[str, Any], stiffness: float) -> Scene:
+    effects = _TWO_STATE_EFFECTS if str(laws[0]).startswith("two_") else _ONE_STATE_EFFECTS
+    return Scene(**{**_INITIAL_SCENE, **effects, "law": laws[0], "stiffness": stiffness, **stated})
 
 
-def _of_laws(stated: Sequence[str], laws: Sequence[str], scene: Scene) -> tuple[str, ...]:
+def _free_parameters(stated: Sequence[str], laws: Sequence[str], scene: Scene) -> tuple[str, ...]:
     """Parameters to look for: those stated, each of which some law has, or those of all laws."""
-    free = tuple(stated) or FREE
-    check_free(free)
-    own = {law: of_law(scene.with_(law=law), free) for law in laws}
+    free = tuple(stated) or DEFAULT_FREE_PARAMETERS
+    check_free_parameters(free)
+    own = {law: parameters_of_law(scene.with_(law=law), free) for law in laws}
     shared = tuple(name for name in free if any(name in names for names in own.values()))
     for name in stated:
         if name not in shared:
             rule = f"is no parameter with {' or '.join(f'law={law!r}' for law in laws)}"
-            remedy = _STATES if name in (*_EFFECTS, "slip_distance_2") else ""
+            remedy = (
+                _STATE_PARAMETERS_REMEDY if name in (*_EVOLUTION_EFFECTS, "slip_distance_2") else ""
+            )
             raise InvalidValue("free", name, rule, remedy=remedy)
     for law, names in own.items():
-        if not names or ({*_EFFECTS} & {*free} and not {*_EFFECTS} & {*names}):
+        if not names or ({*_EVOLUTION_EFFECTS} & {*free} and not {*_EVOLUTION_EFFECTS} & {*names}):
             rule = f"names no {'evolution effect' if names else 'parameter'} of law={law!r}"
-            raise InvalidValue("free", free, rule, remedy=_STATES)
+            raise InvalidValue("free", free, rule, remedy=_STATE_PARAMETERS_REMEDY)
     return shared
 
 
@@ -414,18 +436,18 @@ def _describe_filter(averaging: Any, low_pass: str) -> str:
         kind, size = filters.MEAN, averaging
         if isinstance(size, str) and size.startswith("trailing "):
             kind, size = filters.TRAILING_MEAN, size.removeprefix("trailing ")
-        seconds = float(size) if isinstance(size, Real) else in_si("averaging", size, "s")
+        seconds = float(size) if isinstance(size, Real) else convert_to_si("averaging", size, "s")
     elif low_pass:
         kind, _, size = str(low_pass).partition(" ")
-        if kind not in filters.LOW_PASS:
+        if kind not in filters.LOW_PASS_ORDERS:
             remedy = "Write it as in 'butterworth_2 2 Hz'."
-            choices = [*filters.LOW_PASS]
+            choices = [*filters.LOW_PASS_ORDERS]
             raise InvalidValue("low_pass", low_pass, "is unknown", choices=choices, remedy=remedy)
-        seconds = in_si("low_pass", size, "1/s")
+        seconds = convert_to_si("low_pass", size, "1/s")
     else:
         return ""
     return f"{kind} {seconds!r}"
 
 
-def _micrometres(name: str, value: Any) -> float:
-    return float(value) if isinstance(value, int | float) else in_si(name, value, "m") * 1e6
+def _to_micrometres(name: str, value: Any) -> float:
+    return float(value) if isinstance(value, int | float) else convert_to_si(name, value, "m") * 1e6

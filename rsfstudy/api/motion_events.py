@@ -11,26 +11,27 @@ from scipy.interpolate import KroghInterpolator
 from scipy.ndimage import find_objects, label
 from scipy.optimize import brentq
 
-from rsfstudy.api.events import Found, catalogue
+from rsfstudy.analysis.drops import EventNumbers
+from rsfstudy.api.events import build_catalogue
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.scales import Scale, slip_rate_of
+from rsfstudy.rig.scales import Scale, slip_rate_from_log
 from rsfstudy.slider.scene import Scene
 
 #: Slip rate over that of the load point from which on a motion is an event. Steady sliding is 1,
 #: and a step of the load point that a stable slider follows overshoots by less.
-_OVER_LOADING = 10.0
+_EVENT_RATE_FACTOR = 10.0
 #: Rows of a motion between which is read: by the polynomial through six, of which the one through
 #: four tells the error. There are six rows in each step of a motion.
-_ROWS, _FEWER = 6, 4
+_INTERPOLATION_ROWS, _CHECK_ROWS = 6, 4
 #: Rows that are so few floating-point numbers apart are two sides of a jump.
-_JUMP = 16
+_MAX_JUMP_SPACING = 16
 #: Decades of slip rate between rows, beyond which nothing is read between them. In the steps
 #: of motions that are accurate to 1e-4 rows are up to 0.37 apart, but where a rupture begins or
 #: ends at once.
-_COARSE = 0.5
+_MAX_LOG_RATE_STEP = 0.5
 
 
-def of_motion(
+def find_motion_events(
     motion: xr.Dataset, slip_rate: float | None, scene: Callable[[], Scene]
 ) -> xr.Dataset:
     """The events of a motion, as `Accessor.events` says.
@@ -53,32 +54,32 @@ def of_motion(
     times, *rest = (np.asarray(motion[name], dtype=float) for name in names)
     if slip_rate is None:
         loads = [segment.load_velocity for segment in scene().parts.loading.segments]
-        slip_rate = _OVER_LOADING * max([1.0, *loads])
+        slip_rate = _EVENT_RATE_FACTOR * max([1.0, *loads])
     if not 0.0 < slip_rate < math.inf:
         raise InvalidValue("slip_rate", slip_rate, "must be positive and finite, over V_*")
-    rows = _Rows(times, np.column_stack(rest), math.log10(slip_rate))
-    found = [rows.event(*ends) for ends in rows.spans()]
+    rows = _MotionRows(times, np.column_stack(rest), math.log10(slip_rate))
+    found = [rows.measure_event(*ends) for ends in rows.event_spans()]
     about = {name: motion[name].attrs for name in names}
-    told = catalogue(found, about).assign_attrs(slip_rate_threshold=slip_rate)
+    told = build_catalogue(found, about).assign_attrs(slip_rate_threshold=slip_rate)
     if "slip_rate" in motion and motion.sizes["time"]:  # in units
         rate = motion["slip_rate"]
         per = Scale(float(rate[0]) / 10.0 ** float(motion["log10_slip_rate"][0]), rate.units)
-        told = told.assign(slip_rate_of(told, "peak_log10_slip_rate", per))
+        told = told.assign(slip_rate_from_log(told, "peak_log10_slip_rate", per))
     return told
 
 
-class _Rows:
+class _MotionRows:
     """Rows of a motion, and what lies between them."""
 
     def __init__(self, times: np.ndarray, values: np.ndarray, level: float) -> None:
         self._times, self._values, self._level = times, values, level
 
-    def spans(self) -> list[tuple[int, int]]:
+    def event_spans(self) -> list[tuple[int, int]]:
         """First and last row above the level, of each event."""
         above = label(self._values[:, 0] > self._level)[0]
         return [(part.start, part.stop - 1) for (part,) in find_objects(above)]
 
-    def event(self, first: int, last: int) -> Found:
+    def measure_event(self, first: int, last: int) -> EventNumbers:
         """The numbers of an event, each with its error, and which part of it is missing."""
         end, stress = len(self._times) - 1, self._values[:, 2]
         peak = first + int(np.argmax(self._values[first : last + 1, 0]))
@@ -89,11 +90,13 @@ class _Rows:
             lowest += 1
         top = highest + int(np.argmax(stress[highest : peak + 1]))
         bottom = peak + int(np.argmin(stress[peak : lowest + 1]))
-        (begin, slip), begun = self._crossing(first - 1) if first else self._end(0)
-        (finish, slipped), finished = self._crossing(last) if last < end else self._end(end)
-        (rate, _, at_peak), (rate_error, _, peak_error) = self._extreme(peak, 0, 1.0)
-        (*_, before), (*_, before_error) = self._extreme(top, 2, 1.0)
-        (*_, after), (*_, after_error) = self._extreme(bottom, 2, -1.0)
+        (begin, slip), begun = self._level_crossing(first - 1) if first else self._end_values(0)
+        (finish, slipped), finished = (
+            self._level_crossing(last) if last < end else self._end_values(end)
+        )
+        (rate, _, at_peak), (rate_error, _, peak_error) = self._find_extreme(peak, 0, 1.0)
+        (*_, before), (*_, before_error) = self._find_extreme(top, 2, 1.0)
+        (*_, after), (*_, after_error) = self._find_extreme(bottom, 2, -1.0)
         cut = (first == 0 or highest == 0) + 2 * (last == end or lowest == end)
         return {
             "time": (begin, begun[0]),
@@ -106,13 +109,15 @@ class _Rows:
             "dynamic_stress_drop": (before - at_peak, before_error + peak_error),
         }, cut
 
-    def _through(self, row: int, number: int) -> KroghInterpolator:
+    def _interpolate(self, row: int, number: int) -> KroghInterpolator:
         """The polynomial through as many rows about that between a row and the next, in time since
         that row, but for those beyond a jump.
         """
         first = max(row + 1 - number // 2, 0)
         last = min(row + number // 2, len(self._times) - 1)
-        apart = np.diff(self._times[first : last + 1]) > _JUMP * np.spacing(self._times[row])
+        apart = np.diff(self._times[first : last + 1]) > _MAX_JUMP_SPACING * np.spacing(
+            self._times[row]
+        )
         apart[row - first] = True
         smooth = label(apart)[0]
         kept = np.flatnonzero(smooth == smooth[row - first])
@@ -123,19 +128,19 @@ class _Rows:
         """True where slip rate changes too much between rows to be read between them, as in a
         motion that is told at given times only.
         """
-        return bool(np.abs(np.diff(self._values[rows, 0])).max() > _COARSE)
+        return bool(np.abs(np.diff(self._values[rows, 0])).max() > _MAX_LOG_RATE_STEP)
 
     @staticmethod
     def _slope(through: KroghInterpolator, at: float, column: int) -> float:
         return float(through.derivative(at)[column])
 
-    def _crossing(self, row: int) -> tuple[np.ndarray, np.ndarray]:
+    def _level_crossing(self, row: int) -> tuple[np.ndarray, np.ndarray]:
         """Time and slip where slip rate passes the level between a row and the next, and their
         errors.
         """
         found = []
-        for number in (_ROWS, _FEWER):
-            through = self._through(row, number)
+        for number in (_INTERPOLATION_ROWS, _CHECK_ROWS):
+            through = self._interpolate(row, number)
             span = self._times[row + 1] - self._times[row]
             late = brentq(lambda t, p=through: p(t)[0] - self._level, 0.0, span)
             found.append([self._times[row] + late, through(late)[1]])
@@ -145,23 +150,23 @@ class _Rows:
         error = np.abs(many - fewer) + 2.0 * np.spacing(np.abs(many))
         return many, error + self._is_coarse(sides) * np.array(left)
 
-    def _end(self, row: int) -> tuple[np.ndarray, np.ndarray]:
+    def _end_values(self, row: int) -> tuple[np.ndarray, np.ndarray]:
         """Time and slip at the first or the last row, without errors."""
         return np.array([self._times[row], self._values[row, 1]]), np.zeros(2)
 
-    def _extreme(self, row: int, column: int, sign: float) -> tuple[np.ndarray, np.ndarray]:
+    def _find_extreme(self, row: int, column: int, sign: float) -> tuple[np.ndarray, np.ndarray]:
         """The values where that of a column is largest about a row (smallest, where `sign` is
         negative), and their errors.
         """
         sides = slice(max(row - 1, 0), row + 2)
         times, found = self._times[sides], []
-        for number in (_ROWS, _FEWER):
+        for number in (_INTERPOLATION_ROWS, _CHECK_ROWS):
             best = self._values[row]
             for begin in range(sides.start, sides.start + len(times) - 1):
                 span = self._times[begin + 1] - self._times[begin]
-                if span <= _JUMP * np.spacing(times[-1]):
+                if span <= _MAX_JUMP_SPACING * np.spacing(times[-1]):
                     continue
-                through = self._through(begin, number)
+                through = self._interpolate(begin, number)
                 if self._slope(through, 0.0, column) * self._slope(through, span, column) < 0.0:
                     at = brentq(lambda t, p=through: self._slope(p, t, column), 0.0, span)
                     best = max(best, through(at), key=lambda values: sign * values[column])

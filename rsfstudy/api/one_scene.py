@@ -10,21 +10,22 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.api.trajectory import attributes_of
+from rsfstudy.api.trajectory import motion_variable_attributes
 from rsfstudy.compute import provenance
 from rsfstudy.error_boundary import error_boundary
-from rsfstudy.errors import NoAnswer, RsfStudyWarning
+from rsfstudy.errors import NoResultWarning, RsfStudyWarning
 from rsfstudy.measures import Measure
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
-from rsfstudy.motion.engines import SCIPY, check_engine
+from rsfstudy.motion.engine_factory import check_engine
+from rsfstudy.motion.engines import SCIPY
 from rsfstudy.netcdf import with_cf_encoding
-from rsfstudy.rig.scales import scaled, scales_of
-from rsfstudy.rig.units import in_si
+from rsfstudy.rig.scales import apply_scales, read_scales
+from rsfstudy.rig.units import convert_to_si
 from rsfstudy.slider.scene import Scene, check_scene
 from rsfstudy.status import Status
-from rsfstudy.vocabulary import quantity
+from rsfstudy.vocabulary import find_quantity
 
 
 @error_boundary
@@ -66,13 +67,13 @@ def critical_step(
 
     Warns
     -----
-    NoAnswer
+    NoResultWarning
         Where there is no critical step, with the status and the message; its numbers are NaN.
     UserWarning
         Where the instability norm is hardly faster than the load point, as on rigs whose period is
         short: ``instability_slip_rate`` tells how fast it is.
     """
-    return _measured(
+    return _measure_scene(
         CriticalStep(of=of, direction=direction), scene, Accuracy(rtol, budget, engine=engine)
     )
 
@@ -110,10 +111,10 @@ def limit_cycle(
 
     Warns
     -----
-    NoAnswer
+    NoResultWarning
         Where there is no cycle, with the status and the message; its numbers are NaN.
     """
-    return _measured(LimitCycle(events=events), scene, Accuracy(rtol, budget, engine=engine))
+    return _measure_scene(LimitCycle(events=events), scene, Accuracy(rtol, budget, engine=engine))
 
 
 @error_boundary
@@ -158,14 +159,14 @@ def to_si(
     units = {"normal_stress": "Pa", "slip_distance": "m", "reference_rate": "1/s"}
     given = (normal_stress, slip_distance, reference_rate)
     stated = {
-        name: in_si(name, value, units[name])
+        name: convert_to_si(name, value, units[name])
         for name, value in zip(units, given, strict=True)
         if value is not None
     }
-    return scaled(dataset, scales_of(dataset, **stated))
+    return apply_scales(dataset, read_scales(dataset, **stated))
 
 
-def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
+def _measure_scene(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
     """A measure's named numbers as a small dataset that bears the names of the lattice; those that
     are None are missing.
     """
@@ -175,7 +176,7 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
     if outcome.status is not Status.OK:
         why = outcome.message or outcome.status.meaning
         text = f"{measure.name} has no number: {outcome.status.label} ({why})"
-        warnings.warn(text, NoAnswer, stacklevel=4)
+        warnings.warn(text, NoResultWarning, stacklevel=4)
     elif outcome.message:
         warnings.warn(outcome.message, RsfStudyWarning, stacklevel=4)
     own, inner = {about.name: about for about in measure.quantities}, measure.inner_coordinates
@@ -184,11 +185,15 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         values = outcome.values.get(name)
         if values is None:
             values = np.full([len(inner[dim]) for dim in dims], np.nan)
-        variables[name] = dims, values, attributes_of(quantity(name, own), scene)
+        variables[name] = dims, values, motion_variable_attributes(find_quantity(name, own), scene)
     work = "rhs_evaluations"
-    variables[work] = (), outcome.rhs_evaluations, quantity(work).attributes
-    rate = (), scene.reference_rate, quantity("reference_rate").attributes
-    norm = (), math.exp(scene.log_norm_rate), quantity("instability_slip_rate").attributes
+    variables[work] = (), outcome.rhs_evaluations, find_quantity(work).attributes
+    rate = (), scene.reference_rate, find_quantity("reference_rate").attributes
+    norm = (
+        (),
+        math.exp(scene.log_instability_rate),
+        find_quantity("instability_slip_rate").attributes,
+    )
     what = measure.name.replace("_", " ").capitalize()
     about = {
         "title": f"{what} of a spring-slider, {scene.law} law",
@@ -198,10 +203,13 @@ def _measured(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
         "engine": accuracy.engine,
         "status": outcome.status.label,
         "message": outcome.message,
-        **provenance.attributes(f"rsfstudy.{measure.name}"),
+        **provenance.provenance_attributes(f"rsfstudy.{measure.name}"),
     }
     coordinates: dict[str, Any] = {
-        **{name: (name, values, quantity(name, own).attributes) for name, values in inner.items()},
+        **{
+            name: (name, values, find_quantity(name, own).attributes)
+            for name, values in inner.items()
+        },
         "reference_rate": rate,
         "instability_slip_rate": norm,
     }

@@ -11,22 +11,23 @@ from dataclasses import replace
 from rich import progress as bars
 from rich.console import Console
 
-from rsfstudy.compute.runner import Progress
-from rsfstudy.motion.engines import compiled_engine, compiling
+from rsfstudy.compute.runner import ProgressCallback
+from rsfstudy.motion.engine_factory import compiled_engine
+from rsfstudy.motion.engines import compilation_log
 from rsfstudy.slider.scene import Scene
 
 #: Most lines of a whole run, where there is no bar, and s between two of them.
-_LINES, _BETWEEN = 10, 10.0
+_MAX_LINES, _MIN_LINE_INTERVAL = 10, 10.0
 
 
 @contextlib.contextmanager
-def shown(name: str, show: bool) -> Iterator[Progress]:
+def show_progress(name: str, show: bool) -> Iterator[ProgressCallback]:
     """Display of how far the run of a study has come, on the standard error."""
     console = Console(stderr=True)
     if not show:
         yield lambda _done, _all: None
     elif not (console.is_terminal or console.is_jupyter):
-        yield _lines(name, console)
+        yield _line_progress(name, console)
     else:
         cells = (bars.MofNCompleteColumn(), bars.TextColumn("cells"))
         times = (bars.TimeElapsedColumn(), bars.TimeRemainingColumn())
@@ -44,7 +45,7 @@ def shown(name: str, show: bool) -> Iterator[Progress]:
             bar.stop()
 
 
-def _lines(name: str, console: Console) -> Progress:
+def _line_progress(name: str, console: Console) -> ProgressCallback:
     """A line for each tenth of the cells, but no two at once, for log files and pipes; a run that
     is soon over has one.
     """
@@ -53,8 +54,8 @@ def _lines(name: str, console: Console) -> Progress:
 
     def update(done: int, total: int) -> None:
         nonlocal said, told
-        now, part = time.monotonic(), _LINES * done // total
-        if part > told and (part == _LINES or now - said >= _BETWEEN):
+        now, part = time.monotonic(), _MAX_LINES * done // total
+        if part > told and (part == _MAX_LINES or now - said >= _MIN_LINE_INTERVAL):
             said, told = now, part
             text = f"{name}: {done:,} of {total:,} cells after {now - began:.0f} s"
             console.print(text, highlight=False, markup=False, soft_wrap=True)
@@ -66,10 +67,13 @@ def compile_with_notice(examples: Sequence[Scene], clocks: Sequence[bool], show:
     """Compile what such scenes need, with time or without it, before any cell is timed, and say how
     long it took.
     """
-    console, before = Console(stderr=True, quiet=not show), replace(compiling)
+    console, before = Console(stderr=True, quiet=not show), replace(compilation_log)
     with console.status("compiling the equations ..."):
         for scene, clock in itertools.product(examples, clocks):
-            compiled_engine().prepare(scene, clock=clock)
-    programs, seconds = compiling.programs - before.programs, compiling.seconds - before.seconds
+            compiled_engine().compile_scene(scene, with_time=clock)
+    programs, seconds = (
+        compilation_log.programs - before.programs,
+        compilation_log.seconds - before.seconds,
+    )
     if programs:
         console.print(f"compiled the equations ({programs} programs) in {seconds:.0f} s, once")

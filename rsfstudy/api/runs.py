@@ -13,25 +13,31 @@ import pandas as pd
 import xarray as xr
 
 from rsfstudy.api import exchange, tables
-from rsfstudy.api.progress import compile_with_notice, shown
+from rsfstudy.api.progress import compile_with_notice, show_progress
 from rsfstudy.compute import provenance, runner
-from rsfstudy.compute.cells import Task, sendable, serial
-from rsfstudy.compute.runner import Keeping
+from rsfstudy.compute.cells import Task, compute_serially, serialize_task
+from rsfstudy.compute.runner import OutputOptions
 from rsfstudy.compute.workers import Workers
 from rsfstudy.declare import catalogue, names
-from rsfstudy.declare.claims import verdicts
+from rsfstudy.declare.claims import build_verdict_table
 from rsfstudy.declare.study import Study
-from rsfstudy.defaults import OUTPUT, TIME_LIMIT
+from rsfstudy.defaults import CELL_TIME_LIMIT, OUTPUT_DIRECTORY
 from rsfstudy.error_boundary import error_boundary, user_stacklevel
-from rsfstudy.errors import Incomplete, InvalidValue, RsfStudyWarning
+from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning
 from rsfstudy.files import contents, places, restore, store
-from rsfstudy.files.comparison import Comparison, cell_number, compared, side_by_side
-from rsfstudy.files.journal import differences
+from rsfstudy.files.comparison import (
+    Comparison,
+    compare_results,
+    compare_same_lattice,
+    find_cell_number,
+)
+from rsfstudy.files.journal import find_differences
 from rsfstudy.measures import Outcome
-from rsfstudy.motion.engines import COMPILED, check_engine, own_stepper
+from rsfstudy.motion.engine_factory import check_engine
+from rsfstudy.motion.engines import COMPILED, user_stepper
 from rsfstudy.netcdf import with_cf_encoding
-from rsfstudy.quantity import table
-from rsfstudy.slider.registry import completed
+from rsfstudy.quantity import html_table
+from rsfstudy.slider.registry import with_field_signature
 from rsfstudy.slider.scene import Scene
 
 if TYPE_CHECKING:
@@ -46,29 +52,29 @@ class Studies(dict[str, Study]):
             (name, study.title, f"{study.size:,}", ", ".join({c.id: c for c in study.claims}))
             for name, study in self.items()
         ]
-        return table(("study", "title", "cells", "claims"), rows)
+        return html_table(("study", "title", "cells", "claims"), rows)
 
 
 @error_boundary
 def studies() -> dict[str, Study]:
     """The named studies, by name."""
-    return Studies({name: catalogue.load(name) for name in names.names()})
+    return Studies({name: catalogue.load_study(name) for name in names.study_names()})
 
 
 @error_boundary
-@completed()
+@with_field_signature()
 def run(
     study: str | Path | Study,
     *,
     workers: int = 2,
     client: Any = None,
-    output: str | Path | None = OUTPUT,
+    output: str | Path | None = OUTPUT_DIRECTORY,
     progress: bool = True,
     fresh: bool = False,
     rtol: float | None = None,
     engine: str | None = None,
     budget: int | None = None,
-    time_limit: float = TIME_LIMIT,
+    time_limit: float = CELL_TIME_LIMIT,
     keep_going: bool = False,
     despite_failures: bool = False,
     format: str = "netcdf",
@@ -127,15 +133,15 @@ def run(
 
     Warns
     -----
-    Incomplete
+    IncompleteWarning
         Where cells failed: how many, and with which status; and where a reduction refused to draw
         on its cells, with the reason.
     UserWarning
         Where answers for a rig are for an instability norm near the load point velocity.
     """
-    declared = declaration(study, overrides, rtol=rtol, engine=engine, budget=budget)
-    keeping = Keeping(
-        output=places.directory(output),
+    declared = apply_overrides(study, overrides, rtol=rtol, engine=engine, budget=budget)
+    keeping = OutputOptions(
+        output=places.output_directory(output),
         format=format,
         fresh=fresh,
         keep_going=keep_going,
@@ -143,30 +149,32 @@ def run(
         command=command,
     )
     with Workers(workers, client, time_limit) as where:
-        results = with_cf_encoding(prepared(declared, keeping, where, progress)())
-    told = [f"no {name}: {why}" for name, why in tables.refused(results).items()]
-    if failed := runner.failures(results):
+        results = with_cf_encoding(prepare_run(declared, keeping, where, progress)())
+    told = [f"no {name}: {why}" for name, why in tables.refusal_reasons(results).items()]
+    if failed := runner.count_failures(results):
         each = ", ".join(f"{label} {number}" for label, number in failed.items())
         first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
         told = [first, *told, "dataset.rsf.failures() lists them"]
     if told:
-        warnings.warn("; ".join(told), Incomplete, stacklevel=user_stacklevel())
-    if slow := tables.slow_norm(results):
+        warnings.warn("; ".join(told), IncompleteWarning, stacklevel=user_stacklevel())
+    if slow := tables.slow_norm_note(results):
         warnings.warn(slow, RsfStudyWarning, stacklevel=user_stacklevel())
     return results
 
 
-def declaration(study: str | Path | Study, overrides: Mapping[str, Any], **accuracy: Any) -> Study:
+def apply_overrides(
+    study: str | Path | Study, overrides: Mapping[str, Any], **accuracy: Any
+) -> Study:
     """A study with other values and fields of its accuracy, those that are not None; checked."""
-    declared = study if isinstance(study, Study) else catalogue.load(str(study))
+    declared = study if isinstance(study, Study) else catalogue.load_study(str(study))
     changes = {name: value for name, value in accuracy.items() if value is not None}
     if changes:
         declared = replace(declared, accuracy=replace(declared.accuracy, **changes))
     return declared.with_(**overrides) if overrides else declared
 
 
-def prepared(
-    study: Study, keeping: Keeping, workers: Workers, progress: bool = True
+def prepare_run(
+    study: Study, keeping: OutputOptions, workers: Workers, progress: bool = True
 ) -> Callable[[], xr.Dataset]:
     """A function that runs the study, once everything has been checked; `progress` shows how
     far it has come.
@@ -179,25 +187,25 @@ def prepared(
         study.measure,
         study.accuracy,
         workers.time_limit,
-        parts=tuple(study.own_parts.values()),
-        steppers=own_stepper(study.accuracy.engine),
-        code=provenance.code(study.accuracy.engine, study.own_classes),
+        user_parts=tuple(study.user_parts.values()),
+        steppers=user_stepper(study.accuracy.engine),
+        code_fingerprint=provenance.code_fingerprint(study.accuracy.engine, study.user_classes),
     )
-    if workers.mapper() is not serial:
-        sendable(task)  # raises before any work if it cannot be sent
-    ready = runner.Run(study, keeping, task, workers.threads())
+    if workers.cell_mapper() is not compute_serially:
+        serialize_task(task)  # raises before any work if it cannot be sent
+    ready = runner.StudyRun(study, keeping, task, workers.count_concurrent_cells())
 
     def run() -> xr.Dataset:
         if study.accuracy.engine == COMPILED:
-            compile_with_notice(ready.plan.examples, study.measure.clocks, progress)
-        with shown(study.name, progress) as show:
-            return ready(workers.mapper(ready.worker_log), show)
+            compile_with_notice(ready.plan.examples, study.measure.needs_time, progress)
+        with show_progress(study.name, progress) as show:
+            return ready(workers.cell_mapper(ready.worker_log_path), show)
 
     return run
 
 
 @error_boundary
-def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
+def open(name: str | Path, output: str | Path = OUTPUT_DIRECTORY) -> xr.Dataset:
     """Load the results of a named study, or a results file, into memory.
 
     Raises
@@ -207,14 +215,14 @@ def open(name: str | Path, output: str | Path = OUTPUT) -> xr.Dataset:
     """
     if not isinstance(name, str | Path):
         raise InvalidValue("name", name, "must be the name of a study, or a path")
-    return store.read(places.results(name, output))
+    return store.read_results(places.find_results(name, output))
 
 
-def _opened(dataset: xr.Dataset | str | Path) -> xr.Dataset:
+def _load_results(dataset: xr.Dataset | str | Path) -> xr.Dataset:
     """Results, as they are given or as their file holds them."""
     if not isinstance(dataset, xr.Dataset):
         return open(dataset)
-    contents.check_of_a_study(dataset, "the dataset")
+    contents.check_is_study(dataset, "the dataset")
     return dataset
 
 
@@ -256,7 +264,7 @@ def plot(
     """
     from rsfstudy import plots
 
-    return plots.figure(_opened(dataset), own, variable=variable, style=style)
+    return plots.draw_figure(_load_results(dataset), own, variable=variable, style=style)
 
 
 @error_boundary
@@ -269,9 +277,9 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
         One row a claim: published value, ours, tolerance and its reason, verdict, and ``moved``
         where the verdict is not the expected one.
     """
-    results = _opened(dataset)
-    declared = contents.declaration(results)
-    return verdicts(results, list(declared.claims), declared.overrides)
+    results = _load_results(dataset)
+    declared = contents.read_declaration(results)
+    return build_verdict_table(results, list(declared.claims), declared.overrides)
 
 
 @error_boundary
@@ -283,7 +291,7 @@ def rerun(
     client: Any = None,
     output: str | Path | None = None,
     progress: bool = True,
-    time_limit: float = TIME_LIMIT,
+    time_limit: float = CELL_TIME_LIMIT,
 ) -> pd.DataFrame:
     """Compute the cells of a results file, or a motion, again from what the file says, and compare
     the numbers.
@@ -312,18 +320,18 @@ def rerun(
     DataError, RunError
         Where the file is damaged, or the run cannot finish.
     """
-    theirs = store.read_any(places.results(file, OUTPUT))
-    if contents.is_of_a_scene(theirs):
+    theirs = store.read_dataset(places.find_results(file, OUTPUT_DIRECTORY))
+    if contents.is_single_scene(theirs):
         if study is not None:
-            catalogue.load(str(study))  # for the parts of its scene
-        return exchange.rerun(theirs)
-    declared = restore.study_of(theirs, study)
-    place = places.directory(output)
+            catalogue.load_study(str(study))  # for the parts of its scene
+        return exchange.rerun_motion(theirs)
+    declared = restore.rebuild_study(theirs, study)
+    place = places.output_directory(output)
     if place is not None:
         for taken in place.glob(f"{declared.name}.*"):
             rule = f"holds {taken.name}, which this would take the place of"
             raise InvalidValue("output", str(output), rule, remedy="Name another directory.")
-    keeping = Keeping(
+    keeping = OutputOptions(
         output=place,
         fresh=True,
         keep_going=True,
@@ -331,8 +339,8 @@ def rerun(
         command=f"rsfstudy.rerun {file}",
     )
     with Workers(workers, client, time_limit) as where:
-        ours = prepared(declared, keeping, where, progress)()
-    return compared(theirs, ours)
+        ours = prepare_run(declared, keeping, where, progress)()
+    return compare_same_lattice(theirs, ours)
 
 
 @error_boundary
@@ -359,11 +367,11 @@ def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> 
     DataError
         Where a file is missing or damaged.
     """
-    return side_by_side(_opened(first), _opened(second))
+    return compare_results(_load_results(first), _load_results(second))
 
 
 @partial(error_boundary, passed=(Exception,))
-def cell(
+def recompute_cell(
     file: str | Path, place: Mapping[str, Any], *, study: str | Path | None = None
 ) -> tuple[Scene, Outcome]:
     """Compute one cell of a results file alone, in this process; what it raises is not caught.
@@ -391,7 +399,7 @@ def cell(
     UserWarning
         Where something that decides its numbers has changed since the file was made.
     """
-    declared, number, differs = _found(file, place, study)
+    declared, number, differs = _find_cell(file, place, study)
     for name, (theirs, ours) in differs.items():
         text = f"{name}: {theirs} then, {ours} now"
         warnings.warn(text, RsfStudyWarning, stacklevel=user_stacklevel())
@@ -400,12 +408,12 @@ def cell(
 
 
 @partial(error_boundary, is_inner=True)
-def _found(
+def _find_cell(
     file: str | Path, place: Mapping[str, Any], study: str | Path | None
 ) -> tuple[Study, int, Mapping[str, tuple[Any, Any]]]:
     """The study of a file, the number of a cell, and what else decided it and has changed."""
     results = open(file)
-    number = cell_number(results, place)
-    declared = restore.study_of(results, study)
-    now = provenance.fingerprint(declared)
-    return declared, number, differences(contents.provenance(results)["fingerprint"], now)
+    number = find_cell_number(results, place)
+    declared = restore.rebuild_study(results, study)
+    now = provenance.run_fingerprint(declared)
+    return declared, number, find_differences(contents.read_provenance(results)["fingerprint"], now)

@@ -8,16 +8,16 @@ import xarray as xr
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import contents
-from rsfstudy.files.lattice import coordinates
-from rsfstudy.slider.history import of_samples
-from rsfstudy.slider.protocol import Stated, protocol
-from rsfstudy.slider.registry import SLOTS, Own, name_of
+from rsfstudy.files.lattice import build_coordinates
+from rsfstudy.slider.history import history_from_table
+from rsfstudy.slider.protocol import UserLoading, protocol
+from rsfstudy.slider.registry import SLOTS, UserPart, normalise_field_value
 from rsfstudy.slider.scene import Scene
 
 
-def cell(dataset: xr.Dataset, study: Study) -> int:
+def selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
     """The number of the cell that is selected."""
-    ours = xr.Dataset(coords=coordinates(study))
+    ours = xr.Dataset(coords=build_coordinates(study))
     places = []
     for name in study.dimensions:
         given = dataset[name].values.ravel() if name in dataset.coords else np.array([])
@@ -32,23 +32,27 @@ def cell(dataset: xr.Dataset, study: Study) -> int:
     return int(np.ravel_multi_index(places, study.shape))
 
 
-def described(dataset: xr.Dataset) -> Scene:
+def described_scene(dataset: xr.Dataset) -> Scene:
     """The scene that the attributes of a dataset describe."""
-    plain = contents.scene_of(dataset)
+    plain = contents.read_scene_fields(dataset)
     segments, loading = plain.pop("segments", ()), str(plain.get("loading"))
     digest = plain.pop("samples", "")
-    own: dict[str, Own] = {name: part for slot in SLOTS for name, part in slot.own.items()}
+    own: dict[str, UserPart] = {
+        name: part for slot in SLOTS for name, part in slot.user_parts.items()
+    }
     # protocols of one name differ: the segments tell which it was
-    if segments and (loading not in own or isinstance(own[loading], Stated)):
+    if segments and (loading not in own or isinstance(own[loading], UserLoading)):
         rebuilt = protocol(segments, loading)
-        own[name_of("loading", rebuilt)] = rebuilt
+        own[normalise_field_value("loading", rebuilt)] = rebuilt
     if digest:
         told = dataset["history_samples"]
         pressure, stress = (bool(told.attrs.get(n)) for n in ("of_pressure", "of_stress"))
-        sampled = of_samples(told.values, stress, loading, of_pressure=pressure)
+        sampled = history_from_table(told.values, stress, loading, of_pressure=pressure)
         if sampled.digest != digest:
-            raise contents.refused("history_samples", f"are not those of the scene ({digest})")
-        own[name_of("loading", sampled)] = sampled
+            raise contents.invalid_part_error(
+                "history_samples", f"are not those of the scene ({digest})"
+            )
+        own[normalise_field_value("loading", sampled)] = sampled
     for slot in SLOTS:
         name = plain.get(slot.name)
         if isinstance(name, str) and name not in {*slot.choices, *own}:
@@ -58,4 +62,4 @@ def described(dataset: xr.Dataset) -> Scene:
             )
             rule = "is a user's own, and not known here"
             raise InvalidValue(slot.name, name, rule, remedy=remedy)
-    return contents.scene(plain, own, "scene")
+    return contents.build_scene(plain, own, "scene")

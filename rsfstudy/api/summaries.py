@@ -9,37 +9,37 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import xarray as xr
 
+from rsfstudy.analysis.drops import EVENT_QUANTITIES
 from rsfstudy.api import fit_results, tables
-from rsfstudy.api.events import QUANTITIES
-from rsfstudy.api.tables import MOST_CELLS, Table, number, units_of
+from rsfstudy.api.tables import MAX_CELLS, Table, format_number, format_units
 from rsfstudy.errors import InvalidValue
 from rsfstudy.files import contents
 from rsfstudy.slider.scene import Scene
-from rsfstudy.wording import flags_of
+from rsfstudy.wording import read_flag_meanings
 
-Piece = Table | Mapping[str, str] | str
+SummaryPiece = Table | Mapping[str, str] | str
 
 
-def numbers(dataset: xr.Dataset) -> Iterator[Piece]:
+def summary_pieces(dataset: xr.Dataset) -> Iterator[SummaryPiece]:
     """The numbers of a dataset: the headline and the slopes of a study, the parameters of fits, or
     what a reader of a motion, or of another answer for one scene, looks for first.
     """
     if fit_results.is_fit(dataset):
-        yield from fit_results.told(dataset)
-    elif not contents.is_of_a_scene(dataset):
-        yield tables.headline(dataset)
-        yield from tables.reductions(dataset)
-        yield {f"no {name}": why for name, why in tables.refused(dataset).items()}
-        yield from filter(None, [tables.slow_norm(dataset)])
+        yield from fit_results.fit_summary(dataset)
+    elif not contents.is_single_scene(dataset):
+        yield tables.headline_table(dataset)
+        yield from tables.reduction_tables(dataset)
+        yield {f"no {name}": why for name, why in tables.refusal_reasons(dataset).items()}
+        yield from filter(None, [tables.slow_norm_note(dataset)])
     elif is_motion(dataset):
-        yield motion(dataset)
+        yield summarise_motion(dataset)
         try:
-            yield stability(dataset.rsf.scene)
-            yield events(dataset.rsf.events())
+            yield describe_stability(dataset.rsf.scene)
+            yield events_table(dataset.rsf.events())
         except InvalidValue as error:  # a part of its scene is a user's own
             yield f"neither its stability nor its events: {error}"
     else:
-        yield tables.answer(dataset)
+        yield tables.answer_table(dataset)
 
 
 def is_motion(dataset: xr.Dataset) -> bool:
@@ -48,27 +48,27 @@ def is_motion(dataset: xr.Dataset) -> bool:
     return dataset.sizes.get("time", 0) > 0 and {*told, "slip"} <= set(dataset.variables)
 
 
-def origin(dataset: xr.Dataset) -> dict[str, str]:
+def describe_origin(dataset: xr.Dataset) -> dict[str, str]:
     """What a dataset is of, and where it comes from, by what each is."""
-    if not contents.is_of_a_scene(dataset):
-        return tables.origin(dataset)
-    about, scene = dataset.attrs, contents.scene_of(dataset)
+    if not contents.is_single_scene(dataset):
+        return tables.describe_study_origin(dataset)
+    about, scene = dataset.attrs, contents.read_scene_fields(dataset)
     fields = {n: v for n, v in scene.items() if n not in ("segments", "samples")}
-    rig = contents.from_json(dataset, "laboratory") if "laboratory" in about else {}
+    rig = contents.read_json_attribute(dataset, "laboratory") if "laboratory" in about else {}
     return {
-        **tables.given("scene", fields, rig),
+        **tables.describe_fields("scene", fields, rig),
         "made by": about.get("history", "unknown"),
         "with": about.get("source", "unknown"),
         "status": f"{about['status']} {about.get('message', '')}".strip(),
     }
 
 
-def motion(dataset: xr.Dataset) -> dict[str, str]:
+def summarise_motion(dataset: xr.Dataset) -> dict[str, str]:
     """What a reader of a motion looks for first."""
     time, friction = dataset["time"], dataset["friction_coefficient"]
     over_reference = (10.0 ** dataset["log10_slip_rate"]).assign_attrs(scale="V_*")
-    rate, unit = dataset.get("slip_rate", over_reference), units_of(time)
-    per = f" {units_of(rate)}"
+    rate, unit = dataset.get("slip_rate", over_reference), format_units(time)
+    per = f" {format_units(rate)}"
     told = {"duration": f"{float(time[-1]):.6g} {unit}"}
     for name, values, of in (("peak friction", friction, ""), ("peak slip rate", rate, per)):
         peak = int(np.argmax(values.values))
@@ -80,30 +80,30 @@ def motion(dataset: xr.Dataset) -> dict[str, str]:
     return told
 
 
-def stability(scene: Scene) -> str:
+def describe_stability(scene: Scene) -> str:
     """Whether steady sliding at V_* is stable, by the stiffness."""
     sliding = "stable" if scene.stiffness_ratio > 1.0 else "unstable"
     ratio = f"{scene.stiffness_ratio:.4g} of the critical"
     return f"stiffness is {ratio}: steady sliding at V_* is {sliding}"
 
 
-def events(catalogue: xr.Dataset) -> Table | str:
+def events_table(catalogue: xr.Dataset) -> Table | str:
     """The events of a motion, without their errors."""
     limit = f"faster than {catalogue.attrs['slip_rate_threshold']:g} V_*"
     count = catalogue.sizes["event"]
     if not count:
         return f"no event {limit}"
-    heads = {n: words for n, (_, words, _) in QUANTITIES.items() if words and n in catalogue}
+    heads = {n: words for n, (_, words, _) in EVENT_QUANTITIES.items() if words and n in catalogue}
     if "peak_slip_rate" in heads:
         del heads["peak_log10_slip_rate"]
     for name, words in heads.items():
-        unit = units_of(catalogue[name])
+        unit = format_units(catalogue[name])
         heads[name] = words if unit == "1" else f"{words} ({unit})"
-    flags = flags_of(catalogue["cut"].attrs) | {0: "-"}
+    flags = read_flag_meanings(catalogue["cut"].attrs) | {0: "-"}
     rows = []
-    for place in range(min(count, MOST_CELLS)):
+    for place in range(min(count, MAX_CELLS)):
         event = catalogue.isel(event=place)
-        row = {words: number(float(event[name]), ".4g") for name, words in heads.items()}
+        row = {words: format_number(float(event[name]), ".4g") for name, words in heads.items()}
         rows.append({**row, "cut": flags[int(event["cut"])].replace("_", " ")})
     caption = f"Events {limit}"
     if count > len(rows):

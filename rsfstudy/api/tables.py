@@ -18,30 +18,30 @@ from rsfstudy.compute import runner
 from rsfstudy.declare import verdicts
 from rsfstudy.declare.claims import NOT_APPLICABLE, VERDICTS
 from rsfstudy.files import contents, lattice, restore
-from rsfstudy.measures._single_step import SLOW_NORM
-from rsfstudy.quantity import units_and_scale
-from rsfstudy.rig.quantities import ON_AXIS, SHOWN, STATED
-from rsfstudy.rig.scales import BESIDE, in_units_of_rig, renamed
-from rsfstudy.rig.units import factor, times
-from rsfstudy.status import LABELS, Status
-from rsfstudy.vocabulary import coverage, quantity
-from rsfstudy.wording import counted, flags_of, listed, short, stated
+from rsfstudy.measures._single_step import SLOW_NORM_PREFIX
+from rsfstudy.quantity import units_or_scale
+from rsfstudy.rig.quantities import AXIS_NAME, DISPLAY_UNITS, RIG_QUANTITIES
+from rsfstudy.rig.scales import DIMENSIONLESS_PREFIX, convert_to_display_units, drop_ratio_from_name
+from rsfstudy.rig.units import multiply_exactly, unit_factor
+from rsfstudy.status import STATUS_LABELS, Status
+from rsfstudy.vocabulary import coverage_content_type, find_quantity
+from rsfstudy.wording import format_fields, format_list, format_value, pluralize, read_flag_meanings
 
 #: Most cells of a lattice that are shown, unless few more are all; and most that failed.
-MOST_CELLS, _ALL_CELLS, _MOST_FAILURES = 24, 36, 20
+MAX_CELLS, _MAX_CELLS_SHOWN_ENTIRELY, _MAX_FAILURES = 24, 36, 20
 #: Quantities that are set at one point beyond which fewer cells are shown.
-_MANY = 4
+_FIELDS_BEFORE_THINNING = 4
 #: Digits of a float.
-_ALL_DIGITS = 15
+_MAX_DIGITS = 15
 #: What is told of a slope, by the ends of names: headings and formats.
-_OF_SLOPES = {
+_SLOPE_COLUMNS = {
     "stderr": ("standard error", ".2g"),
     "misfit": ("largest misfit", ".2g"),
     "points": ("points", ".0f"),
     "error": ("numerical error", ".2g"),
 }
 #: Variables of columns, each with what makes a text of a value, by the headings.
-Columns = dict[str, tuple[str, Callable[[Any], str]]]
+TableColumns = dict[str, tuple[str, Callable[[Any], str]]]
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Table:
         Each a row, by the headings.
     caption : str
         What it shows.
-    prose : collection of str
+    wrappable : collection of str
         Headings of columns whose texts may be broken between words; no other is.
     colours : sequence of str
         Colour of the last cell of each row.
@@ -62,24 +62,24 @@ class Table:
 
     rows: Sequence[Mapping[str, str]]
     caption: str = ""
-    prose: Collection[str] = ()
+    wrappable: Collection[str] = ()
     colours: Sequence[str] = ()
 
 
-def number(value: float, form: str = ".8g") -> str:
+def format_number(value: float, form: str = ".8g") -> str:
     """A number, or a dash where there is none."""
     return "-" if np.isnan(value) else format(value, form)
 
 
-def to_error(value: float, error: float) -> str:
+def format_to_error(value: float, error: float) -> str:
     """A number to two digits of its error; to eight where it has none, or is all error."""
     if not 0.0 < error < abs(value):
-        return number(value)
+        return format_number(value)
     digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2
-    return format(value, f".{min(digits, _ALL_DIGITS)}g")
+    return format(value, f".{min(digits, _MAX_DIGITS)}g")
 
 
-def answer(dataset: xr.Dataset) -> Table:
+def answer_table(dataset: xr.Dataset) -> Table:
     """The numbers of an answer for one scene, each with its units and its error estimate; words for
     codes.
     """
@@ -88,33 +88,33 @@ def answer(dataset: xr.Dataset) -> Table:
         if values.dims or str(name).removesuffix("_error") in set(dataset) - {name}:
             continue
         value, error = values.item(), float(dataset.get(f"{name}_error", np.nan))
-        units, flags = units_of(values), flags_of(values.attrs)
-        text = flags.get(value, to_error(value, error))
+        units, flags = format_units(values), read_flag_meanings(values.attrs)
+        text = flags.get(value, format_to_error(value, error))
         row = {
             "number": str(name),
             "value": text if units == "1" or text == "-" else f"{text} {units}",
-            "error": number(error, ".1e"),
+            "error": format_number(error, ".1e"),
             "what": str(values.attrs.get("long_name", "")),
         }
         rows.append(row)
-    return Table(rows, prose={"what"})
+    return Table(rows, wrappable={"what"})
 
 
-def units_of(values: xr.DataArray) -> str:
+def format_units(values: xr.DataArray) -> str:
     """The units of values, or what those without units are measured in; "1" for numbers."""
-    units = re.sub(r" (s|[num]?m)-1\b", r"/\1", units_and_scale(values.attrs) or "1")
+    units = re.sub(r" (s|[num]?m)-1\b", r"/\1", units_or_scale(values.attrs) or "1")
     return re.sub(r" \((\w+)\)-1| (\(.*?\))-1", r"/\1\2", units)
 
 
-def with_units(along: xr.DataArray) -> str:
+def format_axis_name(along: xr.DataArray) -> str:
     """The name of an axis, and its units where it is that of a rig."""
     name, units = str(along.name), along.attrs.get("units", "1")
-    return name if units in ("1", quantity(name).units) else f"{name} ({units})"
+    return name if units in ("1", find_quantity(name).units) else f"{name} ({units})"
 
 
-def tally(dataset: xr.Dataset) -> str:
+def format_status_counts(dataset: xr.Dataset) -> str:
     """How many cells ended how, with what that means where none is ok, and their work."""
-    work, counts = int(dataset["rhs_evaluations"].sum()), runner.counts(dataset)
+    work, counts = int(dataset["rhs_evaluations"].sum()), runner.count_statuses(dataset)
     nothing = Status.OK.label not in counts
     told = ", ".join(
         f"{count} {label}" + f" ({Status[label.upper()].meaning})" * nothing
@@ -123,20 +123,22 @@ def tally(dataset: xr.Dataset) -> str:
     return f"{told}; {work:,} right-hand sides"
 
 
-def given(
+def describe_fields(
     what: str, fields: Mapping[str, Any], rig: Mapping[str, float], varied: Collection[str] = ()
 ) -> dict[str, str]:
     """Fields of a scene that have a value, under the heading stated, those that are 0, and what the
     rig states, but for what is varied; nothing of what there is none of.
     """
     fields = {n: v for n, v in fields.items() if n not in varied}
-    units = {n: STATED[n].units for n in rig if ON_AXIS.get(n, n) not in varied}
-    shown = {n: SHOWN.get(si, si) for n, si in units.items()}
-    sizes = {n: times(rig[n], 1 / factor(n, shown[n], si)) for n, si in units.items()}
+    units = {n: RIG_QUANTITIES[n].units for n in rig if AXIS_NAME.get(n, n) not in varied}
+    shown = {n: DISPLAY_UNITS.get(si, si) for n, si in units.items()}
+    sizes = {
+        n: multiply_exactly(rig[n], 1 / unit_factor(n, shown[n], si)) for n, si in units.items()
+    }
     told = {
-        what: stated({n: v for n, v in fields.items() if v}),
+        what: format_fields({n: v for n, v in fields.items() if v}),
         "0 or absent": ", ".join(n for n, v in fields.items() if not v and v is not None),
-        "laboratory": stated({n: f"{v:g} {shown[n]}" for n, v in sizes.items()}),
+        "laboratory": format_fields({n: f"{v:g} {shown[n]}" for n, v in sizes.items()}),
     }
     norm, period = fields.get("instability_norm"), fields.get("period")
     if norm and period and {"slip_distance", "reference_velocity"} <= set(sizes):
@@ -146,96 +148,102 @@ def given(
     return {name: text for name, text in told.items() if text}
 
 
-def origin(dataset: xr.Dataset) -> dict[str, str]:
+def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
     """What the results of a study are of, and where they come from, by what each is."""
-    attrs, about = dataset.attrs, contents.provenance(dataset)
-    dims, declared = dataset["status"].dims, contents.declaration(dataset)
-    varied = {str(n).removeprefix(BESIDE) for n, along in dataset.coords.items() if along.dims}
+    attrs, about = dataset.attrs, contents.read_provenance(dataset)
+    dims, declared = dataset["status"].dims, contents.read_declaration(dataset)
+    varied = {
+        str(n).removeprefix(DIMENSIONLESS_PREFIX)
+        for n, along in dataset.coords.items()
+        if along.dims
+    }
     reduced = attrs.get("reduced_despite")
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
     return {
         "lattice": " x ".join(f"{dataset.sizes[d]} {d}" for d in dims),
-        **given("fixed", declared.base, declared.laboratory or {}, varied),
-        "cells": f"{attrs['completeness']}; {tally(dataset)}",
+        **describe_fields("fixed", declared.base, declared.laboratory or {}, varied),
+        "cells": f"{attrs['completeness']}; {format_status_counts(dataset)}",
         **({"reductions": reduced} if reduced else {}),
         "made by": f"{about['command']}, {about['time']}",
         "with": f"{versions}; git {about['git']}; {about['machine']}",
     }
 
 
-def rows(dataset: xr.Dataset, dims: Iterable[Hashable], columns: Columns) -> list[dict[str, str]]:
+def build_rows(
+    dataset: xr.Dataset, dims: Iterable[Hashable], columns: TableColumns
+) -> list[dict[str, str]]:
     """A row for each point of some dimensions: where it is, then columns of variables."""
     dims, found = list(map(str, dims)), []
     for at in np.ndindex(*(dataset.sizes[d] for d in dims)):
         one = dataset.isel(dict(zip(dims, at, strict=True)))
-        row = {with_units(one[d]): short(one[d].item()) for d in dims}
+        row = {format_axis_name(one[d]): format_value(one[d].item()) for d in dims}
         found.append(row | {head: form(one[n].item()) for head, (n, form) in columns.items()})
     return found
 
 
-def headline(dataset: xr.Dataset) -> Table:
+def headline_table(dataset: xr.Dataset) -> Table:
     """The headline along the axes, with what is set at points that only have numbers, its error
     estimate and how each cell ended; no row where there is none.
     """
-    name = restore.headline(dataset)
+    name = restore.find_primary_output(dataset)
     if name is None:
         return Table([])
-    dataset = in_units_of_rig(dataset)
-    name = name if name in dataset else renamed(name)
+    dataset = convert_to_display_units(dataset)
+    name = name if name in dataset else drop_ratio_from_name(name)
     dims = dataset["status"].dims
-    drawn = [n for n in _numbered(dataset) if n in dataset.coords]
-    columns = Columns({with_units(dataset[n]): (n, short) for n in drawn})
-    columns[name] = name, number
+    drawn = [n for n in _sampled_fields(dataset) if n in dataset.coords]
+    columns = TableColumns({format_axis_name(dataset[n]): (n, format_value) for n in drawn})
+    columns[name] = name, format_number
     if f"{name}_error" in dataset:
-        columns["error"] = f"{name}_error", partial(number, form=".1e")
-    size, fewer = dataset["status"].size, 1 + len(drawn) // _MANY
-    most = size if size <= _ALL_CELLS // fewer else MOST_CELLS // fewer
-    at = lattice.sample({str(d): dataset.sizes[d] for d in dims}, most)
+        columns["error"] = f"{name}_error", partial(format_number, form=".1e")
+    size, fewer = dataset["status"].size, 1 + len(drawn) // _FIELDS_BEFORE_THINNING
+    most = size if size <= _MAX_CELLS_SHOWN_ENTIRELY // fewer else MAX_CELLS // fewer
+    at = lattice.thin_dimensions({str(d): dataset.sizes[d] for d in dims}, most)
     few = dataset[[*(n for n, _form in columns.values()), "status"]].isel(at).load()
     if (few["status"] != int(Status.OK)).any():
-        columns["status"] = "status", LABELS.__getitem__
-    units, shown = units_of(dataset[name]), few["status"].size
+        columns["status"] = "status", STATUS_LABELS.__getitem__
+    units, shown = format_units(dataset[name]), few["status"].size
     caption = str(dataset[name].attrs.get("long_name", name)) + f", in {units}" * (units != "1")
     if shown < size:
         full = dataset.sizes
         every = [f"{n} of {full[d]} {d}" for d, n in few.sizes.items() if n < full[d]]
         which = f"{shown} of {size:,} cells, {', '.join(every)}, from first to last"
         caption += f" ({which}; rsfstudy export --csv writes all)"
-    return Table(rows(few, dims, columns), caption)
+    return Table(build_rows(few, dims, columns), caption)
 
 
-def _numbered(dataset: xr.Dataset) -> list[str]:
+def _sampled_fields(dataset: xr.Dataset) -> list[str]:
     """What is set along axes whose points only have numbers: samples, and cases."""
-    axes = [axis["values"] for axis in contents.declaration(dataset).axes]
+    axes = [axis["values"] for axis in contents.read_declaration(dataset).axes]
     columns = [
         v for v in axes if isinstance(v, Mapping) and isinstance(next(iter(v.values())), list)
     ]
     return [name for column in columns for name in column]
 
 
-def in_short(dataset: xr.Dataset) -> list[str]:
+def summarise_in_lines(dataset: xr.Dataset) -> list[str]:
     """The headline and the slopes in a line each, and how cells ended in another."""
-    lines, converted = [], in_units_of_rig(dataset)
-    if (name := restore.headline(dataset)) is not None:
-        values = converted[name if name in converted else renamed(name)]
-        told, units = np.unique(values.values[np.isfinite(values.values)]), units_of(values)
-        ends = " to ".join(map(short, dict.fromkeys((*told[:1], *told[-1:]))))
+    lines, converted = [], convert_to_display_units(dataset)
+    if (name := restore.find_primary_output(dataset)) is not None:
+        values = converted[name if name in converted else drop_ratio_from_name(name)]
+        told, units = np.unique(values.values[np.isfinite(values.values)]), format_units(values)
+        ends = " to ".join(map(format_value, dict.fromkeys((*told[:1], *told[-1:]))))
         text = f"{ends}{f' {units}' * (units != '1')}" if ends else "no number"
         lines.append(f"{values.name}: {text}")
-    for slope in _slopes(converted):
-        slopes, units = converted[slope].values.ravel().tolist(), units_of(converted[slope])
-        lines.append(f"{slope}: {listed(slopes, ', ')}{f' {units}' * (units != '1')}")
-    return [*lines, tally(dataset)]
+    for slope in _slope_names(converted):
+        slopes, units = converted[slope].values.ravel().tolist(), format_units(converted[slope])
+        lines.append(f"{slope}: {format_list(slopes, ', ')}{f' {units}' * (units != '1')}")
+    return [*lines, format_status_counts(dataset)]
 
 
-def reductions(dataset: xr.Dataset) -> Iterator[Table]:
+def reduction_tables(dataset: xr.Dataset) -> Iterator[Table]:
     """Slopes and their like, those with a standard error, with one row for each point of their
     dimensions; and, where integrators were compared, the cheapest for each number of digits.
     """
-    converted = in_units_of_rig(dataset)
-    for slope in _slopes(converted):
-        yield _slope(converted, slope)
-    columns: Columns = {
+    converted = convert_to_display_units(dataset)
+    for slope in _slope_names(converted):
+        yield _slope_table(converted, slope)
+    columns: TableColumns = {
         "cheapest": ("cheapest_integrator", str),
         "its work": ("cheapest_work", "{:,.0f}".format),
         "work of the default": ("cheapest_default_work", "{:,.0f}".format),
@@ -243,12 +251,12 @@ def reductions(dataset: xr.Dataset) -> Iterator[Table]:
     }
     if {name for name, _form in columns.values()} <= set(dataset.data_vars):
         dims = dataset["cheapest_work"].dims
-        yield Table(rows(dataset, dims, columns), prose={"problem", "cheapest"})
+        yield Table(build_rows(dataset, dims, columns), wrappable={"problem", "cheapest"})
 
 
-def refused(dataset: xr.Dataset) -> dict[str, str]:
+def refusal_reasons(dataset: xr.Dataset) -> dict[str, str]:
     """Why reductions refuse to draw on cells, by their names."""
-    named = [str(reduction["name"]) for reduction in contents.declaration(dataset).reductions]
+    named = [str(reduction["name"]) for reduction in contents.read_declaration(dataset).reductions]
     named.sort(key=len, reverse=True)  # a name may begin with another
     found: dict[str, str] = {}
     for result, values in dataset.data_vars.items():
@@ -258,65 +266,69 @@ def refused(dataset: xr.Dataset) -> dict[str, str]:
     return found
 
 
-def unreduced(dataset: xr.Dataset) -> dict[str, str]:
+def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
     """Why reductions have no results, by their names."""
-    found, there = refused(dataset), tuple(map(str, dataset.data_vars))
-    for stated_as in contents.declaration(dataset).reductions:
+    found, there = refusal_reasons(dataset), tuple(map(str, dataset.data_vars))
+    for stated_as in contents.read_declaration(dataset).reductions:
         about: Mapping[str, Any] = {**stated_as}
         if not any(name.startswith(about["name"]) for name in there):
-            least, most = map(short, about.get("within") or ("", ""))
-            on = with_units(dataset[about["on"]]) if most else ""
+            least, most = map(format_value, about.get("within") or ("", ""))
+            on = format_axis_name(dataset[about["on"]]) if most else ""
             span = f", with {least} <= {on} <= {most}" if most else ""
             found[about["name"]] = f"among these cells are none, or too few, to draw on{span}"
     return found
 
 
-def slow_norm(dataset: xr.Dataset) -> str:
+def slow_norm_note(dataset: xr.Dataset) -> str:
     """How many answers of a study of a rig are for a norm near the load point velocity, and what
     the first of them says; empty where there are none.
     """
-    if contents.declaration(dataset).laboratory is None:
+    if contents.read_declaration(dataset).laboratory is None:
         return ""
     ok = dataset["message"].values[dataset["status"].values == int(Status.OK)]
-    near = [text for text in ok.tolist() if text.startswith(SLOW_NORM)]
-    return f"{len(near)} of {counted(len(ok), 'answer')}: {near[0]}" if near else ""
+    near = [text for text in ok.tolist() if text.startswith(SLOW_NORM_PREFIX)]
+    return f"{len(near)} of {pluralize(len(ok), 'answer')}: {near[0]}" if near else ""
 
 
-def _slopes(dataset: xr.Dataset) -> list[str]:
+def _slope_names(dataset: xr.Dataset) -> list[str]:
     """Names of the reductions that have a standard error."""
-    named = [reduction["name"] for reduction in contents.declaration(dataset).reductions]
+    named = [reduction["name"] for reduction in contents.read_declaration(dataset).reductions]
     return [name for name in named if {name, f"{name}_stderr"} <= set(dataset.data_vars)]
 
 
-def _slope(dataset: xr.Dataset, name: str) -> Table:
+def _slope_table(dataset: xr.Dataset, name: str) -> Table:
     dims, words = dataset[name].dims, dataset[name].attrs.get("comment", name)
-    units = units_of(dataset[name])
-    columns: Columns = {f"{name} ({units})" if units != "1" else name: (name, short)}
-    for end, (heading, form) in _OF_SLOPES.items():
+    units = format_units(dataset[name])
+    columns: TableColumns = {f"{name} ({units})" if units != "1" else name: (name, format_value)}
+    for end, (heading, form) in _SLOPE_COLUMNS.items():
         if (beside := f"{name}_{end}") in dataset:
-            if end != "points" and (own := units_of(dataset[beside])) != units:
+            if end != "points" and (own := format_units(dataset[beside])) != units:
                 heading += f" ({own})"
             columns[heading] = beside, f"{{:{form}}}".format
-    return Table(rows(dataset, dims, columns), words, {with_units(dataset[d]) for d in dims})
+    return Table(
+        build_rows(dataset, dims, columns), words, {format_axis_name(dataset[d]) for d in dims}
+    )
 
 
-def claims(frame: pd.DataFrame) -> Table | str:
+def claims_table(frame: pd.DataFrame) -> Table | str:
     """Claims and their verdicts, as `rsfstudy.check` gives them, of one study or of several; a
     sentence where none applies.
     """
     rows = frame.to_dict("records")
     if not any(row["verdict"] != NOT_APPLICABLE for row in rows):
-        return f"{counted(len(rows), 'claim')} not checked: {verdicts_of(frame)}" * bool(rows)
+        return f"{pluralize(len(rows), 'claim')} not checked: {count_verdicts(frame)}" * bool(rows)
     colours = [
         "red" if row["moved"] else "green" if row["verdict"] == "reproduced" else "yellow"
         for row in rows
     ]
     return Table(
-        [verdicts.told(row) for row in rows], prose={"claim", "tolerance, and why"}, colours=colours
+        [verdicts.format_claim_row(row) for row in rows],
+        wrappable={"claim", "tolerance, and why"},
+        colours=colours,
     )
 
 
-def verdicts_of(found: pd.DataFrame) -> str:
+def count_verdicts(found: pd.DataFrame) -> str:
     """How many claims have which verdict; where none applies, why."""
     given = list(found["verdict"])
     if set(given) == {NOT_APPLICABLE}:
@@ -324,42 +336,42 @@ def verdicts_of(found: pd.DataFrame) -> str:
     return ", ".join(f"{given.count(v)} {v}" for v in VERDICTS if v in given)
 
 
-def ended(dataset: xr.Dataset, found: pd.DataFrame) -> tuple[str, list[str]]:
+def summarise_verdicts(dataset: xr.Dataset, found: pd.DataFrame) -> tuple[str, list[str]]:
     """How many claims have which verdict, and what went wrong, in words."""
-    wrong = [f"{count} {label}" for label, count in runner.failures(dataset).items()]
+    wrong = [f"{count} {label}" for label, count in runner.count_failures(dataset).items()]
     wrong += [f"{claim} moved" for claim in dict.fromkeys(found["id"][found["moved"]])]
-    return verdicts_of(found), wrong
+    return count_verdicts(found), wrong
 
 
-def cells(dataset: xr.Dataset, where: xr.DataArray, axes: Sequence[str]) -> pd.DataFrame:
+def cells_frame(dataset: xr.Dataset, where: xr.DataArray, axes: Sequence[str]) -> pd.DataFrame:
     """Some cells, one row each: their places on axes, how each ended, and the message."""
     at = where.values
     columns = {name: dataset[name].broadcast_like(where).values[at] for name in axes}
-    columns["status"] = [LABELS[code] for code in dataset["status"].values[at].tolist()]
+    columns["status"] = [STATUS_LABELS[code] for code in dataset["status"].values[at].tolist()]
     return pd.DataFrame(columns | {"message": dataset["message"].values[at]})
 
 
-def failures(dataset: xr.Dataset) -> tuple[Table, list[dict[Any, Any]]]:
+def failures_table(dataset: xr.Dataset) -> tuple[Table, list[dict[Any, Any]]]:
     """The first cells that failed, and the place of each on the axes."""
     status = dataset["status"]
     failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
-    found = cells(dataset, failed, list(map(str, failed.dims)))
-    first = found[:_MOST_FAILURES]
+    found = cells_frame(dataset, failed, list(map(str, failed.dims)))
+    first = found[:_MAX_FAILURES]
     places: list[dict[Any, Any]] = first[list(failed.dims)].to_dict("records")
     rows = [
-        {"cell": stated(place), "status": label, "message": message}
+        {"cell": format_fields(place), "status": label, "message": message}
         for place, label, message in zip(places, first["status"], first["message"], strict=True)
     ]
-    caption = f"{counted(len(found), 'cell')} failed"
+    caption = f"{pluralize(len(found), 'cell')} failed"
     if len(found) > len(rows):
         caption += f", of which the first {len(rows)}"
-    return Table(rows, caption, prose={"cell", "message"}), places
+    return Table(rows, caption, wrappable={"cell", "message"}), places
 
 
-def reproducing(dataset: xr.Dataset, file: str, place: Mapping[str, Any]) -> str:
+def rerun_command(dataset: xr.Dataset, file: str, place: Mapping[str, Any]) -> str:
     """The command that computes one cell alone."""
     words = ["rsfstudy", "rerun", file]
-    declared_in = contents.provenance(dataset)["declared_in"]
+    declared_in = contents.read_provenance(dataset)["declared_in"]
     if declared_in:
         words += ["--study", declared_in]
     for name, value in place.items():
@@ -367,12 +379,12 @@ def reproducing(dataset: xr.Dataset, file: str, place: Mapping[str, Any]) -> str
     return shlex.join(words)
 
 
-def undone(dataset: xr.Dataset) -> int:
+def count_pending(dataset: xr.Dataset) -> int:
     """Number of cells that are not computed yet."""
     return int((dataset["status"] == int(Status.PENDING)).sum())
 
 
-def held(dataset: xr.Dataset) -> Table:
+def contents_table(dataset: xr.Dataset) -> Table:
     """The results that a file holds, what they are and along what."""
     rows = [
         {
@@ -380,6 +392,6 @@ def held(dataset: xr.Dataset) -> Table:
             "what": f"{v.attrs.get('long_name', '')} ({', '.join(map(str, v.dims))})".strip(),
         }
         for name, v in dataset.data_vars.items()
-        if coverage(str(name)) == "modelResult"
+        if coverage_content_type(str(name)) == "modelResult"
     ]
-    return Table(rows, prose={"what"})
+    return Table(rows, wrappable={"what"})

@@ -14,44 +14,53 @@ import xarray as xr
 
 from rsfstudy.compute import provenance
 from rsfstudy.error_boundary import error_boundary
-from rsfstudy.errors import Incomplete, InvalidValue, NoAnswer, brief
+from rsfstudy.errors import IncompleteWarning, InvalidValue, NoResultWarning, shorten
 from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL, Accuracy
-from rsfstudy.motion.course import follow
-from rsfstudy.motion.engines import SCIPY, check_engine
-from rsfstudy.motion.events import Event, Kind, rise
-from rsfstudy.motion.meter import Halt, Meter, more_work
-from rsfstudy.motion.readings import friction_coefficient_of, load_point_of
-from rsfstudy.motion.recording import OBSERVED, REGIME, STATES, Recording, strictly_later
+from rsfstudy.motion.course import integrate_events
+from rsfstudy.motion.engine_factory import check_engine
+from rsfstudy.motion.engines import SCIPY
+from rsfstudy.motion.events import Event, EventKind, rise
+from rsfstudy.motion.meter import MotionStopped, WorkMeter, larger_budget_remedy
+from rsfstudy.motion.readings import friction_coefficient, load_point_displacement
+from rsfstudy.motion.recording import (
+    FIRST_STATE_COLUMN,
+    MOTION_VARIABLES,
+    REGIME_COLUMN,
+    Recording,
+    with_increasing_times,
+)
 from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.equations import IN_RUPTURE
-from rsfstudy.slider.history import History
-from rsfstudy.slider.places import BEGINS, VELOCITY
+from rsfstudy.slider.equations import RUPTURE_REGIME
+from rsfstudy.slider.history import SampledHistory
+from rsfstudy.slider.places import SEGMENT_START, SEGMENT_VELOCITY
 from rsfstudy.slider.point import Point
-from rsfstudy.slider.protocol import Stated
+from rsfstudy.slider.protocol import UserLoading
 from rsfstudy.slider.scene import Scene, check_scene
 from rsfstudy.status import Status
-from rsfstudy.vocabulary import quantity
+from rsfstudy.vocabulary import find_quantity
 
 #: Time that a step is followed for, and load point displacement beyond what a protocol states.
-_USUAL, _BEYOND = 50.0, 20.0
-_UNSTEPPED = (
+_DEFAULT_DURATION, _EXTRA_DISPLACEMENT = 50.0, 20.0
+_NOTHING_STEPPED = (
     "nothing is stepped: the motion is steady sliding at V_*. State load_velocity_ratio, "
     "displacement_step, hold_time, velocity_steps, loading or initial_state in the scene."
 )
-_FIRST = "time at which slip rate first passed the instability norm"
-_INSTABILITY_TIME = Quantity("instability_time", "$t V_*/D_c$", "1", _FIRST, "D_c/V_*")
+_INSTABILITY_TIME_NAME = "time at which slip rate first passed the instability norm"
+_INSTABILITY_TIME = Quantity(
+    "instability_time", "$t V_*/D_c$", "1", _INSTABILITY_TIME_NAME, "D_c/V_*"
+)
 #: Attribute that says from when on a motion is no physics.
-BEYOND = "beyond_instability_norm"
+BEYOND_NORM_ATTRIBUTE = "beyond_instability_norm"
 #: Attribute that holds time, slip and point of the end of a motion.
-END = "end"
+END_ATTRIBUTE = "end"
 #: Slip rate over that of the load point that counts as instability where the load point alone
 #: reaches the norm, as it may where the period is not that of the slider.
-_OVER_LOADING = 1e6
+_INSTABILITY_RATE_FACTOR = 1e6
 #: Variables along motions that are made of spring stress.
-_OF_SPRING = ("shear_stress", "friction_coefficient")
+_SPRING_STRESS_VARIABLES = ("shear_stress", "friction_coefficient")
 #: Those of our own dynamics; others stand behind them.
-_REGIMES = ("quasi_static", "slow_manifold", IN_RUPTURE, "quasi_dynamic")
+_STANDARD_REGIMES = ("quasi_static", "slow_manifold", RUPTURE_REGIME, "quasi_dynamic")
 
 
 @error_boundary
@@ -65,7 +74,7 @@ def simulate(
     budget: int = DEFAULT_BUDGET,
     engine: Any = SCIPY,
     accuracy: Accuracy | None = None,
-    meter: Meter | None = None,
+    meter: WorkMeter | None = None,
 ) -> xr.Dataset:
     """Follow the motion of a scene from the instant after its step.
 
@@ -90,8 +99,8 @@ def simulate(
     engine : {"scipy", "python", "compiled"}, or type
         What integrates; compiled, which needs Numba, is much faster. A stepper of your own is given
         by its class.
-    accuracy, meter : Accuracy and Meter, optional
-        The arguments of `Measure.find`, if you call `simulate` in a user-defined measure. They
+    accuracy, meter : Accuracy and WorkMeter, optional
+        The arguments of `Measure.compute`, if you call `simulate` in a user-defined measure. They
         replace `rtol`, `budget` and `engine`; the right-hand sides count as work of the cell, and a
         motion that cannot go on ends the cell with its status.
 
@@ -124,56 +133,58 @@ def simulate(
 
     Warns
     -----
-    Incomplete
+    IncompleteWarning
         Where the motion ends early, with the status and the reason.
-    NoAnswer
+    NoResultWarning
         Where nothing is stepped: the slider goes on as it began, in steady sliding at V_*. And
         where it passes the instability norm with neither mass nor radiation damping.
     """
     if nameless:
-        remedy = f"Write duration={brief(nameless[0])}, in D_c/V_*."
+        remedy = f"Write duration={shorten(nameless[0])}, in D_c/V_*."
         raise InvalidValue("simulate", nameless[0], "is given without a name", remedy=remedy)
     check_scene(scene)
-    since = None if start is None else _end_of(start, scene)
+    since = None if start is None else _read_end(start, scene)
     began = since.time if since else 0.0
-    at = _increasing(times, duration, began)
+    at = _check_times(times, duration, began)
     if at is not None:
         duration = float(at[-1]) - began
-    duration = _as_stated(scene) - began if duration is None else duration
+    duration = _loading_duration(scene) - began if duration is None else duration
     known = isinstance(duration, int | float | np.number) and not isinstance(duration, bool)
     if not (known and 0.0 < duration < math.inf):
-        remedy = "It is in D_c/V_*; rig.dimensionless converts units of a laboratory."
+        remedy = "It is in D_c/V_*; rig.dimensionless converts units of a rig."
         raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
     is_alone = accuracy is None and meter is None
     if is_alone:
         accuracy = Accuracy(rtol, budget, engine=engine)
-        meter = Meter(budget, engine=accuracy.engine)
-    if not (isinstance(accuracy, Accuracy) and isinstance(meter, Meter)):
-        rule = "must be an Accuracy and a Meter"
+        meter = WorkMeter(budget, engine=accuracy.engine)
+    if not (isinstance(accuracy, Accuracy) and isinstance(meter, WorkMeter)):
+        rule = "must be an Accuracy and a WorkMeter"
         remedy = "Pass accuracy=accuracy, meter=meter, as Measure.find receives them."
         raise InvalidValue("accuracy, meter", (accuracy, meter), rule, remedy=remedy)
     check_engine(accuracy.engine)
-    if is_alone and not scene.is_disturbed:
-        warnings.warn(_UNSTEPPED, NoAnswer, stacklevel=3)
-    spent, by_regime = meter.spent, dict(meter.by_regime)
-    recording = Recording(list(_REGIMES), at)
-    status, message, limit, passed = Status.OK, "", _limit(scene), math.nan
+    if is_alone and not scene.is_perturbed:
+        warnings.warn(_NOTHING_STEPPED, NoResultWarning, stacklevel=3)
+    spent, by_regime = meter.evaluations, dict(meter.evaluations_by_regime)
+    recording = Recording(list(_STANDARD_REGIMES), at)
+    status, message, limit, passed = Status.OK, "", _instability_limit(scene), math.nan
     watches = [rise("log_slip_rate", limit)] if limit < math.inf else []
     until = began + duration if at is None else float(at[-1])
-    moving = follow(scene, accuracy, meter, watches, recording=recording, until=until, since=since)
+    moving = integrate_events(
+        scene, accuracy, meter, watches, recording=recording, until=until, resume_from=since
+    )
     try:
         for last in moving:
-            if math.isnan(passed) and (last.watch or last.point.log_slip_rate >= limit):
+            if math.isnan(passed) and (last.specification or last.point.log_slip_rate >= limit):
                 passed = last.time
-    except Halt as halt:
+    except MotionStopped as halt:
         if not is_alone:
             raise
         status, message = halt.status, str(halt)
         if status is Status.WORK_BUDGET_SPENT:
-            message += more_work(budget)
-    seen = recording.seen(scene)
-    seen = strictly_later(seen) if at is None else seen
-    dataset = _along_time(scene, seen, recording.regimes)
+            message += larger_budget_remedy(budget)
+    seen = recording.table(scene)
+    seen = with_increasing_times(seen) if at is None else seen
+    dataset = _recording_to_dataset(scene, seen, recording.regimes)
     dataset = dataset.assign_attrs(
         {
             "title": f"Motion of a spring-slider, {scene.law} law",
@@ -187,116 +198,126 @@ def simulate(
             "rtol": accuracy.rtol,
             "budget": accuracy.budget,
             "engine": accuracy.engine,
-            "rhs_evaluations": meter.spent - spent,
+            "rhs_evaluations": meter.evaluations - spent,
             "rhs_evaluations_by_regime": json.dumps(
-                {regime: n - by_regime.get(regime, 0) for regime, n in meter.by_regime.items()}
+                {
+                    regime: n - by_regime.get(regime, 0)
+                    for regime, n in meter.evaluations_by_regime.items()
+                }
             ),
-            **provenance.attributes("rsfstudy.simulate"),
+            **provenance.provenance_attributes("rsfstudy.simulate"),
         }
     )
     if status is Status.OK:
-        dataset.attrs[END] = json.dumps((last.time, last.slip, last.point))
-    if isinstance(scene.parts.loading, History):
-        dataset = dataset.assign(history_samples=_samples(scene.parts.loading))
+        dataset.attrs[END_ATTRIBUTE] = json.dumps((last.time, last.slip, last.point))
+    if isinstance(scene.parts.loading, SampledHistory):
+        dataset = dataset.assign(history_samples=_history_variable(scene.parts.loading))
     if passed >= 0.0:
         text = f"from {passed:.9g} D_c/V_* on, with neither mass nor radiation damping: no physics"
         dataset[_INSTABILITY_TIME.name] = ((), passed, _INSTABILITY_TIME.attributes)
-        dataset = dataset.assign_attrs({BEYOND: text})
+        dataset = dataset.assign_attrs({BEYOND_NORM_ATTRIBUTE: text})
         if is_alone:
-            warnings.warn(f"beyond the instability norm {text}", NoAnswer, stacklevel=3)
+            warnings.warn(f"beyond the instability norm {text}", NoResultWarning, stacklevel=3)
     if status is not Status.OK:
         text = f"the motion ends after {max([0.0, *seen[-1:, 0]]):.6g} of {duration:g} D_c/V_*"
-        warnings.warn(f"{text}: {status.label} ({message})", Incomplete, stacklevel=3)
+        warnings.warn(f"{text}: {status.label} ({message})", IncompleteWarning, stacklevel=3)
     return with_cf_encoding(dataset)
 
 
-def _along_time(scene: Scene, seen: np.ndarray, regimes: Sequence[str]) -> xr.Dataset:
+def _recording_to_dataset(scene: Scene, seen: np.ndarray, regimes: Sequence[str]) -> xr.Dataset:
     """Convert the rows of a recording to a dataset along time."""
     fluid = scene.parts.fluid.unknowns
-    columns = {quantity(name): seen[:, column] for column, name in enumerate(OBSERVED)}
-    first = STATES + scene.states - len(fluid)
+    columns = {find_quantity(name): seen[:, column] for column, name in enumerate(MOTION_VARIABLES)}
+    first = FIRST_STATE_COLUMN + scene.state_count - len(fluid)
     columns |= {about: seen[:, first + i] for i, about in enumerate(fluid)}
-    if scene.parts.law.states > 1:
-        of_law = range(scene.parts.law.states)
-        columns |= {_state(i + 1): seen[:, STATES + i] for i in of_law}
-    columns[quantity("load_point_displacement")] = load_point_of(scene, seen)
-    columns[quantity("friction_coefficient")] = friction_coefficient_of(seen)
+    if scene.parts.law.state_count > 1:
+        of_law = range(scene.parts.law.state_count)
+        columns |= {_state_quantity(i + 1): seen[:, FIRST_STATE_COLUMN + i] for i in of_law}
+    columns[find_quantity("load_point_displacement")] = load_point_displacement(scene, seen)
+    columns[find_quantity("friction_coefficient")] = friction_coefficient(seen)
     dataset = xr.Dataset(
-        {q.name: ("time", values, attributes_of(q, scene)) for q, values in columns.items()}
+        {
+            q.name: ("time", values, motion_variable_attributes(q, scene))
+            for q, values in columns.items()
+        }
     )
     flags = {
-        "long_name": quantity("regime").long_name,
+        "long_name": find_quantity("regime").long_name,
         "flag_values": np.arange(len(regimes), dtype=np.int8),
         "flag_meanings": " ".join(regimes),
     }
-    dataset["regime"] = "time", seen[:, REGIME].astype(np.int8), flags
-    about_rate = quantity("reference_rate").attributes
+    dataset["regime"] = "time", seen[:, REGIME_COLUMN].astype(np.int8), flags
+    about_rate = find_quantity("reference_rate").attributes
     dataset["reference_rate"] = (), scene.reference_rate, about_rate
     return dataset.set_coords(["slip", "reference_rate"])
 
 
-def attributes_of(about: Quantity, scene: Scene) -> dict[str, Any]:
+def motion_variable_attributes(about: Quantity, scene: Scene) -> dict[str, Any]:
     """Return the attributes of a variable of a motion.
 
     If the scene has radiation damping, spring stress is reported minus the radiation damping stress
     at V_*. Spring stress and frictional stress are then equal at V_*.
     """
     attributes = about.attributes
-    if about.name in _OF_SPRING and scene.dynamics.damping(0.0):
+    if about.name in _SPRING_STRESS_VARIABLES and scene.dynamics.radiated_stress_slope(0.0):
         attributes["long_name"] += " less the radiation damping stress at V_star"
     return attributes
 
 
-def _state(number: int) -> Quantity:
+def _state_quantity(number: int) -> Quantity:
     about = f"state {number} of the law, as a part of the friction coefficient, freed of stress"
     return Quantity(f"state_{number}", rf"$\Psi_{{{number}}}$", "1", about)
 
 
-def _end_of(motion: object, scene: Scene) -> Event:
+def _read_end(motion: object, scene: Scene) -> Event:
     """The end of a motion of a scene, from which it can go on."""
-    if not isinstance(motion, xr.Dataset) or END not in motion.attrs:
+    if not isinstance(motion, xr.Dataset) or END_ATTRIBUTE not in motion.attrs:
         remedy = "Give a motion that simulate returned, and that lasted as long as was asked."
         raise InvalidValue("start", motion, "is no motion with an end", remedy=remedy)
     if json.loads(motion.attrs["scene"]) != json.loads(json.dumps(scene.describe())):
         remedy = "Give the scene of the motion itself, motion.rsf.scene."
         raise InvalidValue("start", motion.attrs["title"], "is of another scene", remedy=remedy)
-    time, slip, numbers = json.loads(motion.attrs[END])
+    time, slip, numbers = json.loads(motion.attrs[END_ATTRIBUTE])
     point = Point._make(tuple(x) if isinstance(x, list) else x for x in numbers)
-    return Event(Kind.END, None, time, slip, point, "", 0, 0.0)
+    return Event(EventKind.END, None, time, slip, point, "", 0, 0.0)
 
 
-def _samples(history: History) -> xr.Variable:
+def _history_variable(history: SampledHistory) -> xr.Variable:
     """The samples of a history, by which its scene can be made again."""
     about = {
         "long_name": "time, load point velocity, fall and rate of normal stress of the loading",
         "of_stress": int(history.of_stress),
         **({"of_pressure": 1} if history.of_pressure else {}),
     }
-    return xr.Variable(("history_sample", "history_column"), history.columns, about)
+    return xr.Variable(("history_sample", "history_column"), history.sample_table, about)
 
 
-def _limit(scene: Scene) -> float:
+def _instability_limit(scene: Scene) -> float:
     """ln(V/V_*) beyond which a motion is no physics."""
-    if scene.has_mass or scene.dynamics.damping(0.0):
+    if scene.has_mass or scene.dynamics.radiated_stress_slope(0.0):
         return math.inf
-    loads = np.asarray(scene.parts.loading.table)[:, VELOCITY]
+    loads = np.asarray(scene.parts.loading.segment_table)[:, SEGMENT_VELOCITY]
     fastest = math.log(max(1.0, float(abs(loads).max())))
-    norm = scene.log_norm_rate
-    return norm if norm > fastest else fastest + math.log(_OVER_LOADING)
+    norm = scene.log_instability_rate
+    return norm if norm > fastest else fastest + math.log(_INSTABILITY_RATE_FACTOR)
 
 
-def _as_stated(scene: Scene) -> float:
+def _loading_duration(scene: Scene) -> float:
     """Time that the loading of a scene takes."""
     loading = scene.parts.loading
-    stated = float(loading.table[-1][BEGINS])
-    if isinstance(loading, History) or (isinstance(loading, Stated) and loading.lasts > stated):
-        return loading.lasts
+    stated = float(loading.segment_table[-1][SEGMENT_START])
+    if isinstance(loading, SampledHistory) or (
+        isinstance(loading, UserLoading) and loading.duration > stated
+    ):
+        return loading.duration
     if len(loading.segments) == 1:
-        return _USUAL
-    return stated + (_BEYOND / abs(scene.load_velocity) if scene.load_velocity else _USUAL)
+        return _DEFAULT_DURATION
+    return stated + (
+        _EXTRA_DISPLACEMENT / abs(scene.load_velocity) if scene.load_velocity else _DEFAULT_DURATION
+    )
 
 
-def _increasing(times: Any, duration: float | None, began: float) -> np.ndarray | None:
+def _check_times(times: Any, duration: float | None, began: float) -> np.ndarray | None:
     """Times that were asked for, checked."""
     if times is None:
         return None

@@ -12,15 +12,18 @@ from typing import Any
 
 import numpy as np
 
+from rsfstudy._deprecation import renamed_keywords, renamed_members, warn_renamed
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import is_name
-from rsfstudy.slider.registry import name_of
-from rsfstudy.wording import is_list, short
+from rsfstudy.quantity import is_variable_name
+from rsfstudy.slider.registry import normalise_field_value
+from rsfstudy.wording import format_value, is_list_like
 
 Row = Mapping[str, Any]
 
 
+@renamed_keywords
+@renamed_members
 @guard_methods
 @dataclass(frozen=True, init=False)
 class Axis:
@@ -37,8 +40,8 @@ class Axis:
         ``{"constant": {"normal_stress": "constant"}, ...}``, or the rig there; or, for points that
         are numbered from 0, the values of each field: see `samples` and `cases`.
     units : mapping of str to str, optional
-        Units of the fields that are in units, in a study of a rig: see `Laboratory.axis`.
-    drawn : mapping, optional
+        Units of the fields that are in units, in a study of a rig: see `Rig.axis`.
+    sampling_info : mapping, optional
         How the points were drawn, as plain data.
 
     Raises
@@ -52,35 +55,35 @@ class Axis:
     rows: tuple[Row, ...]
     labels: tuple[str, ...] | None
     units: Mapping[str, str]
-    drawn: Mapping[str, Any]
+    sampling_info: Mapping[str, Any]
 
     def __init__(
         self,
         dimension: str,
         values: Sequence[Any] | np.ndarray | Mapping[str, Any],
         units: Mapping[str, str] | None = None,
-        drawn: Mapping[str, Any] | None = None,
+        sampling_info: Mapping[str, Any] | None = None,
     ) -> None:
-        if not is_name(dimension):
+        if not is_variable_name(dimension):
             rule = "must be named by a Python identifier, its accents composed (NFC)"
             raise InvalidValue("axis", dimension, rule)
         labels: tuple[str, ...] | None = None
-        if isinstance(values, Mapping) and values and all(map(is_list, values.values())):
-            rows = _numbered(dimension, values)
+        if isinstance(values, Mapping) and values and all(map(is_list_like, values.values())):
+            rows = _rows_from_columns(dimension, values)
         elif isinstance(values, Mapping):
-            labels, rows = tuple(values), _rows(dimension, values)
+            labels, rows = tuple(values), _rows_from_points(dimension, values)
         else:
             listed = [values] if isinstance(values, str) else values
-            if not is_list(listed):
+            if not is_list_like(listed):
                 raise InvalidValue(dimension, values, "must be a list of values")
-            rows = tuple({dimension: plain(dimension, value)} for value in listed)
+            rows = tuple({dimension: to_plain_value(dimension, value)} for value in listed)
             if any(row[dimension] is None for row in rows):
                 raise InvalidValue(dimension, None, "must be a value on an axis")
-        beside = ({} if mapping is None else mapping for mapping in (units, drawn))
+        beside = ({} if mapping is None else mapping for mapping in (units, sampling_info))
         held = (dimension, rows, labels, *beside)
         for name, value in zip(self.__dataclass_fields__, held, strict=True):
             object.__setattr__(self, name, value)
-        self._check()
+        self._check_values()
 
     @classmethod
     def samples(
@@ -129,8 +132,8 @@ class Axis:
         """
         from rsfstudy.axes import samples  # loads scipy.stats
 
-        drawn, how = samples.draw(distribution, n, seed, method, covariance)
-        return cls(dimension, samples.set_by(drawn, fields), units, how)
+        drawn, how = samples.draw_samples(distribution, n, seed, method, covariance)
+        return cls(dimension, samples.compute_fields(drawn, fields), units, how)
 
     @classmethod
     def cases(
@@ -154,31 +157,31 @@ class Axis:
         """
         from rsfstudy.axes import samples
 
-        columns, stated = samples.columns_of(table)
-        made = samples.set_by(columns, fields)
+        columns, stated = samples.read_columns(table)
+        made = samples.compute_fields(columns, fields)
         kept = {n: text for n, text in stated.items() if made.get(n) is columns[n]}
         return cls(dimension, made, kept | dict(units or {}))
 
-    def _check(self) -> None:
+    def _check_values(self) -> None:
         if not self.rows:
             raise InvalidValue("axis", self.dimension, "has no values")
         if not isinstance(self.units, Mapping) or not set(self.units) <= set(self.fields):
             rule = "must map fields of the axis to their units"
             raise InvalidValue("units", self.units, rule, choices=self.fields)
         for name, text in self.units.items():
-            check_text(name, text)
+            check_storable_text(name, text)
         for number, row in enumerate(self.rows):
             for name, value in row.items():
                 if not isinstance(value, float | str | bool | None):
                     raise InvalidValue(name, value, "must be a number, a flag or a text")
                 if isinstance(value, str):
-                    check_text(name, value)
+                    check_storable_text(name, value)
                 if isinstance(value, float) and not math.isfinite(value):
-                    if self.is_numbered:
+                    if self.has_numbered_points:
                         wrong = InvalidValue(name, value, "must be finite")
-                        raise wrong.at(f"{self.dimension} {number}")
+                        raise wrong.with_location(f"{self.dimension} {number}")
                     raise InvalidValue(self.dimension, value, "must be finite")
-        if self.is_numbered:
+        if self.has_numbered_points:
             return  # of equal ones one is computed
         seen: set[frozenset[tuple[str, Any]]] = set()
         for row in self.rows:
@@ -194,30 +197,30 @@ class Axis:
         return tuple(dict.fromkeys(name for row in self.rows for name in row))
 
     @property
-    def is_numbered(self) -> bool:
+    def has_numbered_points(self) -> bool:
         """True if its points are numbered: samples, or cases."""
         return self.labels is None and self.dimension not in self.rows[0]
 
     @property
-    def is_plain(self) -> bool:
+    def is_single_field(self) -> bool:
         """True if its points are values of the field that it is named by."""
-        return self.labels is None and not self.is_numbered
+        return self.labels is None and not self.has_numbered_points
 
     def with_rows(
         self,
         rows: Sequence[Row],
         units: Mapping[str, str],
-        drawn: Mapping[str, Any] | None = None,
+        sampling_info: Mapping[str, Any] | None = None,
     ) -> Axis:
         """An axis of this kind with other fields set at its points."""
-        return Axis(self.dimension, self._values(rows), units, drawn)
+        return Axis(self.dimension, self._constructor_values(rows), units, sampling_info)
 
-    def _values(self, rows: Sequence[Row]) -> Any:
+    def _constructor_values(self, rows: Sequence[Row]) -> Any:
         """What an axis of this kind with these rows is declared by."""
         if self.labels is not None:
             return {label: dict(row) for label, row in zip(self.labels, rows, strict=True)}
-        if self.is_numbered:
-            return columns(rows)
+        if self.has_numbered_points:
+            return rows_to_columns(rows)
         return [row.get(self.dimension) for row in rows]
 
     def __len__(self) -> int:
@@ -225,32 +228,36 @@ class Axis:
 
     def describe(self) -> dict[str, Any]:
         """The axis as plain data."""
-        beside = {"units": dict(self.units), "drawn": dict(self.drawn)}
+        beside = {"units": dict(self.units), "drawn": dict(self.sampling_info)}
         stated = {name: about for name, about in beside.items() if about}
-        return {"dimension": self.dimension, "values": self._values(self.rows), **stated}
+        return {
+            "dimension": self.dimension,
+            "values": self._constructor_values(self.rows),
+            **stated,
+        }
 
     @property
-    def points(self) -> list[str]:
+    def point_names(self) -> list[str]:
         """What its points are called: labels, numbers, or values with their units."""
-        if self.is_numbered:
+        if self.has_numbered_points:
             return list(map(str, range(len(self))))
         units = self.units.get(self.dimension, "")
-        values = (f"{short(row.get(self.dimension))} {units}".strip() for row in self.rows)
+        values = (f"{format_value(row.get(self.dimension))} {units}".strip() for row in self.rows)
         return list(self.labels or values)
 
 
-def kinds(rows: Sequence[Row]) -> np.ndarray:
+def row_kinds(rows: Sequence[Row]) -> np.ndarray:
     """The kind of each row of an axis, counted from 0 in the order of the first of each. Rows are
     of one kind if they set the same fields, to the same texts and flags, and of numbers to 0 or to
     any others: then scenes with them are made of the same parts.
     """
     known: dict[tuple[Any, ...], int] = {}
-    return np.array([known.setdefault(_kind(row), len(known)) for row in rows])
+    return np.array([known.setdefault(_row_kind(row), len(known)) for row in rows])
 
 
-def places_by_kind(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
+def group_rows_by_kind(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
     """Rows on each axis that are of one kind, for each combination of kinds."""
-    every = [kinds(axis.rows) for axis in axes]
+    every = [row_kinds(axis.rows) for axis in axes]
     for kind in np.ndindex(*(int(of.max()) + 1 for of in every)):
         yield tuple(np.flatnonzero(of == n) for of, n in zip(every, kind, strict=True))
 
@@ -260,44 +267,57 @@ def point_key(row: Row) -> frozenset[tuple[str, Any]]:
     return frozenset(row.items())
 
 
-def _kind(row: Row) -> tuple[Any, ...]:
+def _row_kind(row: Row) -> tuple[Any, ...]:
     return tuple(
         (name, type(value), bool(value) if isinstance(value, float) else value)
         for name, value in row.items()
     )
 
 
-def _rows(dimension: str, points: Mapping[str, Any]) -> tuple[Row, ...]:
+def fields_of_point(point: Any) -> Any:
+    """Return the fields of a rig, or of another object with fields for an axis.
+
+    Any other point is returned as it is.
+    """
+    if hasattr(point, "axis_fields"):
+        return point.axis_fields
+    if hasattr(point, "on_axis"):
+        warn_renamed("on_axis", "axis_fields", type(point).__name__)
+        return point.on_axis
+    return point
+
+
+def _rows_from_points(dimension: str, points: Mapping[str, Any]) -> tuple[Row, ...]:
     """The rows of a zipped axis: for each label the fields set there."""
-    rows = {label: getattr(row, "on_axis", row) for label, row in points.items()}
+    rows = {label: fields_of_point(point) for label, point in points.items()}
     for label, row in rows.items():
-        check_text(dimension, label)
+        check_storable_text(dimension, label)
         if not label:
             raise InvalidValue(dimension, label, "must be a text that labels a point")
         if not isinstance(row, Mapping) or not row:
             raise InvalidValue(dimension, row, f"must be the fields set at {label!r}")
-    return tuple({n: plain(n, v) for n, v in row.items()} for row in rows.values())
+    return tuple({n: to_plain_value(n, v) for n, v in row.items()} for row in rows.values())
 
 
-def _numbered(dimension: str, values: Mapping[str, Sequence[Any]]) -> tuple[Row, ...]:
+def _rows_from_columns(dimension: str, values: Mapping[str, Sequence[Any]]) -> tuple[Row, ...]:
     """The rows of an axis whose points are numbered: at each, a value of each field."""
     lengths = {name: len(column) for name, column in values.items()}
     for name, length in lengths.items():
-        if not is_name(name) or name == dimension:
+        if not is_variable_name(name) or name == dimension:
             rule = f"must be named as a field is, and not as the axis, {dimension!r}"
             raise InvalidValue("column", name, rule)
         if length != max(lengths.values()):
             raise InvalidValue("columns", lengths, "must be of one length")
-    made = [[plain(name, value) for value in column] for name, column in values.items()]
+    made = [[to_plain_value(name, value) for value in column] for name, column in values.items()]
     return tuple(dict(zip(values, row, strict=True)) for row in zip(*made, strict=True))
 
 
-def columns(rows: Sequence[Row]) -> dict[str, list[Any]]:
+def rows_to_columns(rows: Sequence[Row]) -> dict[str, list[Any]]:
     """Values of each field at points that all set the same fields."""
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
-def check_text(name: str, text: object) -> None:
+def check_storable_text(name: str, text: object) -> None:
     """A text that a file can hold."""
     if not isinstance(text, str) or "\0" in text:
         raise InvalidValue(name, text, "must be a text")
@@ -307,16 +327,20 @@ def check_text(name: str, text: object) -> None:
         raise InvalidValue(name, text, "must be a text that UTF-8 can hold") from error
 
 
-def plain_values(field: str, value: Any) -> Any:
-    """A value of a field, or a list of them, as `plain` gives it."""
-    return [plain(field, each) for each in value] if is_list(value) else plain(field, value)
+def to_plain_values(field: str, value: Any) -> Any:
+    """A value of a field, or a list of them, as `to_plain_value` gives it."""
+    return (
+        [to_plain_value(field, each) for each in value]
+        if is_list_like(value)
+        else to_plain_value(field, value)
+    )
 
 
-def plain(field: str, value: Any) -> Any:
+def to_plain_value(field: str, value: Any) -> Any:
     """A value of a field as Python's own number, flag or text: whole numbers as float, a part of
     the user's own by its name.
     """
-    value = name_of(field, value)
+    value = normalise_field_value(field, value)
     if isinstance(value, np.ndarray) and value.ndim:
         raise InvalidValue(field, value.tolist(), "must be one number, flag or text")
     value = value.item() if isinstance(value, np.generic | np.ndarray) else value

@@ -7,12 +7,12 @@ from collections.abc import Hashable, Sequence
 from functools import partial
 from typing import Any
 
-from rsfstudy.axes.axis import Axis, Row, plain, point_key
+from rsfstudy.axes.axis import Axis, Row, point_key, to_plain_value
 from rsfstudy.errors import InvalidValue
-from rsfstudy.wording import short
+from rsfstudy.wording import format_value
 
 
-def select(axis: Axis, points: Sequence[Any]) -> Axis:
+def select_points(axis: Axis, points: Sequence[Any]) -> Axis:
     """Select points of a zipped axis by label, or of a numbered axis by number.
 
     If the selection contains the first ``n`` samples in order, the axis keeps the record of the
@@ -22,17 +22,17 @@ def select(axis: Axis, points: Sequence[Any]) -> Axis:
     for point in points:
         if point not in rows:
             rule, choices = "is no point of the axis", axis.labels or ()
-            if axis.is_numbered:
+            if axis.has_numbered_points:
                 rule += f": they are numbered from 0 to {len(axis) - 1}"
             raise InvalidValue(axis.dimension, point, rule, choices=choices)
     if axis.labels is not None:
         return Axis(axis.dimension, {label: rows[label] for label in points}, axis.units)
     first = list(points) == list(range(len(points)))
-    drawn = {**axis.drawn, "n": len(points)} if axis.drawn and first else {}
+    drawn = {**axis.sampling_info, "n": len(points)} if axis.sampling_info and first else {}
     return axis.with_rows([rows[number] for number in points], axis.units, drawn)
 
 
-def with_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
+def replace_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
     """Replace the values of one field of a zipped or numbered axis.
 
     Parameters
@@ -51,7 +51,7 @@ def with_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
         point exists already, the point keeps its label. Each new label depends only on its own
         point, not on the other values. A numbered axis loses the record of the sampling method.
     """
-    if axis.is_numbered:
+    if axis.has_numbered_points:
         if len(values) != 1:
             rule = f"varies along the axis {axis.dimension}: all of its points take one value"
             raise InvalidValue(name, values, rule, remedy="Give one value.")
@@ -68,7 +68,7 @@ def with_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
         if name not in row:
             points[label] = row
             continue
-        for value in map(partial(plain, name), values):
+        for value in map(partial(to_plain_value, name), values):
             changed = {**row, name: value}
             if changed in points.values():
                 continue
@@ -88,16 +88,16 @@ def _new_label(label: str, name: str, old: Any, new: Any, *, is_unique: bool) ->
     replaced. Otherwise, if the new value identifies the point (``is_unique``), the label becomes
     ``"alpha = 0.3"``. In all other cases ``"alpha = 0.3"`` is appended to the label.
     """
-    text = f"{name} = {_exact(new)}"
-    stated = rf"(?<!\w){re.escape(name)} = {re.escape(_exact(old))}(?![\w.])"
+    text = f"{name} = {_format_exact(new)}"
+    stated = rf"(?<!\w){re.escape(name)} = {re.escape(_format_exact(old))}(?![\w.])"
     replaced, count = re.subn(stated, lambda _found: text, label)
     if count:
         return replaced
     return text if is_unique else f"{label}, {text}"
 
 
-def _exact(value: Any) -> str:
+def _format_exact(value: Any) -> str:
     """Format a value, with all digits if six digits do not represent a float exactly."""
-    short_text = short(value)
+    short_text = format_value(value)
     is_rounded = isinstance(value, float) and float(short_text) != value
     return repr(value) if is_rounded else short_text

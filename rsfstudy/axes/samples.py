@@ -11,31 +11,33 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
-from rsfstudy.argument_checks import MOST_ITEMS
+from rsfstudy.argument_checks import MAX_ITEMS
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import headed
+from rsfstudy.quantity import parse_heading
 
 #: What a field is set by: a quantity that is drawn, or a function of all of them.
-SetBy = str | Callable[[Mapping[str, np.ndarray]], Any]
+FieldSource = str | Callable[[Mapping[str, np.ndarray]], Any]
 
-METHODS = ("sobol", "latin_hypercube", "random", "saltelli")
+SAMPLING_METHODS = ("sobol", "latin_hypercube", "random", "saltelli")
 #: Those that are made of Sobol points, whose number must be a power of two to be balanced.
-_OF_SOBOL = ("sobol", "saltelli")
+_SOBOL_METHODS = ("sobol", "saltelli")
 #: Probabilities nearer to 0 and 1 are none: a distribution without bounds would be infinite there.
-_LEAST = 2.0**-40
+_MIN_PROBABILITY = 2.0**-40
 #: Rounding error that an eigenvalue of a correlation, over the largest, may have.
-_ROUNDING = 1e-10
+_EIGENVALUE_ROUNDING_ERROR = 1e-10
 
 
-def draw(
+def draw_samples(
     distribution: Mapping[str, Any], n: int, seed: int, method: str, covariance: Any
 ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Samples of each quantity, and how they were drawn as plain data; see `Axis.samples`."""
     if not isinstance(distribution, Mapping) or not distribution:
         raise InvalidValue("distribution", distribution, "must map names to distributions")
-    _check(distribution, n, seed, method)
-    deviations, correlation = _spread(distribution, covariance, method)
-    scores = ndtri(_probabilities(len(distribution), n, seed, method)) @ _root(correlation)
+    _check_arguments(distribution, n, seed, method)
+    deviations, correlation = _deviations_and_correlation(distribution, covariance, method)
+    scores = ndtri(_draw_probabilities(len(distribution), n, seed, method)) @ _matrix_square_root(
+        correlation
+    )
     found = {}
     for (name, drawn), score, deviation in zip(
         distribution.items(), scores.T, deviations, strict=True
@@ -43,38 +45,38 @@ def draw(
         if _is_estimate(drawn):
             found[name] = drawn + deviation * score
         else:
-            found[name] = _values(name, drawn, ndtr(score))
+            found[name] = _compute_quantiles(name, drawn, ndtr(score))
     how = {
         "method": method,
         "n": n * (len(distribution) + 2) if method == "saltelli" else n,
         "seed": seed,
-        "of": {name: _said(drawn) for name, drawn in distribution.items()},
+        "of": {name: _describe_distribution(drawn) for name, drawn in distribution.items()},
     }
     if covariance is not None:
         how["covariance"] = np.asarray(covariance, dtype=float).tolist()
     return found, how
 
 
-def _check(distribution: Mapping[str, Any], n: int, seed: int, method: str) -> None:
-    if method not in METHODS:
-        raise InvalidValue("method", method, "is unknown", choices=METHODS)
+def _check_arguments(distribution: Mapping[str, Any], n: int, seed: int, method: str) -> None:
+    if method not in SAMPLING_METHODS:
+        raise InvalidValue("method", method, "is unknown", choices=SAMPLING_METHODS)
     for name, value, least in (("n", n, 1), ("seed", seed, 0)):
         if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
             raise InvalidValue(name, value, f"must be a whole number, {least} or more")
-    if n > MOST_ITEMS:
-        raise InvalidValue("n", n, f"must be at most {MOST_ITEMS:,}")
-    if method in _OF_SOBOL and n & (n - 1):
+    if n > MAX_ITEMS:
+        raise InvalidValue("n", n, f"must be at most {MAX_ITEMS:,}")
+    if method in _SOBOL_METHODS and n & (n - 1):
         below = 1 << (int(n).bit_length() - 1)
         rule = "is no power of two, without which Sobol points are not balanced"
         remedy = f"Draw {below} or {2 * below}, or by method='latin_hypercube'."
         raise InvalidValue("n", n, rule, remedy=remedy)
     for name, drawn in distribution.items():
-        if not _is_estimate(drawn) and _quantiles(drawn) is None:
+        if not _is_estimate(drawn) and _quantile_function(drawn) is None:
             rule = "is neither a distribution of scipy.stats with its parameters, nor an estimate"
             raise InvalidValue(name, drawn, rule, remedy="As in scipy.stats.norm(0.01, 0.001).")
 
 
-def _spread(
+def _deviations_and_correlation(
     distribution: Mapping[str, Any], covariance: Any, method: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """Standard deviations of what is drawn, and the correlation of their normal scores."""
@@ -104,19 +106,19 @@ def _spread(
         remedy = "Draw by method='sobol', or draw independent quantities of which fields are made."
         raise InvalidValue("covariance", given.tolist(), rule, remedy=remedy)
     lowest = float(np.linalg.eigvalsh(correlation)[0])
-    if lowest < -_ROUNDING * count:
+    if lowest < -_EIGENVALUE_ROUNDING_ERROR * count:
         rule = f"is impossible: its correlations have the eigenvalue {lowest:.2g}, below zero"
         raise InvalidValue("covariance", given.tolist(), rule)
     return deviations, correlation
 
 
-def _root(correlation: np.ndarray) -> np.ndarray:
+def _matrix_square_root(correlation: np.ndarray) -> np.ndarray:
     """The symmetric square root, which unlike other factors is one on every machine."""
     values, vectors = np.linalg.eigh(correlation)
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
 
-def _probabilities(count: int, n: int, seed: int, method: str) -> np.ndarray:
+def _draw_probabilities(count: int, n: int, seed: int, method: str) -> np.ndarray:
     """Points of the unit cube, of shape (samples, count)."""
     random = np.random.default_rng(seed)
     if method == "random":
@@ -130,30 +132,32 @@ def _probabilities(count: int, n: int, seed: int, method: str) -> np.ndarray:
         ours, theirs = found[:, :count], found[:, count:]
         mixed = np.where(np.eye(count, dtype=bool), theirs[:, None, :], ours[:, None, :])
         found = np.concatenate([ours[:, None], theirs[:, None], mixed], axis=1)
-    return np.clip(found.reshape(-1, count), _LEAST, 1.0 - _LEAST)
+    return np.clip(found.reshape(-1, count), _MIN_PROBABILITY, 1.0 - _MIN_PROBABILITY)
 
 
 def _is_estimate(drawn: Any) -> bool:
     return isinstance(drawn, int | float | np.number) and not isinstance(drawn, bool)
 
 
-def _quantiles(drawn: Any) -> Any:
+def _quantile_function(drawn: Any) -> Any:
     """The function that gives quantiles of a distribution; None of what is none."""
     return getattr(drawn, "ppf", None) if hasattr(drawn, "dist") else getattr(drawn, "icdf", None)
 
 
-def _values(name: str, drawn: Any, probabilities: np.ndarray) -> np.ndarray:
+def _compute_quantiles(name: str, drawn: Any, probabilities: np.ndarray) -> np.ndarray:
     """The quantiles of a distribution."""
     try:
-        found = np.asarray(_quantiles(drawn)(probabilities), dtype=float)
+        found = np.asarray(_quantile_function(drawn)(probabilities), dtype=float)
     except ValueError:  # of parameters that are arrays
         found = np.empty(0)
     if found.shape != probabilities.shape or not np.isfinite(found).all():
-        raise InvalidValue(name, _said(drawn), "has no finite quantiles: look at its parameters")
+        raise InvalidValue(
+            name, _describe_distribution(drawn), "has no finite quantiles: look at its parameters"
+        )
     return found
 
 
-def _said(drawn: Any) -> Any:
+def _describe_distribution(drawn: Any) -> Any:
     """A distribution in words; an estimate as it is."""
     if _is_estimate(drawn):
         return float(drawn)
@@ -163,8 +167,8 @@ def _said(drawn: Any) -> Any:
     return f"{drawn.dist.name}({', '.join(given)})"
 
 
-def set_by(
-    drawn: Mapping[str, Any], fields: Mapping[str, SetBy] | None
+def compute_fields(
+    drawn: Mapping[str, Any], fields: Mapping[str, FieldSource] | None
 ) -> dict[str, Sequence[Any] | np.ndarray]:
     """Values of each field that is set: by a quantity that is drawn, or a function of them all."""
     if fields is None:
@@ -176,11 +180,15 @@ def set_by(
                 raise InvalidValue(name, by, "is not drawn", choices=drawn)
             found[name] = drawn[by]
         else:
-            found[name] = _made(name, by, {n: np.asarray(values) for n, values in drawn.items()})
+            found[name] = _evaluate_field(
+                name, by, {n: np.asarray(values) for n, values in drawn.items()}
+            )
     return found
 
 
-def _made(name: str, by: Callable[..., Any], drawn: Mapping[str, np.ndarray]) -> np.ndarray:
+def _evaluate_field(
+    name: str, by: Callable[..., Any], drawn: Mapping[str, np.ndarray]
+) -> np.ndarray:
     count = len(next(iter(drawn.values())))
     try:
         made = np.asarray(by(drawn)).astype(float, casting="same_kind")
@@ -190,7 +198,7 @@ def _made(name: str, by: Callable[..., Any], drawn: Mapping[str, np.ndarray]) ->
         raise InvalidValue(name, getattr(by, "__name__", by), rule, choices=drawn) from error
 
 
-def columns_of(table: Any) -> tuple[dict[str, Any], dict[str, str]]:
+def read_columns(table: Any) -> tuple[dict[str, Any], dict[str, str]]:
     """Columns of a table by their names, and the units that it states of them."""
     if not hasattr(table, "keys") or getattr(table, "ndim", 2) != 2 or not len(table):
         rule = "is no table of columns"
@@ -203,7 +211,7 @@ def columns_of(table: Any) -> tuple[dict[str, Any], dict[str, str]]:
         heading, column = str(key), table[key]
         stated = getattr(column, "attrs", {}).get("units", getattr(column, "units", ""))
         stated = stated.get(heading, "") if isinstance(stated, Mapping) else stated
-        name, of_heading = headed(heading) or (heading, "")
+        name, of_heading = parse_heading(heading) or (heading, "")
         if name in found:
             raise InvalidValue("column", name, "stands twice in the table")
         if stated and of_heading and stated != of_heading:

@@ -9,34 +9,38 @@ from typing import Any
 from rsfstudy.declare.study import Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.history import history, read_protocol
-from rsfstudy.rig.laboratory import Laboratory
-from rsfstudy.rig.quantities import SCALES, STATED
+from rsfstudy.rig.laboratory import Rig
+from rsfstudy.rig.quantities import REQUIRED_QUANTITIES, RIG_QUANTITIES
 from rsfstudy.rig.table import read_table
-from rsfstudy.rig.units import number, spaced
-from rsfstudy.slider.protocol import Stated
+from rsfstudy.rig.units import expand_range, parse_number
+from rsfstudy.slider.protocol import UserLoading
 
-_FLAGS = {"true": True, "yes": True, "false": False, "no": False}
+_FLAG_VALUES = {"true": True, "yes": True, "false": False, "no": False}
 
 
-def overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
+def parse_overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
     """Values of axes and fields of a study that ``--set`` states."""
-    texts = {p for axis in study.axes for p in axis.points if axis.labels or "," in p}
-    found = _each(settings, lambda text: setting(text, texts))
+    texts = {p for axis in study.axes for p in axis.point_names if axis.labels or "," in p}
+    found = _parse_each(settings, lambda text: parse_setting(text, texts))
     if "loading" in found:
-        given, rig = found["loading"], study.laboratory
+        given, rig = found["loading"], study.rig
         several = isinstance(given, list)
-        found["loading"] = [loading(v, rig) for v in given] if several else loading(given, rig)
+        found["loading"] = (
+            [parse_loading(v, rig) for v in given] if several else parse_loading(given, rig)
+        )
     return found
 
 
-def fields(settings: tuple[str, ...]) -> dict[str, Any]:
+def parse_fields(settings: tuple[str, ...]) -> dict[str, Any]:
     """Fields of a scene that ``--set`` states."""
     rule = "must read FIELD=VALUE, as in law=slowness"
-    given = _each(settings, lambda text: named("--set", text, rule))
-    return {name: value(text) for name, text in given.items()}
+    given = _parse_each(settings, lambda text: split_assignment("--set", text, rule))
+    return {name: parse_value(text) for name, text in given.items()}
 
 
-def _each(settings: tuple[str, ...], read: Callable[[str], tuple[str, Any]]) -> dict[str, Any]:
+def _parse_each(
+    settings: tuple[str, ...], read: Callable[[str], tuple[str, Any]]
+) -> dict[str, Any]:
     """What each of the settings states, no name twice."""
     found: dict[str, Any] = {}
     for text in settings:
@@ -47,13 +51,13 @@ def _each(settings: tuple[str, ...], read: Callable[[str], tuple[str, Any]]) -> 
     return found
 
 
-def loading(value: Any, laboratory: Laboratory | None) -> Any:
+def parse_loading(value: Any, laboratory: Rig | None) -> Any:
     """A value of `loading`: what a CSV file tells, which goes by the name of the file."""
     path = Path(str(value))
-    return from_table(path, laboratory) if path.suffix.lower() == ".csv" else value
+    return loading_from_file(path, laboratory) if path.suffix.lower() == ".csv" else value
 
 
-def from_table(path: Path, laboratory: Laboratory | None) -> Stated:
+def loading_from_file(path: Path, laboratory: Rig | None) -> UserLoading:
     """The loading that a table tells: a record where it has the column ``time``, else a
     protocol.
     """
@@ -61,18 +65,20 @@ def from_table(path: Path, laboratory: Laboratory | None) -> Stated:
     return read(path, laboratory, name=path.stem)
 
 
-def laboratory(texts: Mapping[str, str]) -> Laboratory:
+def parse_rig(texts: Mapping[str, str]) -> Rig:
     """The rig that options state."""
-    stated = {name: number_or_text(text) for name, text in texts.items() if name in STATED}
-    for name in SCALES:
+    stated = {
+        name: parse_number_or_text(text) for name, text in texts.items() if name in RIG_QUANTITIES
+    }
+    for name in REQUIRED_QUANTITIES:
         if name not in stated:
             remedy = "A rig is stated by these three at least."
             option = f"--{name.replace('_', '-')}"
             raise InvalidValue(option, None, "must be stated", remedy=remedy)
-    return Laboratory(**stated)
+    return Rig(**stated)
 
 
-def place(text: str) -> tuple[str, str]:
+def parse_cell_coordinate(text: str) -> tuple[str, str]:
     """One ``AXIS=VALUE``, the value as it is."""
     name, equals, value = text.partition("=")
     if not equals:
@@ -80,7 +86,7 @@ def place(text: str) -> tuple[str, str]:
     return name, value
 
 
-def named(option: str, text: str, rule: str) -> tuple[str, str]:
+def split_assignment(option: str, text: str, rule: str) -> tuple[str, str]:
     """Both sides of a text that reads NAME=VALUE; the rule names what it must read."""
     name, equals, given = (part.strip() for part in text.partition("="))
     if not (name and equals and given):
@@ -88,18 +94,18 @@ def named(option: str, text: str, rule: str) -> tuple[str, str]:
     return name, given
 
 
-def columns(text: str | None) -> dict[str, str] | None:
+def parse_columns(text: str | None) -> dict[str, str] | None:
     """Which heading stands above which quantity, of ``time=t (s),friction=mu``."""
     rule = "must read NAME=HEADING, as in 'time=t (s),friction=mu'"
     parts = (part for part in (text or "").split(",") if part.strip())
-    return dict(named("--columns", part.strip(), rule) for part in parts) or None
+    return dict(split_assignment("--columns", part.strip(), rule) for part in parts) or None
 
 
-def setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
+def parse_setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
     """One ``AXIS=VALUES``: a label, a single value, a comma list, start:stop:count, or
     start:stop:count:log. Labels may hold commas.
     """
-    name, values = named("--set", text, "must read AXIS=VALUES, as in b_over_a=2,3,4")
+    name, values = split_assignment("--set", text, "must read AXIS=VALUES, as in b_over_a=2,3,4")
     if values in labels:
         return name, [values]
     for label in sorted(labels, key=len, reverse=True):
@@ -108,16 +114,18 @@ def setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
     if not all(parts):
         raise InvalidValue("--set", text, "leaves a value out")
     if len(parts) > 1:
-        return name, [value(part) for part in parts]
-    return name, spaced("--set", text, values) if ":" in values else value(values)
+        return name, [parse_value(part) for part in parts]
+    return name, expand_range("--set", text, values) if ":" in values else parse_value(values)
 
 
-def value(text: str) -> Any:
+def parse_value(text: str) -> Any:
     """A flag, a number, or else a text."""
-    return _FLAGS[text.lower()] if text.lower() in _FLAGS else number_or_text(text)
+    return (
+        _FLAG_VALUES[text.lower()] if text.lower() in _FLAG_VALUES else parse_number_or_text(text)
+    )
 
 
-def number_or_text(text: str) -> float | str:
+def parse_number_or_text(text: str) -> float | str:
     """The number that a text is, or else the text."""
-    read = number(text)
+    read = parse_number(text)
     return text if read is None else read

@@ -17,27 +17,27 @@ import click
 
 from rsfstudy.cli import command_line_motions, options
 from rsfstudy.declare import names
-from rsfstudy.defaults import FORMATS, OUTPUT
-from rsfstudy.error_boundary import in_words
+from rsfstudy.defaults import OUTPUT_DIRECTORY, RESULT_FORMATS
+from rsfstudy.error_boundary import format_exception
 from rsfstudy.errors import (
-    Incomplete,
+    IncompleteWarning,
     Interrupted,
     InvalidValue,
     RsfStudyError,
-    Signalled,
-    brief,
-    spelt,
+    SignalInterrupt,
+    escape_control,
+    shorten,
 )
 
 OK, FAILED, WRONG_USAGE = 0, 1, 2
 #: Signals that end a command as Ctrl-C does.
-_ENDING = (signal.SIGTERM, signal.SIGHUP)
+_ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 
-class Commands(click.Group):
+class OrderedGroup(click.Group):
     """A group whose help names commands in the order of this file."""
 
-    command_class = options.Command
+    command_class = options.LazyCommand
 
     def list_commands(self, _context: click.Context) -> list[str]:
         """Names of the commands."""
@@ -52,7 +52,7 @@ class Commands(click.Group):
 
 
 @click.group(
-    cls=Commands,
+    cls=OrderedGroup,
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
     epilog="To begin with: rsfstudy list, then rsfstudy show NAME, then rsfstudy run NAME. "
     "Each command has a --help of its own.",
@@ -67,57 +67,60 @@ def main() -> None:
     environment has RSFSTUDY_TRACEBACK.
     """
     warnings.filterwarnings("always", category=UserWarning, module="rsfstudy")
-    warnings.filterwarnings("ignore", category=Incomplete)  # commands print it themselves
-    warnings.showwarning = lambda message, *_place: _warn(message)
-    logging.getLogger("matplotlib").addHandler(_LOG)
+    warnings.filterwarnings("ignore", category=IncompleteWarning)  # commands print it themselves
+    warnings.showwarning = lambda message, *_place: _print_warning(message)
+    logging.getLogger("matplotlib").addHandler(_LOG_HANDLER)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # which may be unable to say what a file says
             stream.reconfigure(errors="backslashreplace")
-    for number in _ENDING:
+    for number in _ENDING_SIGNALS:
         if signal.getsignal(number) is signal.SIG_DFL:  # and not ignored, as by nohup
-            signal.signal(number, _end)
+            signal.signal(number, _handle_signal)
     try:
         sys.exit(cli(standalone_mode=False) or OK)
     except click.ClickException as error:
-        error.message = spelt(brief(error.message))  # type: ignore[misc]
+        error.message = escape_control(shorten(error.message))  # type: ignore[misc]
         error.show()
         sys.exit(WRONG_USAGE)
     except (click.Abort, KeyboardInterrupt):
-        _say("interrupted")
+        _print_error("interrupted")
         sys.exit(FAILED)
     except RsfStudyError as error:
-        _say(f"error: {error}")
+        _print_error(f"error: {error}")
         of_ours = WRONG_USAGE if isinstance(error, InvalidValue) else FAILED
         sys.exit(error.exit_status if isinstance(error, Interrupted) else of_ours)
     except Exception as error:
         if os.environ.get("RSFSTUDY_TRACEBACK"):
             raise
-        _say(f"error: rsfstudy {brief(shlex.join(sys.argv[1:]))}: {_explain(error)}")
+        _print_error(
+            f"error: rsfstudy {shorten(shlex.join(sys.argv[1:]))}: "
+            f"{_describe_unexpected_error(error)}"
+        )
         sys.exit(FAILED)
 
 
-def _explain(error: Exception) -> str:
+def _describe_unexpected_error(error: Exception) -> str:
     """Return a message for an exception that no command handles."""
     if isinstance(error, OSError) and error.strerror:
-        place = f" ({brief(error.filename)})" if error.filename else ""
+        place = f" ({shorten(error.filename)})" if error.filename else ""
         remedy = "Check that the place exists, may be written to, and is not full."
         return f"{error.strerror}{place}. {remedy}"
     if isinstance(error, MemoryError):
         return "there is not enough memory for it. Ask for fewer or smaller values."
     return (
-        f"{in_words(error)}. Look at what it names: a file may be damaged, or no place to write "
-        "to. RSFSTUDY_TRACEBACK=1 shows where it arose."
+        f"{format_exception(error)}. Look at what it names: a file may be damaged, or no place to "
+        "write to. RSFSTUDY_TRACEBACK=1 shows where it arose."
     )
 
 
-def _end(number: int, _frame: object) -> None:
+def _handle_signal(number: int, _frame: object) -> None:
     """End the command; it then takes its own time whatever follows: `timeout` sends two signals."""
-    for other in _ENDING:
+    for other in _ENDING_SIGNALS:
         signal.signal(other, signal.SIG_IGN)
-    raise Signalled(number)
+    raise SignalInterrupt(number)
 
 
-class _Log(logging.Handler):
+class _WarnOnceHandler(logging.Handler):
     """Log handler that prints each message of a library once, as a warning.
 
     Matplotlib logs the same message for each text of a figure.
@@ -132,18 +135,18 @@ class _Log(logging.Handler):
         text = record.getMessage()
         if text not in self._printed:
             self._printed.add(text)
-            _warn(text)
+            _print_warning(text)
 
 
-_LOG = _Log(logging.WARNING)
+_LOG_HANDLER = _WarnOnceHandler(logging.WARNING)
 
 
-def _warn(message: Warning | str) -> None:
+def _print_warning(message: Warning | str) -> None:
     # not by the console, which knows nothing of a progress bar and would write over it
-    print(spelt(brief(f"warning: {message}", 5000)), file=sys.stderr)
+    print(escape_control(shorten(f"warning: {message}", 5000)), file=sys.stderr)
 
 
-def _say(text: str) -> None:
+def _print_error(text: str) -> None:
     from rsfstudy.cli.console import stderr
 
     stderr.print(text)
@@ -154,7 +157,7 @@ def _say(text: str) -> None:
 def list_studies(context: click.Context) -> None:
     """Name the studies."""
     text = context.make_formatter()
-    text.write_dl(list(names.titles().items()))
+    text.write_dl(list(names.study_titles().items()))
     text.write_paragraph()
     text.write_text("rsfstudy show NAME tells what one consists of, rsfstudy run NAME computes it.")
     click.echo(text.getvalue().rstrip())
@@ -162,11 +165,11 @@ def list_studies(context: click.Context) -> None:
 
 @cli.command()
 @click.argument("name")
-@options.settings
-@options.rtol
-@options.output
-@options.study
-@options.rig
+@options.set_option
+@options.rtol_option
+@options.output_option
+@options.study_option
+@options.rig_options
 def show() -> None:
     """Show a study before it is run, or what is in a results file.
 
@@ -177,24 +180,24 @@ def show() -> None:
 
 
 @cli.command()
-@options.named
-@options.settings
-@options.output
-@options.rtol
-@options.engine
-@options.budget
-@options.computing
+@options.study_argument
+@options.set_option
+@options.output_option
+@options.rtol_option
+@options.engine_option
+@options.budget_option
+@options.worker_options
 @click.option("--fresh", is_flag=True, help="Compute every cell anew.")
 @click.option("--keep-going", is_flag=True, help="Go on where the first cells all fail.")
 @click.option("--despite-failures", is_flag=True, help="Reduce what there is where cells failed.")
 @click.option(
     "--format",
-    type=click.Choice(FORMATS),
-    default=FORMATS[0],
+    type=click.Choice(RESULT_FORMATS),
+    default=RESULT_FORMATS[0],
     help="One NetCDF file, or a Zarr store written in pieces, which never replaces another.",
 )
-@options.looks
-@options.rig
+@options.figure_options
+@options.rig_options
 def run() -> None:
     """Run a study: results, figure, slopes and claims.
 
@@ -204,8 +207,8 @@ def run() -> None:
 
 
 @cli.command()
-@options.named
-@options.output
+@options.study_argument
+@options.output_option
 @click.option(
     "--claim",
     "claims",
@@ -222,15 +225,15 @@ def check() -> None:
 
 
 @cli.command()
-@options.named
-@options.into(
+@options.study_argument
+@options.make_output_option(
     "Directory of the results and of the figure, or the figure itself, such as fig.pdf.  "
     "[default: outputs, and beside a FILE]"
 )
-@options.looks
+@options.figure_options
 @click.option("--variable", metavar="NAME", help="Draw this variable: maps, or lines.")
-@options.study
-@options.against
+@options.study_option
+@options.abscissa_option
 def plot() -> None:
     """Draw the figure of results, or a motion, beside them.
 
@@ -240,7 +243,7 @@ def plot() -> None:
 
 
 @cli.command()
-@click.argument("directory", default=OUTPUT, type=options.FilePath())
+@click.argument("directory", default=OUTPUT_DIRECTORY, type=options.FilePath())
 @click.option(
     "--output",
     type=options.FilePath(dir_okay=False),
@@ -258,7 +261,7 @@ def report() -> None:
 @cli.command()
 @click.argument("first")
 @click.argument("second")
-@options.output
+@options.output_option
 def compare() -> None:
     """Compare two results files: declarations, versions and numbers.
 
@@ -278,11 +281,11 @@ def compare() -> None:
     metavar="AXIS=VALUE",
     help="Only this cell, in this process, failing as it fails.",
 )
-@options.study
-@options.into(
+@options.study_option
+@options.make_output_option(
     "Directory to keep the new results in; nothing is written without it.", file_okay=False
 )
-@options.computing
+@options.worker_options
 def rerun() -> None:
     """Compute a results file anew, and compare every number.
 

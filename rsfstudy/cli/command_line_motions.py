@@ -17,8 +17,8 @@ from rsfstudy.motion.accuracy import DEFAULT_BUDGET, DEFAULT_RTOL
 from rsfstudy.motion.engines import ENGINES, SCIPY
 
 
-@click.command(cls=options.Command, does="commands_motions")
-@options.fields(
+@click.command(cls=options.LazyCommand, does="commands_motions")
+@options.make_set_option(
     "A field of the scene, as in law=slowness; of a rig with units, as in hold_time='100 s'; "
     "a loading from a CSV file, as in loading=record.csv."
 )
@@ -30,12 +30,12 @@ from rsfstudy.motion.engines import ENGINES, SCIPY
     "or, of a record, 'time (s), displacement (um)'. The same as --set loading=FILE.",
 )
 @click.option("--duration", help="Time to follow it for.  [default: that of the protocol, or 50]")
-@options.against
-@options.rig
+@options.abscissa_option
+@options.rig_options
 @click.option("--rtol", type=float, default=DEFAULT_RTOL, help="Accuracy.")
-@options.count("--budget", DEFAULT_BUDGET, "Right-hand sides it may evaluate.")
+@options.make_count_option("--budget", DEFAULT_BUDGET, "Right-hand sides it may evaluate.")
 @click.option("--engine", type=click.Choice(ENGINES), default=SCIPY)
-@options.image(
+@options.make_image_option(
     "--output", Path("motion.png"), "File of the picture; the data stand beside it as NetCDF."
 )
 @click.option("--quiet", is_flag=True, help="Say how it ended, and not its peaks and events.")
@@ -50,32 +50,38 @@ def simulate() -> None:
     """
 
 
-def _parts(_context: click.Context, _option: click.Parameter, text: str | None) -> tuple[str, ...]:
+def _split_commas(
+    _context: click.Context, _option: click.Parameter, text: str | None
+) -> tuple[str, ...]:
     """Parts of a comma list."""
     return tuple(part.strip() for part in (text or "").split(",") if part.strip())
 
 
-def _number_or_text(_context: click.Context, _option: click.Parameter, text: str | None) -> Any:
+def _parse_number_or_text(
+    _context: click.Context, _option: click.Parameter, text: str | None
+) -> Any:
     """A number in units of records, or a text with units."""
     from rsfstudy.cli import assignments
 
-    return None if text is None else assignments.number_or_text(text)
+    return None if text is None else assignments.parse_number_or_text(text)
 
 
-def _listed(
+def _comma_list_option(
     *names: str, words: str, default: str | None = None, metavar: str = "TEXT"
 ) -> Callable[[F], F]:
     """An option that is a comma list."""
-    return click.option(*names, callback=_parts, default=default, metavar=metavar, help=words)
+    return click.option(
+        *names, callback=_split_commas, default=default, metavar=metavar, help=words
+    )
 
 
-def _quantity(name: str, words: str, default: str | None = None) -> Callable[[F], F]:
+def _quantity_option(name: str, words: str, default: str | None = None) -> Callable[[F], F]:
     """An option that is a number with its units; what help says of its default stands in words."""
     about: dict[str, Any] = {"default": default, "show_default": False, "help": words}
-    return click.option(name, callback=_number_or_text, **about)
+    return click.option(name, callback=_parse_number_or_text, **about)
 
 
-@click.command(cls=options.Command, does="commands_motions")
+@click.command(cls=options.LazyCommand, does="commands_motions")
 @click.argument("records", nargs=-1, required=True, type=options.FilePath())
 @click.option(
     "--columns",
@@ -85,27 +91,31 @@ def _quantity(name: str, words: str, default: str | None = None) -> Callable[[F]
     "[default: by headings that are known]",
 )
 @click.option("--normal-stress", help="As in '20 MPa', where the record does not hold it.")
-@_quantity("--stiffness", "Over normal stress, as in '1.6e-3 /um', or as in '0.03 MPa/um'.")
-@_quantity("--slip-distance", "First guess of D_c, as in '10 um'.")
-@_listed("--law", "laws", default="slip,slowness", words="State evolution laws, a fit by each.")
-@_listed(
+@_quantity_option("--stiffness", "Over normal stress, as in '1.6e-3 /um', or as in '0.03 MPa/um'.")
+@_quantity_option("--slip-distance", "First guess of D_c, as in '10 um'.")
+@_comma_list_option(
+    "--law", "laws", default="slip,slowness", words="State evolution laws, a fit by each."
+)
+@_comma_list_option(
     "--free",
     words="Parameters to look for, of which each law is fitted with those that it has; also "
     "stiffness, step_time, trend2, alpha; of law=family law_exponent.  [default: a, b (b1 and b2 "
     "of two states), slip_distance (slip_distance_2), mu_star, trend1]",
 )
-@_listed("--step", "steps", metavar="N,...", words="Steps to fit.  [default: all]")
+@_comma_list_option("--step", "steps", metavar="N,...", words="Steps to fit.  [default: all]")
 @click.option(
     "--together", is_flag=True, help="Fit these steps, of all RECORDS, as one, by one a, b and D_c."
 )
-@_quantity(
+@_quantity_option(
     "--before",
     "Load point displacement that is fitted before a step.  [default: half the way back to the "
     "step before]",
     "0 um",
 )
-@_quantity("--after", "That after it, as in '250 um'.  [default: up to the next step]", "0 um")
-@options.count(
+@_quantity_option(
+    "--after", "That after it, as in '250 um'.  [default: up to the next step]", "0 um"
+)
+@options.make_count_option(
     "--windows", 1, "Windows, from half of what follows a step to all of it: how parameters differ."
 )
 @click.option(
@@ -119,7 +129,7 @@ def _quantity(name: str, words: str, default: str | None = None) -> Callable[[F]
     default="steps",
     help="The load point by its steps, or as it was recorded.",
 )
-@_quantity(
+@_quantity_option(
     "--averaging",
     "Time over which the data logger averaged friction, as in '1 s', or 'trailing 1 s' if the "
     "average ends at the row.  [default: none]",
@@ -139,14 +149,14 @@ def _quantity(name: str, words: str, default: str | None = None) -> Callable[[F]
     show_default=False,
     help="Draws from the posterior, by emcee.  [default: none]",
 )
-@options.fields("A field of the scene that is not looked for, as in a=0.01.")
-@options.count("--budget", FIT_BUDGET, "Right-hand sides that a fit may evaluate.")
+@options.make_set_option("A field of the scene that is not looked for, as in a=0.01.")
+@options.make_count_option("--budget", FIT_BUDGET, "Right-hand sides that a fit may evaluate.")
 @click.option(
     "--engine",
     type=click.Choice(ENGINES),
     help="What integrates motions.  [default: compiled where Numba is installed, else scipy]",
 )
-@options.image(
+@options.make_image_option(
     "--output", Path("fit.png"), "File of the figure; the data stand beside it as NetCDF."
 )
 def fit() -> None:
@@ -162,7 +172,7 @@ def fit() -> None:
     """
 
 
-@click.command(cls=options.Command, does="commands_referee")
+@click.command(cls=options.LazyCommand, does="commands_referee")
 @click.argument("directory", metavar="DIR", type=options.FilePath())
 def problems() -> None:
     """Write the problems of the referee into a new directory.
@@ -171,7 +181,7 @@ def problems() -> None:
     """
 
 
-@click.command(cls=options.Command, does="commands_referee")
+@click.command(cls=options.LazyCommand, does="commands_referee")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=options.FilePath())
 @click.option(
     "--problem",
@@ -187,7 +197,7 @@ def problems() -> None:
 @click.option(
     "--digits", type=click.FloatRange(1.0, 12.0), default=6.0, help="Digits that make a pass."
 )
-@options.image("--figure", None, "Draw where they agree, into this .png, .pdf or .svg.")
+@options.make_image_option("--figure", None, "Draw where they agree, into this .png, .pdf or .svg.")
 def verify() -> None:
     """Hold answers of another code against those that are known.
 

@@ -23,186 +23,194 @@ from rsfstudy.api import exchange, runs
 from rsfstudy.api import report as reports
 from rsfstudy.cli import assignments, terminal
 from rsfstudy.cli.console import console, stderr
-from rsfstudy.cli.cost import clock
-from rsfstudy.cli.options import Given
-from rsfstudy.cli.terminal import FAILED, OK, Ended
-from rsfstudy.compute.clusters import existing_cluster
-from rsfstudy.compute.runner import Keeping
+from rsfstudy.cli.cost import format_duration
+from rsfstudy.cli.options import CommandOptions
+from rsfstudy.cli.terminal import FAILED, OK, RunSummary
+from rsfstudy.compute.clusters import connect_to_cluster
+from rsfstudy.compute.runner import OutputOptions
 from rsfstudy.compute.workers import Workers
 from rsfstudy.declare import catalogue, names, rigs
 from rsfstudy.declare.study import Study
-from rsfstudy.defaults import FIGURES, OUTPUT
-from rsfstudy.error_boundary import check_file
+from rsfstudy.defaults import FIGURE_FORMATS, OUTPUT_DIRECTORY
+from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError
 from rsfstudy.files import contents, places, restore, store
-from rsfstudy.files.comparison import cell_number
-from rsfstudy.motion.engines import lacking
-from rsfstudy.rig.quantities import STATED
-from rsfstudy.rig.units import number
+from rsfstudy.files.comparison import find_cell_number
+from rsfstudy.motion.engine_factory import missing_packages
+from rsfstudy.rig.quantities import RIG_QUANTITIES
+from rsfstudy.rig.units import parse_number
 
-_ENDINGS = {"netcdf": "nc", "zarr": "zarr"}
-_RESULTS = (".nc", ".zarr")
-_UNITS = ("stress", "length", "time")
+_FILE_SUFFIXES = {"netcdf": "nc", "zarr": "zarr"}
+_RESULT_SUFFIXES = (".nc", ".zarr")
+_UNIT_KINDS = ("stress", "length", "time")
 
 
-def show(given: Given) -> int:
+def show(given: CommandOptions) -> int:
     """Show a study, or a results file."""
-    if Path(given.name).suffix not in _RESULTS:
-        terminal.declaration(_declared(given.name, given), given.output)
+    if Path(given.name).suffix not in _RESULT_SUFFIXES:
+        terminal.print_declaration(_build_study(given.name, given), given.output)
         return OK
     if given.settings or given.rtol is not None or given.rig:
         raise click.UsageError("a results file is shown as it is, without --set, --rtol or a rig")
-    return terminal.results(_read(Path(given.name), given.study), given.name)
+    return terminal.print_results(_read_file(Path(given.name), given.study), given.name)
 
 
-def run(given: Given) -> int:
+def run(given: CommandOptions) -> int:
     """Run a study, or all."""
-    studies = [_declared(name, given) for name in _names(given)]
-    left_out = _left_out(studies) if given.every and given.engine is None else []
+    studies = [_build_study(name, given) for name in _selected_names(given)]
+    left_out = _skip_studies_without_engine(studies) if given.every and given.engine is None else []
     studies = [study for study in studies if study.name not in {end.study for end in left_out}]
-    kept = given.only("output", "format", "fresh", "keep_going", "despite_failures", "command")
+    kept = given.select("output", "format", "fresh", "keep_going", "despite_failures", "command")
     log = given.output / "workers.log" if given.every else None
-    with _workers(given, log) as where:
-        ready = [(s, runs.prepared(s, Keeping(**kept), where, not given.quiet)) for s in studies]
+    with _open_workers(given, log) as where:
+        ready = [
+            (s, runs.prepare_run(s, OutputOptions(**kept), where, not given.quiet)) for s in studies
+        ]
         advice = not (given.every or given.quiet)
         for study in studies:
-            terminal.announce(study, given.output, given.rtol is not None, advice)
+            terminal.print_expected_cost(study, given.output, given.rtol is not None, advice)
         if given.every:
             return _run_all(ready, given, left_out)
-        return FAILED if _run(*ready[0], given).colour == "red" else OK
+        return FAILED if _run_study(*ready[0], given).colour == "red" else OK
 
 
-def _run(study: Study, compute: Callable[[], xr.Dataset], given: Given) -> Ended:
+def _run_study(
+    study: Study, compute: Callable[[], xr.Dataset], given: CommandOptions
+) -> RunSummary:
     """Compute a study, draw it and print what came out, in short where others follow."""
     began = time.monotonic()
     dataset = compute()
-    file = given.output / f"{study.name}.{_ENDINGS[given.format]}"
+    file = given.output / f"{study.name}.{_FILE_SUFFIXES[given.format]}"
     own = None if isinstance(study.plot, str) else study.plot
-    drawn = _drawn(dataset, _beside(file, given), given, own)
-    end = terminal.ended(dataset, study.name, time.monotonic() - began, bool(drawn))
-    (terminal.in_short if given.every else terminal.report)(dataset, end, [file, *drawn])
+    drawn = _save_figure(dataset, _default_figure_path(file, given), given, own)
+    end = terminal.run_summary(dataset, study.name, time.monotonic() - began, bool(drawn))
+    (terminal.print_short if given.every else terminal.print_report)(dataset, end, [file, *drawn])
     return end
 
 
-def _left_out(studies: Sequence[Study]) -> list[Ended]:
+def _skip_studies_without_engine(studies: Sequence[Study]) -> list[RunSummary]:
     """Name the studies whose engine is not installed."""
     ends = []
     for study in studies:
-        if why := lacking(study.accuracy.engine):
+        if why := missing_packages(study.accuracy.engine):
             console.print(f"{study.name}: left out: {why}", style="yellow")
             text = f"left out: {why.partition(' (')[0]}"
-            ends.append(Ended(study.name, "-", text, colour="yellow"))
+            ends.append(RunSummary(study.name, "-", text, colour="yellow"))
     return ends
 
 
 def _run_all(
     ready: Sequence[tuple[Study, Callable[[], xr.Dataset]]],
-    given: Given,
-    left_out: Sequence[Ended],
+    given: CommandOptions,
+    left_out: Sequence[RunSummary],
 ) -> int:
     """Run one study after the other, even if some fail; only Ctrl-C ends them all."""
-    ends: list[Ended] = []
+    ends: list[RunSummary] = []
     try:
         for study, compute in ready:
             began = time.monotonic()
             try:
-                ends.append(_run(study, compute, given))
+                ends.append(_run_study(study, compute, given))
             except Interrupted:
                 raise
             except RsfStudyError as error:
                 stderr.print(f"error: {error}")
-                ends.append(Ended(study.name, clock(time.monotonic() - began), "not finished"))
+                ends.append(
+                    RunSummary(
+                        study.name, format_duration(time.monotonic() - began), "not finished"
+                    )
+                )
     finally:
-        terminal.summary([*ends, *left_out])
+        terminal.print_run_summaries([*ends, *left_out])
     return FAILED if any(end.colour == "red" for end in ends) else OK
 
 
-def rerun(given: Given) -> int:
+def rerun(given: CommandOptions) -> int:
     """Compute a results file anew, or one cell of it."""
     if given.place:
-        place = dict(map(assignments.place, given.place))
+        place = dict(map(assignments.parse_cell_coordinate, given.place))
         try:
             with warnings.catch_warnings(record=True, action="always") as caught:
-                scene, outcome = runs.cell(given.file, place, study=given.study)
+                scene, outcome = runs.recompute_cell(given.file, place, study=given.study)
         except RsfStudyError:
             raise
         except Exception:  # it fails as it fails
             traceback.print_exc()
             return FAILED
         results = runs.open(given.file)
-        index = np.unravel_index(cell_number(results, place), results["status"].shape)
+        index = np.unravel_index(find_cell_number(results, place), results["status"].shape)
         there = results.isel(dict(zip(results["status"].dims, index, strict=True)))
-        return terminal.outcome(scene, outcome, there, [str(one.message) for one in caught])
-    with _workers(given) as where:
-        asked = given.only("study", "output", "time_limit") | {"progress": not given.quiet}
+        return terminal.print_outcome(scene, outcome, there, [str(one.message) for one in caught])
+    with _open_workers(given) as where:
+        asked = given.select("study", "output", "time_limit") | {"progress": not given.quiet}
         table = runs.rerun(given.file, workers=where.processes, client=where.client, **asked)
-    return terminal.agreement(table)
+    return terminal.print_agreement(table)
 
 
-def report(given: Given) -> int:
+def report(given: CommandOptions) -> int:
     """Write a page of all results."""
-    page, unread = reports.written(given.directory, given.output)
+    page, unread = reports.write_report(given.directory, given.output)
     console.print(f"wrote {page}", soft_wrap=True)
     for file in unread:
         console.print(f"{file} cannot be read: the page says why", style="red", soft_wrap=True)
     return FAILED if unread else OK
 
 
-def compare(given: Given) -> int:
+def compare(given: CommandOptions) -> int:
     """Compare two results files."""
-    files = [places.results(name, given.output) for name in (given.first, given.second)]
+    files = [places.find_results(name, given.output) for name in (given.first, given.second)]
     datasets = [runs.open(file) for file in files]
-    return terminal.comparison(files, datasets, runs.compare(*datasets))
+    return terminal.print_comparison(files, datasets, runs.compare(*datasets))
 
 
-def check(given: Given) -> int:
+def check(given: CommandOptions) -> int:
     """Hold results against published values."""
     status, datasets = OK, []
-    for name in _names(given):
+    for name in _selected_names(given):
         if not given.every or (given.output / f"{name}.nc").exists():
             datasets.append(runs.open(name, given.output))
-        elif why := lacking(catalogue.load(name).accuracy.engine):
+        elif why := missing_packages(catalogue.load_study(name).accuracy.engine):
             console.print(f"{name}: left out: {why}", style="yellow")
         else:
             console.print(f"{name}: not run yet", style="red")
             status = FAILED
-    return max(status, terminal.checked(datasets, given.claims)) if datasets else status
+    return max(status, terminal.print_checks(datasets, given.claims)) if datasets else status
 
 
-def plot(given: Given) -> int:
+def plot(given: CommandOptions) -> int:
     """Draw results, or a motion."""
-    status, target = OK, _target(given)
-    for name in _names(given):
-        results = places.results(name, OUTPUT if target else given.output)
-        dataset = _read(results, given.study)
+    status, target = OK, _figure_target(given)
+    for name in _selected_names(given):
+        results = places.find_results(name, OUTPUT_DIRECTORY if target else given.output)
+        dataset = _read_file(results, given.study)
         beside = results if given.output is None else given.output / results.name
-        place = target or _beside(beside, given)
-        if contents.is_of_a_scene(dataset):
+        place = target or _default_figure_path(beside, given)
+        if contents.is_single_scene(dataset):
             drawing = dataset.rsf.plot(against=given.against)
             terminal.write_figure(drawing, place, given.style)
             drawn = [place]
         else:
-            own = None if given.variable else _own_figure(dataset, given.study)
-            drawn = _drawn(dataset, place, given, own)
+            own = None if given.variable else _load_user_figure(dataset, given.study)
+            drawn = _save_figure(dataset, place, given, own)
         status = status if drawn else FAILED
         for file in drawn:
             console.print(f"{file}")
     return status
 
 
-def export(given: Given) -> int:
+def export(given: CommandOptions) -> int:
     """Write a file for other programs, or two."""
     writers = {"csv": exchange.to_csv, "mat": exchange.to_mat}
     asked = [ending for ending in writers if getattr(given, ending)]
     if not asked:
         raise click.UsageError("say --csv or --mat, or both")
-    dataset = store.read_any(given.file)
+    dataset = store.read_dataset(given.file)
     paths = {ending: (given.output or given.file).with_suffix(f".{ending}") for ending in asked}
     for path in paths.values():
         if os.path.lexists(path):
             raise InvalidValue("--output", str(path), "is there already", remedy="Name another.")
     if given.units:
-        dataset = dataset.rsf.in_units(**dict(zip(_UNITS, given.units, strict=True)))
+        dataset = dataset.rsf.in_units(**dict(zip(_UNIT_KINDS, given.units, strict=True)))
     for ending, path in paths.items():
         try:
             writers[ending](dataset, path)
@@ -212,48 +220,51 @@ def export(given: Given) -> int:
     return OK
 
 
-def _read(file: Path, study: Path | None) -> xr.Dataset:
+def _read_file(file: Path, study: Path | None) -> xr.Dataset:
     """What a file holds, once the parts of its scenes are known that a study file defines."""
     if study is not None:
-        catalogue.load(str(study))
-    return store.read_any(file)
+        catalogue.load_study(str(study))
+    return store.read_dataset(file)
 
 
 # ---- what options say -----------------------------------------------------------------------
 
 
-def _names(given: Given) -> list[str]:
+def _selected_names(given: CommandOptions) -> list[str]:
     """The study or file that is named, or all studies."""
     if given.every == (given.name is not None):
         raise click.UsageError("name one study, or say --all")
-    return list(names.names()) if given.every else [given.name]
+    return list(names.study_names()) if given.every else [given.name]
 
 
-def _declared(name: str, given: Given) -> Study:
+def _build_study(name: str, given: CommandOptions) -> Study:
     """A study with the values that options set, on the rig that they state, whose stiffness takes
     the place of those on an axis.
     """
-    study, stated = catalogue.load(name), given.rig
+    study, stated = catalogue.load_study(name), given.rig
     varied = {field for axis in study.axes for field in axis.fields}
     taken = {"load_velocity", *(["stiffness"] * bool(varied & {"stiffness", "stiffness_ratio"}))}
-    if {*stated} - taken and study.laboratory is None:
+    if {*stated} - taken and study.rig is None:
         rig = {name: text for name, text in stated.items() if name not in taken}
-        study = rigs.on(study, assignments.laboratory(rig))
+        study = rigs.with_rig(study, assignments.parse_rig(rig))
         study = replace(study, overrides={**study.overrides, **rig})
         stated = {name: text for name, text in stated.items() if name in taken}
-    in_si = {"load_velocity": "m/s", **{name: about.units for name, about in STATED.items()}}
-    texts = {n: t if number(t) is None else f"{t} {in_si[n]}" for n, t in stated.items()}
-    changes = texts | assignments.overrides(study, given.settings)
-    return runs.declaration(study, changes, **given.only("rtol", "engine", "budget"))
+    in_si = {
+        "load_velocity": "m/s",
+        **{name: about.units for name, about in RIG_QUANTITIES.items()},
+    }
+    texts = {n: t if parse_number(t) is None else f"{t} {in_si[n]}" for n, t in stated.items()}
+    changes = texts | assignments.parse_overrides(study, given.settings)
+    return runs.apply_overrides(study, changes, **given.select("rtol", "engine", "budget"))
 
 
 @contextlib.contextmanager
-def _workers(given: Given, log: Path | None = None) -> Iterator[Workers]:
+def _open_workers(given: CommandOptions, log: Path | None = None) -> Iterator[Workers]:
     """Where cells are computed; `log` is where worker processes write errors."""
     if given.serial and given.scheduler:
         raise click.UsageError("--serial and --scheduler exclude each other")
     nowhere = contextlib.nullcontext()
-    with nowhere if given.scheduler is None else existing_cluster(given.scheduler) as client:
+    with nowhere if given.scheduler is None else connect_to_cluster(given.scheduler) as client:
         processes = 0 if given.serial else given.workers
         with Workers(processes, client, given.time_limit, log) as workers:
             yield workers
@@ -262,14 +273,14 @@ def _workers(given: Given, log: Path | None = None) -> Iterator[Workers]:
 # ---- figures --------------------------------------------------------------------------------
 
 
-def _beside(results: Path, given: Given) -> Path:
+def _default_figure_path(results: Path, given: CommandOptions) -> Path:
     """The figure beside results, which may be no file."""
     name = results.name.removesuffix(".nc").removesuffix(".zarr")
-    words = [name, given.variable, given.form or FIGURES[0]]
+    words = [name, given.variable, given.form or FIGURE_FORMATS[0]]
     return results.with_name(".".join(filter(None, words)))
 
 
-def _target(given: Given) -> Path | None:
+def _figure_target(given: CommandOptions) -> Path | None:
     """The file that --output names, if it is a figure and no directory; one that looks like another
     kind of file must be a directory already.
     """
@@ -277,24 +288,24 @@ def _target(given: Given) -> Path | None:
     ending = "" if output is None else output.suffix[1:].lower()
     if output is None or not ending:
         return None
-    if ending in FIGURES:
+    if ending in FIGURE_FORMATS:
         if given.every or given.form not in (None, ending):
             raise click.UsageError(f"{output} is one figure: no --all, nor another --figure")
-        check_file("--output", output)
+        check_regular_file("--output", output)
         return output
     if not output.is_dir():
         rule = "ends in no format that figures are written in"
         remedy = "A directory with such a name must be there already."
-        raise InvalidValue("--output", str(output), rule, choices=FIGURES, remedy=remedy)
+        raise InvalidValue("--output", str(output), rule, choices=FIGURE_FORMATS, remedy=remedy)
     return None
 
 
-def _own_figure(dataset: xr.Dataset, study: Path | None) -> Any:
+def _load_user_figure(dataset: xr.Dataset, study: Path | None) -> Any:
     """What draws a figure that is not part of rsfstudy: the study file's own, or maps or lines."""
-    if contents.declaration(dataset).plot in plots.NAMES:
+    if contents.read_declaration(dataset).plot in plots.FIGURE_NAMES:
         return None
     try:
-        return restore.own_figure(dataset, study)
+        return restore.load_user_figure(dataset, study)
     except RsfStudyError as error:
         if study is not None:
             raise
@@ -302,10 +313,10 @@ def _own_figure(dataset: xr.Dataset, study: Path | None) -> Any:
         return "lines"
 
 
-def _drawn(dataset: xr.Dataset, path: Path, given: Given, own: Any) -> list[Path]:
+def _save_figure(dataset: xr.Dataset, path: Path, given: CommandOptions, own: Any) -> list[Path]:
     """The figure, if it can be drawn; the results are there already."""
     try:
-        plots.save(dataset, path, own, variable=given.variable, style=given.style)
+        plots.save_figure(dataset, path, own, variable=given.variable, style=given.style)
     except (OSError, RsfStudyError) as error:
         stderr.print(f"no figure: {error}")
         return []

@@ -7,15 +7,15 @@ from typing import Any
 from rich.console import Console, ConsoleDimensions
 from rich.text import Text
 
-from rsfstudy.errors import RunError, brief, spelt
+from rsfstudy.errors import RunError, escape_control, shorten
 
 #: Most characters of a text that is printed: what a file says may be without end.
-_LONGEST = 5000
+_MAX_TEXT_LENGTH = 5000
 #: Bounds of the width: the environment may state any.
-_NARROWEST, _WIDEST = 16, 1000
+_MIN_WIDTH, _MAX_WIDTH = 16, 1000
 
 
-class Plain(Console):
+class PlainConsole(Console):
     """A console that prints any text literally, brackets included; only control characters, which
     would steer the terminal, are spelt out.
     """
@@ -27,7 +27,7 @@ class Plain(Console):
         The environment variable COLUMNS overrides the width of the terminal.
         """
         found = super().size
-        return ConsoleDimensions(min(max(found.width, _NARROWEST), _WIDEST), found.height)
+        return ConsoleDimensions(min(max(found.width, _MIN_WIDTH), _MAX_WIDTH), found.height)
 
     @size.setter
     def size(self, size: tuple[int, int]) -> None:
@@ -35,7 +35,7 @@ class Plain(Console):
 
     def render_str(self, text: str, **options: Any) -> Text:
         """Text with control characters spelt out, and without its middle where it is endless."""
-        return super().render_str(clean(text), **options)
+        return super().render_str(clean_text(text), **options)
 
     def print(self, *objects: Any, **options: Any) -> None:
         """Print; the output may go to a file on a full disk, which is a `RunError`."""
@@ -45,10 +45,10 @@ class Plain(Console):
             raise RunError(f"cannot print: {error.strerror}.") from error
 
 
-def clean(text: str) -> str:
+def clean_text(text: str) -> str:
     """Text with control characters spelt out, and without its middle where it is endless."""
-    return spelt(brief(text, _LONGEST))
+    return escape_control(shorten(text, _MAX_TEXT_LENGTH))
 
 
-console = Plain(markup=False, emoji=False, highlight=False)
-stderr = Plain(stderr=True, markup=False, emoji=False, highlight=False)
+console = PlainConsole(markup=False, emoji=False, highlight=False)
+stderr = PlainConsole(stderr=True, markup=False, emoji=False, highlight=False)

@@ -7,20 +7,21 @@ from pathlib import Path
 
 import numpy as np
 
-from rsfstudy.compute.plan import Plan, estimated_cost
+from rsfstudy.compute.plan import Plan, estimate_cost
 from rsfstudy.files import journal
-from rsfstudy.motion.engines import COMPILED, SCIPY, lacking
+from rsfstudy.motion.engine_factory import missing_packages
+from rsfstudy.motion.engines import COMPILED, SCIPY
 
 #: How many times as long a call takes with SciPy as compiled, by measure. The page of benchmarks
 #: has 7 to 12 times, and 31 to 72 times, the more the more accurate.
-_FASTER = {"critical_step": 10, "limit_cycle": 30}
+_COMPILED_SPEEDUP = {"critical_step": 10, "limit_cycle": 30}
 #: The measure that compares integrators of SciPy.
-_OF_SCIPY = "work_precision"
+_SCIPY_ONLY_MEASURE = "work_precision"
 #: Time in s above which another engine is worth a word.
-_WORTH = 60.0
+_MIN_TIME_FOR_HINT = 60.0
 
 
-def in_words(plan: Plan, output: Path) -> str:
+def cost_text(plan: Plan, output: Path) -> str:
     """Work and time of a study on one core.
 
     Parameters
@@ -29,38 +30,47 @@ def in_words(plan: Plan, output: Path) -> str:
     output : Path
         Directory of its results: what is kept there tells how long cells took.
     """
-    work, guess = estimated_cost(plan)
+    work, guess = estimate_cost(plan)
     work = round(work, 2 - len(str(work)))  # more digits than two would claim too much
     text = f"about {work:,} right-hand sides at rtol {plan.study.accuracy.rtol:g}; "
     kept = output / f"{plan.study.name}.cells.sqlite"
-    took = journal.timed(kept)
-    if took is None or not _alike(plan, took) or not took.seconds:
-        return f"{text}at a guess {clock(guess)} on one core, but ten times as long is possible"
-    cells = len(plan.different)
-    known = [took.seconds[key] for key in plan.keys[plan.different].tolist() if key in took.seconds]
+    took = journal.read_timings(kept)
+    if took is None or not _has_same_accuracy(plan, took) or not took.seconds:
+        return (
+            f"{text}at a guess {format_duration(guess)} on one core, "
+            "but ten times as long is possible"
+        )
+    cells = len(plan.unique_cells)
+    known = [
+        took.seconds[key] for key in plan.keys[plan.unique_cells].tolist() if key in took.seconds
+    ]
     if len(known) == cells:
-        return text + f"took {clock(math.fsum(known))} on one core here last ({kept})"
+        return text + f"took {format_duration(math.fsum(known))} on one core here last ({kept})"
     missing = (cells - len(known)) * float(np.mean(list(took.seconds.values())))
     by = f"by the {len(took.seconds):,} cells in {kept}"
-    return text + f"about {clock(math.fsum(known) + missing)} on one core, {by}"
+    return text + f"about {format_duration(math.fsum(known) + missing)} on one core, {by}"
 
 
-def faster(plan: Plan, output: Path) -> str:
+def compiled_engine_hint(plan: Plan, output: Path) -> str:
     """Advice to take the compiled engine; empty where it is not installed, where cells of another
     engine are kept, or where little time is to be saved.
     """
     measure, engine = plan.study.measure.describe()["name"], plan.study.accuracy.engine
     kept = output / f"{plan.study.name}.cells.sqlite"
-    saves = engine == SCIPY and measure != _OF_SCIPY and estimated_cost(plan)[1] > _WORTH
-    if not saves or kept.exists() or lacking(COMPILED):
+    saves = (
+        engine == SCIPY
+        and measure != _SCIPY_ONLY_MEASURE
+        and estimate_cost(plan)[1] > _MIN_TIME_FOR_HINT
+    )
+    if not saves or kept.exists() or missing_packages(COMPILED):
         return ""
-    if measure in _FASTER:
-        return f"--engine compiled is about {_FASTER[measure]} times faster here"
-    each = ", ".join(f"{times} times with {name}" for name, times in _FASTER.items())
+    if measure in _COMPILED_SPEEDUP:
+        return f"--engine compiled is about {_COMPILED_SPEEDUP[measure]} times faster here"
+    each = ", ".join(f"{times} times with {name}" for name, times in _COMPILED_SPEEDUP.items())
     return f"--engine compiled is faster as a rule: about {each}"
 
 
-def clock(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """A time as one says it."""
     if seconds < 0.05:
         return "less than 0.1 s"
@@ -74,7 +84,7 @@ def clock(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
-def _alike(plan: Plan, took: journal.Timed) -> bool:
+def _has_same_accuracy(plan: Plan, took: journal.CellTimings) -> bool:
     """True if cells were computed as accurately as they are to be now, and by the same engine."""
     asked = plan.study.accuracy
     return took.fingerprint.get("rtol") == asked.rtol and took.fingerprint.get("engine") == (

@@ -16,8 +16,8 @@ from typing import Any, TypeVar
 
 import click
 
-from rsfstudy.defaults import FIGURES, OUTPUT, TIME_LIMIT
-from rsfstudy.error_boundary import check_file
+from rsfstudy.defaults import CELL_TIME_LIMIT, FIGURE_FORMATS, OUTPUT_DIRECTORY
+from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.paths import check_path
@@ -25,7 +25,7 @@ from rsfstudy.paths import check_path
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-class Given(SimpleNamespace):
+class CommandOptions(SimpleNamespace):
     """Arguments and options of one call of a command, by their names."""
 
     variable: str | None = None
@@ -37,29 +37,29 @@ class Given(SimpleNamespace):
         """What was typed."""
         return shlex.join(["rsfstudy", *sys.argv[1:]])
 
-    def only(self, *names: str) -> dict[str, Any]:
+    def select(self, *names: str) -> dict[str, Any]:
         """Those of some names."""
         return {name: getattr(self, name) for name in names}
 
     @property
     def rig(self) -> dict[str, str]:
         """What is stated of a rig."""
-        return {name: text for name in RIG if (text := getattr(self, name)) is not None}
+        return {name: text for name in RIG_EXAMPLES if (text := getattr(self, name)) is not None}
 
 
-class Command(click.Command):
+class LazyCommand(click.Command):
     """A command that is spelt here; what it does is the function of its name in a module of this
     folder, which is given the options and returns the exit status.
     """
 
     def __init__(self, *args: Any, does: str = "commands", **about: Any) -> None:
         super().__init__(*args, **about)
-        self._does = does
+        self._module_name = does
 
     def invoke(self, context: click.Context) -> Any:
         """Load what the command does, and do it."""
-        module = importlib.import_module(f"rsfstudy.cli.{self._does}")
-        return getattr(module, str(self.name))(Given(**context.params))
+        module = importlib.import_module(f"rsfstudy.cli.{self._module_name}")
+        return getattr(module, str(self.name))(CommandOptions(**context.params))
 
 
 class FilePath(click.Path):
@@ -77,28 +77,28 @@ class FilePath(click.Path):
         return super().convert(value, param, ctx)
 
 
-def together(*several: Callable[[Any], Any]) -> Callable[[F], F]:
+def option_group(*several: Callable[[Any], Any]) -> Callable[[F], F]:
     """Several options as one, in their order."""
     return lambda command: functools.reduce(lambda c, each: each(c), reversed(several), command)
 
 
-def count(name: str, default: int | None, words: str) -> Callable[[F], F]:
+def make_count_option(name: str, default: int | None, words: str) -> Callable[[F], F]:
     """An option that is a whole number, 1 or more."""
     kind = click.IntRange(1)
     return click.option(name, type=kind, metavar="N", default=default, help=words)
 
 
-def into(words: str, default: Path | None = None, **kind: bool) -> Callable[[F], F]:
+def make_output_option(words: str, default: Path | None = None, **kind: bool) -> Callable[[F], F]:
     """The option that says where results go."""
     return click.option("--output", type=FilePath(**kind), default=default, help=words)
 
 
-named = together(
+study_argument = option_group(
     click.argument("name", required=False),
     click.option("--all", "every", is_flag=True, help="Every named study."),
 )
-output = into("Directory of the results.", OUTPUT, file_okay=False)
-settings = click.option(
+output_option = make_output_option("Directory of the results.", OUTPUT_DIRECTORY, file_okay=False)
+set_option = click.option(
     "--set",
     "settings",
     multiple=True,
@@ -106,57 +106,59 @@ settings = click.option(
     help="Other values: a comma list, start:stop:count or start:stop:count:log; of a rig with "
     "units, as in hold_time='10 s,100 s'; of loading CSV files of protocols or records.",
 )
-rtol = click.option(
+rtol_option = click.option(
     "--rtol",
     type=float,
     metavar="RTOL",
     help="Accuracy of each cell, 1e-11 to 0.01.  [default: the study's, 1e-07]",
 )
-engine = click.option(
+engine_option = click.option(
     "--engine",
     type=click.Choice(ENGINES),
     help="What integrates motions; compiled, which needs Numba, is much faster.  "
     "[default: the study's, scipy]",
 )
 
-budget = count(
+budget_option = make_count_option(
     "--budget",
     None,
     "Right-hand sides a cell may evaluate; with more, cells that have an answer keep it.  "
     "[default: the study's, 500000]",
 )
 #: Where cells are computed.
-computing = together(
-    count("--workers", 2, "Worker processes of this machine."),
+worker_options = option_group(
+    make_count_option("--workers", 2, "Worker processes of this machine."),
     click.option("--serial", is_flag=True, help="Compute in this process."),
     click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster."),
     click.option(
         "--time-limit",
         type=float,
         metavar="SECONDS",
-        default=TIME_LIMIT,
+        default=CELL_TIME_LIMIT,
         help="CPU time after which a worker gives a cell up.",
     ),
     click.option("--quiet", is_flag=True, help="Do not show how far it has come."),
 )
-study = click.option(
+study_option = click.option(
     "--study",
     type=FilePath(),
     help="File that declares the study, if its measure, a part or the figure is its own.",
 )
 
 #: By their names in datasets.
-_ABSCISSAE = {"displacement": "load_point_displacement"}
-against = click.option(
+_ABSCISSA_VARIABLES = {"displacement": "load_point_displacement"}
+abscissa_option = click.option(
     "--against",
     type=click.Choice(["displacement", "slip", "time"]),
-    callback=lambda _context, _option, value: _ABSCISSAE.get(value, value),
+    callback=lambda _context, _option, value: _ABSCISSA_VARIABLES.get(value, value),
     help="Abscissa of the picture of a motion; displacement is that of the load point.  "
     "[default: displacement, or slip where the load point is held]",
 )
 
 
-def _style(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
+def _check_style(
+    _context: click.Context, _option: click.Parameter, value: str | None
+) -> str | None:
     """Check a plotting style before the command starts, and return the style.
 
     Raises
@@ -165,31 +167,33 @@ def _style(_context: click.Context, _option: click.Parameter, value: str | None)
         If the style cannot be used.
     """
     if value is not None:
-        from rsfstudy.plots import styled
+        from rsfstudy.plots import style_context
 
-        with styled(value):
+        with style_context(value):
             pass
     return value
 
 
 #: How figures look.
-looks = together(
+figure_options = option_group(
     click.option(
         "--figure",
         "form",
-        type=click.Choice(FIGURES),
+        type=click.Choice(FIGURE_FORMATS),
         help="File format of figures.  [default: png]",
     ),
     click.option(
         "--style",
         metavar="STYLE",
-        callback=_style,
+        callback=_check_style,
         help="Style sheet of matplotlib (FILE.mplstyle), or the name of one, on top of ours.",
     ),
 )
 
 
-def _image(_context: click.Context, option: click.Parameter, value: Path | None) -> Path | None:
+def _check_image_path(
+    _context: click.Context, option: click.Parameter, value: Path | None
+) -> Path | None:
     """Check the path of a figure and return the path.
 
     Raises
@@ -202,23 +206,23 @@ def _image(_context: click.Context, option: click.Parameter, value: Path | None)
     if value.suffix not in (".png", ".pdf", ".svg"):
         rule = "must end in .png, .pdf or .svg"
         raise InvalidValue(option.opts[0], str(value), rule)
-    check_file(option.opts[0], value)
+    check_regular_file(option.opts[0], value)
     return value
 
 
-def image(name: str, default: Path | None, words: str) -> Callable[[F], F]:
+def make_image_option(name: str, default: Path | None, words: str) -> Callable[[F], F]:
     """An option that names the file of a figure."""
     kind = FilePath(dir_okay=False)
-    return click.option(name, type=kind, callback=_image, default=default, help=words)
+    return click.option(name, type=kind, callback=_check_image_path, default=default, help=words)
 
 
-def fields(words: str) -> Callable[[F], F]:
+def make_set_option(words: str) -> Callable[[F], F]:
     """The option that sets fields of one scene."""
     return click.option("--set", "settings", multiple=True, metavar="FIELD=VALUE", help=words)
 
 
-#: What a laboratory may state, and an example of it.
-RIG = {
+#: What a rig may state, and an example of it.
+RIG_EXAMPLES = {
     "normal_stress": "5 MPa",
     "slip_distance": "10 um",
     "reference_velocity": "1 um/s",
@@ -231,8 +235,11 @@ RIG = {
 }
 
 
-_OF_RIG = "Of the rig, as in '{}'; a plain number is in SI units."
-#: The options that state a laboratory.
-rig = together(
-    *(click.option(f"--{n.replace('_', '-')}", help=_OF_RIG.format(e)) for n, e in RIG.items())
+_RIG_OPTION_HELP = "Of the rig, as in '{}'; a plain number is in SI units."
+#: The options that state a rig.
+rig_options = option_group(
+    *(
+        click.option(f"--{n.replace('_', '-')}", help=_RIG_OPTION_HELP.format(e))
+        for n, e in RIG_EXAMPLES.items()
+    )
 )

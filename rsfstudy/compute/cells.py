@@ -21,34 +21,34 @@ import cloudpickle
 import numpy as np
 
 from rsfstudy.compute import provenance
-from rsfstudy.declare.cell import Cell, Changes
-from rsfstudy.declare.names import PACKAGE
-from rsfstudy.defaults import TIME_LIMIT
-from rsfstudy.errors import InvalidValue, RunError, brief
-from rsfstudy.files.journal import Finished, Layout
+from rsfstudy.declare.cell import Cell, CellChanges
+from rsfstudy.declare.names import STUDIES_PACKAGE
+from rsfstudy.defaults import CELL_TIME_LIMIT
+from rsfstudy.errors import InvalidValue, RunError, shorten
+from rsfstudy.files.journal import CellRow, OutputPacking
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion import engines
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import compiling
+from rsfstudy.motion.engines import compilation_log
 from rsfstudy.slider import registry
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 if TYPE_CHECKING:
-    from rsfstudy.compute.plan import Batches, Plan
+    from rsfstudy.compute.plan import BatchIterator, Plan
 
 #: Wall time that a cell may take, over its limit of CPU time: for cells that sleep or wait.
-WAITING = 10.0
+WALL_TIME_FACTOR = 10.0
 #: Seconds after which finished cells are handed over; the disk may take 30 ms to keep them.
-_HAND_OVER = 0.5
+_HAND_OVER_INTERVAL = 0.5
 #: Identifies this process.
-_HERE = uuid.uuid4().hex
+_PROCESS_ID = uuid.uuid4().hex
 #: CPU time that Dask itself may use on a worker, over that of the cells.
-_BESIDE = 0.25
+_DASK_CPU_SHARE = 0.25
 #: Characters of a message that are kept.
-_LONGEST_MESSAGE = 2000
+_MAX_MESSAGE_LENGTH = 2000
 
-FinishedCells = list[Finished]
+CellRows = list[CellRow]
 
 
 @dataclass(frozen=True)
@@ -64,52 +64,52 @@ class Task:
     accuracy : Accuracy
     time_limit : float
         CPU time in s a cell may take on a worker. Nothing bounds it in the user's own process.
-    parts, steppers : tuple of type
+    user_parts, steppers : tuple of type
         Parts of the slider, and a stepper, that are the user's own.
-    code : mapping
+    code_fingerprint : mapping
         Versions, and digests of code, that decide a number: every worker must have the same.
-    home : str
+    origin_process : str
         The process that made the task.
     """
 
     base: Scene
     measure: Measure
     accuracy: Accuracy
-    time_limit: float = TIME_LIMIT
-    parts: tuple[registry.Own, ...] = ()
+    time_limit: float = CELL_TIME_LIMIT
+    user_parts: tuple[registry.UserPart, ...] = ()
     steppers: tuple[type, ...] = ()
-    code: Mapping[str, str] = field(default_factory=dict)
-    home: str = _HERE
+    code_fingerprint: Mapping[str, str] = field(default_factory=dict)
+    origin_process: str = _PROCESS_ID
 
     @functools.cached_property
-    def layout(self) -> Layout:
+    def packing(self) -> OutputPacking:
         """Places of the numbers of a cell."""
-        return Layout(self.measure)
+        return OutputPacking(self.measure)
 
 
 #: Takes a task and batches, and yields the finished cells, in any order.
-Mapper = Callable[[Task, "Batches"], Generator[FinishedCells]]
+CellMapper = Callable[[Task, "BatchIterator"], Generator[CellRows]]
 
 
-def serial(task: Task, batches: Batches) -> Generator[FinishedCells]:
+def compute_serially(task: Task, batches: BatchIterator) -> Generator[CellRows]:
     """Compute in this process, one cell after the other. Finished cells are handed over in groups,
     because recording each on its own may cost more than computing it: each group is as large as all
     before it, unless it takes too long.
     """
-    finished: FinishedCells = []
+    finished: CellRows = []
     handed_over, since = 0, time.monotonic()
     for key, changes in (cell for some in batches for cell in batches.plan.cells(some)):
-        cell = changes.of(task.base)
-        outcome, seconds = computed(task, cell, let_through=(KeyboardInterrupt,))
-        finished.append(task.layout.finished(key, outcome, seconds))
-        if len(finished) >= max(1, handed_over) or time.monotonic() - since > _HAND_OVER:
+        cell = changes.apply_to(task.base)
+        outcome, seconds = compute_cell(task, cell, propagated=(KeyboardInterrupt,))
+        finished.append(task.packing.pack_cell(key, outcome, seconds))
+        if len(finished) >= max(1, handed_over) or time.monotonic() - since > _HAND_OVER_INTERVAL:
             yield finished
             handed_over += len(finished)
             finished, since = [], time.monotonic()
     yield finished
 
 
-def sendable(task: Task) -> bytes:
+def serialize_task(task: Task) -> bytes:
     """A task as bytes, with all the code that workers cannot import, and that of named studies, to
     import which would load all that declares and reduces them.
 
@@ -118,8 +118,8 @@ def sendable(task: Task) -> bytes:
     InvalidValue
         Where the measure, a part of the slider or a stepper cannot be serialized.
     """
-    cloudpickle.register_pickle_by_value(importlib.import_module(PACKAGE))
-    each: list[tuple[str, str, object]] = [("part", part.name, part) for part in task.parts]
+    cloudpickle.register_pickle_by_value(importlib.import_module(STUDIES_PACKAGE))
+    each: list[tuple[str, str, object]] = [("part", part.name, part) for part in task.user_parts]
     each += [("engine", task.accuracy.engine, stepper) for stepper in task.steppers]
     for what, name, value in (*each, ("measure", task.measure.name, task)):
         try:
@@ -132,7 +132,7 @@ def sendable(task: Task) -> bytes:
 
 
 @functools.lru_cache(maxsize=4)
-def _received(sent: bytes) -> Task:
+def _load_task(sent: bytes) -> Task:
     """The task, in a worker process, which must run the same code as the process that sent it.
 
     Raises
@@ -147,9 +147,9 @@ def _received(sent: bytes) -> Task:
             f"a worker cannot load the measure, or a part ({type(error).__name__}: {error}). Give "
             "the workers the files it needs, or put them beside the study file"
         ) from error
-    used = *task.measure.classes, *task.parts, *task.steppers
-    ours = provenance.code(task.accuracy.engine, used)
-    for name, wanted in task.code.items():
+    used = *task.measure.code_classes, *task.user_parts, *task.steppers
+    ours = provenance.code_fingerprint(task.accuracy.engine, used)
+    for name, wanted in task.code_fingerprint.items():
         if ours.get(name) != wanted:
             raise RunError(
                 f"a worker has {name} {ours.get(name)}, this run {wanted}: their numbers would "
@@ -158,7 +158,7 @@ def _received(sent: bytes) -> Task:
     return task
 
 
-def packed(plan: Plan, numbers: np.ndarray) -> bytes:
+def pack_batch(plan: Plan, numbers: np.ndarray) -> bytes:
     """Cells of a plan in as few bytes as possible, because Dask's scheduler keeps what it has
     passed on. Parts of the user's own are sent by their names; a worker has them from the task.
     """
@@ -169,7 +169,7 @@ def packed(plan: Plan, numbers: np.ndarray) -> bytes:
     return zlib.compress(pickle.dumps(cells), level=1)
 
 
-def on_worker(sent: bytes, batch: bytes) -> bytes:
+def compute_batch(sent: bytes, batch: bytes) -> bytes:
     """Compute a packed batch in a worker process; a cell over its time limit ends the process.
 
     Returns
@@ -183,95 +183,99 @@ def on_worker(sent: bytes, batch: bytes) -> bytes:
     RunError
         Where the worker cannot load the task, or runs other code than the sender.
     """
-    task = _received(sent)
-    finished: FinishedCells = []
+    task = _load_task(sent)
+    finished: CellRows = []
     began = time.monotonic()
-    ours = task.home == _HERE  # a worker may be a thread of the user's own process
+    ours = task.origin_process == _PROCESS_ID  # a worker may be a thread of the user's own process
     if not ours:
-        compiling.aside = _limits.lifted
-    with contextlib.nullcontext() if ours else _limits.within(task.time_limit):
-        registry.register(task.parts)
-        engines.know(task.steppers)
+        compilation_log.context = _cpu_time_limits.suspended
+    with contextlib.nullcontext() if ours else _cpu_time_limits.enforced(task.time_limit):
+        registry.register_parts(task.user_parts)
+        engines.register_steppers(task.steppers)
         for key, *changes in pickle.loads(zlib.decompress(batch)):
-            cell = Changes(*changes).of(task.base)
-            finished.append(task.layout.finished(key, *computed(task, cell)))
-            if time.monotonic() - began > _HAND_OVER:
+            cell = CellChanges(*changes).apply_to(task.base)
+            finished.append(task.packing.pack_cell(key, *compute_cell(task, cell)))
+            if time.monotonic() - began > _HAND_OVER_INTERVAL:
                 break
     return pickle.dumps(finished)
 
 
-def computed(
-    task: Task, cell: Cell, let_through: tuple[type[BaseException], ...] = ()
+def compute_cell(
+    task: Task, cell: Cell, propagated: tuple[type[BaseException], ...] = ()
 ) -> tuple[Outcome, float]:
     """The outcome of one cell, and its wall time in s, without that of compiling; an exception is
     an outcome too.
     """
-    begin = time.perf_counter() - compiling.seconds
+    begin = time.perf_counter() - compilation_log.seconds
     try:
-        outcome = task.measure.with_(**cell.changes)(cell.scene, task.accuracy)
-    except let_through:
+        outcome = task.measure.with_(**cell.measure_changes)(cell.scene, task.accuracy)
+    except propagated:
         raise
     except BaseException as error:  # a cell may raise SystemExit or CancelledError too
         # not str(error), which may raise as well
         text = traceback.format_exception_only(error)[-1].strip()
         outcome = Outcome(Status.CELL_RAISED, message=text)
     if outcome.message:
-        outcome = replace(outcome, message=_storable(outcome.message))
-    return outcome, time.perf_counter() - compiling.seconds - begin
+        outcome = replace(outcome, message=_to_storable_message(outcome.message))
+    return outcome, time.perf_counter() - compilation_log.seconds - begin
 
 
-def _storable(message: str) -> str:
+def _to_storable_message(message: str) -> str:
     """A message as a file can hold it."""
-    text = brief(message, _LONGEST_MESSAGE).encode(errors="backslashreplace").decode()
+    text = shorten(message, _MAX_MESSAGE_LENGTH).encode(errors="backslashreplace").decode()
     return text.replace("\0", "\\0")
 
 
-class _Limits:
+class _CpuTimeLimits:
     """Has the operating system end this process when a thread takes too long over a cell.
 
     CPU time is limited, because a slow or busy machine takes longer for the same computation. The
     system counts it for the whole process, so the limit is multiplied by the number of threads that
     compute. The system acts even while a cell holds the interpreter's lock. The limit is set once
-    for each batch: all cells but the last take no longer than `_HAND_OVER` together.
+    for each batch: all cells but the last take no longer than `_HAND_OVER_INTERVAL` together.
     """
 
     def __init__(self) -> None:
-        self._computing, self._limit = 0, 0.0
+        self._active_threads, self._limit = 0, 0.0
         self._lock = threading.Lock()
 
     @contextlib.contextmanager
-    def within(self, seconds: float) -> Iterator[None]:
+    def enforced(self, seconds: float) -> Iterator[None]:
         """Allow this thread so many seconds of CPU time for a cell of a batch."""
-        self._add(1, seconds)
+        self._update(1, seconds)
         try:
             yield
         finally:
-            self._add(-1, seconds)
+            self._update(-1, seconds)
 
-    def _add(self, threads: int, seconds: float) -> None:
+    def _update(self, threads: int, seconds: float) -> None:
         with self._lock:
-            self._computing += threads
-            self._limit = self._computing * seconds
-            self._set(self._limit)
+            self._active_threads += threads
+            self._limit = self._active_threads * seconds
+            self._set_timers(self._limit)
 
     @contextlib.contextmanager
-    def lifted(self) -> Iterator[None]:
+    def suspended(self) -> Iterator[None]:
         """No limit for a while; it starts anew afterwards."""
-        self._set(0.0)
+        self._set_timers(0.0)
         try:
             yield
         finally:
-            self._set(self._limit)
+            self._set_timers(self._limit)
 
     @staticmethod
-    def _set(seconds: float) -> None:
+    def _set_timers(seconds: float) -> None:
         """Set the limit, or none for 0 s. Beyond it, the worker's log shows each thread."""
         faulthandler.cancel_dump_traceback_later()
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         if seconds:
-            faulthandler.dump_traceback_later(WAITING * seconds + _HAND_OVER, exit=True)
+            faulthandler.dump_traceback_later(
+                WALL_TIME_FACTOR * seconds + _HAND_OVER_INTERVAL, exit=True
+            )
             faulthandler.register(signal.SIGPROF, chain=True)  # which then ends the process
-            signal.setitimer(signal.ITIMER_PROF, (1.0 + _BESIDE) * seconds + _HAND_OVER)
+            signal.setitimer(
+                signal.ITIMER_PROF, (1.0 + _DASK_CPU_SHARE) * seconds + _HAND_OVER_INTERVAL
+            )
 
 
-_limits = _Limits()
+_cpu_time_limits = _CpuTimeLimits()

@@ -18,15 +18,15 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from rsfstudy.errors import InvalidValue, RunError, brief
+from rsfstudy.errors import InvalidValue, RunError, shorten
 
 #: Time in s to wait for a process of this machine that does not answer.
-_HANGS = 600
+_CONNECT_TIMEOUT = 600
 #: What ends a run in order, where it is handled.
-_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-def check_guard(workers: int) -> None:
+def check_main_guard(workers: int) -> None:
     """Refuse a script that worker processes, which import it, would run as well: one whose line
     that leads here stands below no condition.
 
@@ -54,13 +54,13 @@ def check_guard(workers: int) -> None:
 
 
 @contextlib.contextmanager
-def _interrupts_held() -> Iterator[None]:
+def _delay_interrupts() -> Iterator[None]:
     """Delay Ctrl-C, and signals that end the run as it does, until the end of this block. Ctrl-C
     and the end of a terminal are kept from processes that are started in it: the driver ends the
     run, and then its workers. A second Ctrl-C is not delayed.
     """
     held: list[int] = []
-    found = {int(number): signal.getsignal(number) for number in _ENDING}
+    found = {int(number): signal.getsignal(number) for number in _ENDING_SIGNALS}
     handlers = {number: handler for number, handler in found.items() if callable(handler)}
 
     def hold(number: int, frame: FrameType | None) -> None:
@@ -102,7 +102,7 @@ def _unregister_safely(unregister: Callable[..., None]) -> Any:
     return unregister_known
 
 
-def _survive_lost_tracker() -> None:
+def _tolerate_lost_tracker() -> None:
     """Install ``_unregister_safely`` for the lifetime of the process.
 
     The wrapper must stay installed, because semaphores are released whenever they are
@@ -113,7 +113,7 @@ def _survive_lost_tracker() -> None:
 
 
 @contextlib.contextmanager
-def local_cluster(workers: int, log: Path) -> Iterator[Any]:
+def start_local_cluster(workers: int, log: Path) -> Iterator[Any]:
     """A Dask client of worker processes on this machine, with one thread each.
 
     Parameters
@@ -142,15 +142,15 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
         # by default each process ticks 50 times and samples its stack 100 times a second
         "distributed.admin.tick.interval": "1s",
         "distributed.worker.profile.enabled": False,
-        "distributed.comm.timeouts.connect": f"{_HANGS}s",
+        "distributed.comm.timeouts.connect": f"{_CONNECT_TIMEOUT}s",
         "distributed.nanny.pre-spawn-environ": dict.fromkeys(
             ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
         ),
     }
     with dask.config.set(quiet), contextlib.ExitStack() as stack:
-        _survive_lost_tracker()
+        _tolerate_lost_tracker()
         resource_tracker.ensure_running()  # before workers start, because it unblocks signals
-        with _interrupts_held():
+        with _delay_interrupts():
             try:
                 cluster = LocalCluster(
                     n_workers=workers,
@@ -159,7 +159,7 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
                     dashboard_address="127.0.0.1:0",  # its pages listen, even where it has none
                     scheduler_kwargs={"dashboard": False},
                     silence_logs=logging.ERROR,
-                    plugins=(worker_log.WritesTo(log.resolve()),),
+                    plugins=(worker_log.StderrToFile(log.resolve()),),
                 )
             except Exception as error:
                 raise RunError(
@@ -174,7 +174,7 @@ def local_cluster(workers: int, log: Path) -> Iterator[Any]:
         os.truncate(log, said)  # that a heartbeat found the scheduler closed is no news
 
 
-async def _greeting(address: str) -> None:
+async def _check_scheduler_answers(address: str) -> None:
     """Check that Dask answers; its client would wait for ever if another program listens there."""
     from distributed import Security
     from distributed.comm.core import connect
@@ -184,7 +184,7 @@ async def _greeting(address: str) -> None:
 
 
 @contextlib.contextmanager
-def existing_cluster(address: str, *, timeout: float = 30.0) -> Iterator[Any]:
+def connect_to_cluster(address: str, *, timeout: float = 30.0) -> Iterator[Any]:
     """A client of a Dask scheduler that is already running, with the certificates of Dask's
     configuration.
 
@@ -200,12 +200,12 @@ def existing_cluster(address: str, *, timeout: float = 30.0) -> Iterator[Any]:
     # closed
     with silence_logging_cmgr(logging.CRITICAL + 1):
         try:
-            asyncio.run(asyncio.wait_for(_greeting(address), timeout))
+            asyncio.run(asyncio.wait_for(_check_scheduler_answers(address), timeout))
             client = Client(address, timeout=timeout)
         except Exception as error:  # Dask raises errors of many kinds for a wrong address
             raise RunError(
-                f"no Dask scheduler answers at {brief(address)!r}: "
-                f"{brief(error) or 'it took too long'}. "
+                f"no Dask scheduler answers at {shorten(address)!r}: "
+                f"{shorten(error) or 'it took too long'}. "
                 "Start one with `dask scheduler` (certificates for tls:// are those of Dask's "
                 "configuration), or leave --scheduler out."
             ) from error

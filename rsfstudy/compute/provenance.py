@@ -17,29 +17,29 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsfstudy.compute import code_digest
-from rsfstudy.motion.engines import SCIPY, versions
+from rsfstudy.motion.engines import SCIPY, package_versions
 
 if TYPE_CHECKING:
     from rsfstudy.declare.study import Study
 
-_PACKAGE = Path(__file__).parent.parent
+_PACKAGE_DIRECTORY = Path(__file__).parent.parent
 #: Code whose change may change a number.
-_PHYSICS = ("slider", "motion", "analysis", "measures")
+_PHYSICS_PACKAGES = ("slider", "motion", "analysis", "measures")
 
 
-def sources(package: Path) -> dict[str, bytes]:
+def read_sources(package: Path) -> dict[str, bytes]:
     """Source of everything that decides the number of a cell in every study, by the path in the
     package.
     """
-    files = [file for part in _PHYSICS for file in sorted((package / part).rglob("*.py"))]
+    files = [file for part in _PHYSICS_PACKAGES for file in sorted((package / part).rglob("*.py"))]
     return {file.relative_to(package).as_posix(): file.read_bytes() for file in files}
 
 
 #: Read at import, because later changes to the files do not change the code that runs.
-_SOURCES = sources(_PACKAGE)
+_PHYSICS_SOURCES = read_sources(_PACKAGE_DIRECTORY)
 
 
-def code(engine: str = SCIPY, used: Iterable[object] = ()) -> dict[str, str]:
+def code_fingerprint(engine: str = SCIPY, used: Iterable[object] = ()) -> dict[str, str]:
     """Versions, and digests of code, that decide the numbers of a cell.
 
     Parameters
@@ -49,24 +49,24 @@ def code(engine: str = SCIPY, used: Iterable[object] = ()) -> dict[str, str]:
         The classes of the measure, and parts and a stepper of the user's own.
     """
     return {
-        "physics": _physics(),
-        "own_code": code_digest.of_classes(*used),
+        "physics": _physics_digest(),
+        "own_code": code_digest.digest_classes(*used),
         "python": f"{sys.version_info.major}.{sys.version_info.minor}",  # whose code is digested
         "numpy": version("numpy"),
         "scipy": version("scipy"),
-        **versions(engine),
+        **package_versions(engine),
     }
 
 
 @functools.cache
-def _physics() -> str:
-    return code_digest.of_sources(_SOURCES)
+def _physics_digest() -> str:
+    return code_digest.digest_sources(_PHYSICS_SOURCES)
 
 
-def fingerprint(study: Study) -> dict[str, Any]:
+def run_fingerprint(study: Study) -> dict[str, Any]:
     """All that decides the numbers of a cell, except its scene and its measure's plain fields."""
     plain, accuracy = study.measure.plain_fields, study.accuracy
-    shared = code(accuracy.engine, study.own_classes)
+    shared = code_fingerprint(accuracy.engine, study.user_classes)
     return {
         "study": f"{study.name} version {study.version}",
         "measure": {n: v for n, v in study.measure.describe().items() if n not in plain},
@@ -75,11 +75,11 @@ def fingerprint(study: Study) -> dict[str, Any]:
         "methods": [list(pair) for pair in accuracy.methods],
         "engine": accuracy.engine,
         **shared,
-        "physics": code_digest.with_measures(shared["physics"], study.measure.classes),
+        "physics": code_digest.digest_with_measures(shared["physics"], study.measure.code_classes),
     }
 
 
-def provenance(study: Study, command: str) -> dict[str, Any]:
+def collect_provenance(study: Study, command: str) -> dict[str, Any]:
     """Where, when and from what a run was made, and by which versions.
 
     Parameters
@@ -91,20 +91,20 @@ def provenance(study: Study, command: str) -> dict[str, Any]:
     return {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": command,
-        "declared_in": study.declared_in,
+        "declared_in": study.source_file,
         "versions": {
             "python": platform.python_version(),
             **{name: version(name) for name in _DEPENDENCIES},
         },
-        "fingerprint": fingerprint(study),
-        "git": git_state(_PACKAGE.parent),
+        "fingerprint": run_fingerprint(study),
+        "git": git_state(_PACKAGE_DIRECTORY.parent),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         "mathematical_library": " ".join(platform.libc_ver()).strip() or "unknown",
         "byte_order": sys.byteorder,
     }
 
 
-def attributes(command: str) -> dict[str, str]:
+def provenance_attributes(command: str) -> dict[str, str]:
     """Root attributes that say which rsfstudy made a dataset of one scene, when, and how.
 
     Parameters
@@ -113,12 +113,12 @@ def attributes(command: str) -> dict[str, str]:
         What the user typed, or called.
     """
     when = datetime.now(UTC).isoformat(timespec="seconds")
-    return {"source": _source(), "history": f"{when} {command}"}
+    return {"source": _source_attribute(), "history": f"{when} {command}"}
 
 
 @functools.cache
-def _source() -> str:
-    commit = git_state(_PACKAGE.parent)
+def _source_attribute() -> str:
+    commit = git_state(_PACKAGE_DIRECTORY.parent)
     return f"rsfstudy {version('rsfstudy')}, commit {commit}, numerical model of a spring-slider"
 
 
@@ -130,7 +130,7 @@ def git_state(root: Path) -> str:
     root is none, as for an installed wheel, the commit that it was built from, or "none".
     """
 
-    def ask(*words: str) -> str:
+    def run_git(*words: str) -> str:
         return subprocess.run(
             ["git", "-C", str(root), *words],
             capture_output=True,
@@ -140,10 +140,12 @@ def git_state(root: Path) -> str:
         ).stdout.strip()
 
     with contextlib.suppress(OSError, subprocess.SubprocessError):
-        if Path(ask("rev-parse", "--show-toplevel")) == root.resolve():
+        if Path(run_git("rev-parse", "--show-toplevel")) == root.resolve():
             # what runs leave in the checkout changes nothing
-            changed = ask("status", "--porcelain", "--", _PACKAGE.name, "studies", "pyproject.toml")
+            changed = run_git(
+                "status", "--porcelain", "--", _PACKAGE_DIRECTORY.name, "studies", "pyproject.toml"
+            )
             state = "with uncommitted changes" if changed else "clean"
-            return f"{ask('rev-parse', 'HEAD')} {state}"
-    stamp = _PACKAGE / "commit.txt"  # as `stamp` writes it into a wheel
+            return f"{run_git('rev-parse', 'HEAD')} {state}"
+    stamp = _PACKAGE_DIRECTORY / "commit.txt"  # as `stamp` writes it into a wheel
     return stamp.read_text().strip() if stamp.exists() else "none"

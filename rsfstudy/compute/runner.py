@@ -14,28 +14,28 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.compute import provenance
-from rsfstudy.compute.cells import FinishedCells, Mapper, Task
-from rsfstudy.compute.plan import Batches, Plan, scattered
+from rsfstudy.compute.cells import CellMapper, CellRows, Task
+from rsfstudy.compute.plan import BatchIterator, Plan, scatter_cells
 from rsfstudy.declare.study import Study
-from rsfstudy.defaults import FORMATS
+from rsfstudy.defaults import RESULT_FORMATS
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
 from rsfstudy.files import store, zarr_store
-from rsfstudy.files.journal import Columns, Journal
-from rsfstudy.files.lattice import assemble
-from rsfstudy.reduce import reduced
+from rsfstudy.files.journal import CellColumns, Journal
+from rsfstudy.files.lattice import assemble_dataset
+from rsfstudy.reduce import apply_reductions
 from rsfstudy.status import Status
 
 #: Statuses of cells that ended their worker.
-_LOST = (Status.WORKER_LOST.name, Status.TIME_LIMIT_SPENT.name)
-_ANSWERS = frozenset(status.name for status in Status if status.is_answer)
+_LOST_STATUSES = (Status.WORKER_LOST.name, Status.TIME_LIMIT_SPENT.name)
+_ANSWER_STATUSES = frozenset(status.name for status in Status if status.is_answer)
 #: A run ends early when this many cells have failed and none has succeeded.
-_HOPELESS = 10
+_MAX_FIRST_FAILURES = 10
 
-Progress = Callable[[int, int], None]
+ProgressCallback = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Keeping:
+class OutputOptions:
     """Files that a run writes, and what it does about failed cells.
 
     Parameters
@@ -62,22 +62,21 @@ class Keeping:
     command: str = "rsfstudy.run"
 
     def __post_init__(self) -> None:
-        if self.format not in FORMATS:
-            raise InvalidValue("format", self.format, "is unknown", choices=FORMATS)
+        if self.format not in RESULT_FORMATS:
+            raise InvalidValue("format", self.format, "is unknown", choices=RESULT_FORMATS)
         if self.format == "zarr":
-            zarr_store.check_installed()
+            zarr_store.check_zarr_installed()
             if self.output is None:
                 raise InvalidValue("output", None, "must name a directory for a Zarr store")
 
 
-class Run:
+class StudyRun:
     """One run of a study.
 
     Parameters
     ----------
     study : Study
-    keeping : Keeping
-    keeping : Keeping
+    options : OutputOptions
     task : Task
     workers : int
         How many cells are computed at a time, to size the tasks.
@@ -89,46 +88,47 @@ class Run:
         its lattice, before anything is computed.
     """
 
-    def __init__(self, study: Study, keeping: Keeping, task: Task, workers: int = 1) -> None:
-        self.study, self.keeping, self.task, self.workers = study, keeping, task, workers
+    def __init__(self, study: Study, options: OutputOptions, task: Task, workers: int = 1) -> None:
+        self.study, self.options, self.task, self.workers = study, options, task, workers
         self.plan = Plan(study)
-        self.about = provenance.provenance(study, keeping.command)
-        self._rehearse()
+        self.provenance = provenance.collect_provenance(study, options.command)
+        self._dry_run()
 
-    def _rehearse(self) -> None:
+    def _dry_run(self) -> None:
         """Apply the reductions to a lattice of pending cells, to find mistakes before any work.
         Unless values were overridden, each claim must name a variable and a place of the result.
         """
-        pending = Columns.pending(self.study.size, self.task.layout.width)
-        lattice = assemble(self.study, pending, self.about)
+        pending = CellColumns.pending(self.study.size, self.task.packing.width)
+        lattice = assemble_dataset(self.study, pending, self.provenance)
         for reduction in self.study.reductions:
             try:
-                lattice = reduced(lattice, (reduction,))
+                lattice = apply_reductions(lattice, (reduction,))
             except RsfStudyError:
                 raise
             except Exception as error:
                 rule = f"does not fit this lattice: {type(error).__name__}: {error}"
                 raise InvalidValue("reduction", reduction.name, rule) from error
         for claim in () if self.study.overrides else self.study.claims:
-            claim.check_place(lattice)
+            claim.check_selection(lattice)
 
-    def path(self, ending: str) -> Path:
+    def output_path(self, ending: str) -> Path:
         """A file of this run."""
-        assert self.keeping.output is not None
-        return self.keeping.output / f"{self.study.name}{ending}"
+        assert self.options.output is not None
+        return self.options.output / f"{self.study.name}{ending}"
 
     @property
-    def worker_log(self) -> Path | None:
+    def worker_log_path(self) -> Path | None:
         """The file for the last words of worker processes, if anything is written."""
-        return None if self.keeping.output is None else self.path(".workers.log")
+        return None if self.options.output is None else self.output_path(".workers.log")
 
-    def __call__(self, mapper: Mapper, progress: Progress) -> xr.Dataset:
+    def __call__(self, mapper: CellMapper, progress: ProgressCallback) -> xr.Dataset:
         """Compute the missing cells, then assemble, reduce and write the dataset.
 
         Parameters
         ----------
         mapper : callable
-            Where cells are computed: `cells.serial`, or what `workers.on_client` gives.
+            Where cells are computed: `cells.compute_serially`, or what
+            `workers.make_client_mapper` gives.
         progress : callable
             Called with the number of finished cells and of all cells.
 
@@ -140,42 +140,48 @@ class Run:
             When it cannot go on, or is interrupted (`Interrupted`); what is finished is kept in
             ``NAME.partial.nc`` and in the journal.
         """
-        keeping = self.keeping
+        keeping = self.options
         if keeping.format == "zarr":
-            zarr_store.check_free(self.path(".zarr"))
-        path = None if keeping.output is None else self.path(".cells.sqlite")
-        fingerprint, layout = self.about["fingerprint"], self.task.layout
+            zarr_store.check_not_existing(self.output_path(".zarr"))
+        path = None if keeping.output is None else self.output_path(".cells.sqlite")
+        fingerprint, layout = self.provenance["fingerprint"], self.task.packing
         with Journal(path, fingerprint, layout, fresh=keeping.fresh) as journal:
             try:
                 self._compute_missing(journal, mapper, progress)
-                return self._finished(journal)
+                return self._write_results(journal)
             except (KeyboardInterrupt, RunError) as error:
-                raise self._interrupted(journal, error) from error
+                raise self._save_partial_results(journal, error) from error
             except DataError as error:
-                raise DataError(f"{error} {self._resumable(journal)}") from error
+                raise DataError(f"{error} {self._resume_hint(journal)}") from error
 
-    def _compute_missing(self, journal: Journal, mapper: Mapper, progress: Progress) -> None:
-        cells = self.plan.different
+    def _compute_missing(
+        self, journal: Journal, mapper: CellMapper, progress: ProgressCallback
+    ) -> None:
+        cells = self.plan.unique_cells
         # failures are tried again
-        answered = journal.ended(self.plan.keys[cells]) < int(Status.WORK_BUDGET_SPENT)
-        missing = scattered(cells[~answered])
+        answered = journal.statuses(self.plan.keys[cells]) < int(Status.WORK_BUDGET_SPENT)
+        missing = scatter_cells(cells[~answered])
         done, failed, total = int(answered.sum()), 0, len(cells)
         progress(done, total)
-        if self.worker_log is not None:
-            self.worker_log.unlink(missing_ok=True)  # of an earlier run
+        if self.worker_log_path is not None:
+            self.worker_log_path.unlink(missing_ok=True)  # of an earlier run
         if not len(missing):
             return
-        batches = Batches(self.plan, missing, self.workers)
+        batches = BatchIterator(self.plan, missing, self.workers)
         with contextlib.closing(mapper(self.task, batches)) as arriving:
             for finished in arriving:
                 journal.add(finished)
-                self._tell_lost(finished)
+                self._warn_of_lost_cells(finished)
                 for row in finished:
-                    batches.learn(row[4])
-                    failed += row[1] not in _ANSWERS
+                    batches.record_time(row[4])
+                    failed += row[1] not in _ANSWER_STATUSES
                 done += len(finished)
                 progress(done, total)
-                if failed == done >= _HOPELESS and done < total and not self.keeping.keep_going:
+                if (
+                    failed == done >= _MAX_FIRST_FAILURES
+                    and done < total
+                    and not self.options.keep_going
+                ):
                     _key, status, message, *_ = row
                     raise RunError(
                         f"the first {done} cells all failed, the last with {Status[status].label}"
@@ -183,78 +189,88 @@ class Run:
                         "Mend that, or go on all the same with --keep-going (keep_going=True)"
                     )
 
-    def _tell_lost(self, finished: FinishedCells) -> None:
+    def _warn_of_lost_cells(self, finished: CellRows) -> None:
         """Warn of cells that ended their worker."""
         for key, status, message, *_ in finished:
-            if status in _LOST:
+            if status in _LOST_STATUSES:
                 cell = int(np.flatnonzero(self.plan.keys == np.void(key))[0])
                 warnings.warn(
-                    f"cell {self.study.place(cell)} failed, {Status[status].label}: "
+                    f"cell {self.study.describe_cell(cell)} failed, {Status[status].label}: "
                     f"{message}. The run goes on",
                     stacklevel=2,
                 )
 
     # ---- from cells to results ------------------------------------------------------------------
 
-    def _finished(self, journal: Journal) -> xr.Dataset:
-        zarr = self.keeping.format == "zarr"
+    def _write_results(self, journal: Journal) -> xr.Dataset:
+        zarr = self.options.format == "zarr"
         try:
-            results = self._in_slabs(journal) if zarr else self._reduced(self.lattice(journal))
+            results = (
+                self._write_zarr_in_slabs(journal)
+                if zarr
+                else self._apply_reductions(self.assemble_lattice(journal))
+            )
         except RsfStudyError:
             raise
         except Exception as error:  # of a reduction
             raise RunError(f"cannot be reduced ({type(error).__name__}: {error})") from error
-        if self.keeping.output is None:
+        if self.options.output is None:
             return store.clean_attributes(results)
-        written = results if zarr else store.write(results, self.path(".nc"))
+        written = results if zarr else store.write_dataset(results, self.output_path(".nc"))
         for stale in (".partial.nc", ".partial.png"):
-            self.path(stale).unlink(missing_ok=True)
+            self.output_path(stale).unlink(missing_ok=True)
         return written
 
-    def lattice(self, journal: Journal) -> xr.Dataset:
+    def assemble_lattice(self, journal: Journal) -> xr.Dataset:
         """The dataset of the cells in the journal, without reductions."""
-        return assemble(self.study, journal.read(self.plan.keys), self.about)
+        return assemble_dataset(self.study, journal.read_cells(self.plan.keys), self.provenance)
 
-    def _reduced(self, lattice: xr.Dataset) -> xr.Dataset:
-        despite = self.keeping.despite_failures
-        return reduced(lattice, tuple(self.study.reductions), despite_failures=despite)
+    def _apply_reductions(self, lattice: xr.Dataset) -> xr.Dataset:
+        despite = self.options.despite_failures
+        return apply_reductions(lattice, tuple(self.study.reductions), despite_failures=despite)
 
-    def _in_slabs(self, journal: Journal) -> xr.Dataset:
-        def read(some: slice) -> Columns:
-            return journal.read(self.plan.keys[some])
+    def _write_zarr_in_slabs(self, journal: Journal) -> xr.Dataset:
+        def read(some: slice) -> CellColumns:
+            return journal.read_cells(self.plan.keys[some])
 
-        return zarr_store.write(self.study, read, self.about, self._reduced, self.path(".zarr"))
+        return zarr_store.write_store(
+            self.study, read, self.provenance, self._apply_reductions, self.output_path(".zarr")
+        )
 
-    def _interrupted(self, journal: Journal, error: BaseException) -> RunError:
+    def _save_partial_results(self, journal: Journal, error: BaseException) -> RunError:
         """Write what is finished, and give the error for a run that ended early."""
         why = f"{self.study.name}: {str(error) or 'interrupted'}. "
-        if self.keeping.output is not None and self.keeping.format == "netcdf":
-            lattice = self.lattice(journal)
+        if self.options.output is not None and self.options.format == "netcdf":
+            lattice = self.assemble_lattice(journal)
             with contextlib.suppress(Exception):  # a reduction may not bear missing cells, or any
-                lattice = self._reduced(lattice)
+                lattice = self._apply_reductions(lattice)
             try:
-                store.write(lattice, self.path(".partial.nc"))
+                store.write_dataset(lattice, self.output_path(".partial.nc"))
             except DataError as unwritten:
                 why += f"{unwritten} "
         kind = Interrupted if isinstance(error, KeyboardInterrupt) else RunError
-        return kind(why + self._resumable(journal))
+        return kind(why + self._resume_hint(journal))
 
-    def _resumable(self, journal: Journal) -> str:
+    def _resume_hint(self, journal: Journal) -> str:
         """A sentence: how many cells are finished, where they are, and how to go on."""
-        known = int((journal.ended(self.plan.keys) != int(Status.PENDING)).sum())
+        known = int((journal.statuses(self.plan.keys) != int(Status.PENDING)).sum())
         text = f"{known} of {self.study.size} cells are finished"
-        if self.keeping.output is None:
+        if self.options.output is None:
             return f"{text}; nothing was to be kept (no output directory)."
-        where = self.path(".cells.sqlite")
+        where = self.output_path(".cells.sqlite")
         return f"{text} and kept in {where}; the same command goes on from there."
 
 
-def counts(dataset: xr.Dataset) -> Mapping[str, int]:
+def count_statuses(dataset: xr.Dataset) -> Mapping[str, int]:
     """Number of cells that ended with each status."""
     status = np.asarray(dataset["status"].values)
     return {s.label: int((status == int(s)).sum()) for s in Status if (status == int(s)).any()}
 
 
-def failures(dataset: xr.Dataset) -> Mapping[str, int]:
+def count_failures(dataset: xr.Dataset) -> Mapping[str, int]:
     """Number of cells that failed with each status."""
-    return {label: n for label, n in counts(dataset).items() if label.upper() not in _ANSWERS}
+    return {
+        label: n
+        for label, n in count_statuses(dataset).items()
+        if label.upper() not in _ANSWER_STATUSES
+    }

@@ -10,7 +10,7 @@ from pathlib import Path
 from setuptools.command.build_py import build_py
 
 
-class Stamped(build_py):  # type: ignore[misc]  # of which there are no types
+class BuildWithCommit(build_py):  # type: ignore[misc]  # of which there are no types
     """The modules of the package, and beside them ``commit.txt``, where git knows the commit."""
 
     def run(self) -> None:

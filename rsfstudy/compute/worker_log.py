@@ -18,13 +18,13 @@ from distributed import WorkerPlugin
 
 from rsfstudy.errors import DataError
 
-_ERRORS = 2
+_STDERR_FILE_NUMBER = 2
 #: Loggers in this process of Dask and of the libraries below it.
-_LOGGERS = ("distributed", "tornado", "asyncio")
+_LOGGER_NAMES = ("distributed", "tornado", "asyncio")
 
 
 @contextlib.contextmanager
-def kept(log: Path | None) -> Iterator[Path]:
+def open_worker_log(log: Path | None) -> Iterator[Path]:
     """The file, ready for writing; a temporary one where no name is given. It is removed if
     it stays empty.
 
@@ -42,7 +42,7 @@ def kept(log: Path | None) -> Iterator[Path]:
     except OSError as error:
         raise DataError(f"cannot write {log or 'a temporary file'}: {error}.") from error
     try:
-        with _logged(log):
+        with _redirect_loggers(log):
             yield log
     finally:
         with contextlib.suppress(OSError):
@@ -51,12 +51,12 @@ def kept(log: Path | None) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def _logged(log: Path) -> Iterator[None]:
+def _redirect_loggers(log: Path) -> Iterator[None]:
     """Write errors that are logged in this process to the file, and nowhere else."""
     handler = logging.FileHandler(log, delay=True)
     handler.setLevel(logging.ERROR)
     handler.setFormatter(logging.Formatter("%(asctime)s - %(name)s - %(message)s"))
-    loggers = [logging.getLogger(name) for name in _LOGGERS]
+    loggers = [logging.getLogger(name) for name in _LOGGER_NAMES]
     before = [(logger.handlers, logger.propagate) for logger in loggers]
     for logger in loggers:
         logger.handlers, logger.propagate = [handler], False
@@ -69,7 +69,7 @@ def _logged(log: Path) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class WritesTo(WorkerPlugin):
+class StderrToFile(WorkerPlugin):
     """A Dask worker whose process writes errors to a file.
 
     Parameters
@@ -85,5 +85,5 @@ class WritesTo(WorkerPlugin):
             return
         with contextlib.suppress(OSError):
             file = os.open(self.log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
-            os.dup2(file, _ERRORS)
+            os.dup2(file, _STDERR_FILE_NUMBER)
             os.close(file)

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from rsfstudy.declare.names import PACKAGE, names
+from rsfstudy.declare.names import STUDIES_PACKAGE, study_names
 from rsfstudy.errors import InvalidValue
 from rsfstudy.paths import check_path
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rsfstudy.declare.study import Study
 
 
-def load(name: str) -> Study:
+def load_study(name: str) -> Study:
     """The declaration of a named study, or that of a Python file with a `study` in it.
 
     Raises
@@ -32,18 +32,18 @@ def load(name: str) -> Study:
     """
     check_path("study", name)
     if name.endswith(".py"):
-        return replace(_declared_in(_run(Path(name)), name), declared_in=name)
-    if name not in names():
-        near = difflib.get_close_matches(name, names(), n=3, cutoff=0.5)
+        return replace(_study_in_module(_import_study_file(Path(name)), name), source_file=name)
+    if name not in study_names():
+        near = difflib.get_close_matches(name, study_names(), n=3, cutoff=0.5)
         remedy = "`rsfstudy list` shows all; or name a file: path/to/study.py."
         if os.path.isfile(f"{name}.py"):
             near, remedy = [], f"There is a file {name}.py here: name it {name}.py."
         raise InvalidValue("study", name, "is unknown", choices=near, remedy=remedy)
-    study: Study = importlib.import_module(f"{PACKAGE}.{name}").study
+    study: Study = importlib.import_module(f"{STUDIES_PACKAGE}.{name}").study
     return study
 
 
-def _run(given: Path) -> ModuleType:
+def _import_study_file(given: Path) -> ModuleType:
     """The module that a file defines.
 
     It is removed from `sys.modules` again, and so are the modules in its directory that it imports.
@@ -68,28 +68,28 @@ def _run(given: Path) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except InvalidValue as error:
-        raise error.at(f"{path}{_line(error, path)}") from error
+        raise error.with_location(f"{path}{_error_line(error, path)}") from error
     except SyntaxError as error:
         place = f"{error.filename or path}, line {error.lineno}"
         raise InvalidValue("study", str(path), f"{place}: {error.msg}") from error
     except (Exception, SystemExit) as error:
-        rule = f"raises {type(error).__name__}{_line(error, path)}: {error}"
+        rule = f"raises {type(error).__name__}{_error_line(error, path)}: {error}"
         raise InvalidValue("study", str(path), rule) from error
     finally:
         sys.path.remove(str(path.parent))
-        for name in [n for n in sys.modules if n not in known and _is_beside(n, path)]:
+        for name in [n for n in sys.modules if n not in known and _is_in_same_directory(n, path)]:
             del sys.modules[name]
     return module
 
 
-def _is_beside(name: str, path: Path) -> bool:
+def _is_in_same_directory(name: str, path: Path) -> bool:
     """True if a module is a file, or in a package, in the same directory."""
     top = sys.modules.get(name.partition(".")[0])
     places = [getattr(top, "__file__", None), *getattr(top, "__path__", ())]
     return any(Path(place).parent == path.parent for place in places if place)
 
 
-def _line(error: BaseException, path: Path) -> str:
+def _error_line(error: BaseException, path: Path) -> str:
     """Line of the file where an error arose, in words."""
     lines = [
         frame.lineno
@@ -99,13 +99,13 @@ def _line(error: BaseException, path: Path) -> str:
     return f", line {lines[-1]}" if lines else ""
 
 
-def _declared_in(module: ModuleType, name: str) -> Study:
+def _study_in_module(module: ModuleType, name: str) -> Study:
     from rsfstudy.declare.study import Study  # here, because names and titles need none of it
 
     study = getattr(module, "study", None)
     if not isinstance(study, Study):
         raise InvalidValue("study", name, "declares no study", remedy="Write study = Study(...).")
-    if study.name in names():
+    if study.name in study_names():
         rule = f"calls its study {study.name!r}, the name of a named study: their files would mix"
         raise InvalidValue("study", name, rule, remedy="Give it a name of its own.")
     return study

@@ -11,15 +11,15 @@ class Cell(NamedTuple):
     """A scene, and what the axes change of the fields of the study's measure there."""
 
     scene: Scene
-    changes: dict[str, Any]
+    measure_changes: dict[str, Any]
 
 
-class Changes(NamedTuple):
+class CellChanges(NamedTuple):
     """What the axes change in a cell: fields of the base scene, and fields of the measure."""
 
-    of_scene: dict[str, Any]
-    of_measure: dict[str, Any]
+    scene_fields: dict[str, Any]
+    measure_fields: dict[str, Any]
 
-    def of(self, base: Scene) -> Cell:
+    def apply_to(self, base: Scene) -> Cell:
         """The cell."""
-        return Cell(base.with_(**self.of_scene), self.of_measure)
+        return Cell(base.with_(**self.scene_fields), self.measure_fields)

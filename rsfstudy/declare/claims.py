@@ -16,10 +16,11 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.declare.verdicts import Verdicts
+from rsfstudy._deprecation import renamed_members
+from rsfstudy.declare.verdicts import VerdictTable
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.scales import SCALES
+from rsfstudy.rig.scales import SCALES_ATTRIBUTE
 from rsfstudy.status import Status
 
 REPRODUCED = "reproduced"
@@ -30,19 +31,20 @@ VERDICTS = (REPRODUCED, DIFFERS, UNDECIDED, NOT_APPLICABLE)
 
 RELATIONS = ("equals", "below", "above")
 #: Of a table of claims.
-_COLUMNS = (
+_TABLE_COLUMNS = (
     *("id", "claim", "source", "relation", "published", "ours"),
     *("tolerance", "reason", "verdict", "expected", "because", "moved"),
 )
 #: Reason of a tolerance of zero where more cannot be asked for.
-INEQUALITY = "an inequality"
-_EXPECTED = (REPRODUCED, DIFFERS)
-_TEXTS = (
+INEQUALITY_REASON = "an inequality"
+_EXPECTED_VERDICTS = (REPRODUCED, DIFFERS)
+_TEXT_FIELDS = (
     *("id", "statement", "source", "variable", "minus_variable", "reason", "because"),
     *("relation", "expected"),
 )
 
 
+@renamed_members
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Claim:
@@ -85,7 +87,7 @@ class Claim:
     where: Mapping[str, Any]
     published: float
     tolerance: float = 0.0
-    reason: str = INEQUALITY
+    reason: str = INEQUALITY_REASON
     relation: str = "equals"
     minus: Mapping[str, Any] = field(default_factory=dict)
     minus_variable: str = ""
@@ -93,17 +95,19 @@ class Claim:
     because: str = ""
 
     def __post_init__(self) -> None:
-        for name in _TEXTS:
+        for name in _TEXT_FIELDS:
             if not isinstance(getattr(self, name), str):
                 rule = f"must be a text, in claim {self.id}"
                 raise InvalidValue(name, getattr(self, name), rule)
         if self.relation not in RELATIONS:
             raise InvalidValue("relation", self.relation, "is unknown", choices=RELATIONS)
-        if self.relation == "equals" and self.reason == INEQUALITY:
+        if self.relation == "equals" and self.reason == INEQUALITY_REASON:
             rule = f"must tell why the tolerance is {self.tolerance}, in claim {self.id}"
             raise InvalidValue("reason", self.reason, rule)
-        if self.expected not in _EXPECTED:
-            raise InvalidValue("expected", self.expected, "is no verdict", choices=_EXPECTED)
+        if self.expected not in _EXPECTED_VERDICTS:
+            raise InvalidValue(
+                "expected", self.expected, "is no verdict", choices=_EXPECTED_VERDICTS
+            )
         for name in ("published", "tolerance"):
             value = getattr(self, name)
             if not _is_number(value) or not math.isfinite(value):
@@ -131,7 +135,7 @@ class Claim:
         """The claim as plain data."""
         return {**asdict(self), "where": dict(self.where), "minus": dict(self.minus)}
 
-    def check_place(self, dataset: xr.Dataset) -> None:
+    def check_selection(self, dataset: xr.Dataset) -> None:
         """Raise InvalidValue where a dataset has no such variable or place: the claim would never
         be applicable.
         """
@@ -155,9 +159,9 @@ class Claim:
         leaves it undecided.
         """
         try:
-            ours = _pick(dataset, self.variable, self.where)
+            ours = _select_value(dataset, self.variable, self.where)
             if self.minus:
-                ours -= _pick(dataset, self.minus_variable or self.variable, self.minus)
+                ours -= _select_value(dataset, self.minus_variable or self.variable, self.minus)
         except KeyError:
             return math.nan, NOT_APPLICABLE
         if math.isnan(ours):
@@ -171,7 +175,9 @@ class Claim:
         return ours, REPRODUCED if holds else DIFFERS
 
 
-def verdicts(dataset: xr.Dataset, claims: list[Claim], overrides: Mapping[str, Any]) -> Verdicts:
+def build_verdict_table(
+    dataset: xr.Dataset, claims: list[Claim], overrides: Mapping[str, Any]
+) -> VerdictTable:
     """A table of claims, one row each.
 
     Claims hold for a study as declared. Where a fixed value of the scene or of the measure was
@@ -179,17 +185,19 @@ def verdicts(dataset: xr.Dataset, claims: list[Claim], overrides: Mapping[str, A
     nor are claims on what was reduced along an axis that was changed, and any on other units.
     """
     along = {str(name) for name in dataset.coords if dataset[name].ndim > 0}
-    moved_base = [name for name in overrides if name not in along] or SCALES in dataset.attrs
+    moved_base = [
+        name for name in overrides if name not in along
+    ] or SCALES_ATTRIBUTE in dataset.attrs
     rows = []
     for claim in claims:
         ours, verdict = claim.verdict(dataset)
-        if moved_base or not _keeps(dataset, claim.variable, overrides):
+        if moved_base or not _has_changed_dimensions(dataset, claim.variable, overrides):
             verdict = NOT_APPLICABLE
         moved = verdict not in (claim.expected, NOT_APPLICABLE)
         about = claim.id, claim.statement, claim.source, claim.relation, claim.published, ours
         why = claim.tolerance, claim.reason, verdict, claim.expected, claim.because, moved
         rows.append((*about, *why))
-    return Verdicts(pd.DataFrame(rows, columns=_COLUMNS).astype({"moved": bool}))
+    return VerdictTable(pd.DataFrame(rows, columns=_TABLE_COLUMNS).astype({"moved": bool}))
 
 
 def _is_number(value: object) -> bool:
@@ -197,13 +205,15 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not sys.float_info.max < abs(value) < math.inf
 
 
-def _keeps(dataset: xr.Dataset, variable: str, overrides: Mapping[str, Any]) -> bool:
+def _has_changed_dimensions(
+    dataset: xr.Dataset, variable: str, overrides: Mapping[str, Any]
+) -> bool:
     """True if a variable still has every dimension that was changed."""
     changed = {str(d) for n in overrides if n in dataset.coords for d in dataset[n].dims}
     return variable not in dataset or changed <= set(dataset[variable].dims)
 
 
-def _pick(dataset: xr.Dataset, variable: str, where: Mapping[str, Any]) -> float:
+def _select_value(dataset: xr.Dataset, variable: str, where: Mapping[str, Any]) -> float:
     """The one number at these coordinate values; KeyError where there is no such place."""
     values = dataset[variable]
     for name, wanted in where.items():

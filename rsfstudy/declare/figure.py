@@ -12,29 +12,33 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rsfstudy.axes.axis import check_text
-from rsfstudy.declare.names import names
+from rsfstudy._deprecation import renamed_keywords, renamed_names
+from rsfstudy.axes.axis import check_storable_text
+from rsfstudy.declare.names import study_names
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import is_name
+from rsfstudy.quantity import is_variable_name
 
 if TYPE_CHECKING:
     import xarray as xr
 
+__getattr__ = renamed_names(__name__)
+
 #: A variable by its name, or a function that computes it; and a text in the same way.
-Along = str | Callable[["xr.Dataset"], "xr.DataArray"]
-Text = str | Callable[["xr.Dataset"], str]
+VariableOrFunction = str | Callable[["xr.Dataset"], "xr.DataArray"]
+TextOrFunction = str | Callable[["xr.Dataset"], str]
 #: `matplotlib.axes.Axes`, for annotations: what workers load must not load matplotlib.
 Axes = Any
 #: A function of a dataset and of axes, which draws the one on the other.
-Draw = Callable[[Any, Any], Any]
+DrawFunction = Callable[[Any, Any], Any]
 
 #: Names of the figures that draw any study.
-ANY_LATTICE = frozenset(
+GENERIC_FIGURES = frozenset(
     module.name for module in pkgutil.iter_modules([str(Path(__file__).parent.parent / "plots")])
 )
 
 
+@renamed_keywords
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Panel:
@@ -48,79 +52,80 @@ class Panel:
     x, y : str or function of dataset
         What curves are drawn of: variables by their names, or what a function makes of them.
         Points of an axis of names lie beside each other, or below each other.
-    by : sequence of str
+    hue : sequence of str
         Axes whose points are curves: the first is told by colours and markers, and the second by
         dashes and open markers.
-    each : sequence of str
+    facet : sequence of str
         Axes whose points have a panel each.
-    at : mapping of str to int, list of int, slice or function
+    isel : mapping of str to int, list of int, slice or function
         Places on other axes: numbers of points, or what gives one of their values, or several, as
         `min` and `max` do; of what is the same everywhere, 0, for the title to say it.
-    points : bool
+    markers_only : bool
         Have markers without a line.
     style : mapping, or function of row
         What `matplotlib.axes.Axes.plot` takes, laid over that of the curve.
-    error : str
+    error_bars : str
         Variable of the bars of error.
-    through : function of row
+    fit_line : function of row
         x and y of a line through the points of a curve, in its colour: a fit or a theory.
-    name : function of row
-        What the legend calls a curve, by default its place on the axes of `by`.
-    says : str
+    curve_label : function of row
+        What the legend calls a curve, by default its place on the axes of `hue`.
+    annotation : str
         A slope that the legend says of each curve, with its standard error; left out where there
         is none.
-    marks : sequence of function of (dataset, axes)
+    overlays : sequence of function of (dataset, axes)
         What is drawn beside the curves.
     title : str, or function of dataset
-        By default the place on the axes of `each` and `at`.
+        By default the place on the axes of `facet` and `isel`.
     x_label, y_label : str, optional
         For what has no name, symbol and units.
     log : str
         Which of x and y have log scales; None for those along which points or values span decades.
     x_limits, y_limits : tuple of float or None
         Ends of the scales; None leaves an end to what is drawn.
-    alike : str
+    y_scale_group : str
         Panels that say the same have the same scale along y.
-    when : function of dataset
+    condition : function of dataset
         Whether there is such a panel; always by default.
-    columns : int
+    legend_columns : int
         Most entries of the legend beside each other.
     legend_title : str
-    as_marked : bool
+    is_custom : bool
         Leave scales, legend and title as marks leave them: a figure of the user's own.
     """
 
-    x: Along = ""
-    y: Along = ""
-    by: Sequence[str] = ()
-    each: Sequence[str] = ()
-    at: Mapping[str, Any] = field(default_factory=dict)
-    points: bool = False
+    x: VariableOrFunction = ""
+    y: VariableOrFunction = ""
+    hue: Sequence[str] = ()
+    facet: Sequence[str] = ()
+    isel: Mapping[str, Any] = field(default_factory=dict)
+    markers_only: bool = False
     style: Mapping[str, Any] | Callable[[xr.Dataset], Mapping[str, Any]] = field(
         default_factory=dict
     )
-    error: str = ""
-    through: Callable[[xr.Dataset], tuple[Any, Any]] | None = None
-    name: Callable[[xr.Dataset], str] | None = None
-    says: str = ""
-    marks: Sequence[Draw] = ()
-    title: Text | None = None
-    x_label: Text | None = None
-    y_label: Text | None = None
+    error_bars: str = ""
+    fit_line: Callable[[xr.Dataset], tuple[Any, Any]] | None = None
+    curve_label: Callable[[xr.Dataset], str] | None = None
+    annotation: str = ""
+    overlays: Sequence[DrawFunction] = ()
+    title: TextOrFunction | None = None
+    x_label: TextOrFunction | None = None
+    y_label: TextOrFunction | None = None
     log: str | None = ""
     x_limits: tuple[float | None, float | None] = (None, None)
     y_limits: tuple[float | None, float | None] = (None, None)
-    alike: str = ""
-    when: Callable[[xr.Dataset], bool] | None = None
-    columns: int = 2
+    y_scale_group: str = ""
+    condition: Callable[[xr.Dataset], bool] | None = None
+    legend_columns: int = 2
     legend_title: str | None = None
-    as_marked: bool = False
+    is_custom: bool = False
 
     def __post_init__(self) -> None:
         if isinstance(self.log, str) and not set(self.log) <= {"x", "y"}:
             raise InvalidValue("log", self.log, "must name axes", choices=("x", "y", "xy"))
 
 
+@renamed_keywords
 @guard_methods
 @dataclass(frozen=True)
 class Figure:
@@ -133,18 +138,18 @@ class Figure:
         Most panels beside each other.
     height : float or function of dataset, optional
         Of a panel without its legend, in mm; that of the style by default.
-    more_axes : bool
+    allow_extra_dims : bool
         Whether it shows further axes of the lattice too.
     """
 
     panels: Sequence[Any]
     columns: int = 2
     height: float | Callable[[Any], float] | None = None
-    more_axes: bool = False
+    allow_extra_dims: bool = False
 
     def __post_init__(self) -> None:
         panels = [
-            panel if isinstance(panel, Panel) else Panel(marks=[panel], as_marked=True)
+            panel if isinstance(panel, Panel) else Panel(overlays=[panel], is_custom=True)
             for panel in self.panels
         ]
         object.__setattr__(self, "panels", panels)
@@ -152,26 +157,26 @@ class Figure:
     @property
     def dimensions(self) -> set[str]:
         """Axes that its panels name."""
-        named = (name for p in self.panels for name in (p.x, *p.by, *p.each, *p.at))
+        named = (name for p in self.panels for name in (p.x, *p.hue, *p.facet, *p.isel))
         return {name for name in named if isinstance(name, str)}
 
 
-def level(height: float, **style: Any) -> Draw:
+def horizontal_line(height: float, **style: Any) -> DrawFunction:
     """A mark: a thin line across the panel."""
     thin = {"color": "0.6", "linewidth": 0.8, "linestyle": "-", "zorder": 0}
     return lambda _dataset, axes: axes.axhline(height, **thin | style)
 
 
 def reference_line(
-    x: str, of: Callable[[Any], Any], name: str, start: float | None = None, **style: Any
-) -> Draw:
+    x: str, function: Callable[[Any], Any], name: str, start: float | None = None, **style: Any
+) -> DrawFunction:
     """A mark: a wide grey line behind the points.
 
     Parameters
     ----------
     x : str
         Variable along x.
-    of : function of array
+    function : function of array
     name : str
         What the legend calls it.
     start : float, optional
@@ -180,14 +185,14 @@ def reference_line(
         As `matplotlib.axes.Axes.plot` takes.
     """
 
-    def mark(dataset: xr.Dataset, axes: Axes) -> None:
+    def draw_line(dataset: xr.Dataset, axes: Axes) -> None:
         low, high = float(dataset[x].min()), float(dataset[x].max())
         low = low if start is None else start
         at = np.linspace(low, high + 0.03 * (high - low), 200)
         wide = {"color": "0.8", "linewidth": 2.2, "linestyle": "-", "zorder": 1.5}
-        axes.plot(at, of(at), label=name, **wide | style)
+        axes.plot(at, function(at), label=name, **wide | style)
 
-    return mark
+    return draw_line
 
 
 def figure_name(plot: Any, study: str) -> str:
@@ -202,7 +207,7 @@ def figure_name(plot: Any, study: str) -> str:
 def check_figure(plot: Any) -> None:
     """Raise InvalidValue for something that cannot draw, or a name that another figure has."""
     if isinstance(plot, str):
-        check_text("plot", plot)
+        check_storable_text("plot", plot)
         return
     if isinstance(plot, Figure):
         return
@@ -210,6 +215,6 @@ def check_figure(plot: Any) -> None:
         rule = "must be a name, a Figure, or a function or module of yours that draws"
         raise InvalidValue("plot", plot, rule, remedy="Write def name(dataset, axes): ...")
     name = figure_name(plot, "")
-    if not is_name(name) or name in ANY_LATTICE or name in names():
+    if not is_variable_name(name) or name in GENERIC_FIGURES or name in study_names():
         rule = "needs a name of its own, which no figure of rsfstudy has"
         raise InvalidValue("plot", name, rule)

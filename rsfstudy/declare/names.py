@@ -8,26 +8,26 @@ import pkgutil
 from pathlib import Path
 
 #: Where the files of `studies/` are installed.
-PACKAGE = "rsfstudy.named_studies"
+STUDIES_PACKAGE = "rsfstudy.named_studies"
 
 
-def names() -> tuple[str, ...]:
+def study_names() -> tuple[str, ...]:
     """Names of the studies, in alphabetical order; files that start with _ are shared by them."""
-    package = importlib.import_module(PACKAGE)
+    package = importlib.import_module(STUDIES_PACKAGE)
     modules = (module.name for module in pkgutil.iter_modules(package.__path__))
     return tuple(sorted(name for name in modules if not name.startswith("_")))
 
 
-def titles() -> dict[str, str]:
+def study_titles() -> dict[str, str]:
     """Titles of the studies, by name, as they stand in their files: none is run, because that would
     load all that studies are made of.
     """
-    (place,) = importlib.import_module(PACKAGE).__path__
-    files = {name: Path(place, f"{name}.py") for name in names()}
-    return {name: _title(file.read_bytes()) for name, file in files.items()}
+    (place,) = importlib.import_module(STUDIES_PACKAGE).__path__
+    files = {name: Path(place, f"{name}.py") for name in study_names()}
+    return {name: _read_title(file.read_bytes()) for name, file in files.items()}
 
 
-def _title(source: bytes) -> str:
+def _read_title(source: bytes) -> str:
     """The text given as ``title`` to the call whose value is named `study`."""
     # what stands before it need not be parsed, which would take as long again
     declared = ast.parse(source[source.index(b"\nstudy = ") :]).body[0]

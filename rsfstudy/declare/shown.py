@@ -2,54 +2,75 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from rsfstudy.axes.axis import Axis
+from rsfstudy.measures import Measure
 from rsfstudy.quantity import (
-    HEADINGS,
+    QUANTITY_TABLE_HEADINGS,
     Quantity,
-    described,
-    folded,
-    quantities_table,
-    symbol,
-    table,
-    unit,
+    html_details,
+    html_quantities_table,
+    html_symbol,
+    html_table,
+    html_unit,
+    quantity_row,
 )
 from rsfstudy.slider import registry
-from rsfstudy.vocabulary import quantity
-from rsfstudy.wording import listed
-
-if TYPE_CHECKING:
-    from rsfstudy.declare.study import Study
+from rsfstudy.slider.scene import Scene
+from rsfstudy.vocabulary import find_quantity
+from rsfstudy.wording import format_list
 
 
-def study_html(study: Study) -> str:
-    """The axes of a study and what it measures; what all cells share is folded away."""
-    base, measure, known = study.base, study.measure, study.quantities
-    varied = {name for axis in study.axes for name in axis.fields}
+def study_html(
+    heading: str,
+    axes: Sequence[Axis],
+    base: Scene,
+    measure: Measure,
+    known: Mapping[str, Quantity],
+) -> str:
+    """Format a study as HTML tables of its axes, its fixed fields and its results.
+
+    Parameters
+    ----------
+    heading : str
+        Heading of the first table.
+    axes : sequence of Axis
+    base : Scene
+        Scene with the fixed fields, which are shown in a collapsed table.
+    measure : Measure
+    known : mapping of str to Quantity
+        Quantities that are not in the common vocabulary.
+
+    Returns
+    -------
+    str
+    """
+    varied = {name for axis in axes for name in axis.fields}
     fixed = {name: v for name, v in base.as_dict().items() if name not in varied}
-    shared = registry.shown(fixed, base.own_parts)
-    along = [described(_about(a, known), _along(a)) for a in study.axes]
-    measured = [quantity(name, known) for name in measure.variables]
-    numbers = [(q.name, symbol(q.symbol), unit(q), q.long_name) for q in measured]
+    shared = registry.quantities_with_values(fixed, base.user_parts)
+    along = [quantity_row(_axis_quantity(a, known), _format_points(a)) for a in axes]
+    measured = [find_quantity(name, known) for name in measure.variables]
+    numbers = [(q.name, html_symbol(q.symbol), html_unit(q), q.long_name) for q in measured]
     return (
-        table(HEADINGS, along, f"{study.name}: {study.title} ({study.size:,} cells)")
-        + folded("what all cells share", quantities_table(shared))
-        + folded(
+        html_table(QUANTITY_TABLE_HEADINGS, along, heading)
+        + html_details("what all cells share", html_quantities_table(shared))
+        + html_details(
             f"what {measure.name} gives in each",
-            table([heading for heading in HEADINGS if heading != "value"], numbers),
+            html_table(
+                [heading for heading in QUANTITY_TABLE_HEADINGS if heading != "value"], numbers
+            ),
         )
     )
 
 
-def _about(axis: Axis, known: Mapping[str, Quantity]) -> Quantity:
+def _axis_quantity(axis: Axis, known: Mapping[str, Quantity]) -> Quantity:
     """The quantity along an axis, without symbol and scale where the axis is in units."""
-    about, units = quantity(axis.dimension, known), axis.units.get(axis.dimension)
+    about, units = find_quantity(axis.dimension, known), axis.units.get(axis.dimension)
     return about if units is None else replace(about, symbol="", units=units, scale="")
 
 
-def _along(axis: Axis) -> str:
+def _format_points(axis: Axis) -> str:
     """The points of an axis, a long list cut short."""
-    return f"{listed(axis.points, ', ')} ({len(axis)})"
+    return f"{format_list(axis.point_names, ', ')} ({len(axis)})"

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes.axis import Axis, Row, check_text, plain_values
-from rsfstudy.axes.overrides import select, with_values
-from rsfstudy.declare import checks, rigs
-from rsfstudy.declare.cell import Cell, Changes
+from rsfstudy._deprecation import renamed_keywords, renamed_members
+from rsfstudy.axes.axis import Axis, Row, check_storable_text, to_plain_values
+from rsfstudy.axes.overrides import replace_values, select_points
+from rsfstudy.declare import checks
+from rsfstudy.declare.cell import Cell, CellChanges
 from rsfstudy.declare.claims import Claim
 from rsfstudy.declare.figure import check_figure, figure_name
 from rsfstudy.declare.shown import study_html
@@ -25,35 +26,35 @@ from rsfstudy.error_boundary import error_boundary, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engines import own_stepper
+from rsfstudy.motion.engines import user_stepper
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce import Reduction
-from rsfstudy.rig.axes import axis as axis_in_units
-from rsfstudy.rig.axes import in_units, name_on_axis, numbers_in, si_units
-from rsfstudy.rig.laboratory import Laboratory
-from rsfstudy.rig.lattice import Cells
-from rsfstudy.rig.quantities import ALSO
-from rsfstudy.slider.assembly import without_meaning
+from rsfstudy.rig.axes import axis_field_name, axis_si_units, convert_axis, convert_values
+from rsfstudy.rig.axes import make_axis as axis_in_units
+from rsfstudy.rig.laboratory import Rig
+from rsfstudy.rig.lattice import RigScenes, with_rig_value
+from rsfstudy.rig.quantities import EQUIVALENT_FIELD
+from rsfstudy.slider.assembly import find_inapplicable_fields
 from rsfstudy.slider.registry import (
-    CALLERS,
+    SELECTOR_FIELDS,
     SLOT_NAMES,
-    Own,
-    by_class,
-    fields_with,
-    own_named,
-    quantities_with,
+    UserPart,
+    find_named_user_parts,
+    names_to_parts,
+    scene_fields,
+    user_field_quantities,
 )
 from rsfstudy.slider.scene import Scene
-from rsfstudy.wording import is_list
+from rsfstudy.wording import is_list_like
 
 #: Most bytes of the name of a study: a file name has at most 255, and endings follow.
-_LONGEST_NAME = 200
+_MAX_NAME_BYTES = 200
 #: Fields that decide what fills a slot.
-_CHOOSING = frozenset({*SLOT_NAMES, *CALLERS})
-#: Most bytes of the name of a study, which leaves room for the suffixes of its files.
-_LONGEST_NAME = 200
+_SELECTING_FIELDS = frozenset({*SLOT_NAMES, *SELECTOR_FIELDS})
 
 
+@renamed_keywords
+@renamed_members
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Study:
@@ -83,7 +84,7 @@ class Study:
         Sources of the study.
     accuracy : Accuracy
         Accuracy of each cell.
-    laboratory : Laboratory, optional
+    rig : Rig, optional
         The rig that the base is a scene of. Axes may be of its quantities, and are in units; plain
         numbers are in SI units then.
     version : int
@@ -107,33 +108,36 @@ class Study:
     plot: Any = "lines"
     references: Sequence[str] = ()
     accuracy: Accuracy = field(default_factory=Accuracy)
-    laboratory: Laboratory | None = None
+    rig: Rig | None = None
     version: int = 1
     overrides: Mapping[str, Any] = field(default_factory=dict)
     #: The file of a study that is no named one.
-    declared_in: str = ""
+    source_file: str = ""
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isidentifier():
             raise InvalidValue("name", self.name, "must be a Python identifier: it names files")
-        if len(self.name.encode()) > _LONGEST_NAME:
-            rule = f"must have at most {_LONGEST_NAME} bytes, because it names files"
+        if len(self.name.encode()) > _MAX_NAME_BYTES:
+            rule = f"must have at most {_MAX_NAME_BYTES} bytes, because it names files"
             raise InvalidValue("name", self.name, rule)
-        for name in ("title", "summary", "declared_in"):
-            check_text(name, getattr(self, name))
+        for name in ("title", "summary", "source_file"):
+            check_storable_text(name, getattr(self, name))
         check_figure(self.plot)
         whole = isinstance(self.version, int) and not isinstance(self.version, bool)
         if not whole or self.version < 1:
             raise InvalidValue("version", self.version, "must be a whole number, 1 or more")
         if not isinstance(self.overrides, Mapping):
             raise InvalidValue("overrides", self.overrides, "must map names to values")
-        checks.parts(self)
-        if self.laboratory is not None:
-            object.__setattr__(self, "axes", [in_units(axis) for axis in self.axes])
-        checks.names(self)
-        checks.own_fields(self)
-        checks.fields(self)
-        checks.apart(self.axes)
+        checks.check_types(vars(self))
+        if self.rig is not None:
+            object.__setattr__(self, "axes", [convert_axis(axis) for axis in self.axes])
+        checks.check_names(self.measure, self.reductions, self.axes)
+        checks.check_user_fields(self.measure, self.reductions, self.scene_fields)
+        checks.check_axis_fields(self.measure, self.axes, self.scene_fields, self.scene_builder)
+        varied = [axis.rows for axis in self.axes if not set(axis.fields) <= self.scene_field_names]
+        changes = (self.split_rows(rows)[1] for rows in itertools.product(*varied))
+        checks.check_same_outputs(self.measure, changes)
+        checks.check_distinct(self.axes)
         for name, value in self.describe().items():
             try:
                 json.dumps(value)
@@ -150,51 +154,55 @@ class Study:
     # ---- parts of the user's own ------------------------------------------------------------
 
     @cached_property
-    def own_parts(self) -> Mapping[str, Own]:
+    def user_parts(self) -> Mapping[str, UserPart]:
         """Parts of the slider that are the user's own, by name, as they were when the study was
         declared.
         """
-        parts: dict[str, Own] = {}
+        parts: dict[str, UserPart] = {}
         for axis in self.axes:
-            parts |= own_named(axis.fields, axis.rows)
-        parts |= {part.name: part for part in self.base.own_parts}
+            parts |= find_named_user_parts(axis.fields, axis.rows)
+        parts |= {part.name: part for part in self.base.user_parts}
         return dict(sorted(parts.items()))
 
     @cached_property
-    def own_classes(self) -> tuple[type | Own, ...]:
+    def user_classes(self) -> tuple[type | UserPart, ...]:
         """The measure, and parts and stepper that are the user's own: what own code starts at."""
-        return *self.measure.classes, *self.own_parts.values(), *own_stepper(self.accuracy.engine)
+        return (
+            *self.measure.code_classes,
+            *self.user_parts.values(),
+            *user_stepper(self.accuracy.engine),
+        )
 
     @cached_property
     def scene_fields(self) -> tuple[str, ...]:
         """Fields that its scenes may have: those of every scene, and those of its own parts."""
-        return tuple(fields_with(self.own_parts.values()))
+        return tuple(scene_fields(self.user_parts.values()))
 
     @cached_property
-    def of_scene(self) -> frozenset[str]:
+    def scene_field_names(self) -> frozenset[str]:
         """Fields of its axes, and others, that decide the scene of a cell."""
         return frozenset({*self.scene_fields, *self.units})
 
     @cached_property
-    def rig(self) -> Cells | None:
+    def scene_builder(self) -> RigScenes | None:
         """What makes scenes of axes in units, in a study of a rig."""
-        return Cells(self.laboratory, self.base, self.axes) if self.laboratory else None
+        return RigScenes(self.rig, self.base, self.axes) if self.rig else None
 
     @cached_property
     def units(self) -> dict[str, str]:
         """Units of the fields of its axes that are in units."""
         return {name: units for axis in self.axes for name, units in axis.units.items()}
 
-    def fields_of(self, row: Row) -> Row:
+    def scene_fields_of_row(self, row: Row) -> Row:
         """The fields of a scene that differ from the base where axes have these values."""
-        return self.rig.fields(row) if self.rig else row
+        return self.scene_builder.scene_fields(row) if self.scene_builder else row
 
     @property
     def quantities(self) -> dict[str, Quantity]:
         """Quantities that its own parts and its measure describe, by name; the vocabulary has
         none of them.
         """
-        stated = *quantities_with(self.own_parts.values()), *self.measure.quantities
+        stated = *user_field_quantities(self.user_parts.values()), *self.measure.quantities
         return {about.name: about for about in stated}
 
     # ---- the lattice ------------------------------------------------------------------------
@@ -224,7 +232,7 @@ class Study:
         """
         unused = {n for axis in self.axes for n in axis.fields if n in self.scene_fields}
         for rows in itertools.product(*(axis.rows for axis in self.axes)):
-            cell = self._cell(rows)
+            cell = self._build_cell(rows)
             unused = {name for name in unused if cell.scene.as_dict().get(name) is None}
             yield cell
         for axis in self.axes:
@@ -234,13 +242,13 @@ class Study:
 
     def cell(self, number: int) -> Cell:
         """One cell, by its number in row-major order."""
-        return self._cell(self._at(number))
+        return self._build_cell(self._rows_of_cell(number))
 
-    def changes(self, number: int) -> Changes:
+    def cell_changes(self, number: int) -> CellChanges:
         """What the axes change in one cell, of which no scene is made here."""
-        return self._changes(self._at(number))
+        return self._compute_changes(self._rows_of_cell(number))
 
-    def _at(self, number: int) -> list[Row]:
+    def _rows_of_cell(self, number: int) -> list[Row]:
         """The row of each axis that makes a cell."""
         places = np.unravel_index(number, self.shape)
         return [axis.rows[i] for axis, i in zip(self.axes, places, strict=True)]
@@ -253,48 +261,48 @@ class Study:
         """The scene of one cell, by its number in row-major order."""
         return self.cell(number).scene
 
-    def place(self, cell: int) -> str:
+    def describe_cell(self, cell: int) -> str:
         """Where a cell is on the axes, in words."""
         at = zip(self.axes, np.unravel_index(cell, self.shape), strict=True)
-        return ", ".join(f"{axis.dimension} = {axis.points[i]}" for axis, i in at)
+        return ", ".join(f"{axis.dimension} = {axis.point_names[i]}" for axis, i in at)
 
-    def split(self, rows: Sequence[Row]) -> tuple[dict[str, Any], dict[str, Any]]:
+    def split_rows(self, rows: Sequence[Row]) -> tuple[dict[str, Any], dict[str, Any]]:
         """The fields of the scene, and those of the measure, that rows set."""
         split: tuple[dict[str, Any], dict[str, Any]] = {}, {}
         for row in rows:
             for name, value in row.items():
-                split[name not in self.of_scene][name] = value
+                split[name not in self.scene_field_names][name] = value
         return split
 
     @cached_property
-    def _shared(self) -> dict[str, Any]:
+    def _base_fields(self) -> dict[str, Any]:
         return self.base.as_dict()
 
     @cached_property
-    def _meaningless(self) -> frozenset[str]:
+    def _inapplicable_fields(self) -> frozenset[str]:
         """Fields without meaning where no axis decides what fills a slot."""
-        parts = self.own_parts
-        return without_meaning(by_class(self._shared, parts), parts.values())
+        parts = self.user_parts
+        return find_inapplicable_fields(names_to_parts(self._base_fields, parts), parts.values())
 
-    def _changes(self, rows: Sequence[Row]) -> Changes:
-        given, of_measure = self.split(rows)
-        of_scene = self.fields_of(given)
-        if _CHOOSING.isdisjoint(of_scene) and _CHOOSING.isdisjoint(given):
-            kept = {n: value for n, value in of_scene.items() if n not in self._meaningless}
-            return Changes(kept, of_measure)
+    def _compute_changes(self, rows: Sequence[Row]) -> CellChanges:
+        given, of_measure = self.split_rows(rows)
+        of_scene = self.scene_fields_of_row(given)
+        if _SELECTING_FIELDS.isdisjoint(of_scene) and _SELECTING_FIELDS.isdisjoint(given):
+            kept = {n: value for n, value in of_scene.items() if n not in self._inapplicable_fields}
+            return CellChanges(kept, of_measure)
         # a row that states a choice together with a field it makes meaningless must be refused
-        stated = {name for row in rows if not _CHOOSING.isdisjoint(row) for name in row}
-        parts = self.own_parts
-        values = by_class({**self._shared, **of_scene}, parts)
-        meaningless = without_meaning(values, parts.values()) - stated
-        return Changes({n: values[n] for n in of_scene if n not in meaningless}, of_measure)
+        stated = {name for row in rows if not _SELECTING_FIELDS.isdisjoint(row) for name in row}
+        parts = self.user_parts
+        values = names_to_parts({**self._base_fields, **of_scene}, parts)
+        meaningless = find_inapplicable_fields(values, parts.values()) - stated
+        return CellChanges({n: values[n] for n in of_scene if n not in meaningless}, of_measure)
 
-    def _cell(self, rows: Sequence[Row]) -> Cell:
+    def _build_cell(self, rows: Sequence[Row]) -> Cell:
         try:
-            return self._changes(rows).of(self.base)
+            return self._compute_changes(rows).apply_to(self.base)
         except InvalidValue as error:
             place = ", ".join(f"{name}={value!r}" for row in rows for name, value in row.items())
-            raise error.at(f"cell {place}") from error
+            raise error.with_location(f"cell {place}") from error
 
     # ---- other axes ---------------------------------------------------------------------------
 
@@ -312,54 +320,69 @@ class Study:
             values that make no axis, and for a field that some points of a zipped axis state and
             the others take from the base.
         """
-        study, given = self, {name: plain_values(name, v) for name, v in overrides.items()}
+        study, given = self, {name: to_plain_values(name, v) for name, v in overrides.items()}
         # parts of the user's own come first: they bring the fields that others may be
-        own = [name for name in given if own_named([name], _rows(name, given[name]))]
-        selections = [axis.dimension for axis in self.axes if not axis.is_plain]
+        own = [
+            name
+            for name in given
+            if find_named_user_parts([name], _override_rows(name, given[name]))
+        ]
+        selections = [axis.dimension for axis in self.axes if not axis.is_single_field]
         for name in dict.fromkeys([*own, *filter(given.__contains__, selections), *given]):
-            study = study._override(name, given[name])
+            study = study._apply_override(name, given[name])
         return replace(study, overrides={**self.overrides, **given})
 
-    def _override(self, name: str, value: Any) -> Study:
-        values = list(value) if is_list(value) else [value]
-        of_rig = self.laboratory is not None and bool(values)
-        name = name_on_axis(name, values[0]) if of_rig else name
+    def _apply_override(self, name: str, value: Any) -> Study:
+        values = list(value) if is_list_like(value) else [value]
+        of_rig = self.rig is not None and bool(values)
+        name = axis_field_name(name, values[0]) if of_rig else name
         for index, axis in enumerate(self.axes):
-            if changed := self._changed(axis, name, values):
+            if changed := self._override_axis(axis, name, values):
                 return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
-        of_rig = of_rig and si_units(name, values[0]) is not None
+        of_rig = of_rig and axis_si_units(name, values[0]) is not None
         known = dict.fromkeys((*self.dimensions, *self.scene_fields, *self.measure.plain_fields))
-        if name not in known and not of_rig and not own_named([name], _rows(name, values)):
+        if (
+            name not in known
+            and not of_rig
+            and not find_named_user_parts([name], _override_rows(name, values))
+        ):
             rule = "is neither an axis nor a field of the scene or of the measure"
-            raise checks.unknown("override", name, rule, known)
-        checks.sought(self, [name])
-        if is_list(value):
-            return replace(self, axes=(self._axis(name, values), *self.axes))
-        if of_rig:
-            return replace(self, **rigs.fixed(self, name, value))
-        if name in self.of_scene | SLOT_NAMES:
-            changes = by_class({name: value}, self.own_parts)
+            raise checks.unknown_name_error("override", name, rule, known)
+        checks.check_not_solved_for(self.measure, [name])
+        if is_list_like(value):
+            return replace(self, axes=(self._make_axis(name, values), *self.axes))
+        if self.rig is not None and of_rig:
+            rig, base = with_rig_value(self.rig, self.base, name, value)
+            return replace(self, rig=rig, base=base)
+        if name in self.scene_field_names | SLOT_NAMES:
+            changes = names_to_parts({name: value}, self.user_parts)
             return replace(self, base=self.base.with_(**changes))
         return replace(self, measure=self.measure.with_(**{name: value}))
 
-    def _changed(self, axis: Axis, name: str, values: Sequence[Any]) -> Axis | None:
+    def _override_axis(self, axis: Axis, name: str, values: Sequence[Any]) -> Axis | None:
         """An axis with other values, if it is of this field, or of one that states the same."""
         units = axis.units.get(name, "")
         if name == axis.dimension:
-            return self._axis(name, values, units) if axis.is_plain else select(axis, values)
+            return (
+                self._make_axis(name, values, units)
+                if axis.is_single_field
+                else select_points(axis, values)
+            )
         if name in axis.fields:
-            checks.override(self, axis, name, values)
-            return with_values(axis, name, numbers_in(name, values, units) if units else values)
-        if ALSO.get(name) not in axis.fields:
+            checks.check_override(self.base, self.user_parts, axis, name, values)
+            return replace_values(
+                axis, name, convert_values(name, values, units) if units else values
+            )
+        if EQUIVALENT_FIELD.get(name) not in axis.fields:
             return None
         if axis.labels is not None:
-            rule = f"states what {ALSO[name]} does along {axis.dimension}"
-            raise InvalidValue(name, values, rule, remedy=f"Give {ALSO[name]}.")
-        return self._axis(name, values)
+            rule = f"states what {EQUIVALENT_FIELD[name]} does along {axis.dimension}"
+            raise InvalidValue(name, values, rule, remedy=f"Give {EQUIVALENT_FIELD[name]}.")
+        return self._make_axis(name, values)
 
-    def _axis(self, name: str, values: Sequence[Any], units: str = "") -> Axis:
+    def _make_axis(self, name: str, values: Sequence[Any], units: str = "") -> Axis:
         """An axis of a field, whose plain numbers are in these units in a study of a rig."""
-        if self.laboratory is None:
+        if self.rig is None:
             return Axis(name, values)
         return axis_in_units(name, values, "" if isinstance(values[0], str) else units)
 
@@ -379,13 +402,14 @@ class Study:
             "plot": figure_name(self.plot, self.name),
             "references": list(self.references),
             "overrides": dict(self.overrides),
-            **({"laboratory": self.laboratory.as_dict()} if self.laboratory else {}),
+            **({"laboratory": self.rig.as_dict()} if self.rig else {}),
         }
 
     def _repr_html_(self) -> str:
-        return study_html(self)
+        heading = f"{self.name}: {self.title} ({self.size:,} cells)"
+        return study_html(heading, self.axes, self.base, self.measure, self.quantities)
 
 
-def _rows(name: str, value: Any) -> list[Row]:
+def _override_rows(name: str, value: Any) -> list[Row]:
     """The rows of a field that is given one value or a list of them."""
-    return [{name: v} for v in (value if is_list(value) else [value])]
+    return [{name: v} for v in (value if is_list_like(value) else [value])]

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import DataError, brief
+from rsfstudy.errors import DataError, shorten
 
 #: Attributes that must be texts, and the most characters of each.
-_TEXTS = {
+_MAX_TEXT_LENGTHS = {
     "long_name": 2000,
     "units": 200,
     "scale": 200,
@@ -36,13 +36,13 @@ def check_attributes(dataset: xr.Dataset) -> None:
         not match.
     """
     for name, values in dataset.variables.items():
-        for key, most in _TEXTS.items():
+        for key, most in _MAX_TEXT_LENGTHS.items():
             if key in values.attrs:
-                _check_text(f"{brief(name)}.{key}", values.attrs[key], most)
+                _check_text(f"{shorten(name)}.{key}", values.attrs[key], most)
         _check_flags(str(name), values.attrs)
 
 
-def check_motion(dataset: xr.Dataset) -> None:
+def check_motion_variables(dataset: xr.Dataset) -> None:
     """Check that the variables along a motion are numeric.
 
     Raises
@@ -53,12 +53,12 @@ def check_motion(dataset: xr.Dataset) -> None:
     along = dataset["slip"].dims if "slip" in dataset.variables else ()
     for name, values in dataset.variables.items():
         if along and values.dims == along and values.dtype.kind not in "fiub":
-            raise DataError(f"{brief(name)} is {values.dtype}, and must be numbers. {_REMEDY}")
+            raise DataError(f"{shorten(name)} is {values.dtype}, and must be numbers. {_REMEDY}")
 
 
 def _check_text(path: str, value: object, most: int) -> None:
     if not isinstance(value, str):
-        raise DataError(f"{path} is {brief(value)}, and must be a text. {_REMEDY}")
+        raise DataError(f"{path} is {shorten(value)}, and must be a text. {_REMEDY}")
     if len(value) > most:
         raise DataError(f"{path} has {len(value):,} characters, at most {most:,}. {_REMEDY}")
 
@@ -70,6 +70,6 @@ def _check_flags(name: str, attributes: Mapping[Any, Any]) -> None:
     meanings = str(attributes.get("flag_meanings", "")).split()
     if values.dtype.kind not in "iuf" or len(values) != len(meanings):
         raise DataError(
-            f"{brief(name)}.flag_values must be numbers, one for each of the {len(meanings)} "
-            f"flag_meanings (got {brief(values.tolist())}). {_REMEDY}"
+            f"{shorten(name)}.flag_values must be numbers, one for each of the {len(meanings)} "
+            f"flag_meanings (got {shorten(values.tolist())}). {_REMEDY}"
         )

@@ -15,24 +15,24 @@ import xarray as xr
 
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.files.contents import provenance
-from rsfstudy.files.journal import differences
-from rsfstudy.files.restore import headline
-from rsfstudy.status import LABELS, Status
-from rsfstudy.vocabulary import MEASURED_TIMES
-from rsfstudy.wording import listed
+from rsfstudy.files.contents import read_provenance
+from rsfstudy.files.journal import find_differences
+from rsfstudy.files.restore import find_primary_output
+from rsfstudy.status import STATUS_LABELS, Status
+from rsfstudy.vocabulary import TIMING_VARIABLES
+from rsfstudy.wording import format_list
 
-_COLUMNS = ["variable", "values", "identical", "largest_difference", "beyond_errors"]
+_AGREEMENT_COLUMNS = ["variable", "values", "identical", "largest_difference", "beyond_errors"]
 #: Of a fingerprint, what the declaration states too.
-_DECLARED = {"study", "measure", "rtol", "budget", "methods", "engine"}
+_DECLARED_FINGERPRINT_KEYS = {"study", "measure", "rtol", "budget", "methods", "engine"}
 
-Pair = tuple[Any, Any]
+ValuePair = tuple[Any, Any]
 
 
 # ---- one lattice --------------------------------------------------------------------------------
 
 
-def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
+def compare_same_lattice(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     """Agreement of two datasets of one study, variable by variable, in the cells that both have.
 
     Returns
@@ -43,39 +43,45 @@ def compared(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
         ``attrs["differs"]`` what decides a number and differs between them. Measured times, which
         no two runs share, are left out.
     """
-    both = _finished(theirs) & _finished(ours)
+    both = _finished_cells(theirs) & _finished_cells(ours)
     rows = []
     for name, values in theirs.data_vars.items():
-        if name in MEASURED_TIMES:
+        if name in TIMING_VARIABLES:
             continue
         if set(both.dims) <= set(values.dims):
             known = both.broadcast_like(values).transpose(*values.dims).values
-            rows.append(_agreement(name, theirs, ours, known))
+            rows.append(_variable_agreement(name, theirs, ours, known))
         elif bool(both.all()):  # else it may be reduced from cells missing in one of them
-            rows.append(_agreement(name, theirs, ours))
-    return _table(rows, *(provenance(dataset)["fingerprint"] for dataset in (theirs, ours)))
+            rows.append(_variable_agreement(name, theirs, ours))
+    return _agreement_table(
+        rows, *(read_provenance(dataset)["fingerprint"] for dataset in (theirs, ours))
+    )
 
 
-def of_motions(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
-    """How two motions of one scene agree, as `compared` tells it of studies."""
-    rows = [_agreement(n, theirs, ours) for n, values in theirs.variables.items() if values.dims]
+def compare_motions(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
+    """How two motions of one scene agree, as `compare_same_lattice` tells it of studies."""
+    rows = [
+        _variable_agreement(n, theirs, ours)
+        for n, values in theirs.variables.items()
+        if values.dims
+    ]
     made = ({"source": str(d.attrs.get("source", "unknown"))} for d in (theirs, ours))
-    return _table(rows, *made)
+    return _agreement_table(rows, *made)
 
 
-def _table(
+def _agreement_table(
     rows: Sequence[dict[str, Any]], theirs: Mapping[str, Any], ours: Mapping[str, Any]
 ) -> pd.DataFrame:
-    frame = pd.DataFrame(rows, columns=_COLUMNS)
-    frame.attrs["differs"] = differences(theirs, ours)
+    frame = pd.DataFrame(rows, columns=_AGREEMENT_COLUMNS)
+    frame.attrs["differs"] = find_differences(theirs, ours)
     return frame
 
 
-def _finished(dataset: xr.Dataset) -> xr.DataArray:
+def _finished_cells(dataset: xr.Dataset) -> xr.DataArray:
     return dataset["status"] != int(Status.PENDING)
 
 
-def _agreement(
+def _variable_agreement(
     name: Hashable, theirs: xr.Dataset, ours: xr.Dataset, known: Any = ...
 ) -> dict[str, Any]:
     """Agreement of a variable where it is known to both. Variables agree nowhere that differ in
@@ -132,8 +138,8 @@ class Comparison:
         Variables that are not compared, and why.
     """
 
-    declaration: Mapping[str, Pair]
-    origin: Mapping[str, Pair]
+    declaration: Mapping[str, ValuePair]
+    origin: Mapping[str, ValuePair]
     points: Mapping[str, tuple[list[Any], list[Any]]]
     cells: tuple[int, int, int]
     statuses: pd.DataFrame
@@ -153,7 +159,7 @@ class Comparison:
         return self.cells[0] > 0 and self.statuses.empty and not self.beyond_errors
 
 
-def side_by_side(first: xr.Dataset, second: xr.Dataset) -> Comparison:
+def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
     """Compare two results datasets, cell by cell where both have the same place on every axis.
 
     Raises
@@ -162,33 +168,35 @@ def side_by_side(first: xr.Dataset, second: xr.Dataset) -> Comparison:
         Where an axis of one has no counterpart in the other, not even a fixed value; and where its
         points have the same names in both and hold other values, as samples drawn anew do.
     """
-    both = [_with_axes(one, other) for one, other in ((first, second), (second, first))]
+    both = [_with_axes_of(one, other) for one, other in ((first, second), (second, first))]
     dims = [str(d) for d in both[0]["status"].dims]
-    labelled = [dataset.assign_coords(_labels(dataset)) for dataset in both]
-    left_out = _left_out(labelled)
+    labelled = [dataset.assign_coords(_alignment_labels(dataset)) for dataset in both]
+    left_out = _uncompared_variables(labelled)
     kept = [dataset.drop_vars(left_out, errors="ignore") for dataset in labelled]
     shared = [one.transpose(*dims, ...) for one in xr.align(*kept, join="inner")]
-    _check_points(*shared)
+    _check_same_points(*shared)
     indexes = [[dataset.indexes[d] for dataset in labelled] for d in dims]
     points = {
         d: (a.difference(b, sort=False).tolist(), b.difference(a, sort=False).tolist())
         for d, (a, b) in zip(dims, indexes, strict=True)
         if set(a) != set(b)
     }
-    known = _finished(shared[0]) & _finished(shared[1])
-    alone = [int(_finished(dataset).sum() - known.sum()) for dataset in both]
+    known = _finished_cells(shared[0]) & _finished_cells(shared[1])
+    alone = [int(_finished_cells(dataset).sum() - known.sum()) for dataset in both]
     return Comparison(
-        declaration=differences(*(dict(_flat(json.loads(d.attrs["declaration"]))) for d in both)),
-        origin=differences(*(_origin(dataset) for dataset in both)),
+        declaration=find_differences(
+            *(dict(_flatten(json.loads(d.attrs["declaration"]))) for d in both)
+        ),
+        origin=find_differences(*(_read_origin(dataset) for dataset in both)),
         points=points,
         cells=(int(known.sum()), alone[0], alone[1]),
-        statuses=_statuses(shared, known),
-        numbers=_numbers(shared),
+        statuses=_compare_statuses(shared, known),
+        numbers=_compare_numbers(shared),
         left_out=left_out,
     )
 
 
-def _with_axes(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
+def _with_axes_of(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     """A dataset with all axes of another: one that it lacks has its fixed value for only point."""
     cells = set(dataset["status"].dims)
     for dimension in other["status"].dims:
@@ -203,7 +211,7 @@ def _with_axes(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     return dataset
 
 
-def _labels(dataset: xr.Dataset) -> dict[str, Any]:
+def _alignment_labels(dataset: xr.Dataset) -> dict[str, Any]:
     """Points of the dimensions to align by: rounding moves no point of an axis from another."""
     labels = {}
     for name in map(str, dataset.dims):
@@ -217,7 +225,7 @@ def _labels(dataset: xr.Dataset) -> dict[str, Any]:
     return labels
 
 
-def _check_points(first: xr.Dataset, second: xr.Dataset) -> None:
+def _check_same_points(first: xr.Dataset, second: xr.Dataset) -> None:
     """Refuse points of one name that hold other values of a field in the two, beyond rounding."""
     for name, one in first.coords.items():
         if not one.dims or name in one.dims or name not in second.coords:
@@ -233,7 +241,7 @@ def _check_points(first: xr.Dataset, second: xr.Dataset) -> None:
             raise InvalidValue("axis", ", ".join(map(str, one.dims)), rule, remedy=remedy)
 
 
-def _left_out(both: Sequence[xr.Dataset]) -> dict[str, str]:
+def _uncompared_variables(both: Sequence[xr.Dataset]) -> dict[str, str]:
     """Variables that cannot be compared, or would compare other things than numbers of cells."""
     first, second = both
     unequal = {
@@ -251,41 +259,41 @@ def _left_out(both: Sequence[xr.Dataset]) -> dict[str, str]:
     return why
 
 
-def _numbers(shared: Sequence[xr.Dataset]) -> pd.DataFrame:
+def _compare_numbers(shared: Sequence[xr.Dataset]) -> pd.DataFrame:
     """Agreement of the numbers; a headline without an error estimate is held to be exact."""
-    frame = compared(*shared)
-    about = headline(shared[0])
+    frame = compare_same_lattice(*shared)
+    about = find_primary_output(shared[0])
     exact = (frame["variable"] == about) & frame["beyond_errors"].isna()
     frame.loc[exact, "beyond_errors"] = (frame["values"] - frame["identical"])[exact]
     return frame
 
 
-def _statuses(shared: Sequence[xr.Dataset], known: xr.DataArray) -> pd.DataFrame:
+def _compare_statuses(shared: Sequence[xr.Dataset], known: xr.DataArray) -> pd.DataFrame:
     """The cells that ended otherwise, by their places on the axes."""
     first, second = (one["status"].reset_coords(drop=True) for one in shared)
     both = xr.Dataset({"first": first, "second": second, "known": known}).reset_coords(drop=True)
     frame = both.to_dataframe(dim_order=[*map(str, first.dims)]).reset_index()
     ended = frame[frame["known"] & (frame["first"] != frame["second"])].drop(columns="known")
-    return ended.replace({"first": LABELS, "second": LABELS}).reset_index(drop=True)
+    return ended.replace({"first": STATUS_LABELS, "second": STATUS_LABELS}).reset_index(drop=True)
 
 
-def _flat(part: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+def _flatten(part: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     """The parts of a declaration by their paths; lists of plain values are parts as they are."""
     if isinstance(part, dict) and part:
         for name, value in part.items():
-            yield from _flat(value, f"{path}.{name}" if path else name)
+            yield from _flatten(value, f"{path}.{name}" if path else name)
     elif isinstance(part, list) and any(isinstance(value, dict) for value in part):
         for number, value in enumerate(part):
             named = value.get("dimension") if isinstance(value, dict) else None
-            yield from _flat(value, f"{path}[{named or number}]")
+            yield from _flatten(value, f"{path}[{named or number}]")
     else:
         yield path, part
 
 
-def _origin(dataset: xr.Dataset) -> dict[str, Any]:
+def _read_origin(dataset: xr.Dataset) -> dict[str, Any]:
     """Versions, code and machine that made a dataset."""
-    about: Mapping[str, Any] = provenance(dataset)
-    decided = {n: v for n, v in about["fingerprint"].items() if n not in _DECLARED}
+    about: Mapping[str, Any] = read_provenance(dataset)
+    decided = {n: v for n, v in about["fingerprint"].items() if n not in _DECLARED_FINGERPRINT_KEYS}
     others = {n: v for n, v in about.items() if isinstance(v, str)}
     for name in ("time", "command", "declared_in"):
         others.pop(name, None)
@@ -295,7 +303,7 @@ def _origin(dataset: xr.Dataset) -> dict[str, Any]:
 # ---- one cell -----------------------------------------------------------------------------------
 
 
-def cell_number(dataset: xr.Dataset, place: Mapping[str, Any]) -> int:
+def find_cell_number(dataset: xr.Dataset, place: Mapping[str, Any]) -> int:
     """The number of the cell at a place, in row-major order.
 
     Raises
@@ -315,12 +323,12 @@ def cell_number(dataset: xr.Dataset, place: Mapping[str, Any]) -> int:
                 rule = f"leaves {dimension} open"
                 remedy = (
                     f"Name one value of each axis (--cell is repeated). {dimension} has "
-                    f"{listed(values.tolist(), ', ')}."
+                    f"{format_list(values.tolist(), ', ')}."
                 )
                 raise InvalidValue("cell", dict(place), rule, remedy=remedy)
             index.append(0)
             continue
-        number = _on_axis(values, place[dimension])
+        number = _find_on_axis(values, place[dimension])
         if number is None:
             rule = "is not on its axis"
             raise InvalidValue(dimension, place[dimension], rule, choices=map(str, values))
@@ -328,7 +336,7 @@ def cell_number(dataset: xr.Dataset, place: Mapping[str, Any]) -> int:
     return int(np.ravel_multi_index(index, status.shape))
 
 
-def _on_axis(values: np.ndarray, wanted: Any) -> int | None:
+def _find_on_axis(values: np.ndarray, wanted: Any) -> int | None:
     """Index of a value on an axis: an equal label, or the nearest number if it is close enough."""
     if values.dtype.kind in "iuf":
         try:

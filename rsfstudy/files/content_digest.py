@@ -16,18 +16,18 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import DataError, brief
-from rsfstudy.quantity import units_and_scale
+from rsfstudy.errors import DataError, shorten
+from rsfstudy.quantity import units_or_scale
 
 #: The attribute of the file that holds the digest.
-ATTRIBUTE = "content_digest"
+DIGEST_ATTRIBUTE = "content_digest"
 #: Attributes of the file that decide how rsfstudy interprets its numbers.
-_ATTRIBUTES = ("declaration", "provenance", "scene", "end", "laboratory")
+_DIGESTED_ATTRIBUTES = ("declaration", "provenance", "scene", "end", "laboratory")
 
 
 def compute_content_digest(dataset: xr.Dataset) -> str:
     """Compute the digests of all variables and of the declaration, as a JSON string."""
-    return json.dumps(_digests(dataset))
+    return json.dumps(_compute_digests(dataset))
 
 
 def check_content(dataset: xr.Dataset, path: str) -> None:
@@ -49,41 +49,45 @@ def check_content(dataset: xr.Dataset, path: str) -> None:
     DataError
         If a number, a string or the declaration does not match the digest.
     """
-    if ATTRIBUTE not in dataset.attrs:
+    if DIGEST_ATTRIBUTE not in dataset.attrs:
         return
-    listed, found = _parse(dataset.attrs[ATTRIBUTE]), _digests(dataset)
+    listed, found = _parse_digest(dataset.attrs[DIGEST_ATTRIBUTE]), _compute_digests(dataset)
     if not listed:
-        raise _damaged(path, ATTRIBUTE)
+        raise _damaged_error(path, DIGEST_ATTRIBUTE)
     for name in [name for name in found if name in listed]:
         (form, _, digest), (form_now, _, digest_now) = (
             each[name].rpartition(" ") for each in (listed, found)
         )
         if form == form_now and digest != digest_now:
-            raise _damaged(path, name)
+            raise _damaged_error(path, name)
 
 
-def _damaged(path: str, name: str) -> DataError:
+def _damaged_error(path: str, name: str) -> DataError:
     return DataError(
-        f"{path} is damaged, or was edited: {brief(name)} is not what was written. Run the study "
-        f"again. If you changed it on purpose, delete the attribute {ATTRIBUTE} and save the file "
-        "again."
+        f"{path} is damaged, or was edited: {shorten(name)} is not what was written. Run the study "
+        f"again. If you changed it on purpose, delete the attribute {DIGEST_ATTRIBUTE} and save "
+        "the file again."
     )
 
 
-def _digests(dataset: xr.Dataset) -> dict[str, str]:
+def _compute_digests(dataset: xr.Dataset) -> dict[str, str]:
     """Compute one digest for each variable and each attribute.
 
     The digest of a variable is preceded by its sizes, units and scale.
     """
-    texts = {name: str(dataset.attrs[name]) for name in _ATTRIBUTES if name in dataset.attrs}
-    found = {f"attribute {name}": f"text {_digest(text.encode())}" for name, text in texts.items()}
+    texts = {
+        name: str(dataset.attrs[name]) for name in _DIGESTED_ATTRIBUTES if name in dataset.attrs
+    }
+    found = {
+        f"attribute {name}": f"text {_hash_bytes(text.encode())}" for name, text in texts.items()
+    }
     for name, values in dataset.variables.items():
-        form = f"{dict(values.sizes)} {units_and_scale(values.attrs)}"
-        found[str(name)] = f"{form} {_digest(_to_bytes(values.values))}"
+        form = f"{dict(values.sizes)} {units_or_scale(values.attrs)}"
+        found[str(name)] = f"{form} {_hash_bytes(_to_bytes(values.values))}"
     return found
 
 
-def _digest(content: bytes) -> str:
+def _hash_bytes(content: bytes) -> str:
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
 
@@ -95,7 +99,7 @@ def _to_bytes(values: np.ndarray) -> bytes:
     return np.where(np.isnan(numbers), np.nan, numbers).tobytes()
 
 
-def _parse(text: object) -> Mapping[str, str]:
+def _parse_digest(text: object) -> Mapping[str, str]:
     """Parse a digest. Return an empty mapping if the string is not a valid digest."""
     try:
         listed = json.loads(str(text))

@@ -23,24 +23,24 @@ import xarray as xr
 
 from rsfstudy.axes.axis import Axis
 from rsfstudy.declare.claims import Claim
-from rsfstudy.errors import DataError, InvalidValue, brief
+from rsfstudy.errors import DataError, InvalidValue, shorten
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider import fluid
-from rsfstudy.slider.parts import names_of
-from rsfstudy.slider.protocol import Stated
-from rsfstudy.slider.registry import IF_STATED, SLOTS, Own, by_class, kinds_with
+from rsfstudy.slider.parts import field_names
+from rsfstudy.slider.protocol import UserLoading
+from rsfstudy.slider.registry import OMITTED_IF_NONE, SLOTS, UserPart, field_types, names_to_parts
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import QUANTITIES
 
 #: The layout of files as they are written. Those without a number are of layout 1, which had
 #: digests of variables among its attributes.
-LAYOUT = 2
+LAYOUT_VERSION = 2
 #: More would take minutes to look through, or not fit in memory.
-MOST_CLAIMS, MOST_POINTS = 10_000, 10_000_000
+MAX_CLAIMS, MAX_POINTS = 10_000, 10_000_000
 
 
-class Attributes(TypedDict):
+class RootAttributes(TypedDict):
     """Attributes of the whole file that rsfstudy uses."""
 
     id: str
@@ -67,12 +67,14 @@ class PlainAxis(TypedDict):
     drawn: NotRequired[Mapping[str, Any]]
 
 
-def axis(plain: PlainAxis) -> Axis:
+def build_axis(plain: PlainAxis) -> Axis:
     """An axis, on which parts of the user's own are named; raises DataError for what is none."""
     try:
         return Axis(plain["dimension"], plain["values"], plain.get("units"), plain.get("drawn"))
     except InvalidValue as error:
-        raise refused(f"declaration.axes.{plain['dimension']}", f"is refused ({error})") from error
+        raise invalid_part_error(
+            f"declaration.axes.{plain['dimension']}", f"is refused ({error})"
+        ) from error
 
 
 class PlainMeasure(TypedDict):
@@ -101,7 +103,7 @@ class Declaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     measure: PlainMeasure
     accuracy: Accuracy
     reductions: Sequence[PlainReduction]
-    claims: Annotated[Sequence[Claim], msgspec.Meta(max_length=MOST_CLAIMS)]
+    claims: Annotated[Sequence[Claim], msgspec.Meta(max_length=MAX_CLAIMS)]
     plot: str
     references: Sequence[str]
     overrides: Mapping[str, Any]
@@ -127,13 +129,13 @@ class Provenance(TypedDict):
 
 
 #: NumPy's kinds of numbers and texts that variables may hold, and those that must be there.
-_KINDS = ("iufbOUT", "numbers or texts")
+_ALLOWED_KINDS = ("iufbOUT", "numbers or texts")
 #: What the scenes of files are that were written before there was a choice of pore fluid.
-_OLDER: Mapping[str, Any] = {
-    **{name: None for part in fluid.PARTS.values() for name in names_of(part)},
+_DEFAULTS_OF_OLDER_FILES: Mapping[str, Any] = {
+    **{name: None for part in fluid.BUILT_IN_PARTS.values() for name in field_names(part)},
     "fluid": "drained",
 }
-_OF_EVERY_LATTICE = {
+_REQUIRED_VARIABLES = {
     "status": ("i", "whole numbers"),
     "message": ("OUT", "texts"),
     "rhs_evaluations": ("iu", "whole numbers"),
@@ -141,7 +143,7 @@ _OF_EVERY_LATTICE = {
 }
 
 
-def check(dataset: xr.Dataset) -> None:
+def check_results(dataset: xr.Dataset) -> None:
     """Check every part of a results file that rsfstudy uses.
 
     Raises
@@ -150,40 +152,44 @@ def check(dataset: xr.Dataset) -> None:
         Names the first part that is missing or wrong.
     """
     layout = dataset.attrs.get("layout", 1)
-    if not isinstance(layout, int | np.integer) or not 1 <= layout <= LAYOUT:
+    if not isinstance(layout, int | np.integer) or not 1 <= layout <= LAYOUT_VERSION:
         raise DataError(
-            f"layout is {brief(layout)}, and this version of rsfstudy reads 1 to {LAYOUT}: "
-            "open it with the version that its attribute source names."
+            f"layout is {shorten(layout)}, and this version of rsfstudy reads 1 to "
+            f"{LAYOUT_VERSION}: open it with the version that its attribute source names."
         )
-    attrs = fit({"reduced_despite": "", **dataset.attrs}, Attributes, "")
-    name = declaration(dataset).name
+    attrs = convert_plain({"reduced_despite": "", **dataset.attrs}, RootAttributes, "")
+    name = read_declaration(dataset).name
     if attrs["id"] != name or not name.isidentifier():
-        raise refused("id", f"is {brief(attrs['id'])!r}, and the declared study {brief(name)!r}")
-    for variable in _OF_EVERY_LATTICE:
+        raise invalid_part_error(
+            "id", f"is {shorten(attrs['id'])!r}, and the declared study {shorten(name)!r}"
+        )
+    for variable in _REQUIRED_VARIABLES:
         if variable not in dataset.data_vars:
-            raise refused(variable, "is missing")
+            raise invalid_part_error(variable, "is missing")
         if dataset[variable].dims != dataset["status"].dims:
             dims = dataset[variable].dims
-            raise refused(variable, f"lies along {dims}, and status along {dataset['status'].dims}")
+            raise invalid_part_error(
+                variable, f"lies along {dims}, and status along {dataset['status'].dims}"
+            )
     for key, values in dataset.variables.items():
         if key in QUANTITIES or key in dataset.coords:  # a notebook may have added others
             _check_kind(str(key), values)
     for name in map(str, dataset["status"].dims):
         if name not in dataset.coords or dataset[name].dims != (name,):
-            raise refused(name, "is no coordinate along the dimension of its name")
+            raise invalid_part_error(name, "is no coordinate along the dimension of its name")
         if not dataset.indexes[name].is_unique:
-            raise refused(name, "has the same value more than once")
+            raise invalid_part_error(name, "has the same value more than once")
     unknown = np.setdiff1d(dataset["status"].values, [int(status) for status in Status])
     if unknown.size:
-        raise refused("status", f"is {unknown[0]} in a cell, which is the code of none")
+        raise invalid_part_error("status", f"is {unknown[0]} in a cell, which is the code of none")
 
 
-def is_of_a_scene(dataset: xr.Dataset) -> bool:
+def is_single_scene(dataset: xr.Dataset) -> bool:
     """True of a motion, a limit cycle or a critical step of one scene."""
     return "scene" in dataset.attrs and "declaration" not in dataset.attrs
 
 
-def check_of_a_study(dataset: xr.Dataset, where: str) -> None:
+def check_is_study(dataset: xr.Dataset, where: str) -> None:
     """Refuse what was asked of one scene, with what to do with it.
 
     Raises
@@ -191,15 +197,16 @@ def check_of_a_study(dataset: xr.Dataset, where: str) -> None:
     DataError
         If the dataset is a motion, a limit cycle or a critical step.
     """
-    if is_of_a_scene(dataset):
-        title = brief(dataset.attrs.get("title", "untitled"))
+    if is_single_scene(dataset):
+        title = shorten(dataset.attrs.get("title", "untitled"))
         raise DataError(
             f"{where} is of one scene ({title}), not the results of a study. Open its file with "
-            "xarray.open_dataset; rsfstudy.picture(dataset), or dataset.rsf.plot(), draws a motion."
+            "xarray.open_dataset; rsfstudy.plot_motion(dataset), or dataset.rsf.plot(), "
+            "draws a motion."
         )
 
 
-def declaration(dataset: xr.Dataset) -> Declaration:
+def read_declaration(dataset: xr.Dataset) -> Declaration:
     """The declaration of the study that made a dataset.
 
     Raises
@@ -207,26 +214,26 @@ def declaration(dataset: xr.Dataset) -> Declaration:
     DataError
         If the dataset carries none, or not as rsfstudy writes it.
     """
-    declared = declaration_of(from_json(dataset, "declaration"))
-    if provenance(dataset)["fingerprint"]["own_code"] == "none":
-        scene(declared.base)
+    declared = parse_declaration(read_json_attribute(dataset, "declaration"))
+    if read_provenance(dataset)["fingerprint"]["own_code"] == "none":
+        build_scene(declared.base)
     return declared
 
 
-def declaration_of(plain: Any) -> Declaration:
+def parse_declaration(plain: Any) -> Declaration:
     """A declaration from plain data; raises DataError where they are none."""
-    declared: Declaration = fit(plain, Declaration, "declaration")
+    declared: Declaration = convert_plain(plain, Declaration, "declaration")
     for number, claim in enumerate(plain["claims"]):
-        _check_names(claim, _names(Claim), f"declaration.claims[{number}]")
-    _check_names(plain["accuracy"], _names(Accuracy), "declaration.accuracy")
+        _check_keys(claim, _field_names(Claim), f"declaration.claims[{number}]")
+    _check_keys(plain["accuracy"], _field_names(Accuracy), "declaration.accuracy")
     # with what else they hold
     whole = {name: plain[name] for name in ("axes", "measure", "reductions", "overrides")}
     return msgspec.structs.replace(declared, **whole)
 
 
-def scene(
+def build_scene(
     plain: PlainScene,
-    own: Mapping[str, Own] = MappingProxyType({}),
+    own: Mapping[str, UserPart] = MappingProxyType({}),
     path: str = "declaration.base",
 ) -> Scene:
     """A scene; by default the one that all cells share.
@@ -245,22 +252,26 @@ def scene(
     DataError
         Where the fields make no scene, naming the first that does not.
     """
-    parts = [part for part in by_class(plain, own).values() if isinstance(part, type | Stated)]
-    kinds = kinds_with(parts)
-    values = {**dict.fromkeys(IF_STATED), **_OLDER, **plain}
-    _check_names(values, kinds, path)
-    values = {name: fit(values[name], kind, f"{path}.{name}") for name, kind in kinds.items()}
+    parts = [
+        part for part in names_to_parts(plain, own).values() if isinstance(part, type | UserLoading)
+    ]
+    kinds = field_types(parts)
+    values = {**dict.fromkeys(OMITTED_IF_NONE), **_DEFAULTS_OF_OLDER_FILES, **plain}
+    _check_keys(values, kinds, path)
+    values = {
+        name: convert_plain(values[name], kind, f"{path}.{name}") for name, kind in kinds.items()
+    }
     try:
-        return Scene(**by_class(values, own))
+        return Scene(**names_to_parts(values, own))
     except InvalidValue as error:
-        raise refused(f"{path}.{error.name}", f"is refused ({error})") from error
+        raise invalid_part_error(f"{path}.{error.name}", f"is refused ({error})") from error
 
 
-def own_part(declared: Declaration, held: Collection[str] = ()) -> tuple[str, str] | None:
+def find_user_part(declared: Declaration, held: Collection[str] = ()) -> tuple[str, str] | None:
     """Slot and name of a part that the user wrote, if any cell has one; not one that is held."""
     rows: list[Mapping[str, Any]] = [declared.base]
     for plain in declared.axes:
-        rows += axis(plain).rows
+        rows += build_axis(plain).rows
     for slot in SLOTS:
         for name in {row.get(slot.name): None for row in rows}:
             if isinstance(name, str) and name not in (*slot.choices, *held):
@@ -268,7 +279,7 @@ def own_part(declared: Declaration, held: Collection[str] = ()) -> tuple[str, st
     return None
 
 
-def provenance(dataset: xr.Dataset) -> Provenance:
+def read_provenance(dataset: xr.Dataset) -> Provenance:
     """Provenance of a dataset.
 
     Raises
@@ -276,48 +287,48 @@ def provenance(dataset: xr.Dataset) -> Provenance:
     DataError
         If the dataset does not say, or not as rsfstudy writes it.
     """
-    origin: Provenance = from_json(dataset, "provenance")
-    fit(origin, Provenance, "provenance")
+    origin: Provenance = read_json_attribute(dataset, "provenance")
+    convert_plain(origin, Provenance, "provenance")
     return origin
 
 
-def scene_of(dataset: xr.Dataset) -> dict[str, Any]:
+def read_scene_fields(dataset: xr.Dataset) -> dict[str, Any]:
     """The fields of the scene that the attributes of a dataset describe."""
-    return dict(fit(from_json(dataset, "scene"), Mapping[str, Any], "scene"))
+    return dict(convert_plain(read_json_attribute(dataset, "scene"), Mapping[str, Any], "scene"))
 
 
-def from_json(dataset: xr.Dataset, name: str) -> Any:
+def read_json_attribute(dataset: xr.Dataset, name: str) -> Any:
     """Value that an attribute of a dataset holds as JSON; raises DataError where it does not."""
     if name not in dataset.attrs:
-        raise refused(name, "is missing")
+        raise invalid_part_error(name, "is missing")
     try:
         return json.loads(dataset.attrs[name])
     except (TypeError, ValueError, RecursionError) as error:
-        raise refused(name, f"is no JSON ({brief(error)})") from error
+        raise invalid_part_error(name, f"is no JSON ({shorten(error)})") from error
 
 
 def _check_kind(name: str, values: xr.Variable) -> None:
     """Refuse a variable that does not hold the kind of numbers or texts it must hold."""
-    kinds, wanted = _OF_EVERY_LATTICE.get(name, _KINDS)
+    kinds, wanted = _REQUIRED_VARIABLES.get(name, _ALLOWED_KINDS)
     kind = values.dtype.kind
     if kind not in kinds:
-        raise refused(name, f"holds {values.dtype}, and must hold {wanted}")
+        raise invalid_part_error(name, f"holds {values.dtype}, and must hold {wanted}")
     if kind == "O" and not all(isinstance(text, str) for text in values.values.flat):
-        raise refused(name, f"holds objects, and must hold {wanted}")
+        raise invalid_part_error(name, f"holds objects, and must hold {wanted}")
 
 
 # ---- plain data, checked against annotations -----------------------------------------------------
 
 
-def refused(path: str, why: str) -> DataError:
+def invalid_part_error(path: str, why: str) -> DataError:
     """The error for a part that is not as rsfstudy writes it."""
     return DataError(
-        f"{brief(path).lstrip('.')} {why}. It was not written by this version of rsfstudy, or was "
-        "edited: run the study again."
+        f"{shorten(path).lstrip('.')} {why}. It was not written by this version of rsfstudy, or "
+        "was edited: run the study again."
     )
 
 
-def fit(value: Any, kind: Any, path: str) -> Any:
+def convert_plain(value: Any, kind: Any, path: str) -> Any:
     """Plain data as the type that an annotation names.
 
     Parameters
@@ -342,33 +353,35 @@ def fit(value: Any, kind: Any, path: str) -> Any:
         place, why = (f"{path}{within.rstrip('`')}", why) if why else (path, str(error))
         if field := re.fullmatch("Object .* (required|unknown) field `(.*)`", why):
             rule = "is missing" if field[1] == "required" else "is unknown"
-            raise refused(f"{place}.{field[2]}", rule) from error
-        raise refused(place, f"is refused ({brief(why)})") from error
+            raise invalid_part_error(f"{place}.{field[2]}", rule) from error
+        raise invalid_part_error(place, f"is refused ({shorten(why)})") from error
 
 
-def restored(value: Mapping[str, Any], kind: Any, path: str, **given: Any) -> Any:
+def build_dataclass(value: Mapping[str, Any], kind: Any, path: str, **given: Any) -> Any:
     """An object of a dataclass from all its fields and no others; some may be `given`."""
     kinds = {name: hint for name, hint in get_type_hints(kind).items() if name in value}
-    _check_names({**value, **given}, _names(kind), path)
+    _check_keys({**value, **given}, _field_names(kind), path)
     for name, part in value.items():
-        if kinds[name] is int and isinstance(part, int) and abs(part) > MOST_POINTS:
-            raise refused(f"{path}.{name}", f"is above {MOST_POINTS}")
-    fitted = {name: fit(part, kinds[name], f"{path}.{name}") for name, part in value.items()}
+        if kinds[name] is int and isinstance(part, int) and abs(part) > MAX_POINTS:
+            raise invalid_part_error(f"{path}.{name}", f"is above {MAX_POINTS}")
+    fitted = {
+        name: convert_plain(part, kinds[name], f"{path}.{name}") for name, part in value.items()
+    }
     try:
         return kind(**{**fitted, **given})
     except InvalidValue as error:
-        raise refused(f"{path}.{error.name}", f"is refused ({error})") from error
+        raise invalid_part_error(f"{path}.{error.name}", f"is refused ({error})") from error
 
 
-def _names(kind: Any) -> list[str]:
+def _field_names(kind: Any) -> list[str]:
     return [field.name for field in fields(kind)]
 
 
-def _check_names(value: Mapping[str, Any], names: Collection[str], path: str) -> None:
+def _check_keys(value: Mapping[str, Any], names: Collection[str], path: str) -> None:
     """Refuse plain data that lack one of these, or have others."""
     for name in names:
         if name not in value:
-            raise refused(f"{path}.{name}", "is missing")
+            raise invalid_part_error(f"{path}.{name}", "is missing")
     for name in value:
         if name not in names:
-            raise refused(f"{path}.{name}", "is unknown")
+            raise invalid_part_error(f"{path}.{name}", "is unknown")

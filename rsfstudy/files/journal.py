@@ -20,33 +20,33 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.errors import DataError, brief
+from rsfstudy.errors import DataError, shorten
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 
 #: A finished cell: its key, status, message, right-hand sides, wall time in s, numbers, checksum.
-Finished = tuple[bytes, str, str, int, float, bytes, int]
+CellRow = tuple[bytes, str, str, int, float, bytes, int]
 
 #: Raised when the tables, the checksum or what a cell is named by change.
-_FORMAT = 4
-_TABLES = """
+_FORMAT_VERSION = 4
+_CREATE_TABLES = """
 CREATE TABLE IF NOT EXISTS fingerprint (json TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS cells (
     key BLOB PRIMARY KEY, status TEXT, message TEXT, work INTEGER, seconds REAL, numbers BLOB,
     checksum INTEGER);
 """
 #: What a journal has no need of, and might act when it is written to.
-_FOREIGN = """
+_FOREIGN_OBJECTS_QUERY = """
 SELECT type || ' ' || name FROM sqlite_master
 WHERE type NOT IN ('table', 'index') OR tbl_name NOT IN ('fingerprint', 'cells')
 """
-_AT_A_TIME = 900
+_KEYS_PER_QUERY = 900
 #: How long to wait for another run to end, in s.
-_WAIT = 5.0
+_LOCK_TIMEOUT = 5.0
 _REMEDY = "Choose another --output, or start over with --fresh."
 
 
-class Layout:
+class OutputPacking:
     """The position of each number of a measure in a row of float64."""
 
     def __init__(self, measure: Measure) -> None:
@@ -55,28 +55,30 @@ class Layout:
         stops = np.cumsum([math.prod(shape) for shape in self.shapes.values()])
         self.width = int(stops[-1])
         starts = [0, *stops[:-1]]
-        self.places = {n: slice(*ends) for n, *ends in zip(self.shapes, starts, stops, strict=True)}
+        self.slices = {n: slice(*ends) for n, *ends in zip(self.shapes, starts, stops, strict=True)}
 
-        self._plain = "" if any(self.shapes.values()) else f"<{self.width}d"
+        self._struct_format = "" if any(self.shapes.values()) else f"<{self.width}d"
 
-    def packed(self, values: Mapping[str, Any]) -> bytes:
+    def pack(self, values: Mapping[str, Any]) -> bytes:
         """Numbers as bytes; those that are missing become NaN."""
-        if self._plain:
-            return struct.pack(self._plain, *(values.get(name, math.nan) for name in self.shapes))
+        if self._struct_format:
+            return struct.pack(
+                self._struct_format, *(values.get(name, math.nan) for name in self.shapes)
+            )
         row = np.full(self.width, np.nan, dtype="<f8")
         for name, value in values.items():
-            row[self.places[name]] = np.ravel(value)
+            row[self.slices[name]] = np.ravel(value)
         return row.tobytes()
 
-    def finished(self, key: bytes, outcome: Outcome, seconds: float) -> Finished:
+    def pack_cell(self, key: bytes, outcome: Outcome, seconds: float) -> CellRow:
         """A cell as the journal holds it."""
-        numbers, work = self.packed(outcome.values), outcome.rhs_evaluations
+        numbers, work = self.pack(outcome.values), outcome.rhs_evaluations
         row = (outcome.status.name, outcome.message, work, seconds, numbers)
-        return (key, *row, _checksum(key, *row))
+        return (key, *row, _compute_checksum(key, *row))
 
 
 @dataclass(frozen=True)
-class Columns:
+class CellColumns:
     """Columns of some cells: status, message, right-hand sides, wall time, and one row of
     numbers each.
     """
@@ -88,7 +90,7 @@ class Columns:
     numbers: np.ndarray
 
     @classmethod
-    def pending(cls, cells: int, width: int) -> Columns:
+    def pending(cls, cells: int, width: int) -> CellColumns:
         """Cells that are not computed yet."""
         return cls(
             np.full(cells, int(Status.PENDING), dtype=np.int8),
@@ -108,7 +110,7 @@ class Journal:
         The SQLite file; None keeps them in memory.
     fingerprint : mapping
         All that decides the numbers of a cell, except what its key holds, as plain data.
-    layout : Layout
+    packing : OutputPacking
         The numbers of a cell.
     fresh : bool
         Forget what the file holds.
@@ -124,55 +126,55 @@ class Journal:
         self,
         path: Path | None,
         fingerprint: Mapping[str, Any],
-        layout: Layout,
+        packing: OutputPacking,
         *,
         fresh: bool = False,
     ) -> None:
-        self._path, self._layout = path or Path("memory"), layout
-        ours = {**fingerprint, "journal": _FORMAT}
+        self._path, self._packing = path or Path("memory"), packing
+        ours = {**fingerprint, "journal": _FORMAT_VERSION}
         wanted = json.dumps(ours, sort_keys=True)
         try:
             if path is not None:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 if fresh:
-                    _remove(path)
+                    _remove_journal(path)
             self._db = _open_exclusively(path or ":memory:")
         except (OSError, sqlite3.Error) as error:
-            raise self._unusable(error) from error
+            raise self._unusable_error(error) from error
         try:
-            theirs = self._fingerprint_or(wanted)
+            theirs = self._stored_fingerprint(wanted)
             if theirs != wanted:
-                self._accept(theirs, ours)
+                self._accept_larger_budget(theirs, ours)
         except sqlite3.Error as error:
             self._db.close()
-            raise self._unusable(error) from error
+            raise self._unusable_error(error) from error
         except BaseException:
             self._db.close()  # an open connection would keep the journal locked
             raise
 
-    def _unusable(self, error: Exception) -> DataError:
+    def _unusable_error(self, error: Exception) -> DataError:
         if _is_locked(error):
             rule = f"another run uses {self._path}: let it end, or choose another --output."
             return DataError(rule)
         return DataError(f"cannot use {self._path}: {error}. {_REMEDY}")
 
-    def _fingerprint_or(self, ours: str) -> Any:
+    def _stored_fingerprint(self, ours: str) -> Any:
         """Return the fingerprint stored in the journal.
 
         If the journal is new, the function stores ``ours`` and returns ``ours``.
         """
         with self._db:
-            self._db.executescript(_TABLES)
-            others = self._db.execute(_FOREIGN).fetchall()
+            self._db.executescript(_CREATE_TABLES)
+            others = self._db.execute(_FOREIGN_OBJECTS_QUERY).fetchall()
             if others:
-                found = brief(others[0][0])
+                found = shorten(others[0][0])
                 raise DataError(f"{self._path} holds {found}, which is not ours. {_REMEDY}")
             row = self._db.execute("SELECT json FROM fingerprint").fetchone()
             if row is None:
                 self._db.execute("INSERT INTO fingerprint VALUES (?)", (ours,))
         return ours if row is None else row[0]
 
-    def _accept(self, theirs: Any, ours: Mapping[str, Any]) -> None:
+    def _accept_larger_budget(self, theirs: Any, ours: Mapping[str, Any]) -> None:
         """Accept a journal with a smaller work budget, and reject any other difference.
 
         If the fingerprints differ only in the work budget and the new budget is larger, the new
@@ -180,14 +182,14 @@ class Journal:
         the budget. Otherwise the method raises ``DataError``.
         """
         try:
-            differ = differences(dict(json.loads(theirs)), ours)
+            differ = find_differences(dict(json.loads(theirs)), ours)
             if differ.keys() == {"budget"} and differ["budget"][0] < differ["budget"][1]:
                 with self._db:
                     wanted = json.dumps(ours, sort_keys=True)
                     self._db.execute("UPDATE fingerprint SET json = ?", (wanted,))
                 return
             told = "; ".join(
-                f"{name}: {brief(there, 70)} there, {brief(now, 70)} now"
+                f"{name}: {shorten(there, 70)} there, {shorten(now, 70)} now"
                 for name, (there, now) in differ.items()
             )
         except (AttributeError, RecursionError, TypeError, ValueError):
@@ -204,7 +206,7 @@ class Journal:
     def __exit__(self, *_error: object) -> None:
         self._db.close()
 
-    def add(self, cells: Iterable[Finished]) -> None:
+    def add(self, cells: Iterable[CellRow]) -> None:
         """Record finished cells, all or none.
 
         Raises
@@ -220,15 +222,15 @@ class Journal:
         except sqlite3.Error as error:
             raise DataError(f"cannot add to {self._path}: {error}.") from error
 
-    def ended(self, keys: np.ndarray) -> np.ndarray:
+    def statuses(self, keys: np.ndarray) -> np.ndarray:
         """The status of each cell; `pending` for a cell that is not in the journal."""
         codes = {status.name: int(status) for status in Status}
         statuses = np.full(len(keys), int(Status.PENDING), dtype=np.int8)
-        for places, rows in self._rows(keys, "status"):
+        for places, rows in self._query_rows(keys, "status"):
             statuses[places] = [codes.get(name, int(Status.PENDING)) for (name,) in rows]
         return statuses
 
-    def read(self, keys: np.ndarray) -> Columns:
+    def read_cells(self, keys: np.ndarray) -> CellColumns:
         """Columns of these cells, in the order of `keys`.
 
         Raises
@@ -236,21 +238,21 @@ class Journal:
         DataError
             If a row is not what was written.
         """
-        columns = Columns.pending(len(keys), self._layout.width)
+        columns = CellColumns.pending(len(keys), self._packing.width)
         what = "key, status, message, work, seconds, numbers, checksum"
-        for places, rows in self._rows(keys, what):
+        for places, rows in self._query_rows(keys, what):
             try:
-                _fill(columns, places, rows)
+                _fill_columns(columns, places, rows)
             except (KeyError, OverflowError, TypeError, ValueError) as error:
                 raise DataError(
                     f"{self._path} is damaged: a cell is not what was written. {_REMEDY}"
                 ) from error
         return columns
 
-    def _rows(self, keys: np.ndarray, what: str) -> Iterator[tuple[list[int], list[Any]]]:
+    def _query_rows(self, keys: np.ndarray, what: str) -> Iterator[tuple[list[int], list[Any]]]:
         """The cells that are known, a group at a time: places of their keys, and their rows."""
-        for start in range(0, len(keys), _AT_A_TIME):
-            wanted: list[bytes] = keys[start : start + _AT_A_TIME].tolist()
+        for start in range(0, len(keys), _KEYS_PER_QUERY):
+            wanted: list[bytes] = keys[start : start + _KEYS_PER_QUERY].tolist()
             marks = ", ".join("?" * len(wanted))
             ask = f"SELECT key, {what} FROM cells WHERE key IN ({marks})"
             try:
@@ -262,9 +264,9 @@ class Journal:
                 yield [start + number for number in known], [rows[wanted[n]] for n in known]
 
 
-def _fill(columns: Columns, places: list[int], rows: list[Any]) -> None:
+def _fill_columns(columns: CellColumns, places: list[int], rows: list[Any]) -> None:
     """Fill in rows; an error of Python's where one is not what was written."""
-    if any(_checksum(*known) != checksum for *known, checksum in rows):
+    if any(_compute_checksum(*known) != checksum for *known, checksum in rows):
         raise ValueError("checksum")
     _keys, status, message, work, seconds, numbers, _checksums = zip(*rows, strict=True)
     columns.status[places] = [Status[name] for name in status]
@@ -275,7 +277,7 @@ def _fill(columns: Columns, places: list[int], rows: list[Any]) -> None:
 
 
 @dataclass(frozen=True)
-class Timed:
+class CellTimings:
     """Times that cells took.
 
     Attributes
@@ -290,21 +292,21 @@ class Timed:
     seconds: Mapping[bytes, float]
 
 
-def timed(path: Path) -> Timed | None:
+def read_timings(path: Path) -> CellTimings | None:
     """Times of the cells of a journal; None where there is none that can be read just now."""
     try:
         uri = f"{path.resolve().as_uri()}?mode=ro"
         with contextlib.closing(sqlite3.connect(uri, uri=True, timeout=0.0)) as db:
             (known,) = db.execute("SELECT json FROM fingerprint").fetchone()
             seconds = db.execute("SELECT key, seconds FROM cells WHERE typeof(seconds) = 'real'")
-            return Timed(dict(json.loads(known)), dict(seconds))
+            return CellTimings(dict(json.loads(known)), dict(seconds))
     except (OSError, RecursionError, sqlite3.Error, TypeError, ValueError):
         return None
 
 
 def _open_exclusively(path: Path | str) -> sqlite3.Connection:
     """Open a database for this process alone, until it is closed or the process ends."""
-    db = sqlite3.connect(path, timeout=_WAIT)
+    db = sqlite3.connect(path, timeout=_LOCK_TIMEOUT)
     try:
         db.execute("PRAGMA locking_mode = EXCLUSIVE")
         db.execute("BEGIN EXCLUSIVE")
@@ -319,7 +321,7 @@ def _is_locked(error: Exception) -> bool:
     return getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY
 
 
-def _remove(path: Path) -> None:
+def _remove_journal(path: Path) -> None:
     """Remove a journal, unless another run uses it, and the rollback file that an interrupted write
     left beside it.
     """
@@ -333,7 +335,7 @@ def _remove(path: Path) -> None:
         file.unlink(missing_ok=True)
 
 
-def _checksum(
+def _compute_checksum(
     key: bytes, status: str, message: str, work: int, seconds: float | None, numbers: bytes
 ) -> int:
     known = math.nan if seconds is None else seconds
@@ -342,7 +344,9 @@ def _checksum(
     return zlib.crc32(numbers, zlib.crc32(text.encode()))
 
 
-def differences(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+def find_differences(
+    theirs: Mapping[str, Any], ours: Mapping[str, Any]
+) -> dict[str, tuple[Any, Any]]:
     """Entries in which two fingerprints differ: theirs and ours, by name. Either may come from a
     file.
     """

@@ -11,63 +11,65 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.axes.axis import kinds
+from rsfstudy.axes.axis import row_kinds
 from rsfstudy.declare.study import Study
 from rsfstudy.files import loadings
-from rsfstudy.files.contents import LAYOUT
-from rsfstudy.files.journal import Columns, Layout
+from rsfstudy.files.contents import LAYOUT_VERSION
+from rsfstudy.files.journal import CellColumns, OutputPacking
 from rsfstudy.quantity import Quantity
-from rsfstudy.rig.scales import BESIDE
+from rsfstudy.rig.scales import DIMENSIONLESS_PREFIX
 from rsfstudy.status import Status
-from rsfstudy.vocabulary import DERIVED, coverage, quantity
+from rsfstudy.vocabulary import DERIVED_COORDINATES, coverage_content_type, find_quantity
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"
-_COMMENT = (
+_DIMENSIONLESS_COMMENT = (
     "Quantities are dimensionless: stress in sigma_*, slip in D_c, time in D_c/V_*, slip rate in "
     "V_*; the attribute scale of a variable says which."
 )
-_OF_RIG = (
+_RIG_COMMENT = (
     " Axes are in the units that they state; sigma_star, slip_distance and reference_velocity are "
     "the scales of each cell."
 )
 #: Attributes that the user sets in the environment: RSFSTUDY_LICENSE and so on.
-_CREDITS = ("creator_name", "creator_email", "institution", "license", "acknowledgement")
+_CREDIT_ATTRIBUTES = ("creator_name", "creator_email", "institution", "license", "acknowledgement")
 
 
-def assemble(study: Study, columns: Columns, provenance: Mapping[str, Any]) -> xr.Dataset:
+def assemble_dataset(
+    study: Study, columns: CellColumns, provenance: Mapping[str, Any]
+) -> xr.Dataset:
     """The lattice of a study.
 
     Parameters
     ----------
     study : Study
-    columns : Columns
+    columns : CellColumns
         What is known of each cell, in row-major order.
     provenance : mapping
         What else decided the numbers, as plain data.
     """
-    dataset = xr.Dataset(variables(study, columns, study.shape), coordinates(study))
+    dataset = xr.Dataset(build_variables(study, columns, study.shape), build_coordinates(study))
     known = int((columns.status != int(Status.PENDING)).sum())
-    return dataset.assign_attrs(attributes(study, known, provenance))
+    return dataset.assign_attrs(root_attributes(study, known, provenance))
 
 
-def variables(
-    study: Study, columns: Columns, shape: tuple[int, ...]
+def build_variables(
+    study: Study, columns: CellColumns, shape: tuple[int, ...]
 ) -> dict[Any, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
     """Variables for a block of cells: the numbers of the measure, and how each cell ended.
 
     Parameters
     ----------
     study : Study
-    columns : Columns
+    columns : CellColumns
         What is known of the cells, in row-major order.
     shape : tuple of int
         Shape of the block.
     """
-    layout, dims, own = Layout(study.measure), study.dimensions, study.quantities
+    layout, dims, own = OutputPacking(study.measure), study.dimensions, study.quantities
     described = {}
     for name, inner in study.measure.variables.items():
-        values = columns.numbers[:, layout.places[name]].reshape(shape + layout.shapes[name])
-        described[name] = ((*dims, *inner), values, _about(name, own))
+        values = columns.numbers[:, layout.slices[name]].reshape(shape + layout.shapes[name])
+        described[name] = ((*dims, *inner), values, _variable_attributes(name, own))
     kept = {
         "status": columns.status,
         "rhs_evaluations": columns.work,
@@ -75,84 +77,104 @@ def variables(
         "message": columns.message,
     }
     for name, values in kept.items():
-        described[name] = (dims, values.reshape(shape), _about(name, {}))
+        described[name] = (dims, values.reshape(shape), _variable_attributes(name, {}))
     described["status"][2].update(
         flag_values=np.array([int(s) for s in Status], dtype=np.int8),
         flag_meanings=" ".join(s.label for s in Status),
         comment="; ".join(f"{s.label}: {s.meaning}" for s in Status),
     )
     for name, (_dims, _values, about) in described.items():
-        about["coverage_content_type"] = coverage(name)
+        about["coverage_content_type"] = coverage_content_type(name)
     for name in study.measure.variables:
         companions = [n for n in (f"{name}_error", "status") if n in described and n != name]
         described[name][2]["ancillary_variables"] = " ".join(companions)
     return described
 
 
-def coordinates(study: Study) -> dict[Any, Any]:
+def build_coordinates(study: Study) -> dict[Any, Any]:
     """Dimension coordinates, what follows from them, and the fixed values as scalars."""
     strides = np.cumprod([1, *study.shape[::-1]])[::-1][1:]
     coords: dict[Any, Any] = {}
     own = study.quantities
     sample = []
     for axis, stride in zip(study.axes, strides, strict=True):
-        firsts = np.unique(kinds(axis.rows), return_index=True, return_inverse=True)[1:]
+        firsts = np.unique(row_kinds(axis.rows), return_index=True, return_inverse=True)[1:]
         scenes = [study.scene(int(i * stride)).as_dict() for i in firsts[0]]
         sample += scenes
         if axis.labels is not None:
             about = {"long_name": axis.dimension.replace("_", " ")}
             coords[axis.dimension] = (axis.dimension, np.array(axis.labels, dtype=object), about)
-        elif axis.is_numbered:
+        elif axis.has_numbered_points:
             about = {"units": "1", "long_name": f"number of the {axis.dimension.replace('_', ' ')}"}
-            about |= {"drawn": json.dumps(axis.drawn)} if axis.drawn else {}
+            about |= {"drawn": json.dumps(axis.sampling_info)} if axis.sampling_info else {}
             coords[axis.dimension] = (axis.dimension, np.arange(len(axis), dtype=np.int32), about)
         # an axis shows its own values, even where its first cells make no use of them
         fixed = [{**study.measure.plain_fields, **scene} for scene in scenes]
         points = [{**fixed[n], **row} for n, row in zip(firsts[1], axis.rows, strict=True)]
         for name in axis.fields:
             varied = [point.get(name) for point in points]
-            coords[name] = (axis.dimension, _array(varied), _about(name, own, _first(varied)))
+            coords[name] = (
+                axis.dimension,
+                _to_storable_array(varied),
+                _variable_attributes(name, own, _first_present(varied)),
+            )
     for name, units in study.units.items():
         of_axis = {key: v for key, v in coords[name][2].items() if key != "scale"}
         coords[name] = (*coords[name][:2], of_axis | {"units": units})
-    for name, (dims, values) in study.rig.beside().items() if study.rig else ():
-        coords[name] = (dims, values, _about(name.removeprefix(BESIDE), own))
+    for name, (dims, values) in (
+        study.scene_builder.scale_coordinates().items() if study.scene_builder else ()
+    ):
+        coords[name] = (
+            dims,
+            values,
+            _variable_attributes(name.removeprefix(DIMENSIONLESS_PREFIX), own),
+        )
     for name in study.scene_fields:
         present = {scene.get(name) for scene in sample} - {None}
         if name not in {*coords, *study.measure.variables} and len(present) == 1:
             value = present.pop()
-            coords[name] = ((), _array([value])[0], _about(name, own, value))
-    for name, (source, formula) in DERIVED.items():
+            coords[name] = (
+                (),
+                _to_storable_array([value])[0],
+                _variable_attributes(name, own, value),
+            )
+    for name, (source, formula) in DERIVED_COORDINATES.items():
         if source in coords:
             dims, values, _attrs = coords[source]
             derived = [formula(value) for value in np.ravel(values).tolist()]
-            coords[name] = (dims, np.reshape(derived, np.shape(values)), _about(name, {}))
+            coords[name] = (
+                dims,
+                np.reshape(derived, np.shape(values)),
+                _variable_attributes(name, {}),
+            )
     for name, values in study.measure.inner_coordinates.items():
-        coords[name] = (name, np.asarray(values), _about(name, own))
-    return coords | loadings.variables(study.own_parts.values())
+        coords[name] = (name, np.asarray(values), _variable_attributes(name, own))
+    return coords | loadings.loading_variables(study.user_parts.values())
 
 
-def _array(values: list[Any]) -> np.ndarray:
+def _to_storable_array(values: list[Any]) -> np.ndarray:
     """Values of one field as NetCDF can hold them: text, flags as int8, numbers with NaN where a
     value is missing.
     """
-    if isinstance(_first(values), str):
+    if isinstance(_first_present(values), str):
         return np.array([value or "" for value in values], dtype=object)
-    if isinstance(_first(values), bool) and None not in values:
+    if isinstance(_first_present(values), bool) and None not in values:
         return np.array(values, dtype=np.int8)
     return np.array([np.nan if value is None else value for value in values], dtype=float)
 
 
-def _first(values: list[Any]) -> Any:
+def _first_present(values: list[Any]) -> Any:
     """The first value that is not None, if any."""
     return next((value for value in values if value is not None), None)
 
 
-def _about(name: str, own: Mapping[str, Quantity], value: Any = None) -> dict[str, Any]:
+def _variable_attributes(
+    name: str, own: Mapping[str, Quantity], value: Any = None
+) -> dict[str, Any]:
     """Attributes of a variable, whether the vocabulary or the study (`own`) describes it; `value`
     is an example of what a coordinate holds.
     """
-    about = quantity(name, own)
+    about = find_quantity(name, own)
     attrs: dict[str, Any] = {"long_name": about.long_name}
     if name in own and about.symbol:
         attrs["symbol"] = about.symbol  # which the vocabulary does not hold
@@ -166,7 +188,7 @@ def _about(name: str, own: Mapping[str, Quantity], value: Any = None) -> dict[st
     return attrs
 
 
-def attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> dict[str, Any]:
+def root_attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Root attributes: what the lattice is, where it comes from, how many of its cells are `known`,
     and the whole declaration.
     """
@@ -176,7 +198,7 @@ def attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> dict[
         "title": study.title,
         "summary": study.summary or study.title,
         "keywords": "rate and state friction, spring-slider, stability, stick-slip",
-        "comment": _COMMENT + (_OF_RIG if study.laboratory else ""),
+        "comment": _DIMENSIONLESS_COMMENT + (_RIG_COMMENT if study.rig else ""),
         "Conventions": CONVENTIONS,
         "project": "rsfstudy",
         "naming_authority": "rsfstudy",
@@ -190,14 +212,17 @@ def attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> dict[
         "completeness": "complete" if complete else f"partial: {known} of {study.size} cells",
         "declaration": json.dumps(study.describe()),
         "provenance": json.dumps(dict(provenance)),
-        **{name: os.environ.get(f"RSFSTUDY_{name.upper()}", "not stated") for name in _CREDITS},
+        **{
+            name: os.environ.get(f"RSFSTUDY_{name.upper()}", "not stated")
+            for name in _CREDIT_ATTRIBUTES
+        },
     }
     # a command, or the environment, may hold bytes that are no text
     plain = {name: text.encode(errors="backslashreplace").decode() for name, text in texts.items()}
-    return {**plain, "layout": LAYOUT}
+    return {**plain, "layout": LAYOUT_VERSION}
 
 
-def sample(sizes: Mapping[str, int], most: int) -> dict[str, np.ndarray]:
+def thin_dimensions(sizes: Mapping[str, int], most: int) -> dict[str, np.ndarray]:
     """Points of each dimension, both ends and some between, that make so many cells at most.
 
     Parameters

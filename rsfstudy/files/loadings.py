@@ -8,30 +8,33 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.files.contents import refused
-from rsfstudy.slider.history import RISING, History, of_samples
+from rsfstudy.files.contents import invalid_part_error
+from rsfstudy.slider.history import STRESS_RATE_COLUMN, SampledHistory, history_from_table
 from rsfstudy.slider.loading import Segment
-from rsfstudy.slider.protocol import Protocol, Stated, protocol
-from rsfstudy.slider.registry import Own
+from rsfstudy.slider.protocol import Protocol, UserLoading, protocol
+from rsfstudy.slider.registry import UserPart
 
 #: What the columns are, by how many there are in each row, and what a row is.
-_SAMPLE = ("sample", "time, load point velocity, fall and rate of normal stress")
-_SEGMENT = ("segment", "load point velocity and step, duration, and normal stress above sigma_star")
+_SAMPLE_ROW = ("sample", "time, load point velocity, fall and rate of normal stress")
+_SEGMENT_ROW = (
+    "segment",
+    "load point velocity and step, duration, and normal stress above sigma_star",
+)
 
 #: What tells of which kind samples are.
-_OF = ("of_stress", "of_pressure")
+_HISTORY_FLAGS = ("of_stress", "of_pressure")
 
 
-def variables(parts: Iterable[Own]) -> dict[str, xr.Variable]:
+def loading_variables(parts: Iterable[UserPart]) -> dict[str, xr.Variable]:
     """Variables that hold the loadings among parts of the user's own, a row a sample or a segment
     of what they are made of, in units of the slider.
     """
     found = {}
     for part in parts:
-        if isinstance(part, History):
-            (row, columns), rows = _SAMPLE, part.columns
+        if isinstance(part, SampledHistory):
+            (row, columns), rows = _SAMPLE_ROW, part.sample_table
         elif isinstance(part, Protocol):
-            (row, columns), rows = _SEGMENT, np.array(part.history)
+            (row, columns), rows = _SEGMENT_ROW, np.array(part.input_segments)
         else:
             continue
         about: dict[str, Any] = {
@@ -40,14 +43,14 @@ def variables(parts: Iterable[Own]) -> dict[str, xr.Variable]:
             "loading": part.name,
             "coverage_content_type": "auxiliaryInformation",
         }
-        if isinstance(part, History):
-            about |= {name: int(getattr(part, name)) for name in _OF}
+        if isinstance(part, SampledHistory):
+            about |= {name: int(getattr(part, name)) for name in _HISTORY_FLAGS}
         dims = (f"{part.name}_{row}", f"{part.name}_column")
         found[f"{part.name}_{row}s"] = xr.Variable(dims, rows, about)
     return found
 
 
-def held(results: xr.Dataset) -> Mapping[str, Stated]:
+def read_loadings(results: xr.Dataset) -> Mapping[str, UserLoading]:
     """The loadings that results hold, by name.
 
     Raises
@@ -55,16 +58,22 @@ def held(results: xr.Dataset) -> Mapping[str, Stated]:
     DataError
         Where a variable that is said to hold one does not.
     """
-    found: dict[str, Stated] = {}
+    found: dict[str, UserLoading] = {}
     for key, values in results.variables.items():
         name = values.attrs.get("loading")
         if name is None:
             continue
-        if values.dtype.kind != "f" or values.ndim != 2 or values.shape[1] != RISING + 1:
-            raise refused(str(key), f"holds no loading of {RISING + 1} columns")
+        if (
+            values.dtype.kind != "f"
+            or values.ndim != 2
+            or values.shape[1] != STRESS_RATE_COLUMN + 1
+        ):
+            raise invalid_part_error(
+                str(key), f"holds no loading of {STRESS_RATE_COLUMN + 1} columns"
+            )
         if "of_stress" in values.attrs:
-            of = {key: bool(values.attrs.get(key, False)) for key in _OF}
-            found[name] = of_samples(values.values, name=name, **of)
+            of = {key: bool(values.attrs.get(key, False)) for key in _HISTORY_FLAGS}
+            found[name] = history_from_table(values.values, name=name, **of)
         else:
             found[name] = protocol([Segment(*row) for row in values.values.tolist()], name)
     return found

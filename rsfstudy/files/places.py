@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from rsfstudy.declare import catalogue, names
-from rsfstudy.defaults import OUTPUT
-from rsfstudy.errors import DataError, InvalidValue, brief
+from rsfstudy.defaults import OUTPUT_DIRECTORY
+from rsfstudy.errors import DataError, InvalidValue, shorten
 from rsfstudy.paths import check_path
 
 
-def directory(output: str | Path | None) -> Path | None:
+def output_directory(output: str | Path | None) -> Path | None:
     """Directory of results, which need not be there yet; None for nowhere.
 
     Raises
@@ -25,7 +25,7 @@ def directory(output: str | Path | None) -> Path | None:
     return check_path("output", output)
 
 
-def results(name: str | Path, output: str | Path | None) -> Path:
+def find_results(name: str | Path, output: str | Path | None) -> Path:
     """The results of a named study, or of the study that a file declares, in a directory; or the
     results file that is named itself. A file that declares a study is run, because results bear the
     name that its `Study` states.
@@ -39,14 +39,14 @@ def results(name: str | Path, output: str | Path | None) -> Path:
     path = Path(name)
     if path.suffix in (".nc", ".zarr"):
         return path
-    study = catalogue.load(str(path)).name if path.suffix == ".py" else str(name)
+    study = catalogue.load_study(str(path)).name if path.suffix == ".py" else str(name)
     try:
-        return _of_study(study, directory(output) or OUTPUT)
+        return _results_of_study(study, output_directory(output) or OUTPUT_DIRECTORY)
     except OSError as error:
-        raise DataError(f"{brief(name)} cannot be looked for: {error.strerror}") from error
+        raise DataError(f"{shorten(name)} cannot be looked for: {error.strerror}") from error
 
 
-def _of_study(name: str, output: Path) -> Path:
+def _results_of_study(name: str, output: Path) -> Path:
     """The results of a study, by its name."""
     file, in_pieces = output / f"{name}.nc", output / f"{name}.zarr"
     if file.exists() and in_pieces.exists():
@@ -59,7 +59,7 @@ def _of_study(name: str, output: Path) -> Path:
             f"{file} does not exist, but {partial} does: run the study again, or name it."
         )
     there = any(file.name.startswith(f"{name}.") for file in output.glob("*"))
-    if not there and name not in names.names():
-        rule, remedy = f"has no results in {brief(output)}", "Results files end in .nc or .zarr."
-        raise InvalidValue("study", name, rule, choices=names.names(), remedy=remedy)
+    if not there and name not in names.study_names():
+        rule, remedy = f"has no results in {shorten(output)}", "Results files end in .nc or .zarr."
+        raise InvalidValue("study", name, rule, choices=names.study_names(), remedy=remedy)
     return file

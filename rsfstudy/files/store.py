@@ -23,15 +23,15 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.error_boundary import user_stacklevel
-from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, brief
+from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, shorten
 from rsfstudy.files import content_digest, contents
-from rsfstudy.files.attributes import check_attributes, check_motion
-from rsfstudy.files.contents import LAYOUT
+from rsfstudy.files.attributes import check_attributes, check_motion_variables
+from rsfstudy.files.contents import LAYOUT_VERSION
 from rsfstudy.netcdf import fill_value_encoding, with_cf_encoding
 from rsfstudy.paths import check_path
 
 #: How Zarr stores are opened: lazily, and none of an older format.
-ZARR: Mapping[str, Any] = {
+ZARR_OPEN_OPTIONS: Mapping[str, Any] = {
     "engine": "zarr",
     "chunks": None,
     "consolidated": False,
@@ -39,13 +39,13 @@ ZARR: Mapping[str, Any] = {
     "zarr_format": 3,
 }
 #: Codecs of our Zarr stores. Any other might run code that the store names.
-_CODECS = {"bytes", "vlen-utf8", "zstd"}
-_MARK = b"\nrsfstudy sha256 "
-_TRAILER = len(_MARK) + 64
-_DIGEST = "digest"
+_ALLOWED_CODECS = {"bytes", "vlen-utf8", "zstd"}
+_TRAILER_PREFIX = b"\nrsfstudy sha256 "
+_TRAILER_LENGTH = len(_TRAILER_PREFIX) + 64
+_STORE_DIGEST_ATTRIBUTE = "digest"
 
 
-def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
+def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     """Write a dataset so that `path` always holds either the old file or the complete new one.
 
     A reader that has the old file open keeps its data. If a write is killed, the next one
@@ -61,9 +61,9 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     DataError
         If the directory cannot be written, or what is read back differs from what was written.
     """
-    clean = clean_attributes(dataset.assign_attrs({"layout": LAYOUT, **dataset.attrs}))
-    clean.attrs.pop(content_digest.ATTRIBUTE, None)
-    digest = {content_digest.ATTRIBUTE: content_digest.compute_content_digest(clean)}
+    clean = clean_attributes(dataset.assign_attrs({"layout": LAYOUT_VERSION, **dataset.attrs}))
+    clean.attrs.pop(content_digest.DIGEST_ATTRIBUTE, None)
+    digest = {content_digest.DIGEST_ATTRIBUTE: content_digest.compute_content_digest(clean)}
     stored = clean.assign_attrs(digest)
     beside = path.with_name(f".{path.name}.new")
     try:
@@ -76,7 +76,7 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
             warnings.filterwarnings("ignore", "Running on a single-machine scheduler", UserWarning)
             stored.to_netcdf(beside, **how, encoding=fill_value_encoding(clean))
         with open(beside, "ab") as file:
-            file.write(_MARK + _digest_of_bytes(beside, beside.stat().st_size))
+            file.write(_TRAILER_PREFIX + _hash_file(beside, beside.stat().st_size))
         with xr.open_dataset(beside, engine="netcdf4") as back:
             if not stored.identical(back.load()):
                 raise DataError(f"{path} was not written: what was read back differs.")
@@ -96,7 +96,7 @@ def write(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     return clean
 
 
-def _digest_of_bytes(path: Path, size: int) -> bytes:
+def _hash_file(path: Path, size: int) -> bytes:
     digest = hashlib.sha256()
     with open(path, "rb") as file:
         while size > 0 and (part := file.read(min(size, 2**20))):
@@ -105,14 +105,14 @@ def _digest_of_bytes(path: Path, size: int) -> bytes:
     return digest.hexdigest().encode()
 
 
-def open_store(path: Path) -> xr.Dataset:
+def open_zarr_store(path: Path) -> xr.Dataset:
     """Open a Zarr store lazily.
 
     Zarr stores attributes as JSON, which does not distinguish numeric types. The function therefore
     converts flag values to the dtype of their variable. It also removes the dtype of strings from
     the encoding, because older versions of xarray cannot write that dtype to a NetCDF file.
     """
-    dataset = xr.open_dataset(path, **ZARR)
+    dataset = xr.open_dataset(path, **ZARR_OPEN_OPTIONS)
     for variable in dataset.variables.values():
         if getattr(variable.encoding.get("dtype"), "kind", "") == "T":
             del variable.encoding["dtype"]
@@ -122,62 +122,64 @@ def open_store(path: Path) -> xr.Dataset:
     return dataset
 
 
-def seal(store: Path) -> None:
+def write_store_digest(store: Path) -> None:
     """Write the digest of all files of a Zarr store among its attributes."""
     root = store / "zarr.json"
     about = json.loads(root.read_text())
-    about["attributes"][_DIGEST] = _digest_of_store(store)
+    about["attributes"][_STORE_DIGEST_ATTRIBUTE] = _hash_store(store)
     root.write_text(json.dumps(about, indent=2))
 
 
-def _digest_of_store(store: Path) -> str:
+def _hash_store(store: Path) -> str:
     """Digest of the files of a store, without the one that its root holds."""
     digest = hashlib.sha256()
     for file in sorted(file for file in store.rglob("*") if file.is_file()):
         content = file.read_bytes()
         if file == store / "zarr.json":
             about = json.loads(content)
-            about["attributes"].pop(_DIGEST, None)
+            about["attributes"].pop(_STORE_DIGEST_ATTRIBUTE, None)
             content = json.dumps(about, sort_keys=True).encode()
         digest.update(f"{file.relative_to(store)} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 
-def _check_store(path: Path) -> bool:
+def _check_store_digest(path: Path) -> bool:
     """Check a Zarr store against its digest; whether it has one."""
     attributes = json.loads((path / "zarr.json").read_text())["attributes"]
-    if _DIGEST in attributes and attributes[_DIGEST] != _digest_of_store(path):
+    if _STORE_DIGEST_ATTRIBUTE in attributes and attributes[_STORE_DIGEST_ATTRIBUTE] != _hash_store(
+        path
+    ):
         raise DataError(f"{path} is damaged, or was edited: its files are not what was written.")
-    return _DIGEST in attributes
+    return _STORE_DIGEST_ATTRIBUTE in attributes
 
 
-def _check_bytes(path: Path) -> bool:
+def _check_file_digest(path: Path) -> bool:
     """Check a file against the digest of its bytes; whether it has one."""
-    size = path.stat().st_size - _TRAILER
+    size = path.stat().st_size - _TRAILER_LENGTH
     with open(path, "rb") as file:
         file.seek(max(0, size))
         trailer = file.read()
-    if not trailer.startswith(_MARK):
+    if not trailer.startswith(_TRAILER_PREFIX):
         return False
-    if trailer != _MARK + _digest_of_bytes(path, size):
+    if trailer != _TRAILER_PREFIX + _hash_file(path, size):
         raise DataError(f"{path} is damaged, or was edited: its bytes are not what was written.")
     return True
 
 
-def read(path: Path) -> xr.Dataset:
-    """Load the results of a study, as `read_any` does.
+def read_results(path: Path) -> xr.Dataset:
+    """Load the results of a study, as `read_dataset` does.
 
     Raises
     ------
     DataError
         If it is missing, unreadable, not written by rsfstudy, damaged, or of one scene.
     """
-    dataset = read_any(path)
-    contents.check_of_a_study(dataset, brief(path))
+    dataset = read_dataset(path)
+    contents.check_is_study(dataset, shorten(path))
     return dataset
 
 
-def read_any(path: Path) -> xr.Dataset:
+def read_dataset(path: Path) -> xr.Dataset:
     """Load a results file, or that of one scene, into memory and close it; a Zarr store is opened,
     not loaded.
 
@@ -186,30 +188,30 @@ def read_any(path: Path) -> xr.Dataset:
     DataError
         If it is missing, unreadable, not written by rsfstudy, or damaged.
     """
-    where = brief(path)
+    where = shorten(path)
     try:
-        _check_there(path, where)
+        _check_readable_path(path, where)
         if path.is_dir():
             _check_codecs(path)
-            sealed = _check_store(path)
-            dataset = open_store(path)
+            sealed = _check_store_digest(path)
+            dataset = open_zarr_store(path)
         else:
-            sealed = _check_bytes(path)
+            sealed = _check_file_digest(path)
             dataset = xr.load_dataset(path, engine="netcdf4")
             if not sealed:
                 content_digest.check_content(dataset, where)
-            dataset.attrs.pop(content_digest.ATTRIBUTE, None)
+            dataset.attrs.pop(content_digest.DIGEST_ATTRIBUTE, None)
     except RsfStudyError:
         raise
     except Exception as error:  # HDF5, Zarr and xarray raise almost anything on damaged data
-        raise DataError(f"{where} cannot be read: {brief(error)}") from error
+        raise DataError(f"{where} cannot be read: {shorten(error)}") from error
     dataset = with_cf_encoding(dataset)
     try:
         check_attributes(dataset)
-        if contents.is_of_a_scene(dataset):
-            check_motion(dataset)
+        if contents.is_single_scene(dataset):
+            check_motion_variables(dataset)
             return dataset  # which users write by xarray, without a digest
-        contents.check(dataset)
+        contents.check_results(dataset)
     except DataError as error:
         raise DataError(f"{where}: {error}") from error
     if not sealed and not (path.is_dir() and "layout" not in dataset.attrs):
@@ -218,7 +220,7 @@ def read_any(path: Path) -> xr.Dataset:
     return dataset
 
 
-def _check_there(path: Path, where: str) -> None:
+def _check_readable_path(path: Path, where: str) -> None:
     """Raise ``DataError`` unless a path is a regular file or a Zarr store.
 
     Opening a pipe could block forever.
@@ -230,7 +232,7 @@ def _check_there(path: Path, where: str) -> None:
         raise DataError(f"{where} is a directory, and no Zarr store.")
     for part in path.rglob("*") if path.is_dir() else [path]:
         if not (part.is_file() or part.is_dir()) or (part != path and part.is_symlink()):
-            raise DataError(f"{brief(part)} is no file, but a pipe, a device or a link.")
+            raise DataError(f"{shorten(part)} is no file, but a pipe, a device or a link.")
 
 
 def _check_codecs(path: Path) -> None:
@@ -238,7 +240,7 @@ def _check_codecs(path: Path) -> None:
     for file in path.rglob("zarr.json"):
         about = json.loads(file.read_text())
         for codec in about.get("codecs", []):
-            if codec["name"] not in _CODECS:
+            if codec["name"] not in _ALLOWED_CODECS:
                 raise DataError(
                     f"{path} was not written by rsfstudy: {file.parent.name} is coded by "
                     f"{codec['name']!r}, which may run code."
@@ -250,22 +252,24 @@ def clean_attributes(dataset: xr.Dataset) -> xr.Dataset:
     arrays of two or more.
     """
     clean = dataset.copy()
-    clean.attrs = _clean(dataset.attrs)
+    clean.attrs = _clean_mapping(dataset.attrs)
     for name in clean.variables:
-        clean[name].attrs = _clean(dataset[name].attrs)
+        clean[name].attrs = _clean_mapping(dataset[name].attrs)
     return clean
 
 
-def _clean(attrs: Mapping[Any, Any]) -> dict[str, Any]:
-    return {str(name): _plain(value) for name, value in attrs.items() if value is not None}
+def _clean_mapping(attrs: Mapping[Any, Any]) -> dict[str, Any]:
+    return {
+        str(name): _to_netcdf_value(value) for name, value in attrs.items() if value is not None
+    }
 
 
-def _plain(value: Any) -> Any:
+def _to_netcdf_value(value: Any) -> Any:
     if isinstance(value, bool | np.bool_):
         return "true" if value else "false"
     if isinstance(value, dict):
         return json.dumps(value)
     if isinstance(value, list | tuple | np.ndarray):
         values = np.asarray(value)
-        return values if values.size > 1 else _plain(values.item()) if values.size else ""
+        return values if values.size > 1 else _to_netcdf_value(values.item()) if values.size else ""
     return value

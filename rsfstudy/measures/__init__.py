@@ -15,23 +15,24 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from rsfstudy._deprecation import adopt_former_members, renamed_members, renamed_names
 from rsfstudy.error_boundary import CheckedKeywords, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import _checks
-from rsfstudy.measures._checks import Plain
-from rsfstudy.measures._checks import Value as Value
-from rsfstudy.motion.accuracy import MUCH_WORSE, Accuracy, relative_work
-from rsfstudy.motion.meter import Halt, Meter, more_work
-from rsfstudy.quantity import Output, Quantity
-from rsfstudy.slider.derived import derived
-from rsfstudy.slider.registry import FIELDS
+from rsfstudy.measures._checks import OutputValue as OutputValue
+from rsfstudy.measures._checks import PlainValue
+from rsfstudy.motion.accuracy import MAX_ERROR_RATIO, Accuracy, relative_work
+from rsfstudy.motion.meter import MotionStopped, WorkMeter, larger_budget_remedy
+from rsfstudy.quantity import Output, Quantity, is_variable_name
+from rsfstudy.slider.derived import cached_attribute
+from rsfstudy.slider.registry import FIELD_NAMES
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
-from rsfstudy.vocabulary import DERIVED
+from rsfstudy.vocabulary import DERIVED_COORDINATES
 
 
 @guard_methods
@@ -57,34 +58,37 @@ class Outcome:
 
 
 #: Names that every lattice uses already.
-TAKEN = frozenset({"status", "message", "rhs_evaluations", "wall_time", *FIELDS, *DERIVED})
+RESERVED_NAMES = frozenset(
+    {"status", "message", "rhs_evaluations", "wall_time", *FIELD_NAMES, *DERIVED_COORDINATES}
+)
 
 
+@renamed_members
 @guard_methods
 @dataclass(frozen=True)
 class Measure(CheckedKeywords):
     """Base class of all measures.
 
-    A measure runs ``find`` with a work budget, and converts a ``Halt`` into a status. To define a
-    measure, write a frozen dataclass with the following members. The fields of the dataclass are
-    the options of the measure::
+    A measure runs ``compute`` with a work budget, and converts a ``MotionStopped`` into a status.
+    To define a measure, write a frozen dataclass with the following members. The fields of the
+    dataclass are the options of the measure::
 
         name: ClassVar[str]                       # name of the measure
-        headline: str                             # name of the main result
+        primary_output: str                       # name of the main result
         outputs: Sequence[Output]                 # results, with units and error estimates
         typical_work: int                         # right-hand sides of a cell
-        find(self, scene, accuracy, meter) -> Outcome
+        compute(self, scene, accuracy, meter) -> Outcome
 
-    ``find`` returns ``Outcome(status, values)``. ``values`` contains a number for each name in
+    ``compute`` returns ``Outcome(status, values)``. ``values`` contains a number for each name in
     ``outputs``, and a number called ``<name>_error`` for each output with ``error=True``. The
     argument ``accuracy`` contains the requested relative accuracy, ``accuracy.rtol``. The argument
     ``meter`` counts right-hand-side evaluations, and stops a motion that exceeds the work budget.
     To compute a motion, pass both arguments to ``rsfstudy.simulate``: ``rsfstudy.simulate(scene,
-    accuracy=accuracy, meter=meter)``. To use the results of another measure, call the ``charged``
-    method of that measure. Override ``scales`` to report a cell as ``unverified`` if its error
-    estimates are far too large::
+    accuracy=accuracy, meter=meter)``. To use the results of another measure, call the
+    ``run_nested`` method of that measure. Override ``error_scales`` to report a cell as
+    ``unverified`` if its error estimates are far too large::
 
-        scales(self, scene, values) -> Mapping[str, float]
+        error_scales(self, scene, values) -> Mapping[str, float]
     """
 
     #: File and registry name.
@@ -92,36 +96,40 @@ class Measure(CheckedKeywords):
     #: What its inner dimensions and its fields mean, where the vocabulary does not say.
     dimensions: ClassVar[Sequence[Quantity]] = ()
     #: Whether its motions carry time along: what is compiled before any cell is.
-    clocks: ClassVar[tuple[bool, ...]] = (True,)
+    needs_time: ClassVar[tuple[bool, ...]] = (True,)
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        adopt_former_members(cls)
 
     @property
-    def headline(self) -> str:
+    def primary_output(self) -> str:
         """Name of the main result of the measure."""
-        raise TypeError(f"{type(self).__name__} names no headline")
+        raise TypeError(f"{type(self).__name__} names no primary_output")
 
     @property
     def outputs(self) -> Sequence[Output]:
         """Results of the measure."""
         return ()
 
-    @derived
+    @cached_attribute
     def variables(self) -> Mapping[str, tuple[str, ...]]:
         """Names of results and error estimates, with their inner dimensions.
 
         Scalar results have no inner dimensions.
         """
-        return {name: about.dims for about in self.outputs for name in about.names}
+        return {name: about.dims for about in self.outputs for name in about.variable_names}
 
-    @derived
-    def optional(self) -> Sequence[str]:
+    @cached_attribute
+    def optional_outputs(self) -> Sequence[str]:
         """Names of results that may be missing from a successful outcome.
 
         If such a result is missing, the message of the outcome explains why.
         """
         return tuple(about.name for about in self.outputs if about.optional)
 
-    @derived
-    def estimated(self) -> tuple[str, ...]:
+    @cached_attribute
+    def outputs_with_error(self) -> tuple[str, ...]:
         """Names of the results that have an error estimate."""
         names = self.variables
         return tuple(name for name in names if f"{name}_error" in names)
@@ -140,7 +148,7 @@ class Measure(CheckedKeywords):
         return (*(about for about in self.outputs if about.long_name), *self.dimensions)
 
     @property
-    def sought(self) -> tuple[str, ...]:
+    def solved_fields(self) -> tuple[str, ...]:
         """Fields of the scene that the measure solves for.
 
         The values of these fields in the scene are ignored.
@@ -148,13 +156,13 @@ class Measure(CheckedKeywords):
         return ()
 
     @property
-    def classes(self) -> tuple[type[Measure], ...]:
+    def code_classes(self) -> tuple[type[Measure], ...]:
         """Class of this measure, and classes of measures in its fields.
 
         The code of these classes determines the results.
         """
         held = (getattr(self, f.name) for f in fields(self))
-        return (type(self), *(c for m in held if isinstance(m, Measure) for c in m.classes))
+        return (type(self), *(c for m in held if isinstance(m, Measure) for c in m.code_classes))
 
     @property
     def typical_work(self) -> int:
@@ -175,10 +183,10 @@ class Measure(CheckedKeywords):
         return self.typical_work * relative_work(accuracy.rtol, self.work_by_digits)
 
     @property
-    def plain_fields(self) -> dict[str, Plain]:
+    def plain_fields(self) -> dict[str, PlainValue]:
         """Fields that hold a number, a flag or a string, which an axis may vary."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.init}
-        return {name: value for name, value in values.items() if isinstance(value, Plain)}
+        return {name: value for name, value in values.items() if isinstance(value, PlainValue)}
 
     def with_(self, **changes: Any) -> Measure:
         """Return a copy with other values of plain fields.
@@ -196,7 +204,7 @@ class Measure(CheckedKeywords):
                 rule = f"is no number, flag or text of the measure {self.name}"
                 raise InvalidValue("field", name, rule, choices=present)
             whole = type(present[name]) is int and annotated[name] not in (float, "float")
-            changes[name] = _checks.alike(name, value, present[name], whole)
+            changes[name] = _checks.check_field_value(name, value, present[name], whole)
         try:
             return replace(self, **changes)
         except InvalidValue:
@@ -205,7 +213,7 @@ class Measure(CheckedKeywords):
             rule = f"are refused by the measure {self.name} ({type(error).__name__}: {error})"
             raise InvalidValue("fields", changes, rule) from error
 
-    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+    def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of each result.
 
         The requested accuracy is relative to this scale. If the error estimate of a result exceeds
@@ -215,19 +223,23 @@ class Measure(CheckedKeywords):
         """
         return {}
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the results for one scene, and count the work in ``meter``."""
         raise TypeError(f"{type(self).__name__} measures nothing")
 
     def check(self) -> None:
         """Raise ``InvalidValue`` if a lattice cannot hold the declared results."""
         try:
-            for name in ("__call__", "charged", "metered"):
+            for name in ("__call__", "run_nested", "run_metered"):
                 if getattr(type(self), name) is not getattr(Measure, name):
                     rule = f"has a {name} of its own"
-                    remedy = "Write find: what it gives is checked."
+                    remedy = "Write compute: what it gives is checked."
                     raise InvalidValue("measure", self.name, rule, remedy=remedy)
-            _checks.check(self, TAKEN)
+            _check_names(self)
+            for name, values in self.inner_coordinates.items():
+                _checks.check_coordinate(name, values)
+            _checks.check_cost(self.typical_work, self.expected_work)
+            _checks.check_description(self.name, self.describe)
         except InvalidValue:
             raise
         except Exception as error:
@@ -239,35 +251,35 @@ class Measure(CheckedKeywords):
 
         If a motion cannot continue, the reason becomes the status of the outcome.
         """
-        outcome, meter = self.metered(scene, accuracy)
-        if outcome.status is Status.WORK_BUDGET_SPENT and meter.spent > meter.budget:
-            return replace(outcome, message=outcome.message + more_work(meter.budget))
+        outcome, meter = self.run_metered(scene, accuracy)
+        if outcome.status is Status.WORK_BUDGET_SPENT and meter.evaluations > meter.budget:
+            return replace(outcome, message=outcome.message + larger_budget_remedy(meter.budget))
         return outcome
 
-    def charged(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def run_nested(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the results for another measure.
 
         The outcome is the same as that of ``__call__``. The work is added to the meter of the other
         measure.
         """
-        outcome, own = self.metered(scene, accuracy)
-        for regime, spent in own.by_regime.items():
+        outcome, own = self.run_metered(scene, accuracy)
+        for regime, spent in own.evaluations_by_regime.items():
             meter.add(regime, spent)
         return outcome
 
-    def metered(self, scene: Scene, accuracy: Accuracy) -> tuple[Outcome, Meter]:
+    def run_metered(self, scene: Scene, accuracy: Accuracy) -> tuple[Outcome, WorkMeter]:
         """Compute the results for one scene, and count the right-hand side evaluations."""
-        meter = Meter(accuracy.budget, dict(accuracy.methods), accuracy.engine)
+        meter = WorkMeter(accuracy.budget, dict(accuracy.methods), accuracy.engine)
         try:
-            outcome = self._checked(self.find(scene, accuracy, meter))
+            outcome = self._validate_outcome(self.compute(scene, accuracy, meter))
             if outcome.status.has_values:
-                outcome = self._held_to(accuracy.rtol, scene, outcome)
-        except Halt as halt:
+                outcome = self._flag_large_errors(accuracy.rtol, scene, outcome)
+        except MotionStopped as halt:
             outcome = Outcome(halt.status, message=str(halt))
-        spent = _checks.count(meter.spent)
+        spent = _checks.check_evaluations(meter.evaluations)
         return Outcome(outcome.status, outcome.values, outcome.message, spent), meter
 
-    def _checked(self, outcome: Outcome) -> Outcome:
+    def _validate_outcome(self, outcome: Outcome) -> Outcome:
         """Check that the results of an outcome agree with their declarations.
 
         The status becomes ``not_finite`` if a required result of a successful outcome is missing.
@@ -292,35 +304,37 @@ class Measure(CheckedKeywords):
             # most are plain numbers
             name: value
             if isinstance(value, float) and declared.get(name) == ()
-            else _checks.number(declared, inner, name, value)
+            else _checks.check_output(declared, inner, name, value)
             for name, value in given
         }
-        lacking = self._lacking(values) if outcome.status.has_values else None
+        lacking = self._find_missing_output(values) if outcome.status.has_values else None
         if lacking:
             why = f"{lacking} = {values.get(lacking, math.nan)}"
             return Outcome(Status.NOT_FINITE, values, why)
         return Outcome(outcome.status, values, outcome.message)
 
-    def _lacking(self, values: Mapping[str, Value]) -> str | None:
+    def _find_missing_output(self, values: Mapping[str, OutputValue]) -> str | None:
         """Return the first required result that is missing or not finite.
 
-        Required results are the headline, and all results with an error estimate, including the
-        error. Optional results are required only if they are present.
+        Required results are the primary output, and all results with an error estimate, including
+        the error. Optional results are required only if they are present.
         """
-        known = [n for n in self.estimated if n in values or n not in self.optional]
-        for name in (self.headline, *known, *(f"{name}_error" for name in known)):
+        known = [
+            n for n in self.outputs_with_error if n in values or n not in self.optional_outputs
+        ]
+        for name in (self.primary_output, *known, *(f"{name}_error" for name in known)):
             value = values.get(name, math.nan)
             finite = math.isfinite(value) if isinstance(value, float) else np.isfinite(value).any()
             if not finite:
                 return name
         return None
 
-    def _held_to(self, rtol: float, scene: Scene, outcome: Outcome) -> Outcome:
+    def _flag_large_errors(self, rtol: float, scene: Scene, outcome: Outcome) -> Outcome:
         """Change the status to ``unverified`` if an error estimate is too large."""
         values, doubts = outcome.values, []
-        for name, scale in self.scales(scene, values).items():
+        for name, scale in self.error_scales(scene, values).items():
             error, asked = values.get(f"{name}_error", 0.0), rtol * scale
-            if error > MUCH_WORSE * asked:
+            if error > MAX_ERROR_RATIO * asked:
                 text = f"{name} = {values[name]:.6g} is known to {error:.2g}, and {asked:.2g}"
                 doubts.append(f"{text} was asked for")
         if not doubts:
@@ -333,9 +347,50 @@ class Measure(CheckedKeywords):
         return {"name": self.name, **asdict(self)}
 
     @classmethod
-    def restored_fields(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
+    def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
         """Return the fields that are not plain data from a description.
 
         The argument ``path`` is the location of the description.
         """
         return {}
+
+
+def _check_names(measure: Measure) -> None:
+    """Raise InvalidValue for numbers, dimensions or quantities that are none, or named twice."""
+    stated = [name for about in measure.outputs for name in about.variable_names]
+    variables = measure.variables
+    names = [*(stated or variables), *measure.inner_coordinates]
+    if not variables:
+        raise InvalidValue("variables", {}, f"must name a number, in measure {measure.name}")
+    if measure.primary_output not in variables:
+        raise InvalidValue(
+            "primary_output", measure.primary_output, "is not measured", choices=variables
+        )
+    for name in names:
+        if (
+            not is_variable_name(name)
+            or name in RESERVED_NAMES - {*measure.solved_fields}
+            or names.count(name) > 1
+        ):
+            rule = f"names something else, or nothing, in measure {measure.name}"
+            raise InvalidValue("variable", name, rule)
+    for name, dims in variables.items():
+        if not isinstance(dims, tuple | list) or len(set(dims)) < len(dims):
+            raise InvalidValue("dimensions", dims, f"of {name!r} must be names, each once")
+        for dim in dims:
+            if dim not in measure.inner_coordinates:
+                raise InvalidValue("dimension", dim, f"of {name!r} has no coordinate values")
+    known = {*names, *measure.plain_fields}
+    for about in measure.quantities:
+        if not isinstance(about, Quantity) or about.name not in known:
+            odd = about.name if isinstance(about, Quantity) else about
+            raise InvalidValue("quantities", odd, "describes nothing measured", choices=known)
+    for name in measure.solved_fields:
+        if name not in FIELD_NAMES:
+            raise InvalidValue(
+                "solved_fields", name, "is not a field of a scene", choices=FIELD_NAMES
+            )
+
+
+if not TYPE_CHECKING:
+    __getattr__ = renamed_names(__name__)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from rsfstudy.analysis.fitting.joint import plain
-from rsfstudy.analysis.fitting.model import OF_SOME_LAWS, PARAMETERS
-from rsfstudy.analysis.fitting.record import COLUMNS
+from rsfstudy.analysis.fitting.joint import strip_window_number
+from rsfstudy.analysis.fitting.model import LAW_SPECIFIC_PARAMETERS, PARAMETERS
+from rsfstudy.analysis.fitting.record import RECORD_COLUMNS
 from rsfstudy.quantity import Output
 
-_NUMBERS = (
+_SCALAR_OUTPUTS = (
     Output("a_minus_b", "$a-b$", "1", "rate dependence of steady friction"),
     Output("a_minus_b_stderr", "", "1", "standard error of a - b"),
     Output("noise_size", "", "1", "standard deviation of the noise"),
@@ -34,10 +34,10 @@ _NUMBERS = (
         for name in ("covariance", "correlation")
     ),
 )
-_ROWS_OF = tuple(
+_ROW_OUTPUTS = tuple(
     Output(*about, dims=("row",))
     for about in (
-        *((f"record_{q.name}", q.symbol, q.units, q.long_name) for q in COLUMNS[:3]),
+        *((f"record_{q.name}", q.symbol, q.units, q.long_name) for q in RECORD_COLUMNS[:3]),
         ("fitted_friction", r"$\mu$", "1", "friction of the fit, with its trend"),
         ("fitted_friction_stderr", "", "1", "standard error of the friction of the fit"),
         ("detrended_friction", r"$\mu$", "1", "friction of the fit, without its trend"),
@@ -45,12 +45,12 @@ _ROWS_OF = tuple(
         ("innovation", "", "1", "residual freed of correlation, over its standard deviation"),
     )
 )
-_BESIDE = {
+_SUFFIX_MEANINGS = {
     "stderr": "standard error",
     "low": "lower end of the 95 % interval",
     "high": "upper end of the 95 % interval",
 }
-_DRAWN = (
+_POSTERIOR_OUTPUTS = (
     Output("autocorrelation_time", "", "1", "steps after which a chain has forgotten where it was"),
     Output(
         "posterior",
@@ -62,16 +62,18 @@ _DRAWN = (
 )
 
 
-def outputs_of(parameters: Sequence[str], drawn: bool, windows: int) -> tuple[Output, ...]:
+def fit_outputs(
+    parameters: Sequence[str], with_posterior: bool, window_count: int
+) -> tuple[Output, ...]:
     """Return the outputs of a fit.
 
     Parameters
     ----------
     parameters : sequence of str
         Names of the free parameters.
-    drawn : bool
+    with_posterior : bool
         If True, include draws from the posterior.
-    windows : int
+    window_count : int
         Number of windows in the fit. If there are several windows, the outputs include the normal
         stress before each step.
 
@@ -79,17 +81,23 @@ def outputs_of(parameters: Sequence[str], drawn: bool, windows: int) -> tuple[Ou
     -------
     tuple of Output
     """
-    found = [output for name in parameters for output in _of_parameter(name)]
+    found = [output for name in parameters for output in _parameter_outputs(name)]
     stresses = [
         Output(f"normal_stress_before_{n}", "", "Pa", f"mean normal stress before step {n}")
-        for n in range(1, windows + 1 if windows > 1 else 1)
+        for n in range(1, window_count + 1 if window_count > 1 else 1)
     ]
-    return (*found, *(_DRAWN if drawn else ()), *_NUMBERS, *stresses, *_ROWS_OF)
+    return (
+        *found,
+        *(_POSTERIOR_OUTPUTS if with_posterior else ()),
+        *_SCALAR_OUTPUTS,
+        *stresses,
+        *_ROW_OUTPUTS,
+    )
 
 
-def _of_parameter(name: str) -> Iterator[Output]:
-    about = PARAMETERS[plain(name)]
-    optional = plain(name) in OF_SOME_LAWS
+def _parameter_outputs(name: str) -> Iterator[Output]:
+    about = PARAMETERS[strip_window_number(name)]
+    optional = strip_window_number(name) in LAW_SPECIFIC_PARAMETERS
     yield Output(name, about.symbol, about.units, about.long_name, error=True, optional=optional)
-    for suffix, words in _BESIDE.items():
+    for suffix, words in _SUFFIX_MEANINGS.items():
         yield Output(f"{name}_{suffix}", "", about.units, f"{words} of the {about.long_name}")

@@ -6,19 +6,19 @@ import math
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.slider.numbers import Slider
+from rsfstudy.slider.numbers import SliderParameters
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Slip rate over that of the load point from which on a norm is that of an instability.
-_FAST = 1e3
+_MIN_NORM_TO_LOAD_RATIO = 1e3
 #: How a text begins that tells of a slower one.
-SLOW_NORM = "the instability norm "
+SLOW_NORM_PREFIX = "the instability norm "
 
 
 def check_single_step(scene: Scene) -> None:
     """Refuse a loading of several segments, and one that changes normal stress all along."""
-    check_leaves_alone(scene)
+    check_steady_loading(scene)
     loading = scene.parts.loading
     if len(loading.segments) > 1:
         rule = "is no single step, after which a motion decides"
@@ -26,7 +26,7 @@ def check_single_step(scene: Scene) -> None:
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)
 
 
-def reached_by_loading(scene: Scene, load_velocity: float = 0.0) -> Outcome:
+def norm_below_loading_outcome(scene: Scene, load_velocity: float = 0.0) -> Outcome:
     """The outcome where steady sliding before the step, or the load point after it, has the norm
     already.
 
@@ -45,7 +45,7 @@ def reached_by_loading(scene: Scene, load_velocity: float = 0.0) -> Outcome:
     )
 
 
-def near_loading(scene: Scene, load_velocity: float) -> str:
+def slow_norm_warning(scene: Scene, load_velocity: float) -> str:
     """A text where the norm is so slow that it tells little: within a thousand times the load point
     velocity. Scenes at the default reference rate are those of published studies, and of no rig.
 
@@ -55,24 +55,27 @@ def near_loading(scene: Scene, load_velocity: float) -> str:
     load_velocity : float
         That after the step, over V_*.
     """
-    rate, load = math.exp(scene.log_norm_rate), max(1.0, abs(load_velocity))
-    if rate >= _FAST * load or scene.reference_rate == Slider.reference_rate:
+    rate, load = math.exp(scene.log_instability_rate), max(1.0, abs(load_velocity))
+    if (
+        rate >= _MIN_NORM_TO_LOAD_RATIO * load
+        or scene.reference_rate == SliderParameters.reference_rate
+    ):
         return ""
     return (
-        f"{SLOW_NORM}{scene.instability_norm:g} is a slip rate of {rate:.3g} V_*, only "
+        f"{SLOW_NORM_PREFIX}{scene.instability_norm:g} is a slip rate of {rate:.3g} V_*, only "
         f"{rate / load:.3g} times that of the load point: what reaches it may be no instability. "
-        f"Give one above {_FAST * load:.3g} V_*, of a rig as a slip rate, as in "
+        f"Give one above {_MIN_NORM_TO_LOAD_RATIO * load:.3g} V_*, of a rig as a slip rate, as in "
         "rig.scene(instability_norm='10 mm/s')"
     )
 
 
-def check_leaves_alone(scene: Scene) -> None:
+def check_steady_loading(scene: Scene) -> None:
     """Refuse a loading that changes stress other than at once: nothing settles or repeats by
     itself under it.
     """
     loading = scene.parts.loading
     if loading.unknowns:
-        what = "load point velocity" if loading.displaces else "normal stress"
+        what = "load point velocity" if loading.has_load_point_unknown else "normal stress"
         rule = f"changes {what} all along, so that no motion settles or repeats by itself"
         remedy = "Read its motion by simulate; that of an oscillation as the study resonance does."
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)

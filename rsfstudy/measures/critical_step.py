@@ -20,47 +20,51 @@ from typing import Any, ClassVar
 from scipy.optimize import toms748
 
 from rsfstudy.analysis import after_step
-from rsfstudy.analysis.by_path import Boundary, from_critical_path, from_touching_cycle
+from rsfstudy.analysis.by_path import StepBoundary, find_by_critical_path, find_by_touching_cycle
 from rsfstudy.analysis.kinds_of_steps import DisplacementSteps, NormalStressSteps, RateSteps
-from rsfstudy.analysis.search_of_steps import Steps
+from rsfstudy.analysis.search_of_steps import StepFamily
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._single_step import check_single_step, near_loading, reached_by_loading
-from rsfstudy.motion.accuracy import ROUNDING, TIGHTEST_RTOL, Accuracy
-from rsfstudy.motion.handover import mass_acts
-from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.measures._single_step import (
+    check_single_step,
+    norm_below_loading_outcome,
+    slow_norm_warning,
+)
+from rsfstudy.motion.accuracy import MIN_RTOL, ROUNDING_ERROR, Accuracy
+from rsfstudy.motion.handover import inertia_matters
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
-KINDS: Mapping[str, type[Steps]] = {
+STEP_FAMILIES: Mapping[str, type[StepFamily]] = {
     "load_velocity_ratio": RateSteps,
     "displacement_step": DisplacementSteps,
     "normal_stress_step": NormalStressSteps,
 }
 DIRECTIONS = ("up", "down")
-#: Aliases of the quantities in `KINDS`, which are names of scene fields.
-SYNONYMS: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
+#: Aliases of the quantities in `STEP_FAMILIES`, which are names of scene fields.
+QUANTITY_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
 #: Accuracy of a boundary that is a limit cycle, whatever is asked for.
-_CAREFUL = 1e-8
+_CYCLE_BOUNDARY_RTOL = 1e-8
 
 #: Widest bracket, over the size, that confirms a boundary.
-_WIDEST = 0.02
+_MAX_CONFIRMING_WIDTH = 0.02
 
 #: Excess of a motion whose first peak is beyond a limit cycle that touches the norm.
-_AT_ONCE = 0.1
+_FIRST_PEAK_EXCESS = 0.1
 
 #: A slip rate norm at which mass hardly acts.
-_LIGHT_NORM = 1e-3
+_MASSLESS_NORM = 1e-3
 
 
 @cache
-def _outputs(of: str) -> tuple[Output, ...]:
-    critical = KINDS[of].quantity
+def _outputs_for(of: str) -> tuple[Output, ...]:
+    critical = STEP_FAMILIES[of].quantity
     confirmed = (f"{critical}_stable", f"{critical}_unstable")
-    beside = (*confirmed, *KINDS[of].beside, "critical_stiffness")
+    beside = (*confirmed, *STEP_FAMILIES[of].extra_outputs, "critical_stiffness")
     return Output(critical, error=True), *map(Output, beside)
 
 
@@ -96,26 +100,26 @@ class CriticalStep(Measure):
     direction: str = "up"
     name: ClassVar[str] = "critical_step"
     typical_work = 4_000
-    clocks: ClassVar[tuple[bool, ...]] = (False,)
+    needs_time: ClassVar[tuple[bool, ...]] = (False,)
 
     def __post_init__(self) -> None:
         if isinstance(self.of, str):
-            object.__setattr__(self, "of", SYNONYMS.get(self.of, self.of))
-        if not isinstance(self.of, str) or self.of not in KINDS:
-            raise InvalidValue("of", self.of, "cannot be stepped", choices=KINDS)
+            object.__setattr__(self, "of", QUANTITY_ALIASES.get(self.of, self.of))
+        if not isinstance(self.of, str) or self.of not in STEP_FAMILIES:
+            raise InvalidValue("of", self.of, "cannot be stepped", choices=STEP_FAMILIES)
         if self.direction not in DIRECTIONS:
             raise InvalidValue("direction", self.direction, "is unknown", choices=DIRECTIONS)
 
     @property
-    def headline(self) -> str:
-        return KINDS[self.of].quantity
+    def primary_output(self) -> str:
+        return STEP_FAMILIES[self.of].quantity
 
     @property
     def outputs(self) -> Sequence[Output]:
-        return _outputs(self.of)
+        return _outputs_for(self.of)
 
     @property
-    def sought(self) -> tuple[str, ...]:
+    def solved_fields(self) -> tuple[str, ...]:
         return (self.of,)
 
     @property
@@ -126,12 +130,12 @@ class CriticalStep(Measure):
         """
         return {3.0: 0.59, 5.0: 0.74, 7.0: 1.0, 8.0: 1.21, 9.0: 1.58, 10.0: 1.89}
 
-    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+    def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error, which is the size of the change."""
         still = 1.0 if self.of == "load_velocity_ratio" else 0.0
-        return {self.headline: abs(values[self.headline] - still)}
+        return {self.primary_output: abs(values[self.primary_output] - still)}
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Find the critical step, and confirm it with a motion on each side.
 
         If the effect of inertia is small below the norm, the critical step follows from
@@ -139,20 +143,23 @@ class CriticalStep(Measure):
         is found from motions that are followed forwards in time.
         """
         check_single_step(scene)
-        if scene.begins_elsewhere:
+        if scene.starts_unsteady:
             rule = "is no steady sliding, from which critical steps start"
             remedy = "Ask whether the step of a scene triggers by the measure triggered."
             raise InvalidValue("initial_state", scene.initial_state, rule, remedy=remedy)
         sign = 1 if self.direction == "up" else -1
-        steps = KINDS[self.of](scene, sign)
-        if steps.largest <= steps.smallest:
+        steps = STEP_FAMILIES[self.of](scene, sign)
+        if steps.max_size <= steps.min_size:
             rate = 0.0 if self.of == "load_velocity_ratio" else steps.scene.load_velocity
-            return reached_by_loading(scene, rate)
-        below = not after_step.orbits_may_close(scene) or after_step.ratio_after(scene) < 1.0
+            return norm_below_loading_outcome(scene, rate)
+        below = (
+            not after_step.may_have_closed_orbits(scene)
+            or after_step.stiffness_ratio_after_step(scene) < 1.0
+        )
         if (
             below
-            and after_step.friction_acts_alone(scene)
-            and after_step.neutral(steps.scene_at(steps.largest), 10.0 * accuracy.rtol)
+            and after_step.has_frictional_damping_only(scene)
+            and after_step.is_neutral(steps.scene_at(steps.max_size), 10.0 * accuracy.rtol)
         ):
             return Outcome(
                 Status.UNVERIFIED,
@@ -160,27 +167,31 @@ class CriticalStep(Measure):
             )
         if not scene.critical_stiffness:
             # nothing grows: only the step itself can reach the norm
-            return self._surveyed(steps, accuracy, meter)
-        if not mass_acts(scene, accuracy):
+            return self._search_upward(steps, accuracy, meter)
+        if not inertia_matters(scene, accuracy):
             # a cycle attracts no path, and takes more care
-            rtols = accuracy.rtol, min(accuracy.rtol, _CAREFUL)
-            for find, rtol in zip((from_critical_path, from_touching_cycle), rtols, strict=True):
-                asked = accuracy if rtol == accuracy.rtol else accuracy.at(rtol)
+            rtols = accuracy.rtol, min(accuracy.rtol, _CYCLE_BOUNDARY_RTOL)
+            for find, rtol in zip(
+                (find_by_critical_path, find_by_touching_cycle), rtols, strict=True
+            ):
+                asked = accuracy if rtol == accuracy.rtol else accuracy.with_rtol(rtol)
                 boundary = find(steps, asked, meter)
-                if boundary is not None and not steps.mass_delays(boundary.size, asked.rtol):
-                    outcome = self._verified(steps, boundary, asked, meter)
+                if boundary is not None and not steps.inertia_shifts_size(
+                    boundary.size, asked.rtol
+                ):
+                    outcome = self._verify_boundary(steps, boundary, asked, meter)
                     if outcome.status is Status.OK:
                         return outcome
-            return self._surveyed(steps, accuracy, meter)
-        near = _at_light_norm(steps, meter)
-        if near is not None and steps.smaller_ones_decay(near):
-            bracket = _neighbours(steps, near, accuracy, meter)
+            return self._search_upward(steps, accuracy, meter)
+        near = _massless_estimate(steps, meter)
+        if near is not None and steps.smaller_steps_decay(near):
+            bracket = _find_bracket(steps, near, accuracy, meter)
             if bracket is not None:
-                return self._closed_in(steps, bracket, accuracy, meter)
-        return self._surveyed(steps, accuracy, meter)
+                return self._refine_bracket(steps, bracket, accuracy, meter)
+        return self._search_upward(steps, accuracy, meter)
 
-    def _verified(
-        self, steps: Steps, boundary: Boundary, accuracy: Accuracy, meter: Meter
+    def _verify_boundary(
+        self, steps: StepFamily, boundary: StepBoundary, accuracy: Accuracy, meter: WorkMeter
     ) -> Outcome:
         """Confirm a boundary by a motion on each side, as close to it as the motions can tell.
 
@@ -188,56 +199,57 @@ class CriticalStep(Measure):
         of one that they do not confirm at once. A path is then none: where orbits grow that have
         not reached the norm yet, a smaller step is critical.
         """
-        first = boundary.relative_error if boundary.by_motions else 3.0 * boundary.relative_error
+        first = boundary.relative_error if boundary.from_motions else 3.0 * boundary.relative_error
         first = width = max(first, accuracy.rtol)
-        while width < _WIDEST:
+        while width < _MAX_CONFIRMING_WIDTH:
             inner, outer = boundary.size * (1.0 - width), boundary.size * (1.0 + width)
-            below, above = (_excess(steps, size, accuracy, meter) for size in (inner, outer))
+            below, above = (_motion_excess(steps, size, accuracy, meter) for size in (inner, outer))
             if below is not None and above is not None and above >= 0.0 > below:
-                at_once = width == first and not boundary.by_motions
+                at_once = width == first and not boundary.from_motions
                 relative = boundary.relative_error if at_once else width
-                error = steps.error(boundary.size, relative)
-                values = self._values(
-                    steps, boundary.size, error, steps.value(inner), steps.value(outer)
+                error = steps.value_error(boundary.size, relative)
+                values = self._output_values(
+                    steps, boundary.size, error, steps.step_value(inner), steps.step_value(outer)
                 )
                 load = steps.scene_at(boundary.size).load_velocity
-                return Outcome(Status.OK, values, near_loading(steps.scene, load))
-            if not (boundary.by_motions or boundary.of_cycle):
+                return Outcome(Status.OK, values, slow_norm_warning(steps.scene, load))
+            if not (boundary.from_motions or boundary.from_cycle):
                 break
-            if boundary.of_cycle and below is not None and below > _AT_ONCE:
+            if boundary.from_cycle and below is not None and below > _FIRST_PEAK_EXCESS:
                 break
             width *= 10.0
         return Outcome(
             Status.UNVERIFIED,
-            self._values(steps),
-            f"no bracket within 2 % confirms {self.headline} = {steps.value(boundary.size):.9g}",
+            self._output_values(steps),
+            "no bracket within 2 % confirms "
+            f"{self.primary_output} = {steps.step_value(boundary.size):.9g}",
         )
 
-    def _values(
+    def _output_values(
         self,
-        steps: Steps,
+        steps: StepFamily,
         size: float = math.nan,
         error: float = math.nan,
         stable: float = math.nan,
         unstable: float = math.nan,
     ) -> dict[str, float]:
-        of = self.headline
+        of = self.primary_output
         return {
-            of: steps.value(size),
+            of: steps.step_value(size),
             f"{of}_error": error,
             f"{of}_stable": stable,
             f"{of}_unstable": unstable,
             "critical_stiffness": steps.scene.critical_stiffness,
-            **steps.values_beside(size),
+            **steps.extra_values(size),
         }
 
-    def _surveyed(self, steps: Steps, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def _search_upward(self, steps: StepFamily, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Find the critical step from motions after steps of increasing size.
 
         The search continues until a motion is unstable, and is then refined.
         """
 
-        smallest, largest = math.log(steps.smallest), math.log(steps.largest)
+        smallest, largest = math.log(steps.min_size), math.log(steps.max_size)
         spacing = (largest - smallest) / max(1, math.ceil((largest - smallest) / math.log(2.0)))
         stable: float | None = None
         unstable = smallest
@@ -245,30 +257,32 @@ class CriticalStep(Measure):
             try:
                 if after_step.reaches_norm(steps.scene_at(math.exp(unstable)), accuracy, meter):
                     break
-            except Halt as halt:
+            except MotionStopped as halt:
                 if halt.status is Status.WORK_BUDGET_SPENT or stable is None:
                     raise
-                return self._never(steps, math.exp(stable), meter, f", where {halt}")
+                return self._no_critical_step_outcome(
+                    steps, math.exp(stable), meter, f", where {halt}"
+                )
             stable, unstable = unstable, unstable + spacing
         else:
-            return self._never(steps, steps.largest, meter)
+            return self._no_critical_step_outcome(steps, steps.max_size, meter)
         if stable is None:
             return Outcome(
                 Status.UNSTABLE_AT_ANY_STEP,
-                self._values(steps, unstable=steps.value(steps.smallest)),
-                f"already a step to {steps.value(steps.smallest):.6g} is unstable",
+                self._output_values(steps, unstable=steps.step_value(steps.min_size)),
+                f"already a step to {steps.step_value(steps.min_size):.6g} is unstable",
             )
-        return self._closed_in(steps, (stable, unstable), accuracy, meter)
+        return self._refine_bracket(steps, (stable, unstable), accuracy, meter)
 
-    def _closed_in(
-        self, steps: Steps, bracket: tuple[float, float], accuracy: Accuracy, meter: Meter
+    def _refine_bracket(
+        self, steps: StepFamily, bracket: tuple[float, float], accuracy: Accuracy, meter: WorkMeter
     ) -> Outcome:
         """Boundary between a stable and an unstable log size, where the excess of the motions
         changes sign; the middle of what is left where a motion in between cannot go on.
         """
         stable, unstable = bracket
-        rtol = max(steps.allowed(math.exp(unstable), accuracy.rtol), TIGHTEST_RTOL)
-        accuracy = accuracy.at(rtol)
+        rtol = max(steps.size_tolerance(math.exp(unstable), accuracy.rtol), MIN_RTOL)
+        accuracy = accuracy.with_rtol(rtol)
 
         def excess(log_size: float) -> float:
             nonlocal stable, unstable
@@ -281,78 +295,86 @@ class CriticalStep(Measure):
 
         try:
             log_size = toms748(excess, *bracket, xtol=0.5 * accuracy.rtol, rtol=1e-15)
-        except Halt as halt:
+        except MotionStopped as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
-            if unstable - stable > _WIDEST:
-                return self._never(steps, math.exp(bracket[0]), meter, f", where {halt}")
+            if unstable - stable > _MAX_CONFIRMING_WIDTH:
+                return self._no_critical_step_outcome(
+                    steps, math.exp(bracket[0]), meter, f", where {halt}"
+                )
             log_size = 0.5 * (stable + unstable)
         # the motions that found it would confirm their own errors: the verdicts come from others
         size = math.exp(log_size)
-        error = max(accuracy.rtol + steps.blur(size, accuracy.rtol), unstable - stable)
-        boundary = Boundary(size, error, by_motions=True)
-        return self._verified(steps, boundary, accuracy.refined(), meter)
+        error = max(
+            accuracy.rtol + steps.neutral_size_error(size, accuracy.rtol), unstable - stable
+        )
+        boundary = StepBoundary(size, error, from_motions=True)
+        return self._verify_boundary(steps, boundary, accuracy.refined(), meter)
 
-    def _never(self, steps: Steps, largest: float, meter: Meter, why: str = "") -> Outcome:
+    def _no_critical_step_outcome(
+        self, steps: StepFamily, largest: float, meter: WorkMeter, reason: str = ""
+    ) -> Outcome:
         """No step up to the largest reached the norm: because nothing is unstable, or because of
         mass.
         """
-        if steps.scene.has_mass and _at_light_norm(steps, meter) is not None:
+        if steps.scene.has_mass and _massless_estimate(steps, meter) is not None:
             return Outcome(
                 Status.NORM_UNREACHABLE,
-                self._values(steps, stable=steps.value(largest)),
+                self._output_values(steps, stable=steps.step_value(largest)),
                 f"mass keeps every slip rate below the norm {steps.scene.instability_norm:g}",
             )
-        if steps.jumps_to_norm and not steps.scene.has_mass and not why:
-            value = steps.value(largest)
-            values = self._values(steps, largest, largest * ROUNDING, value, value)
+        if steps.largest_step_reaches_norm and not steps.scene.has_mass and not reason:
+            value = steps.step_value(largest)
+            values = self._output_values(steps, largest, largest * ROUNDING_ERROR, value, value)
             return Outcome(
                 Status.OK, values, "the jump of slip rate at the step itself is critical"
             )
         return Outcome(
             Status.STABLE_FOR_ALL_STEPS,
-            self._values(steps, stable=steps.value(largest)),
-            f"stable for every step up to {steps.value(largest):.6g}{why}",
+            self._output_values(steps, stable=steps.step_value(largest)),
+            f"stable for every step up to {steps.step_value(largest):.6g}{reason}",
         )
 
 
-def _excess(steps: Steps, size: float, accuracy: Accuracy, meter: Meter) -> float | None:
+def _motion_excess(
+    steps: StepFamily, size: float, accuracy: Accuracy, meter: WorkMeter
+) -> float | None:
     """Compute the excess of the motion after a step of a given size.
 
     The result is None if the motion cannot continue.
     """
     try:
         return after_step.excess_over_norm(steps.scene_at(size), accuracy, meter)
-    except Halt as halt:
+    except MotionStopped as halt:
         if halt.status is Status.WORK_BUDGET_SPENT:
             raise
         return None
 
 
-def _at_light_norm(steps: Steps, meter: Meter) -> float | None:
+def _massless_estimate(steps: StepFamily, meter: WorkMeter) -> float | None:
     """Compute the critical step for a norm at which inertia is negligible.
 
     The result is an inexpensive approximation of the critical step.
     """
-    norm = min(steps.scene.instability_norm, _LIGHT_NORM)
+    norm = min(steps.scene.instability_norm, _MASSLESS_NORM)
     massless = type(steps)(steps.scene.without_mass().with_(instability_norm=norm), steps.sign)
-    if massless.largest <= massless.smallest or not massless.scene.critical_stiffness:
+    if massless.max_size <= massless.min_size or not massless.scene.critical_stiffness:
         return None
-    return next(massless.sizes_on_path((1e-6,), meter), None)
+    return next(massless.find_path_sizes((1e-6,), meter), None)
 
 
-def _neighbours(
-    steps: Steps, near: float, accuracy: Accuracy, meter: Meter
+def _find_bracket(
+    steps: StepFamily, guess: float, accuracy: Accuracy, meter: WorkMeter
 ) -> tuple[float, float] | None:
     """Find a stable and an unstable logarithm of size around a guess.
 
     The result is None if there are no such sizes within a factor of four.
     """
-    middle = math.log(near)
-    reached = after_step.reaches_norm(steps.scene_at(near), accuracy, meter)
+    middle = math.log(guess)
+    reached = after_step.reaches_norm(steps.scene_at(guess), accuracy, meter)
     inner, reach = middle, 1e-4
     while reach < 1.5:
-        outer = middle - reach if reached else min(middle + reach, math.log(steps.largest))
+        outer = middle - reach if reached else min(middle + reach, math.log(steps.max_size))
         if after_step.reaches_norm(steps.scene_at(math.exp(outer)), accuracy, meter) != reached:
             return (outer, inner) if reached else (inner, outer)
         inner, reach = outer, 5.0 * reach

@@ -13,38 +13,44 @@ import numpy as np
 
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome, Value
+from rsfstudy.measures import Measure, Outcome, OutputValue
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import Halt, Meter
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.quantity import Output, Quantity
-from rsfstudy.slider.registry import KINDS
+from rsfstudy.slider.registry import FIELD_TYPES
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Fields of a scene that hold numbers.
-NUMBERS = tuple(name for name, kind in KINDS.items() if kind in (float, float | None))
+NUMERIC_SCENE_FIELDS = tuple(
+    name for name, kind in FIELD_TYPES.items() if kind in (float, float | None)
+)
 #: What a rig has, and a scene has not; and how elasticities by that follow.
-_OF_A_RIG = ("b", "slip_distance", "normal_stress", "sigma_star", "reference_velocity")
-_FOLLOWS = (
+_RIG_QUANTITIES = ("b", "slip_distance", "normal_stress", "sigma_star", "reference_velocity")
+_RIG_ELASTICITIES_REMEDY = (
     "b at constant a is b_over_a; of a time in s, D_c is 1 + stiffness - reference_rate, normal "
     "stress is -stiffness, and V_* is reference_rate - 1."
 )
 #: Longest step of ln p, of which the formula spans four.
-_LONGEST = 0.05
+_MAX_LOG_STEP = 0.05
 #: Places of the levels of a derivative, in steps; and weights of their fourth difference.
-_PLACES, _FOURTH = (-2.0, -1.0, 1.0, 2.0), (1.0, -4.0, 6.0, -4.0, 1.0)
+_STENCIL, _FOURTH_DIFFERENCE_WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0, -4.0, 6.0, -4.0, 1.0)
 #: Part of the correction from the second to the fourth order that counts as an error; at most 0.14
 #: of it is left in random scenes, by the longest steps.
-_CORRECTED = 0.25
+_CORRECTION_ERROR_FRACTION = 0.25
 #: Parts of a step that are tried where there is no number on one side of it, or an error of more
 #: than a part of the slope; and right-hand sides that a measurement takes then at most, over those
 #: of the number itself.
-_SHORTER, _CLOSE, _MOST = (1.0, 0.125, 0.125**2, 0.125**3), 0.1, 4
+_STEP_FRACTIONS, _MAX_RELATIVE_ERROR, _MAX_EVALUATION_RATIO = (
+    (1.0, 0.125, 0.125**2, 0.125**3),
+    0.1,
+    4,
+)
 #: How many numbers a scene usually has that are not zero.
-_USUAL = 8
+_TYPICAL_PARAMETER_COUNT = 8
 
 
-class _Level(NamedTuple):
+class _LogValue(NamedTuple):
     """Value and error of ln|y|. The error is the error of y divided by |y|."""
 
     value: float
@@ -84,35 +90,44 @@ class Elasticities(Measure):
     measure: Measure
     parameters: tuple[str, ...] = ()
     name: ClassVar[str] = "elasticities"
-    clocks: ClassVar[tuple[bool, ...]] = (False, True)
+    needs_time: ClassVar[tuple[bool, ...]] = (False, True)
     dimensions: ClassVar[Sequence[Quantity]] = (
         Quantity("parameter", "", "", "number of the scene that is changed"),
     )
 
     def __post_init__(self) -> None:
-        if not isinstance(self.measure, Measure) or self.measure.variables[self.measure.headline]:
+        if (
+            not isinstance(self.measure, Measure)
+            or self.measure.variables[self.measure.primary_output]
+        ):
             rule = "must be a measure whose headline is one number"
             raise InvalidValue("measure", self.measure, rule)
-        object.__setattr__(self, "parameters", tuple(self.parameters) or self._all)
+        object.__setattr__(self, "parameters", tuple(self.parameters) or self._available_parameters)
         for name in self.parameters:
-            if name not in self._all:
+            if name not in self._available_parameters:
                 rule = f"is no number of a scene that {self.measure.name} leaves as it is"
-                choices, remedy = ((), _FOLLOWS) if name in _OF_A_RIG else (self._all, "")
+                choices, remedy = (
+                    ((), _RIG_ELASTICITIES_REMEDY)
+                    if name in _RIG_QUANTITIES
+                    else (self._available_parameters, "")
+                )
                 raise InvalidValue("parameters", name, rule, choices=choices, remedy=remedy)
 
     @cached_property
-    def _all(self) -> tuple[str, ...]:
-        return tuple(name for name in NUMBERS if name not in self.measure.sought)
+    def _available_parameters(self) -> tuple[str, ...]:
+        return tuple(
+            name for name in NUMERIC_SCENE_FIELDS if name not in self.measure.solved_fields
+        )
 
     @property
-    def headline(self) -> str:
-        return self.measure.headline
+    def primary_output(self) -> str:
+        return self.measure.primary_output
 
     @property
     def outputs(self) -> Sequence[Output]:
         given = {about.name: about for about in self.measure.outputs}
-        headline = given.get(self.headline, Output(self.headline))
-        text = f"d ln|y|/d ln p of {self.headline.replace('_', ' ')}"
+        headline = given.get(self.primary_output, Output(self.primary_output))
+        text = f"d ln|y|/d ln p of {self.primary_output.replace('_', ' ')}"
         return (
             replace(headline, error=True),
             Output("elasticity", "", "1", text, dims=("parameter",), error=True),
@@ -123,12 +138,14 @@ class Elasticities(Measure):
         return {"parameter": np.array(self.parameters, dtype=object)}
 
     @property
-    def sought(self) -> tuple[str, ...]:
-        return self.measure.sought
+    def solved_fields(self) -> tuple[str, ...]:
+        return self.measure.solved_fields
 
     @property
     def typical_work(self) -> int:
-        return self.measure.typical_work * (4 * min(_USUAL, len(self.parameters)) + 1)
+        return self.measure.typical_work * (
+            4 * min(_TYPICAL_PARAMETER_COUNT, len(self.parameters)) + 1
+        )
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
@@ -142,40 +159,40 @@ class Elasticities(Measure):
             "parameters": list(self.parameters),
         }
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the headline and its elasticities."""
-        outcome = self.measure.charged(scene, accuracy, meter)
+        outcome = self.measure.run_nested(scene, accuracy, meter)
         if outcome.status is not Status.OK:
             return Outcome(outcome.status, message=outcome.message)
-        names = self.headline, f"{self.headline}_error"
-        values: dict[str, Value] = {name: outcome.values.get(name, 0.0) for name in names}
-        here = self._level(outcome)
+        names = self.primary_output, f"{self.primary_output}_error"
+        values: dict[str, OutputValue] = {name: outcome.values.get(name, 0.0) for name in names}
+        here = self._log_value(outcome)
         if here is None:
-            why = f"{self.headline} is zero, which has no logarithm"
+            why = f"{self.primary_output} is zero, which has no logarithm"
             return Outcome(Status.NOT_APPLICABLE, values, why)
-        most = min(accuracy.budget, _MOST * (outcome.rhs_evaluations or 1))
+        most = min(accuracy.budget, _MAX_EVALUATION_RATIO * (outcome.rhs_evaluations or 1))
         accuracies = accuracy, *3 * (replace(accuracy, budget=most),)
-        step = min(_LONGEST, (0.5 * here.error) ** (1.0 / 3.0))
+        step = min(_MAX_LOG_STEP, (0.5 * here.error) ** (1.0 / 3.0))
         found = np.full((len(self.parameters), 2), np.nan)
         lacking, stated = [], scene.as_dict()
         for place, name in enumerate(self.parameters):
             if not stated.get(name):
                 continue
-            found[place] = self._by(scene, name, here, step, accuracies, meter)
+            found[place] = self._differentiate(scene, name, here, step, accuracies, meter)
             if np.isnan(found[place, 0]):
                 lacking.append(name)
         values = {**values, "elasticity": found[:, 0], "elasticity_error": found[:, 1]}
         why = f"no number on either side of {', '.join(lacking)}" if lacking else ""
         return Outcome(Status.OK, values, why)
 
-    def _by(
+    def _differentiate(
         self,
         scene: Scene,
         name: str,
-        here: _Level,
+        centre: _LogValue,
         step: float,
         accuracies: Sequence[Accuracy],
-        meter: Meter,
+        meter: WorkMeter,
     ) -> tuple[float, float]:
         """Compute the derivative with respect to one parameter, and its error.
 
@@ -187,40 +204,42 @@ class Elasticities(Measure):
         scene : Scene
         name : str
             Name of the parameter.
-        here : _Level
+        centre : _Level
             Value at the scene.
         step : float
             Longest step of ln p.
         accuracies : sequence of Accuracy
             Accuracy for each step.
-        meter : Meter
+        meter : WorkMeter
 
         Returns
         -------
         slope, error : float
         """
         found: list[tuple[bool, float, float]] = []
-        for part, accuracy in zip(_SHORTER, accuracies, strict=True):
+        for part, accuracy in zip(_STEP_FRACTIONS, accuracies, strict=True):
             size = part * step
             try:
-                sides = [self._at(scene, name, by * size, accuracy, meter) for by in _PLACES]
-            except Halt:
+                sides = [
+                    self._evaluate_at(scene, name, by * size, accuracy, meter) for by in _STENCIL
+                ]
+            except MotionStopped:
                 if not found:
                     raise
                 break  # beside the end of answers some take long
-            slope, error, of_levels = _derivative(here, sides, size)
+            slope, error, of_levels = _central_difference(centre, sides, size)
             if found and not all(sides):  # the longer step leaves out eight times as much
                 error += 2.0 * abs(slope - found[-1][2])
             found.append((not all(sides), error, slope))
-            told = error < max(2.0 * of_levels, _CLOSE * abs(slope))
+            told = error < max(2.0 * of_levels, _MAX_RELATIVE_ERROR * abs(slope))
             if not any(sides) or (all(sides) and told):
                 break
         _one_sided, error, slope = found[-1] if found[-1][0] else min(found)
         return slope, error
 
-    def _at(
-        self, scene: Scene, name: str, by: float, accuracy: Accuracy, meter: Meter
-    ) -> _Level | None:
+    def _evaluate_at(
+        self, scene: Scene, name: str, log_change: float, accuracy: Accuracy, meter: WorkMeter
+    ) -> _LogValue | None:
         """Compute ln|y| after a change of ln p.
 
         Returns
@@ -230,20 +249,20 @@ class Elasticities(Measure):
 
         Raises
         ------
-        Halt
+        MotionStopped
             If the measure fails.
         """
         try:
-            beside = scene.with_(**{name: getattr(scene, name) * math.exp(by)})
+            beside = scene.with_(**{name: getattr(scene, name) * math.exp(log_change)})
         except InvalidValue:
             return None
-        outcome = self.measure.charged(beside, accuracy, meter)
+        outcome = self.measure.run_nested(beside, accuracy, meter)
         if not outcome.status.is_answer:
             where = f"at {name} = {getattr(beside, name):.9g}"
-            raise Halt(outcome.status, f"{where}: {outcome.message}")
-        return self._level(outcome)
+            raise MotionStopped(outcome.status, f"{where}: {outcome.message}")
+        return self._log_value(outcome)
 
-    def _level(self, outcome: Outcome) -> _Level | None:
+    def _log_value(self, outcome: Outcome) -> _LogValue | None:
         """Return ln|y| and its error, including rounding errors.
 
         Returns
@@ -251,24 +270,27 @@ class Elasticities(Measure):
         _Level or None
             None if the outcome has no headline, or if the headline is zero.
         """
-        y = float(outcome.values[self.headline]) if outcome.status is Status.OK else 0.0
+        y = float(outcome.values[self.primary_output]) if outcome.status is Status.OK else 0.0
         if not y:
             return None
-        value, error = math.log(abs(y)), float(outcome.values.get(f"{self.headline}_error", 0.0))
-        return _Level(value, error / abs(y) + 4.0 * sys.float_info.epsilon * (1.0 + abs(value)))
+        value, error = (
+            math.log(abs(y)),
+            float(outcome.values.get(f"{self.primary_output}_error", 0.0)),
+        )
+        return _LogValue(value, error / abs(y) + 4.0 * sys.float_info.epsilon * (1.0 + abs(value)))
 
 
-def _derivative(
-    here: _Level, sides: Sequence[_Level | None], step: float
+def _central_difference(
+    centre: _LogValue, neighbours: Sequence[_LogValue | None], step: float
 ) -> tuple[float, float, float]:
     """Compute the derivative of ln|y| with respect to ln p.
 
     Parameters
     ----------
-    here : _Level
+    centre : _Level
         Value at the scene.
-    sides : sequence of _Level or None
-        Values at ``_PLACES``, or None for missing values.
+    neighbours : sequence of _Level or None
+        Values at ``_STENCIL``, or None for missing values.
     step : float
         Step of ln p.
 
@@ -278,27 +300,31 @@ def _derivative(
         The derivative, its error, and the contribution of the errors of y to this error. All are
         NaN if the values on both sides are missing.
     """
-    far_below, below, above, far_above = sides
+    far_below, below, above, far_above = neighbours
     if far_below and below and above and far_above:
         near = (above.value - below.value) / (2.0 * step)
         far = (far_above.value - far_below.value) / (4.0 * step)
         of_levels = (above.error + below.error) / 1.5 + (far_above.error + far_below.error) / 12.0
         of_levels /= step
         correction = (near - far) / 3.0
-        levels = far_below, below, here, above, far_above
-        fourth = abs(sum(w * level.value for w, level in zip(_FOURTH, levels, strict=True)))
+        levels = far_below, below, centre, above, far_above
+        fourth = abs(
+            sum(
+                w * level.value for w, level in zip(_FOURTH_DIFFERENCE_WEIGHTS, levels, strict=True)
+            )
+        )
         # the fifth derivative is at most the fourth one over the span of the levels
-        left = _CORRECTED * abs(correction) + fourth / (12.0 * step)
+        left = _CORRECTION_ERROR_FRACTION * abs(correction) + fourth / (12.0 * step)
         return near + correction, left + of_levels, of_levels
     if below and above:
         slope = (above.value - below.value) / (2.0 * step)
-        bend = abs(above.value - 2.0 * here.value + below.value) / step
+        bend = abs(above.value - 2.0 * centre.value + below.value) / step
         of_levels = (above.error + below.error) / (2.0 * step)
         return slope, max(step**2, bend) + of_levels, of_levels
     for beside, sign in ((below, -1.0), (above, 1.0)):
         if beside:
-            slope = sign * (beside.value - here.value) / step
+            slope = sign * (beside.value - centre.value) / step
             # how it curves is not known: twice as much as a logarithm of that slope
-            of_levels = (beside.error + here.error) / step
+            of_levels = (beside.error + centre.error) / step
             return slope, step * max(1.0, slope**2) + of_levels, of_levels
     return math.nan, math.nan, math.nan

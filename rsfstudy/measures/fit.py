@@ -12,51 +12,61 @@ import numpy as np
 
 from rsfstudy.analysis.fitting import posterior
 from rsfstudy.analysis.fitting.filters import Filter
-from rsfstudy.analysis.fitting.intervals import interval
-from rsfstudy.analysis.fitting.joint import Joint, is_own, numbered, plain
-from rsfstudy.analysis.fitting.model import (
-    OF_SOME_LAWS,
-    check_free,
-    check_positive,
-    of_law,
+from rsfstudy.analysis.fitting.intervals import confidence_interval
+from rsfstudy.analysis.fitting.joint import (
+    JointModel,
+    is_window_parameter,
+    number_parameters,
+    strip_window_number,
 )
-from rsfstudy.analysis.fitting.noise import WHITE, check_noise, whiteness
-from rsfstudy.analysis.fitting.record import COLUMNS, Record
-from rsfstudy.analysis.fitting.search import Fitted, Search
+from rsfstudy.analysis.fitting.model import (
+    LAW_SPECIFIC_PARAMETERS,
+    check_free_parameters,
+    check_positive,
+    parameters_of_law,
+)
+from rsfstudy.analysis.fitting.noise import WHITE, check_noise_name, ljung_box_p_value
+from rsfstudy.analysis.fitting.record import RECORD_COLUMNS, Record
+from rsfstudy.analysis.fitting.search import FitProblem, FitSolution
 from rsfstudy.analysis.fitting.unstated_filter import find_filter
 from rsfstudy.analysis.fitting.validity import (
-    NEGLIGIBLE,
+    MIN_NOISE_SD,
     describe_asymmetry,
-    describe_load_point,
+    describe_load_point_noise,
+    describe_outliers,
     describe_unidentified,
-    find_reasons,
     find_unidentified,
-    is_rounded,
-    name_outliers,
+    find_validity_problems,
+    is_rounding_too_coarse,
 )
-from rsfstudy.analysis.fitting.window import LOADINGS, Window, first_guess, stiffness_factors
+from rsfstudy.analysis.fitting.window import (
+    LOADING_KINDS,
+    FitWindow,
+    guess_parameters,
+    stiffness_factors,
+)
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome, Value
-from rsfstudy.measures._fit_outputs import outputs_of
+from rsfstudy.measures import Measure, Outcome, OutputValue
+from rsfstudy.measures._fit_outputs import fit_outputs
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Accuracy of motions at which their differences tell derivatives.
-_SMOOTH = 1e-9
+_DERIVATIVE_RTOL = 1e-9
 #: Standard errors that numerical errors are held to as to the parameter itself: at the default
 #: accuracy, 1e-7, of which a hundredfold is let pass, a hundredth of one is too much.
-_SMALL = 1000.0
+_STDERR_SCALE = 1000.0
 #: Fields of a scene that follow from what is found.
-_SOUGHT = (
+_SOLVED_FIELDS = (
     *("a", "b_over_a", "b1_over_a", "b2_over_a", "length_ratio", "mu_star", "stiffness"),
     *("stiffness_ratio", "reference_rate", "load_velocity_ratio"),
 )
 #: A direct effect over its lower bound below which it is at that bound.
-_LEAST = 1.001
+_LOWER_BOUND_FACTOR = 1.001
 
 
 @guard_methods
@@ -167,8 +177,8 @@ class Fit(Measure):
         names = [record.name for record in self.records]
         if len(set(names)) < len(names):
             raise InvalidValue("records", names, "must have names that differ")
-        check_free(self.free)
-        for name, step in self._steps:
+        check_free_parameters(self.free)
+        for name, step in self._selected_steps:
             if name not in names:
                 raise InvalidValue("record", name, "is unknown", choices=names)
             if step < 1:
@@ -179,47 +189,51 @@ class Fit(Measure):
         if not 0.0 < self.part <= 1.0:
             raise InvalidValue("part", self.part, "must be above 0, and 1 at most")
         check_positive(self, "slip_distance_guess", "slip_distance_2_guess")
-        if self.loading not in LOADINGS:
-            raise InvalidValue("loading", self.loading, "is unknown", choices=LOADINGS)
+        if self.loading not in LOADING_KINDS:
+            raise InvalidValue("loading", self.loading, "is unknown", choices=LOADING_KINDS)
         if "step_time" in self.free and self.loading == "recorded":
             rule = "is that of a loading by steps"
             raise InvalidValue("free", "step_time", rule, remedy="Leave it out.")
-        check_noise(self.noise)
+        check_noise_name(self.noise)
         Filter.parse(self.filter)
-        posterior.check(self.posterior)
+        posterior.check_sampling(self.posterior)
 
     @property
-    def sought(self) -> tuple[str, ...]:
+    def solved_fields(self) -> tuple[str, ...]:
         """Fields of the scene that the fit determines."""
-        return (*_SOUGHT, *(name for name in ("alpha", "law_exponent") if name in self.free))
+        return (*_SOLVED_FIELDS, *(name for name in ("alpha", "law_exponent") if name in self.free))
 
     @property
-    def headline(self) -> str:
+    def primary_output(self) -> str:
         """Name of the first parameter that all laws have."""
-        return next((n for n in self.parameters if n not in OF_SOME_LAWS), self.parameters[0])
+        return next(
+            (n for n in self.parameters if n not in LAW_SPECIFIC_PARAMETERS), self.parameters[0]
+        )
 
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the free parameters, numbered by window if necessary."""
-        return numbered(self.free, len(self._steps))
+        return number_parameters(self.free, len(self._selected_steps))
 
     @property
-    def _steps(self) -> tuple[tuple[str, int], ...]:
+    def _selected_steps(self) -> tuple[tuple[str, int], ...]:
         """Names of the records and numbers of the steps to fit."""
         return self.together or ((self.record or self.records[0].name, self.step),)
 
     @cached_property
-    def _windows(self) -> tuple[Window, ...]:
+    def _windows(self) -> tuple[FitWindow, ...]:
         """Windows of the steps to fit."""
         by_name = {record.name: record for record in self.records}
         others = {name: {n for other, n in self.together if other == name} for name in by_name}
         ends = self.before, self.after, self.part
-        return tuple(Window(by_name[name], n, *ends, others[name]) for name, n in self._steps)
+        return tuple(
+            FitWindow(by_name[name], n, *ends, others[name]) for name, n in self._selected_steps
+        )
 
     @property
     def outputs(self) -> Sequence[Output]:
         """Parameters with their errors, properties of the fit, and rows."""
-        return outputs_of(self.parameters, self.posterior > 0, len(self._steps))
+        return fit_outputs(self.parameters, self.posterior > 0, len(self._selected_steps))
 
     @property
     def quantities(self) -> Sequence[Quantity]:
@@ -236,7 +250,7 @@ class Fit(Measure):
         draws = {"draw": np.arange(self.posterior)} if self.posterior else {}
         return {"parameter": names, "other_parameter": names, "row": rows, **draws}
 
-    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+    def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of each parameter.
 
         The scale is the sum of the absolute value of the parameter and a large multiple of its
@@ -250,8 +264,8 @@ class Fit(Measure):
         sizes |= {f"trend{n}": scene.mu_star / extent**n for n in range(1, 6)}
         return {
             name: abs(values[name])
-            + _SMALL * values[f"{name}_stderr"]
-            + sizes.get(plain(name), 0.0)
+            + _STDERR_SCALE * values[f"{name}_stderr"]
+            + sizes.get(strip_window_number(name), 0.0)
             for name in self.parameters
             if name in values
         }
@@ -263,7 +277,7 @@ class Fit(Measure):
         return {"name": self.name, **stated, "free": list(self.free), "records": records}
 
     @classmethod
-    def restored_fields(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
+    def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
         """Raise ``InvalidValue``, because a file contains only hashes of records."""
         rule = "are fitted, and the file has no more than digests of them"
         remedy = "Fit them again: show FILE tells the command."
@@ -275,99 +289,114 @@ class Fit(Measure):
         records = [*dict.fromkeys(window.record for window in self._windows)]
         return {record: sum(map(len, records[:n])) for n, record in enumerate(records)}
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Fit the parameters and compute their errors and confidence intervals.
 
         Parameters that the law does not have are omitted.
         """
-        own = of_law(scene, self.free)
+        own = parameters_of_law(scene, self.free)
         if own != self.free:
-            return self._widened(replace(self, free=own).find(scene, accuracy, meter))
+            return self._insert_missing_parameters(
+                replace(self, free=own).compute(scene, accuracy, meter)
+            )
         windows = self._windows
         search, found = self.solve(scene, accuracy, meter)
-        model, place = search.model, windows[0].about
-        part = model.parts[0]
-        apart = float(np.median(np.diff(part.displacement[part.time >= windows[0].step.begins])))
+        model, place = search.model, windows[0].properties
+        part = model.models[0]
+        apart = float(np.median(np.diff(part.displacement[part.time >= windows[0].step.start])))
         unidentified = find_unidentified(found, apart)
         rows = [window.rows + self._first_rows[window.record] for window in windows]
-        values = self._told(found, np.concatenate(rows), model)
+        values = self._collect_values(found, np.concatenate(rows), model)
         values |= place
         values["window_stiffness"] = found.values["stiffness"]
         if len(windows) > 1:
             stresses = enumerate(windows, start=1)
             values |= {f"normal_stress_before_{n}": w.normal_stress for n, w in stresses}
         ends = {
-            name: search.bounds(name) if name in unidentified else interval(search, found, name)
+            name: search.parameter_bounds(name)
+            if name in unidentified
+            else confidence_interval(search, found, name)
             for name in self.parameters
         }
         for name, (low, high) in ends.items():
             values[f"{name}_low"], values[f"{name}_high"] = low, high
         if self.posterior:
-            values |= posterior.draw(search, found, self.posterior)
+            values |= posterior.draw_parameters(search, found, self.posterior)
         if unidentified:
-            is_least = "a" in found.free and found.values["a"] < _LEAST * search.bounds("a")[0]
-            text = describe_unidentified(found, unidentified, apart, is_least=is_least)
+            is_least = (
+                "a" in found.free
+                and found.values["a"] < _LOWER_BOUND_FACTOR * search.parameter_bounds("a")[0]
+            )
+            text = describe_unidentified(found, unidentified, apart, is_a_at_bound=is_least)
             return Outcome(Status.NOT_IDENTIFIED, values, text)
         remarks = (
-            name_outliers(found.outliers),
-            describe_load_point(found, self.loading, place["load_point_noise"]),
+            describe_outliers(found.outliers),
+            describe_load_point_noise(found, self.loading, place["load_point_noise"]),
         )
-        reasons = (*self.find_reasons(search, found), *describe_asymmetry(found, ends))
+        reasons = (*self.find_validity_problems(search, found), *describe_asymmetry(found, ends))
         status = Status.ERRORS_NOT_VALID if reasons else Status.OK
-        cuts = [cut for window in windows for cut in window.cuts]
+        cuts = [cut for window in windows for cut in window.truncation_remarks]
         return Outcome(status, values, "; ".join(filter(None, (*reasons, *cuts, *remarks))))
 
-    def solve(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> tuple[Search, Fitted]:
+    def solve(
+        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
+    ) -> tuple[FitProblem, FitSolution]:
         """Fit the windows with a law that has all free parameters.
 
         Returns
         -------
-        search : Search
-        found : Fitted
+        search : FitProblem
+        found : FitSolution
         """
-        smooth = accuracy.at(min(accuracy.rtol, _SMOOTH))
+        smooth = accuracy.with_rtol(min(accuracy.rtol, _DERIVATIVE_RTOL))
         windows = self._windows
         per_um = self.machine_stiffness * self.slip_distance_guess
-        scenes = [w.scene(scene, per_um) for w in windows]
+        scenes = [w.with_machine_stiffness(scene, per_um) for w in windows]
         of_each = zip(windows, scenes, strict=True)
-        parts = [w.model(one, self.free, self.loading, smooth, meter) for w, one in of_each]
+        parts = [w.create_model(one, self.free, self.loading, smooth, meter) for w, one in of_each]
         parts = [replace(part, filter=Filter.parse(self.filter)) for part in parts]
         if self.noise == WHITE:  # the usual formula
-            parts = [replace(part, moves=()) for part in parts]
+            parts = [replace(part, shifted_loadings=()) for part in parts]
         distances = self.slip_distance_guess, self.slip_distance_2_guess
         first: dict[str, float] = {}
         for number, (part, window) in enumerate(zip(parts, windows, strict=True), start=1):
-            guess = first_guess(part, window.step, self.free, distances)
+            guess = guess_parameters(part, window.step, self.free, distances)
             first = guess | first
             if len(windows) > 1:
-                first |= {f"{n}_{number}": v for n, v in guess.items() if is_own(n)}
+                first |= {f"{n}_{number}": v for n, v in guess.items() if is_window_parameter(n)}
         one_machine = self.machine_stiffness > 0.0 or "stiffness" in self.free
-        model = Joint(tuple(parts), stiffness_factors(windows) if one_machine else ())
-        search = Search(model, first, self.parameters, self.noise)
-        return search, search.run()
+        model = JointModel(tuple(parts), stiffness_factors(windows) if one_machine else ())
+        search = FitProblem(model, first, self.parameters, self.noise)
+        return search, search.solve()
 
-    def find_reasons(self, search: Search, found: Fitted) -> tuple[str, ...]:
+    def find_validity_problems(self, problem: FitProblem, solution: FitSolution) -> tuple[str, ...]:
         """Return the reasons why the standard errors of a fit are not valid.
 
         Parameters
         ----------
-        search : Search
-        found : Fitted
+        problem : FitProblem
+        solution : FitSolution
 
         Returns
         -------
         tuple of str
             Empty if the standard errors are valid.
         """
-        reasons = find_reasons(found, search.model.friction)
+        reasons = find_validity_problems(solution, problem.model.friction)
         # a recorded load point has noise that any average would reduce
         is_recorded = self.loading == "recorded"
-        is_exact = found.noise_sd < NEGLIGIBLE
-        if self.filter or is_recorded or is_exact or self.noise == WHITE or is_rounded(found):
+        is_exact = solution.noise_sd < MIN_NOISE_SD
+        if (
+            self.filter
+            or is_recorded
+            or is_exact
+            or self.noise == WHITE
+            or is_rounding_too_coarse(solution)
+        ):
             return reasons
-        return (*find_filter(found, search.model.time, self.noise), *reasons)
+        return (*find_filter(solution, problem.model.time, self.noise), *reasons)
 
-    def _widened(self, outcome: Outcome) -> Outcome:
+    def _insert_missing_parameters(self, outcome: Outcome) -> Outcome:
         """Insert NaN into the matrices for parameters that the law does not have."""
         values = dict(outcome.values)
         has = np.array([name in values for name in self.parameters])
@@ -377,13 +406,17 @@ class Fit(Measure):
                 values[name] = np.insert(values[name], before, math.nan, axis=axis)
         return replace(outcome, values=values)
 
-    def _told(self, found: Fitted, rows: np.ndarray, model: Joint) -> dict[str, Value]:
+    def _collect_values(
+        self, found: FitSolution, rows: np.ndarray, model: JointModel
+    ) -> dict[str, OutputValue]:
         """Return the numbers and the rows of a fit."""
-        values: dict[str, Value] = {}
+        values: dict[str, OutputValue] = {}
         for name in found.free:
-            values[name], values[f"{name}_error"] = found.values[name], found.errors[name]
+            values[name], values[f"{name}_error"] = found.values[name], found.numerical_errors[name]
             values[f"{name}_stderr"] = found.stderr(name)
-        covariance = found.covariance * np.outer(found.slopes, found.slopes)
+        covariance = found.covariance * np.outer(
+            found.coordinate_derivatives, found.coordinate_derivatives
+        )
         spread = np.sqrt(np.diag(covariance))
         signs = np.array([float(n == "a") - (n in ("b", "b1", "b2")) for n in found.free])
         with np.errstate(invalid="ignore"):
@@ -399,23 +432,23 @@ class Fit(Measure):
             "outliers": len(found.outliers),
             "friction_quantum": found.quantum,
             "noise_order": found.noise.order,
-            "effective_samples": found.noise.effective_samples,
+            "effective_samples": found.noise.effective_sample_size,
             "degrees_of_freedom": found.degrees_of_freedom,
-            "whiteness": whiteness(found.innovations, found.noise.order),
+            "whiteness": ljung_box_p_value(found.whitened_residuals, found.noise.order),
             "r_squared": 1.0 - float(np.var(found.residuals)) / variance,
             "rows_fitted": len(rows),
-            "criterion": found.criterion,
+            "criterion": found.aic,
             "covariance": covariance,
             "correlation": correlation,
         }
         along = {
-            "fitted_friction": found.curve + trend,
-            "fitted_friction_stderr": found.band,
-            "detrended_friction": found.curve,
+            "fitted_friction": found.model_friction + trend,
+            "fitted_friction_stderr": found.curve_stderr,
+            "detrended_friction": found.model_friction,
             "residual": found.residuals,
-            "innovation": found.all_innovations,
+            "innovation": found.all_whitened_residuals,
         }
-        for name in (about.name for about in COLUMNS[:3]):
+        for name in (about.name for about in RECORD_COLUMNS[:3]):
             whole = [record.columns[name] for record in self._first_rows]
             along[f"record_{name}"] = np.concatenate(whole)
         for name, column in along.items():

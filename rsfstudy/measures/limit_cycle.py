@@ -20,17 +20,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy.analysis.approach import Approach, Course, course
-from rsfstudy.analysis.cycles import LN10, Cycle, more_events, path_of
+from rsfstudy.analysis.approach import CycleSearch, EventSequence, follow_to_orbit
+from rsfstudy.analysis.cycles import LN10, Cycle, cycle_record, more_events_remedy
 from rsfstudy.analysis.return_map import Orbit, ReturnMap
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._records import Recorded, recorded
-from rsfstudy.measures._single_step import check_leaves_alone
-from rsfstudy.motion.accuracy import MUCH_WORSE, Accuracy, error_between
-from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.recording import OBSERVED, along_path
+from rsfstudy.measures._records import RecordingMeasure, phase_outputs
+from rsfstudy.measures._single_step import check_steady_loading
+from rsfstudy.motion.accuracy import MAX_ERROR_RATIO, Accuracy, estimate_error
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
+from rsfstudy.motion.readings import sample_along_path
+from rsfstudy.motion.recording import MOTION_VARIABLES
 from rsfstudy.quantity import Output
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
@@ -38,15 +39,15 @@ from rsfstudy.slider.stability import growth_rates
 from rsfstudy.status import Status
 
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
-_BY_CHANCE = 0.06
+_COINCIDENCE_FLOOR = 0.06
 #: Displacement in D_c that sets off a motion where the scene has no step.
-NUDGE = 0.1
+PERTURBATION_DISPLACEMENT = 0.1
 #: Points of an orbit that are no more than its ends, of which no recording has to be made.
-_ENDS = 2
+_END_POINT_COUNT = 2
 #: Relative accuracy with which a limit cycle is looked for, before it is followed as asked.
-_LOW = 1e-4
+_SEARCH_RTOL = 1e-4
 
-_HEADLINES = (
+_PRIMARY_OUTPUTS = (
     "recurrence_interval",
     "static_stress_drop",
     "dynamic_stress_drop",
@@ -54,16 +55,20 @@ _HEADLINES = (
     "max_log10_slip_rate",
 )
 #: Place of the peak slip rate among them.
-PEAK = 4
+PEAK_INDEX = 4
 
 #: How many events a motion takes to repeat itself.
-PERIOD = Output("period_events", "", "1", "number of events after which a motion repeats itself")
+PERIOD_OUTPUT = Output(
+    "period_events", "", "1", "number of events after which a motion repeats itself"
+)
 #: What a slider does in the end: it slides steadily, which it comes to without or with oscillation,
 #: or it cycles, with a slower or a faster peak than what `LimitCycle` says.
 SLIP_MODES = ("steady", "damped_oscillation", "slow_slip", "stick_slip")
-_STEADY, _DAMPED, _SLOW, _STICK_SLIP = map(float, range(len(SLIP_MODES)))
+_STEADY_CODE, _DAMPED_OSCILLATION_CODE, _SLOW_SLIP_CODE, _STICK_SLIP_CODE = map(
+    float, range(len(SLIP_MODES))
+)
 _OUTPUTS = (
-    *(Output(name, error=True) for name in _HEADLINES),
+    *(Output(name, error=True) for name in _PRIMARY_OUTPUTS),
     Output("slip_per_event"),
     Output(
         "healing_exponent",
@@ -78,7 +83,7 @@ _OUTPUTS = (
         "1",
         "stress drop while slip accelerates over that while it decelerates",
     ),
-    PERIOD,
+    PERIOD_OUTPUT,
     Output("events_until_repeat", "", "1", "number of the cycle that repeated the one before"),
     Output("work_per_cycle", "", "1", "right-hand sides of the accepted cycle"),
     Output(
@@ -88,13 +93,13 @@ _OUTPUTS = (
         "what the slider does in the end, by its peak slip rate",
         flags=SLIP_MODES,
     ),
-    *recorded(*OBSERVED),
+    *phase_outputs(*MOTION_VARIABLES),
 )
 
 
 @guard_methods
 @dataclass(frozen=True)
-class LimitCycle(Recorded):
+class LimitCycle(RecordingMeasure):
     """Limit cycle of stick-slip under a steady load point velocity.
 
     If a motion with several states repeats only after ``period_events`` events, the results
@@ -123,7 +128,7 @@ class LimitCycle(Recorded):
     phases: int = 400
     events: int = 300
     name: ClassVar[str] = "limit_cycle"
-    headline = "recurrence_interval"
+    primary_output = "recurrence_interval"
     typical_work = 9_000
     outputs = _OUTPUTS
 
@@ -132,132 +137,152 @@ class LimitCycle(Recorded):
         if isinstance(self.events, bool) or not self.events >= 1 or self.events % 1:
             raise InvalidValue("events", self.events, "must be a whole number from 1")
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the limit cycle of a scene.
 
         The motion is followed until an event repeats. The cycle is then recomputed with smaller
         tolerances, to estimate the error and to record the orbit.
         """
-        check_leaves_alone(scene)
-        if scene.log_load_rate == -math.inf:
+        check_steady_loading(scene)
+        if scene.log_load_velocity == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
-        if not scene.is_disturbed:
+        if not scene.is_perturbed:
             # steady sliding left alone never leaves its steady state, stable or not
-            scene = scene.under(Segment(1.0, NUDGE))
-        if scene.states > 1:
-            return self._of_several_states(scene, accuracy, meter)
-        loose = max(accuracy.rtol, _LOW)
+            scene = scene.with_segment(Segment(1.0, PERTURBATION_DISPLACEMENT))
+        if scene.state_count > 1:
+            return self._find_multi_state_cycle(scene, accuracy, meter)
+        loose = max(accuracy.rtol, _SEARCH_RTOL)
         for rtol in dict.fromkeys((loose, accuracy.rtol)):
-            approach = Approach(scene, accuracy.at(rtol), meter)
+            approach = CycleSearch(scene, accuracy.with_rtol(rtol), meter)
             try:
-                found = approach.follow(self.events)
-            except Halt:
+                found = approach.run(self.events)
+            except MotionStopped:
                 # what cannot go on loosely, or does not repeat so within its events, may as asked
-                if rtol == accuracy.rtol or meter.spent > meter.budget:
+                if rtol == accuracy.rtol or meter.evaluations > meter.budget:
                     raise
                 continue
             if found:
-                outcome = self._closed(scene, accuracy, meter, approach.orbit, len(approach.seen))
+                outcome = self._close_orbit(
+                    scene, accuracy, meter, approach.orbit, len(approach.cycles)
+                )
                 if outcome.status is not Status.UNVERIFIED:
                     return outcome
-        return outcome if found else settled(scene)
+        return outcome if found else no_cycle_outcome(scene)
 
-    def _of_several_states(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def _find_multi_state_cycle(
+        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
+    ) -> Outcome:
         """Compute the limit cycle of a scene with several states.
 
         The motion is followed with a low accuracy until it approaches a periodic orbit. The orbit
         is then closed, starting from its largest event.
         """
-        motion = course(scene, accuracy.at(max(accuracy.rtol, _LOW)), meter, self.events)
+        motion = follow_to_orbit(
+            scene, accuracy.with_rtol(max(accuracy.rtol, _SEARCH_RTOL)), meter, self.events
+        )
         if motion is None:
-            return settled(scene)
+            return no_cycle_outcome(scene)
         if motion.orbit is None:
-            return without_period(scene, motion, more_events(self.events))
-        return self._closed(scene, accuracy, meter, motion.orbit.from_largest, len(motion.seen))
+            return aperiodic_outcome(scene, motion, more_events_remedy(self.events))
+        return self._close_orbit(
+            scene, accuracy, meter, motion.orbit.from_largest_event, len(motion.cycles)
+        )
 
-    def _closed(
-        self, scene: Scene, accuracy: Accuracy, meter: Meter, known: Orbit, events: int
+    def _close_orbit(
+        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter, orbit: Orbit, events: int
     ) -> Outcome:
         """Close a known cycle with the requested accuracy.
 
         The cycle is closed again with smaller tolerances, to estimate the error and to record the
         orbit.
         """
-        one = ReturnMap(scene, accuracy, meter).again(known)
-        fine = ReturnMap(scene, accuracy.refined(), meter, recorded=self.phases > _ENDS)
-        again = one and fine.again(one)
+        one = ReturnMap(scene, accuracy, meter).refine(orbit)
+        fine = ReturnMap(scene, accuracy.refined(), meter, recorded=self.phases > _END_POINT_COUNT)
+        again = one and fine.refine(one)
         if one is None or again is None:
             why = "with other tolerances the cycle does not close: ask for a smaller rtol"
             return Outcome(Status.UNVERIFIED, message=why)
-        errors = cycle_errors(accuracy, one, again)
-        values = dict(zip(_HEADLINES, one.numbers.tolist(), strict=True))
-        values |= {f"{n}_error": e for n, e in zip(_HEADLINES, errors.tolist(), strict=True)}
+        errors = estimate_cycle_errors(accuracy, one, again)
+        values = dict(zip(_PRIMARY_OUTPUTS, one.primary_outputs.tolist(), strict=True))
+        values |= {f"{n}_error": e for n, e in zip(_PRIMARY_OUTPUTS, errors.tolist(), strict=True)}
         cycle = one.cycles[0]
-        carried = (cycle.end.spring_stress - cycle.begin.spring_stress) / scene.stiffness
+        carried = (
+            cycle.end_point.spring_stress - cycle.start_point.spring_stress
+        ) / scene.stiffness
         values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"]
         values["slip_per_event"] -= carried if one.period > 1 else 0.0
-        values |= _properties(scene, cycle)
-        values["slip_mode"] = _mode(scene, LN10 * float(one.numbers[PEAK]))
+        values |= _cycle_properties(scene, cycle)
+        values["slip_mode"] = _classify_slip_mode(
+            scene, LN10 * float(one.primary_outputs[PEAK_INDEX])
+        )
         values["period_events"] = float(one.period)
         values["events_until_repeat"] = float(events)
-        values["work_per_cycle"] = one.work / one.period
-        status, why = judged(accuracy, one, errors)
-        why = why or _of_period(one)
-        path = path_of(scene, again.cycles, again.recording)
-        return Outcome(status, values | along_path(path, self.phases, engine=accuracy.engine), why)
+        values["work_per_cycle"] = one.evaluations / one.period
+        status, why = check_errors(accuracy, one, errors)
+        why = why or _period_message(one)
+        path = cycle_record(scene, again.cycles, again.recording)
+        return Outcome(
+            status, values | sample_along_path(path, self.phases, engine=accuracy.engine), why
+        )
 
 
-def _of_period(orbit: Orbit) -> str:
+def _period_message(orbit: Orbit) -> str:
     """Return a message if a motion repeats only after several events."""
     if orbit.period == 1:
         return ""
+    period = math.fsum(cycle.recurrence_interval for cycle in orbit.cycles)
     return (
-        f"the motion repeats itself after {orbit.period} events, in "
-        f"{math.fsum(cycle.interval for cycle in orbit.cycles):.6g} D_c/V_*: the numbers are those "
-        "of the event with the fastest peak, up to the next maximum of spring stress"
+        f"the motion repeats itself after {orbit.period} events, in {period:.6g} D_c/V_*: "
+        "the numbers are those of the event with the fastest peak, up to the next maximum of "
+        "spring stress"
     )
 
 
-SETTLES = Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")
+STEADY_SLIDING_OUTCOME = Outcome(
+    Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding"
+)
 
 
-def settled(scene: Scene) -> Outcome:
+def no_cycle_outcome(scene: Scene) -> Outcome:
     """Return the outcome of a motion that settles to steady sliding."""
     try:
-        last = growth_rates(scene, scene.log_load_rate)[0]
+        last = growth_rates(scene, scene.log_load_velocity)[0]
     except ValueError:  # there is none in closed form
-        return SETTLES
-    return replace(SETTLES, values={"slip_mode": _DAMPED if last.imag else _STEADY})
+        return STEADY_SLIDING_OUTCOME
+    return replace(
+        STEADY_SLIDING_OUTCOME,
+        values={"slip_mode": _DAMPED_OSCILLATION_CODE if last.imag else _STEADY_CODE},
+    )
 
 
-def _mode(scene: Scene, log_peak: float) -> float:
+def _classify_slip_mode(scene: Scene, log_peak: float) -> float:
     """Return slow slip or stick-slip, depending on the peak of ln V."""
-    damping = scene.parts.dynamics.damping(0.0)
-    limit = math.log(scene.a / damping) if damping else scene.log_norm_rate
-    return _STICK_SLIP if log_peak >= limit else _SLOW
+    damping = scene.parts.dynamics.radiated_stress_slope(0.0)
+    limit = math.log(scene.a / damping) if damping else scene.log_instability_rate
+    return _STICK_SLIP_CODE if log_peak >= limit else _SLOW_SLIP_CODE
 
 
-def without_period(scene: Scene, motion: Course, remedy: str) -> Outcome:
+def aperiodic_outcome(scene: Scene, sequence: EventSequence, remedy: str) -> Outcome:
     """Return the outcome of a motion that has not reached a periodic orbit.
 
     The status depends on whether the motion may still reach a periodic orbit.
     """
-    latest = motion.seen[len(motion.seen) // 2 :]
-    peaks = [cycle.fastest / LN10 for cycle in latest]
-    intervals = [cycle.interval for cycle in latest]
+    latest = sequence.cycles[len(sequence.cycles) // 2 :]
+    peaks = [cycle.max_log_slip_rate / LN10 for cycle in latest]
+    intervals = [cycle.recurrence_interval for cycle in latest]
     text = (
-        f"the last {len(latest)} of {len(motion.seen)} events peak at 10^{min(peaks):.4g} to "
+        f"the last {len(latest)} of {len(sequence.cycles)} events peak at 10^{min(peaks):.4g} to "
         f"10^{max(peaks):.4g} V_* and come after {min(intervals):.5g} to {max(intervals):.5g} "
         "D_c/V_*"
     )
-    if motion.open:
+    if sequence.may_still_converge:
         why = f"no cycle repeats yet: {text}; {remedy}"
         return Outcome(Status.WORK_BUDGET_SPENT, message=why)
     return Outcome(Status.NOT_PERIODIC, message=text)
 
 
-def judged(
-    accuracy: Accuracy, one: Orbit, errors: np.ndarray, places: slice = slice(None)
+def check_errors(
+    accuracy: Accuracy, orbit: Orbit, errors: np.ndarray, outputs: slice = slice(None)
 ) -> tuple[Status, str]:
     """Return the status that follows from the errors of the headline numbers.
 
@@ -267,42 +292,45 @@ def judged(
         OK, or ``unverified`` if an error is too large.
     message : str
     """
-    worst = float((errors / _scales(one))[places].max())
-    if worst <= MUCH_WORSE * accuracy.rtol:
+    worst = float((errors / _error_scales(orbit))[outputs].max())
+    if worst <= MAX_ERROR_RATIO * accuracy.rtol:
         return Status.OK, ""
     why = f"the cycle is known to {worst:.1e} only, where {accuracy.rtol:g} was asked for"
     return Status.UNVERIFIED, f"{why}: ask for another rtol"
 
 
-def _scales(orbit: Orbit) -> list[float]:
+def _error_scales(orbit: Orbit) -> list[float]:
     """Return the scales of the errors of the headline numbers.
 
     The scale of a logarithm of slip rate is at least half of the range of the logarithms, because
     the logarithm is zero at V_*.
     """
-    *others, slowest, fastest = orbit.numbers.tolist()
+    *others, slowest, fastest = orbit.primary_outputs.tolist()
     half = 0.5 * (fastest - slowest)
     return [*map(abs, others), max(abs(slowest), half), max(abs(fastest), half)]
 
 
-def cycle_errors(accuracy: Accuracy, one: Orbit, again: Orbit) -> np.ndarray:
+def estimate_cycle_errors(accuracy: Accuracy, orbit: Orbit, refined_orbit: Orbit) -> np.ndarray:
     """Estimate the errors of the headline numbers.
 
     The estimate includes the difference between two runs, and the corrections for the closure
     error, which both runs share.
     """
-    chance, scales = _BY_CHANCE * accuracy.rtol, _scales(one)
-    pairs = zip(one.numbers.tolist(), again.numbers.tolist(), scales, strict=True)
-    errors = [error_between(number, refined, chance, scale) for number, refined, scale in pairs]
-    return np.asarray(np.abs(one.implied) + np.array(errors))
+    chance, scales = _COINCIDENCE_FLOOR * accuracy.rtol, _error_scales(orbit)
+    pairs = zip(
+        orbit.primary_outputs.tolist(), refined_orbit.primary_outputs.tolist(), scales, strict=True
+    )
+    errors = [estimate_error(number, refined, chance, scale) for number, refined, scale in pairs]
+    return np.asarray(np.abs(orbit.output_corrections) + np.array(errors))
 
 
-def _properties(scene: Scene, cycle: Cycle) -> dict[str, float]:
+def _cycle_properties(scene: Scene, cycle: Cycle) -> dict[str, float]:
     """Return additional properties of a cycle."""
     return {
         "healing_exponent": _healing_exponent(scene, cycle),
-        "residual_friction": cycle.sliding,
-        "drop_asymmetry": (cycle.highest - cycle.at_peak) / (cycle.at_peak - cycle.lowest),
+        "residual_friction": cycle.friction_at_peak,
+        "drop_asymmetry": (cycle.max_spring_stress - cycle.spring_stress_at_peak)
+        / (cycle.spring_stress_at_peak - cycle.min_spring_stress),
     }
 
 
@@ -311,8 +339,8 @@ def _healing_exponent(scene: Scene, cycle: Cycle) -> float:
 
     The result is NaN if the law has no such theta.
     """
-    slowed = cycle.rested.log_slip_rate - cycle.landed.log_slip_rate
+    slowed = cycle.slowest_point.log_slip_rate - cycle.arrest_point.log_slip_rate
     law = scene.parts.law
-    if law.states > 1 or not law.logarithmic or not abs(slowed) > 1.0:
+    if law.state_count > 1 or not law.has_logarithmic_state or not abs(slowed) > 1.0:
         return math.nan
-    return (cycle.rested.state - cycle.landed.state) / (scene.b * slowed)
+    return (cycle.slowest_point.state - cycle.arrest_point.state) / (scene.b * slowed)

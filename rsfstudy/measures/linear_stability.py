@@ -16,23 +16,28 @@ from scipy.optimize import brentq
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.quantity import Output
 from rsfstudy.slider import closed_forms
-from rsfstudy.slider.equations import Equations, by_displacement, by_inertial_time, normal_stress_at
+from rsfstudy.slider.equations import (
+    Equations,
+    equations_by_displacement,
+    equations_by_inertial_time,
+    normal_stress_at,
+)
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.stability import critical_stiffness, critical_stiffnesses
-from rsfstudy.slider.steady import Steady, steady_excess, steady_sliding
+from rsfstudy.slider.steady import SteadySliding, steady_friction_excess, steady_sliding
 from rsfstudy.status import Status
 
 #: Step of the central differences in units of the scale of an unknown: rounding and truncation
 #: balance there.
-_DIFFERENCE = 1e-4
+_RELATIVE_DIFFERENCE_STEP = 1e-4
 #: Slip rate norm from which growth is found from the full equations; below, double precision does
 #: not see mass in them, and the slow manifold, of second order in mass, is exact enough.
-_MASS_SHOWS = 1e-3
+_MIN_INERTIAL_NORM = 1e-3
 #: Rise of the critical stiffness by mass beyond which no spring counts as stiff enough.
-_LARGEST_RISE = 1e6
+_MAX_STIFFNESS_RISE = 1e6
 
 _OUTPUTS = (
     Output("critical_stiffness", error=True),
@@ -74,33 +79,33 @@ class LinearStability(Measure):
     """
 
     name: ClassVar[str] = "linear_stability"
-    headline = "critical_stiffness"
+    primary_output = "critical_stiffness"
     typical_work = 100
     outputs = _OUTPUTS
-    clocks: ClassVar[tuple[bool, ...]] = ()
+    needs_time: ClassVar[tuple[bool, ...]] = ()
 
     @property
-    def sought(self) -> tuple[str, ...]:
+    def solved_fields(self) -> tuple[str, ...]:
         return ("stiffness_ratio",)
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the critical stiffness from friction and from growth rates.
 
         The error estimate is the difference between both results.
         """
-        scene = scene.unforced
-        load = scene.log_load_rate
+        scene = scene.under_steady_loading
+        load = scene.log_load_velocity
         if load == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
         steady = steady_sliding(scene, load)
         if steady is None:
             return Outcome(
                 Status.NO_STEADY_STATE,
-                {"steady_friction": scene.mu_star + steady_excess(scene, load)},
+                {"steady_friction": scene.mu_star + steady_friction_excess(scene, load)},
                 "phi < atan(mu_ss): the slider locks while stress rises, and runs while it falls",
             )
-        sigma_ss = normal_stress_at(scene, steady.friction)
-        mu_ss = (scene.mu_star + steady.friction) / sigma_ss
+        sigma_ss = normal_stress_at(scene, steady.frictional_stress)
+        mu_ss = (scene.mu_star + steady.frictional_stress) / sigma_ss
         values = {"steady_friction": mu_ss, "steady_normal_stress": sigma_ss}
         massless = critical_stiffness(scene, load, quasi_static=True)
         critical = critical_stiffness(scene, load)
@@ -110,8 +115,8 @@ class LinearStability(Measure):
                 values,
                 "without rate weakening every perturbation decays"
                 if massless <= 0.0
-                else f"at eta V = {scene.dynamics.damping(load):.3g} sigma_* radiation damps every "
-                "perturbation",
+                else f"at eta V = {scene.dynamics.radiated_stress_slope(load):.3g} sigma_* "
+                "radiation damps every perturbation",
             )
         if massless == math.inf:
             why = "with this friction a perturbation grows without mass or damping too"
@@ -119,14 +124,14 @@ class LinearStability(Measure):
         at_reference = scene.critical_stiffness
         relative = critical / at_reference if at_reference else math.inf
         rise = critical / massless - 1.0 if massless else math.inf
-        if rise > _LARGEST_RISE:
-            norm = scene.dynamics.norm(scene, load)
+        if rise > _MAX_STIFFNESS_RISE:
+            norm = scene.dynamics.slip_rate_norm(scene, load)
             return Outcome(
                 Status.UNSTABLE_AT_ANY_STIFFNESS,
                 values,
                 f"at V T/(2 pi D_c) = {norm:.3g} the direct effect cannot damp the spring",
             )
-        by_growth = _threshold(scene, steady, critical, meter)
+        by_growth = _stiffness_at_zero_growth(scene, steady, critical, meter)
         if math.isnan(by_growth):
             why = f"growth of the equations does not end at a stiffness of {critical:.9g}"
             return Outcome(Status.UNVERIFIED, values, why)
@@ -136,7 +141,7 @@ class LinearStability(Measure):
                 "critical_stiffness": critical,
                 "critical_stiffness_error": abs(by_growth - critical) + 1e-15 * critical,
                 "critical_stiffness_from_growth": by_growth,
-                "critical_stiffness_explicit": _explicit(scene) * (1.0 + rise),
+                "critical_stiffness_explicit": _closed_form_stiffness(scene) * (1.0 + rise),
                 "relative_critical_stiffness": relative,
                 "rise_by_dynamics": rise,
                 **values,
@@ -144,7 +149,7 @@ class LinearStability(Measure):
         )
 
 
-def _explicit(scene: Scene) -> float:
+def _closed_form_stiffness(scene: Scene) -> float:
     """Compute the critical stiffness from the published formula.
 
     Returns
@@ -153,15 +158,17 @@ def _explicit(scene: Scene) -> float:
         NaN if the formula does not apply to the scene.
     """
     law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
-    others = law.steady_states or law.feels_stress or scene.parts.fluid.effects
+    others = law.steady_states or law.depends_on_stress or scene.parts.fluid.effects
     if coupling is None or others or scene.imposed_normal_stress:
         return math.nan
     return closed_forms.critical_stiffness(
-        scene.log_load_rate, scene.mu_star, scene.a, scene.b, *coupling
+        scene.log_load_velocity, scene.mu_star, scene.a, scene.b, *coupling
     )
 
 
-def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float:
+def _stiffness_at_zero_growth(
+    scene: Scene, steady: SteadySliding, guess: float, meter: WorkMeter
+) -> float:
     """Find the stiffness at which the largest growth rate is zero.
 
     Returns
@@ -169,29 +176,29 @@ def _threshold(scene: Scene, steady: Steady, near: float, meter: Meter) -> float
     float
         NaN if perturbations do not grow below this stiffness, or do not decay above it.
     """
-    with_mass = scene.dynamics.norm(scene, steady.log_slip_rate) > _MASS_SHOWS
+    with_mass = scene.dynamics.slip_rate_norm(scene, steady.log_slip_rate) > _MIN_INERTIAL_NORM
 
     def growth_at(stiffness: float) -> float:
         changed = scene.with_(stiffness=stiffness)
         if with_mass:
-            equations = by_inertial_time(changed)
+            equations = equations_by_inertial_time(changed)
             stress = steady.spring_stress
             state = (stress, steady.log_slip_rate, stress, *steady.psis[1:])
         else:
-            equations = by_displacement(changed)
+            equations = equations_by_displacement(changed)
             state = (steady.spring_stress, *steady.psis)
         meter.charge(equations.regime, 2 * len(state))
-        return growth(jacobian(equations, state))
+        return max_growth_rate(compute_jacobian(equations, state))
 
     # softer than at the root before it, several states may be stable again
-    before = [k for k in critical_stiffnesses(scene, steady.log_slip_rate) if k < near]
-    softer = max(0.5 * near, math.sqrt(near * before[-1]) if before else 0.0)
-    if not growth_at(softer) > 0.0 > growth_at(2.0 * near):
+    before = [k for k in critical_stiffnesses(scene, steady.log_slip_rate) if k < guess]
+    softer = max(0.5 * guess, math.sqrt(guess * before[-1]) if before else 0.0)
+    if not growth_at(softer) > 0.0 > growth_at(2.0 * guess):
         return math.nan
-    return float(brentq(growth_at, softer, 2.0 * near, xtol=1e-15 * near, rtol=1e-14))
+    return float(brentq(growth_at, softer, 2.0 * guess, xtol=1e-15 * guess, rtol=1e-14))
 
 
-def growth(jacobian: np.ndarray) -> float:
+def max_growth_rate(jacobian: np.ndarray) -> float:
     """Return the growth rate of the fastest-growing perturbation.
 
     The unit is the inverse of the independent variable of the equations.
@@ -199,16 +206,18 @@ def growth(jacobian: np.ndarray) -> float:
     return float(np.linalg.eigvals(jacobian).real.max())
 
 
-def jacobian(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
+def compute_jacobian(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
     """Compute the Jacobian of the rates by central differences.
 
     Rows are rates, and columns are unknowns.
     """
     columns = []
     for number, scale in enumerate(equations.scales):
-        step = _DIFFERENCE * scale
+        step = _RELATIVE_DIFFERENCE_STEP * scale
         ahead, behind = (
-            equations.rates(tuple(x + sign * step * (i == number) for i, x in enumerate(state)))
+            equations.evaluate_rates(
+                tuple(x + sign * step * (i == number) for i, x in enumerate(state))
+            )
             for sign in (1.0, -1.0)
         )
         columns.append([(u - v) / (2.0 * step) for u, v in zip(ahead, behind, strict=True)])

@@ -14,23 +14,23 @@ import numpy as np
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._records import error_of
+from rsfstudy.measures._records import estimate_instant_error
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import along
-from rsfstudy.motion.events import Kind, fall, rise
-from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.recording import READ, Recording
+from rsfstudy.motion.course import events_along
+from rsfstudy.motion.events import EventKind, fall, rise
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
+from rsfstudy.motion.recording import RECORDED_VARIABLES, Recording
 from rsfstudy.quantity import Output
-from rsfstudy.slider.equations import rigid, steady_states_of
+from rsfstudy.slider.equations import compute_steady_states, equations_of_rigid_slider
 from rsfstudy.slider.scene import Scene
 from rsfstudy.slider.steady import steady_sliding, stress_after_jump
 from rsfstudy.status import Status
 
 #: Part of a by which friction evolves after a step, at least: less is lost to rounding.
-_EVOLVES = 1e-9
+_MIN_RELATIVE_EVOLUTION = 1e-9
 
 #: Stress changes over sigma_*, and their quotients.
-_CHANGES = (
+_STRESS_CHANGE_OUTPUTS = (
     ("direct_stress_change", "sigma_*", "stress change just after a rate step"),
     ("direct_asymmetry", "", "direct stress change of the step over that of its inverse, less 1"),
     (
@@ -53,7 +53,7 @@ _CHANGES = (
 )
 _OUTPUTS = (
     Output("evolution_distance", error=True),
-    *(Output(name, "", "1", meaning, scale) for name, scale, meaning in _CHANGES),
+    *(Output(name, "", "1", meaning, scale) for name, scale, meaning in _STRESS_CHANGE_OUTPUTS),
     *(
         Output(name, dims=("slip",))
         for name in ("shear_stress", "normal_stress_ratio", "state_variable")
@@ -93,10 +93,10 @@ class RigidResponse(Measure):
     slip: float = 10.0
     points: int = 201
     name: ClassVar[str] = "rigid_response"
-    headline = "evolution_distance"
+    primary_output = "evolution_distance"
     typical_work = 800
     outputs = _OUTPUTS
-    clocks: ClassVar[tuple[bool, ...]] = ()
+    needs_time: ClassVar[tuple[bool, ...]] = ()
 
     def __post_init__(self) -> None:
         if not 1.0 <= self.slip < math.inf:
@@ -108,15 +108,15 @@ class RigidResponse(Measure):
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         return {"slip": np.linspace(0.0, self.slip, self.points)}
 
-    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+    def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """The distance itself, that ends where stress falls by 1/e of its evolution over D_c."""
         evolution = abs(values["direct_stress_change"] - values["steady_stress_change"])
         part = 1.0 + math.e * scene.a / evolution
         return {"evolution_distance": part * abs(values["evolution_distance"])}
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """The response, followed over slip at two tolerances: their difference is the error."""
-        log_slip_rate = scene.log_load_rate
+        log_slip_rate = scene.log_load_velocity
         if log_slip_rate == 0.0:
             return Outcome(Status.NO_STEP, message="V = V_* is no step")
         if log_slip_rate == -math.inf:
@@ -124,12 +124,12 @@ class RigidResponse(Measure):
         sliding = steady_sliding(scene, log_slip_rate)
         if sliding is None:
             return Outcome(Status.NO_STEADY_STATE, message="no steady state at this slip rate")
-        start, steady = friction_after_step(scene, log_slip_rate), sliding.friction
-        if abs(start - steady) < _EVOLVES * scene.a:
+        start, steady = friction_after_step(scene, log_slip_rate), sliding.frictional_stress
+        if abs(start - steady) < _MIN_RELATIVE_EVOLUTION * scene.a:
             return Outcome(Status.NOT_APPLICABLE, message="friction does not evolve after the step")
         level = steady + (start - steady) / math.e
-        distance, left, rows = self._follow(scene, start, level, accuracy, meter)
-        again, _left, _rows = self._follow(scene, start, level, accuracy.refined(), meter)
+        distance, left, rows = self._follow_response(scene, start, level, accuracy, meter)
+        again, _left, _rows = self._follow_response(scene, start, level, accuracy.refined(), meter)
         # where an exponential has 1/e left
         by_friction = math.e * distance / (start - steady)
         slip = self.inner_coordinates["slip"]
@@ -139,9 +139,11 @@ class RigidResponse(Measure):
             Status.OK,
             {
                 "evolution_distance": distance,
-                "evolution_distance_error": error_of(distance, again, by_friction, scene, accuracy),
+                "evolution_distance_error": estimate_instant_error(
+                    distance, again, by_friction, scene, accuracy
+                ),
                 "direct_stress_change": start,
-                **_asymmetry(scene, log_slip_rate),
+                **_compute_asymmetries(scene, log_slip_rate),
                 "steady_stress_change": steady,
                 "stress_left_at_unit_slip": left - steady,
                 "closed_form_misfit": _closed_form_misfit(scene, steady, slip, rows[:, 0]),
@@ -152,28 +154,28 @@ class RigidResponse(Measure):
             },
         )
 
-    def _follow(
-        self, scene: Scene, start: float, level: float, accuracy: Accuracy, meter: Meter
+    def _follow_response(
+        self, scene: Scene, start: float, level: float, accuracy: Accuracy, meter: WorkMeter
     ) -> tuple[float, float, np.ndarray]:
         """Slip at which stress passes the level, stress after D_c, and (stress, state, normal
         stress) at the points.
         """
         at, distance = self.inner_coordinates["slip"], math.nan
-        recording = Recording(at=np.union1d(at, [1.0]))
-        equations = rigid(scene, scene.log_load_rate)
-        watches = (rise("friction", level), fall("friction", level))
+        recording = Recording(sample_times=np.union1d(at, [1.0]))
+        equations = equations_of_rigid_slider(scene, scene.log_load_velocity)
+        watches = (rise("frictional_stress", level), fall("frictional_stress", level))
         # states freed of stress are still those of steady sliding at V_* before the step
-        state = (start, *steady_states_of(scene, 0.0, 0.0)[1:])
-        tolerance, complete = accuracy.solver, False
-        for event in along(equations, state, tolerance, meter, watches, recording=recording):
-            if event.watch is not None and math.isnan(distance):
+        state = (start, *compute_steady_states(scene, 0.0, 0.0)[1:])
+        tolerance, complete = accuracy.local_tolerance, False
+        for event in events_along(equations, state, tolerance, meter, watches, recording=recording):
+            if event.specification is not None and math.isnan(distance):
                 distance = event.slip
-            complete = complete or event.kind is Kind.SAMPLED
+            complete = complete or event.kind is EventKind.SAMPLED
             if complete and not math.isnan(distance):
                 break
         names = ("slip", "frictional_stress", "state_variable", "normal_stress_ratio")
-        columns = [READ.index(name) for name in names]
-        slips, *values = recording.seen(scene)[:, columns].T
+        columns = [RECORDED_VARIABLES.index(name) for name in names]
+        slips, *values = recording.table(scene)[:, columns].T
         values[0] = values[0] - scene.mu_star
         rows = np.stack(values, axis=1)
         return distance, float(rows[slips == 1.0, 0][0]), rows[np.isin(slips, at)]
@@ -185,15 +187,15 @@ def _closed_form_misfit(scene: Scene, steady: float, slip: np.ndarray, stress: n
     which they leave out), over sigma_*; NaN where there is none.
     """
     law, parts = scene.parts.law, scene.parts
-    stress_acts = parts.normal_stress.effects or parts.fluid.effects or law.feels_stress
+    stress_acts = parts.normal_stress.effects or parts.fluid.effects or law.depends_on_stress
     if stress_acts or law.relaxation is None:
         return math.nan
-    left = np.array([law.relaxation(scene.log_load_rate, at) for at in slip.tolist()])
+    left = np.array([law.relaxation(scene.log_load_velocity, at) for at in slip.tolist()])
     exact = steady + (1.0 + scene.imposed_normal_stress) * scene.b * left
     return float(np.abs(stress - exact).max())
 
 
-def _asymmetry(scene: Scene, log_slip_rate: float) -> dict[str, float]:
+def _compute_asymmetries(scene: Scene, log_slip_rate: float) -> dict[str, float]:
     """Relative excess of the change by a step over that by its inverse: at once, and over its
     evolution to the new steady state.
 
@@ -203,8 +205,8 @@ def _asymmetry(scene: Scene, log_slip_rate: float) -> dict[str, float]:
     if steady is None or inverse_steady is None:
         return {}
     direct, inverse = (friction_after_step(scene, x) for x in (log_slip_rate, -log_slip_rate))
-    evolves = direct - steady.friction
-    inverse_evolves = inverse - inverse_steady.friction
+    evolves = direct - steady.frictional_stress
+    inverse_evolves = inverse - inverse_steady.frictional_stress
     return {
         "direct_asymmetry": -direct / inverse - 1.0,
         "evolution_asymmetry": -evolves / inverse_evolves - 1.0,
@@ -217,13 +219,13 @@ def friction_after_step(scene: Scene, log_slip_rate: float) -> float:
 
     Raises
     ------
-    Halt
+    MotionStopped
         With `normal_stress_lost` where no stress above the fault's opening is that weak, and
         `locked` where none is that strong.
     """
     friction = stress_after_jump(scene, scene.a * log_slip_rate)
     if friction is None and log_slip_rate < 0.0:
-        raise Halt(Status.NORMAL_STRESS_LOST, "the direct effect takes normal stress away")
+        raise MotionStopped(Status.NORMAL_STRESS_LOST, "the direct effect takes normal stress away")
     if friction is None:
-        raise Halt(Status.LOCKED, "no stress is strong enough for the direct effect")
+        raise MotionStopped(Status.LOCKED, "no stress is strong enough for the direct effect")
     return friction

@@ -9,17 +9,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.analysis.settling import is_attracted
+from rsfstudy.analysis.settling import settles_to_steady_sliding
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Outcome
-from rsfstudy.measures._records import BY_CHANCE, Recorded, recorded
-from rsfstudy.measures._single_step import check_leaves_alone
-from rsfstudy.motion.accuracy import Accuracy, error_between
-from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Event, Kind, maximum, settling
-from rsfstudy.motion.meter import Halt, Meter
-from rsfstudy.motion.recording import OBSERVED, Recording, along_path
+from rsfstudy.measures._records import COINCIDENCE_FLOOR, RecordingMeasure, phase_outputs
+from rsfstudy.measures._single_step import check_steady_loading
+from rsfstudy.motion.accuracy import Accuracy, estimate_error
+from rsfstudy.motion.course import integrate_events
+from rsfstudy.motion.events import Event, EventKind, approach_to_steady_state, maximum
+from rsfstudy.motion.meter import MotionStopped, WorkMeter
+from rsfstudy.motion.readings import sample_along_path
+from rsfstudy.motion.recording import MOTION_VARIABLES, Recording
 from rsfstudy.quantity import Output, Quantity
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -27,7 +28,7 @@ from rsfstudy.status import Status
 LN10 = math.log(10.0)
 
 #: Part of the largest distance from steady sliding at which an oscillation counts as over.
-_OVER = 1e-3
+_STEADY_FRACTION = 1e-3
 
 _OUTPUTS = (
     Output("max_log10_slip_rate", error=True),
@@ -37,13 +38,13 @@ _OUTPUTS = (
         "oscillations repeat",
     ),
     Output("peak_log10_slip_rate", dims=("peak",)),
-    *recorded(*OBSERVED),
+    *phase_outputs(*MOTION_VARIABLES),
 )
 
 
 @guard_methods
 @dataclass(frozen=True)
-class StepResponse(Recorded):
+class StepResponse(RecordingMeasure):
     """Oscillations of slip rate after a step: peaks of log10(V/V_*) and the path.
 
     The motion is followed until it has the requested number of peaks, or until it settles. A motion
@@ -71,7 +72,7 @@ class StepResponse(Recorded):
     peaks: int = 8
     phases: int = 2000
     name: ClassVar[str] = "step_response"
-    headline = "max_log10_slip_rate"
+    primary_output = "max_log10_slip_rate"
     typical_work = 10_000
     outputs = _OUTPUTS
     dimensions = (Quantity("peak", "", "1", "number of the peak of slip rate after the step"),)
@@ -85,75 +86,84 @@ class StepResponse(Recorded):
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         return {"peak": np.arange(1, self.peaks + 1), **super().inner_coordinates}
 
-    def scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+    def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of the largest logarithm.
 
         The scale includes an e-fold of slip rate, because the logarithm of V_* is zero.
         """
         return {"max_log10_slip_rate": abs(values["max_log10_slip_rate"]) + 1.0 / LN10}
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the peaks and the path of the motion, with error estimates.
 
         The errors are estimated from a second motion with smaller tolerances.
         """
-        check_leaves_alone(scene)
-        if scene.log_load_rate == -math.inf:
+        check_steady_loading(scene)
+        if scene.log_load_velocity == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
-        if not scene.is_disturbed:
+        if not scene.is_perturbed:
             return Outcome(Status.NO_STEP, message="V_0 = V_* is no step")
-        peaks, rows = self._follow(scene, accuracy, meter)
-        again, _rows = self._follow(scene, accuracy.refined(), meter)
-        heights = peaks - scene.log_load_rate / LN10
+        peaks, rows = self._follow_oscillations(scene, accuracy, meter)
+        again, _rows = self._follow_oscillations(scene, accuracy.refined(), meter)
+        heights = peaks - scene.log_load_velocity / LN10
         log_slip_rates = np.full(self.peaks, np.nan)
         log_slip_rates[: len(peaks)] = peaks
         return Outcome(
             Status.OK,
             {
                 "max_log10_slip_rate": float(peaks.max()),
-                "max_log10_slip_rate_error": error_between(
-                    peaks.max(), again.max(), BY_CHANCE * accuracy.rtol
+                "max_log10_slip_rate_error": estimate_error(
+                    peaks.max(), again.max(), COINCIDENCE_FLOOR * accuracy.rtol
                 )
-                + _left_out(scene, accuracy),
+                + _neglected_rise_error(scene, accuracy),
                 "peak_ratio": float(heights[1] / heights[0]) if len(peaks) > 1 else 0.0,
                 "peak_log10_slip_rate": log_slip_rates,
-                **along_path(rows, self.phases),
+                **sample_along_path(rows, self.phases),
             },
         )
 
-    def _follow(
-        self, scene: Scene, accuracy: Accuracy, meter: Meter
+    def _follow_oscillations(
+        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
     ) -> tuple[np.ndarray, np.ndarray]:
         """Follow the motion, and return the peaks of log10(V/V_*) and the record."""
         peaks: list[float] = []
-        recording, asked = Recording(), (maximum("log_slip_rate"), settling(_OVER))
-        for event in follow(scene, accuracy, meter, asked, clock=True, recording=recording):
-            if event.kind is Kind.MAXIMUM or _tops_at_start(scene, event):
+        recording, asked = (
+            Recording(),
+            (maximum("log_slip_rate"), approach_to_steady_state(_STEADY_FRACTION)),
+        )
+        for event in integrate_events(
+            scene, accuracy, meter, asked, with_time=True, recording=recording
+        ):
+            if event.kind is EventKind.MAXIMUM or _has_initial_maximum(scene, event):
                 peaks.append(event.point.log_slip_rate / LN10)
-            settles = event.kind is Kind.SETTLED and is_attracted(scene)
+            settles = event.kind is EventKind.SETTLED and settles_to_steady_sliding(scene)
             if settles and not peaks:
                 text = "slip rate has no maximum: it changes steadily to that of the load point"
-                raise Halt(Status.NOT_APPLICABLE, text)
+                raise MotionStopped(Status.NOT_APPLICABLE, text)
             if len(peaks) == self.peaks or settles:
-                return np.array(peaks), recording.seen(scene, until=event)
+                return np.array(peaks), recording.table(scene, until=event)
         raise AssertionError("a motion never ends by itself")
 
 
-def _tops_at_start(scene: Scene, event: Event) -> bool:
+def _has_initial_maximum(scene: Scene, event: Event) -> bool:
     """Return True if the slip rate has a maximum at the start due to inertia.
 
     If the motion starts on the slow manifold, the initial rise of the slip rate is a jump. The rise
     is followed only if the tolerance requires it.
     """
-    return _jumps(scene) and event.kind is Kind.START and event.point.growth <= 0.0
+    return (
+        _delays_initial_rise(scene)
+        and event.kind is EventKind.START
+        and event.point.log_slip_rate_derivative <= 0.0
+    )
 
 
-def _left_out(scene: Scene, accuracy: Accuracy) -> float:
+def _neglected_rise_error(scene: Scene, accuracy: Accuracy) -> float:
     """Return the error of log10(V/V_*) due to a rise that is not followed."""
-    slip = accuracy.remaining_slip if _jumps(scene) else 0.0
+    slip = accuracy.max_remaining_slip if _delays_initial_rise(scene) else 0.0
     return (1.0 + scene.stiffness / scene.a) * slip / LN10
 
 
-def _jumps(scene: Scene) -> bool:
+def _delays_initial_rise(scene: Scene) -> bool:
     """Return True if inertia delays an initial rise of the slip rate from V_*."""
-    return scene.has_mass and (scene.begins_elsewhere or scene.spring_stress_step > 0.0)
+    return scene.has_mass and (scene.starts_unsteady or scene.spring_stress_step > 0.0)

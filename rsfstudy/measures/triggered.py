@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.analysis.after_step import neutral, reaches_norm
+from rsfstudy.analysis.after_step import is_neutral, reaches_norm
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._single_step import check_single_step, near_loading, reached_by_loading
+from rsfstudy.measures._single_step import (
+    check_single_step,
+    norm_below_loading_outcome,
+    slow_norm_warning,
+)
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.quantity import Output
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
@@ -33,24 +37,24 @@ class Triggered(Measure):
     """
 
     name: ClassVar[str] = "triggered"
-    headline = "unstable"
+    primary_output = "unstable"
     typical_work = 800
     outputs = (Output("unstable", "", "1", "whether the step triggers instability", error=True),)
-    clocks: ClassVar[tuple[bool, ...]] = (False,)
+    needs_time: ClassVar[tuple[bool, ...]] = (False,)
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """The answer, from motions followed at two tolerances until each is certain."""
         check_single_step(scene)
-        if max(0.0, scene.log_load_rate) >= scene.log_norm_rate:
-            return reached_by_loading(scene, scene.load_velocity)
-        if not scene.is_disturbed:
+        if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
+            return norm_below_loading_outcome(scene, scene.load_velocity)
+        if not scene.is_perturbed:
             return Outcome(Status.OK, {"unstable": 0.0, "unstable_error": 0.0}, "there is no step")
         accuracies = accuracy, accuracy.refined()
         answer, again = (reaches_norm(scene, asked, meter) for asked in accuracies)
         # closer to critical stiffness than the tolerance, growth and decay cannot be told apart
-        if answer != again or neutral(scene, 10.0 * accuracy.rtol):
+        if answer != again or is_neutral(scene, 10.0 * accuracy.rtol):
             return Outcome(
                 Status.UNVERIFIED, message="the tolerance decides: ask for a smaller rtol"
             )
         values = {"unstable": float(answer), "unstable_error": 0.0}
-        return Outcome(Status.OK, values, near_loading(scene, scene.load_velocity))
+        return Outcome(Status.OK, values, slow_norm_warning(scene, scene.load_velocity))

@@ -8,25 +8,27 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from numbers import Real
 
+from rsfstudy._deprecation import renamed_members
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion.engines import SCIPY, named
+from rsfstudy.motion.engines import SCIPY, engine_name
 
 DEFAULT_RTOL = 1e-7
-TIGHTEST_RTOL, LOOSEST_RTOL = 1e-11, 1e-2
+MIN_RTOL, MAX_RTOL = 1e-11, 1e-2
 DEFAULT_BUDGET = 500_000
 #: More than any computer evaluates; files hold it.
-LARGEST_BUDGET = 10**15
+MAX_BUDGET = 10**15
 #: The loosest accuracy that decides where to leave the slow manifold: its series in mass turns back
 #: at a change of ln V of 0.08, which a motion that is to leave it beyond would never reach.
-_LOOSEST_SWITCH = 2e-5
+_MAX_SWITCHING_RTOL = 2e-5
 #: How far above what was asked for an error estimate may stay: numbers are then still good to
 #: something near it, and two runs that agree less than that tell nothing of their errors.
-MUCH_WORSE = 100.0
+MAX_ERROR_RATIO = 100.0
 #: Relative error that rounding alone explains.
-ROUNDING = 1e-13
+ROUNDING_ERROR = 1e-13
 
 
+@renamed_members
 @guard_methods
 @dataclass(frozen=True)
 class Accuracy:
@@ -64,18 +66,18 @@ class Accuracy:
         for name in ("rtol", "budget"):
             if isinstance(getattr(self, name), bool) or not isinstance(getattr(self, name), Real):
                 raise InvalidValue(name, getattr(self, name), "must be a number")
-        if not TIGHTEST_RTOL <= self.rtol <= LOOSEST_RTOL:
+        if not MIN_RTOL <= self.rtol <= MAX_RTOL:
             raise InvalidValue(
                 "rtol",
                 self.rtol,
-                f"must lie between {TIGHTEST_RTOL:g} and {LOOSEST_RTOL:g}",
+                f"must lie between {MIN_RTOL:g} and {MAX_RTOL:g}",
                 remedy="Below that, rounding decides; above it, nothing is resolved.",
             )
-        if not 1 <= self.budget <= LARGEST_BUDGET or self.budget % 1:
-            rule = f"must be a whole number from 1 to {LARGEST_BUDGET:,}"
+        if not 1 <= self.budget <= MAX_BUDGET or self.budget % 1:
+            rule = f"must be a whole number from 1 to {MAX_BUDGET:,}"
             raise InvalidValue("budget", self.budget, rule)
         object.__setattr__(self, "budget", int(self.budget))
-        object.__setattr__(self, "engine", named(self.engine))
+        object.__setattr__(self, "engine", engine_name(self.engine))
         if self.methods and self.engine != SCIPY:
             rule = f"are SciPy's, and the engine is {self.engine}"
             raise InvalidValue("methods", self.methods, rule, remedy="Leave them out.")
@@ -87,41 +89,41 @@ class Accuracy:
         At order eight it costs a third more than the first. The errors of the two are far apart,
         and nothing is shared that could be wrong in both.
         """
-        return _changed(self, self.rtol, 0.1 * self.refinement)
+        return _replace_cached(self, self.rtol, 0.1 * self.refinement)
 
-    def at(self, rtol: float) -> Accuracy:
+    def with_rtol(self, rtol: float) -> Accuracy:
         """The same with another `rtol`."""
-        return _changed(self, rtol, self.refinement)
+        return _replace_cached(self, rtol, self.refinement)
 
     @property
-    def solver(self) -> float:
+    def local_tolerance(self) -> float:
         """Local tolerance for the integrator: local errors add up over a motion, so a part of
         `rtol`.
         """
         return 0.07 * self.rtol * self.refinement
 
     @property
-    def switch_weight(self) -> float:
+    def max_inertia_weight(self) -> float:
         """Weight (K/a) w**2 of mass up to which the slow manifold stands in for the full equations.
 
         The manifold is of second order in it. Where slip peaks at a weight, ln V is off by 1.6
         times its third power, and over random scenes a stress drop by up to 0.4 times (the tests
         measure the first).
         """
-        return math.cbrt(0.75 * min(self.rtol, _LOOSEST_SWITCH) * self.refinement)
+        return math.cbrt(0.75 * min(self.rtol, _MAX_SWITCHING_RTOL) * self.refinement)
 
     @property
-    def switch_correction(self) -> float:
+    def max_inertia_correction(self) -> float:
         """Change d of ln V by inertia up to which the slow manifold may be used: this bound comes
         first where slip weakens strongly.
 
         Leaving it at d costs a cycle up to 0.07 d**3 over random scenes, and 0.0014 d**3 of the
         paper's slider (the tests measure it).
         """
-        return math.cbrt(15.0 * min(self.rtol, _LOOSEST_SWITCH) * self.refinement)
+        return math.cbrt(15.0 * min(self.rtol, _MAX_SWITCHING_RTOL) * self.refinement)
 
     @property
-    def remaining_slip(self) -> float:
+    def max_remaining_slip(self) -> float:
         """Slip in D_c that may remain when the inertial equations hand back to the slow
         manifold.
         """
@@ -129,14 +131,12 @@ class Accuracy:
 
 
 @lru_cache(maxsize=256)
-def _changed(accuracy: Accuracy, rtol: float, refinement: float) -> Accuracy:
+def _replace_cached(accuracy: Accuracy, rtol: float, refinement: float) -> Accuracy:
     """A copy, the same for all cells of a study."""
     return replace(accuracy, rtol=rtol, refinement=refinement)
 
 
-def error_between(
-    number: float, refined: float, chance: float, scale: float | None = None
-) -> float:
+def estimate_error(value: float, refined: float, floor: float, scale: float | None = None) -> float:
     """Error estimate of a number, from what `Accuracy.refined` makes of it.
 
     Three times the difference, which misses only where the second error is more than two thirds of
@@ -144,25 +144,25 @@ def error_between(
 
     Parameters
     ----------
-    number, refined : float
+    value, refined : float
         Results of the first run, and of the refined one.
-    chance : float
+    floor : float
         Relative error that chance may hide: a small part of the accuracy asked for, measured by the
         study coverage.
     scale : float, optional
         What that error is relative to, where the number itself may come near zero.
     """
-    number = float(number)
-    hidden = (chance + ROUNDING) * abs(number if scale is None else scale)
-    return 3.0 * abs(number - float(refined)) + hidden
+    value = float(value)
+    hidden = (floor + ROUNDING_ERROR) * abs(value if scale is None else scale)
+    return 3.0 * abs(value - float(refined)) + hidden
 
 
-def relative_work(rtol: float, by_digits: Mapping[float, float]) -> float:
+def relative_work(rtol: float, work_by_digits: Mapping[float, float]) -> float:
     """Cost of an accuracy over that of the default one, from measured costs by digits."""
-    known = sorted(by_digits)
+    known = sorted(work_by_digits)
     digits = min(-math.log10(rtol), known[-1] + 2.0)
     above = next((d for d in known[1:] if d >= digits), known[-1])
     below = known[known.index(above) - 1]
     share = (digits - below) / (above - below)
-    low, high = by_digits[below], by_digits[above]
+    low, high = work_by_digits[below], work_by_digits[above]
     return float(low * (high / low) ** share)

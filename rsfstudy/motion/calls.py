@@ -12,16 +12,16 @@ def evaluate(function, y, rates, p, result):
     function(y, rates, p, result)
 
 
-def first_of(array):
+def as_pointer(array):
     """An array from its first number on."""
     return array
 
 
-def moved(array, numbers):
+def offset_by(array, count):
     """An array from so many numbers further on."""
-    return array[numbers:]
+    return array[count:]
 
 
-def copy(source, target, count):
+def copy_values(source, target, count):
     """Copy so many numbers."""
     target[:count] = source[:count]

@@ -11,13 +11,13 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
-from rsfstudy.motion.layout import LOG_RATE, PSIS
+from rsfstudy.motion.layout import FIRST_STATE, LOG_SLIP_RATE
 from rsfstudy.motion.steppers import unrolled
 from rsfstudy.slider.equations import Equations
 from rsfstudy.slider.parts import Function, Numbers
 
 
-class Filling(NamedTuple):
+class InPlaceFunctions(NamedTuple):
     """Functions ``(y, rates, p, result)`` that fill arrays, in the order of the table of functions
     (`layout`); `attempt` is ``(y, stages, p, step)``, and the last is missing in ruptures.
     """
@@ -28,70 +28,86 @@ class Filling(NamedTuple):
     balance: Function | None
 
 
-def filling(equations: Equations) -> Filling:
+def in_place_functions(equations: Equations) -> InPlaceFunctions:
     """The functions that fill arrays for a system of equations; the same ones for all scenes of the
     same parts.
     """
-    rate, point, balance = equations.rate, equations.point, equations.balance
-    return _filling(
-        rate, point, balance, len(equations.unknowns), equations.states, len(equations.p)
+    rate, point, balance = (
+        equations.rate_function,
+        equations.point_function,
+        equations.balance_function,
+    )
+    return _build_in_place(
+        rate,
+        point,
+        balance,
+        len(equations.unknowns),
+        equations.state_count,
+        len(equations.parameters),
     )
 
 
 @cache
-def _filling(
+def _build_in_place(
     rate: Function,
     point: Function,
     balance: Function | None,
     unknowns: int,
     states: int,
-    count: int,
-) -> Filling:
-    of_unknowns, numbers = unpacking(unknowns), unpacking(count)
-    return Filling(
-        rates=rates_into(rate, of_unknowns, numbers, unknowns),
-        point=point_into(point, of_unknowns, numbers, states),
-        attempt=unrolled.attempt(rate, unknowns, numbers),
-        balance=balance and balance_into(balance, unpacking(states, first=1), numbers),
+    parameters: int,
+) -> InPlaceFunctions:
+    of_unknowns, numbers = unpack_function(unknowns), unpack_function(parameters)
+    return InPlaceFunctions(
+        rates=fill_rates_function(rate, of_unknowns, numbers, unknowns),
+        point=fill_point_function(point, of_unknowns, numbers, states),
+        attempt=unrolled.build_attempt_function(rate, unknowns, numbers),
+        balance=balance
+        and fill_balance_function(balance, unpack_function(states, first=1), numbers),
     )
 
 
-def rates_into(rate_of: Function, unknowns: Function, numbers: Function, count: int) -> Function:
+def fill_rates_function(
+    rate_of: Function, unpack_unknowns: Function, unpack_parameters: Function, count: int
+) -> Function:
     """Function that fills in the rates of so many unknowns."""
 
     def fill_rates(y, rates, p, result):  # type: ignore[no-untyped-def]
         for i in range(count):
             result[i] = math.nan
-        changes = rate_of(unknowns(y), numbers(p))
+        changes = rate_of(unpack_unknowns(y), unpack_parameters(p))
         for i in range(count):
             result[i] = changes[i]
 
     return fill_rates
 
 
-def point_into(point_of: Function, unknowns: Function, numbers: Function, states: int) -> Function:
+def fill_point_function(
+    point_of: Function, unpack_unknowns: Function, unpack_parameters: Function, states: int
+) -> Function:
     """Function that fills in the columns of a point, of unknowns and their rates."""
 
     def fill_point(y, rates, p, result):  # type: ignore[no-untyped-def]
-        result[LOG_RATE] = math.nan
-        point = point_of(unknowns(y), unknowns(rates), numbers(p))
-        columns = point[:PSIS]
-        for i in range(PSIS):
+        result[LOG_SLIP_RATE] = math.nan
+        point = point_of(unpack_unknowns(y), unpack_unknowns(rates), unpack_parameters(p))
+        columns = point[:FIRST_STATE]
+        for i in range(FIRST_STATE):
             result[i] = columns[i]
         for i in range(states):
-            result[PSIS + i] = point.psis[i]
+            result[FIRST_STATE + i] = point.psis[i]
 
     return fill_point
 
 
-def balance_into(balance_of: Function, psis_of: Function, numbers: Function) -> Function:
+def fill_balance_function(
+    balance_of: Function, unpack_states: Function, unpack_parameters: Function
+) -> Function:
     """Function that fills in ln(V/V_*) and friction on the slow manifold, at a spring stress and
     states.
     """
 
     def fill_balance(y, rates, p, result):  # type: ignore[no-untyped-def]
         result[0] = result[1] = math.nan
-        log_slip_rate, friction, _shift = balance_of(y[0], psis_of(y), numbers(p))
+        log_slip_rate, friction, _shift = balance_of(y[0], unpack_states(y), unpack_parameters(p))
         result[0] = log_slip_rate
         result[1] = friction
 
@@ -99,7 +115,7 @@ def balance_into(balance_of: Function, psis_of: Function, numbers: Function) -> 
 
 
 @cache
-def unpacking(count: int, first: int = 0) -> Callable[..., Numbers]:
+def unpack_function(count: int, first: int = 0) -> Callable[..., Numbers]:
     """A function that makes a tuple of so many numbers of an array."""
     made: dict[str, Any] = {}
     listed = ", ".join(f"y[{i}]" for i in range(first, first + count))

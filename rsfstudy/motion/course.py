@@ -8,31 +8,37 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.events import Event, EventSpecification, Kind
-from rsfstudy.motion.handover import limits
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.events import Event, EventKind, EventSpecification
+from rsfstudy.motion.handover import switch_thresholds
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.recording import Recording
-from rsfstudy.motion.running import along as along
-from rsfstudy.motion.running import happening, runner_of
-from rsfstudy.motion.starting import jumped, starting
+from rsfstudy.motion.running import driver_of, events_at_jump
+from rsfstudy.motion.running import events_along as events_along
+from rsfstudy.motion.starting import initial_point, point_after_jump
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.places import BEGINS, ENDS_AT, LOADING, LOG_LOAD_RATE, LOG_VELOCITY
+from rsfstudy.slider.places import (
+    LOADING,
+    LOG_LOAD_VELOCITY,
+    SEGMENT_END,
+    SEGMENT_LOG_VELOCITY,
+    SEGMENT_START,
+)
 from rsfstudy.slider.point import Point
-from rsfstudy.slider.scene import FOR_EVER, Scene
+from rsfstudy.slider.scene import ENDLESS_SEGMENT_TABLE, Scene
 from rsfstudy.slider.stability import largest_growth_rate
 
 
-def follow(
+def integrate_events(
     scene: Scene,
     accuracy: Accuracy,
-    meter: Meter,
+    meter: WorkMeter,
     specs: Sequence[EventSpecification] = (),
     *,
     start: Point | None = None,
-    clock: bool = False,
+    with_time: bool = False,
     recording: Recording | None = None,
     until: float = math.inf,
-    since: Event | None = None,
+    resume_from: Event | None = None,
 ) -> Iterator[Event]:
     """Follow a scene from the instant after its first step, for as long as the caller asks.
 
@@ -40,19 +46,19 @@ def follow(
     ----------
     scene : Scene
     accuracy : Accuracy
-    meter : Meter
+    meter : WorkMeter
         Charged with the work, by regime.
     specs : sequence of EventSpecification
         What to be told of.
     start : Point, optional
         Where to start, in the last segment of loading; else all begins with steady sliding at V_*.
-    clock : bool
+    with_time : bool
         Carry time along: without it, times and slips are NaN, and work is saved.
     recording : Recording, optional
         Takes in what the motion does, step by step.
     until : float
         Time at which to end.
-    since : Event, optional
+    resume_from : Event, optional
         End of an earlier motion of the scene, from which to go on.
 
     Yields
@@ -61,95 +67,107 @@ def follow(
 
     Raises
     ------
-    Halt
+    MotionStopped
         With `normal_stress_lost`, `shear_stress_reversed`, `locked` or `slip_rate_unbounded` where
         the equations end; `work_budget_spent`; or `integration_failed` where no step can be taken,
         a step has no length, or a number is not finite.
     """
     chains: Sequence[tuple[Scene, np.ndarray]]
-    chains = scene.chains if start is None else ((scene.acting(-1), FOR_EVER),)
-    clock = clock or until < math.inf or len(chains) > 1 or len(chains[0][1]) > 1
-    time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.told
-    if since is not None:
-        chains, start = _left(scene, since)
-        time, slip = since.time, since.slip
+    chains = (
+        scene.continuous_segments
+        if start is None
+        else ((scene.segment_scene(-1), ENDLESS_SEGMENT_TABLE),)
+    )
+    with_time = with_time or until < math.inf or len(chains) > 1 or len(chains[0][1]) > 1
+    time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.reported_segment_count
+    if resume_from is not None:
+        chains, start = _remaining_segments(scene, resume_from)
+        time, slip = resume_from.time, resume_from.slip
     for number, (acting, table) in enumerate(chains):
         if start is None:
-            start = starting(acting)
+            start = initial_point(acting)
         elif number:
-            start = jumped(acting, start)
+            start = point_after_jump(acting, start)
         goes_on = number == len(chains) - 1 and not acting.parts.loading.unknowns
-        asked = specs if goes_on and _may_settle(scene, specs) else _without_settling(specs)
-        table = _up_to(table, until)
-        end = float(table[-1, ENDS_AT])
-        motion = runner_of(acting, meter.engine, clock=clock).run(
+        asked = specs if goes_on and _may_settle(scene, specs) else _remove_settling(specs)
+        table = _segments_until(table, until)
+        end = float(table[-1, SEGMENT_END])
+        motion = driver_of(acting, meter.engine, with_time=with_time).run(
             start,
             meter,
             asked,
-            accuracy.solver,
-            times=(float(table[0, ENDS_AT]) - time if clock else math.inf, time, slip),
-            between=limits(acting, accuracy),
+            accuracy.local_tolerance,
+            start_times=(
+                float(table[0, SEGMENT_END]) - time if with_time else math.inf,
+                time,
+                slip,
+            ),
+            thresholds=switch_thresholds(acting, accuracy),
             recording=recording,
             kinks=(table[1:], told),
-            imposed=acting.numbers[LOADING + 2] if acting.parts.loading.displaces else None,
+            initial_imposed_stress=acting.numbers[LOADING + 2]
+            if acting.parts.loading.has_load_point_unknown
+            else None,
         )
         if before is None and end == math.inf:  # it has all there is to tell
             yield from motion
             return
         for last in motion:
-            if before is not None and last.kind is Kind.START:
-                for event in _begun(last, before, acting, asked):
+            if before is not None and last.kind is EventKind.START:
+                for event in _segment_start_events(last, before, acting, asked):
                     yield event
-                    if event.watch is not None and event.watch.ends:
+                    if event.specification is not None and event.specification.terminal:
                         return
-            elif last.kind is not Kind.END:
+            elif last.kind is not EventKind.END:
                 yield last
-                if last.watch is not None and last.watch.ends:
+                if last.specification is not None and last.specification.terminal:
                     return
-        if last.kind is Kind.END:
+        if last.kind is EventKind.END:
             # it was located to the spacing of numbers around the clock
             last = last._replace(time=end)
             if recording is not None:
-                recording.ends_at(end)
+                recording.clip_to(end)
         if end >= until:
             yield last
             return
         numbers = list(acting.numbers)  # of the first segment of the chain
-        numbers[LOG_LOAD_RATE] = float(table[-1, LOG_VELOCITY])
+        numbers[LOG_LOAD_VELOCITY] = float(table[-1, SEGMENT_LOG_VELOCITY])
         start, before = last.point, (last.point, tuple(numbers))
         time, slip = last.time, last.slip
 
 
-def _left(scene: Scene, since: Event) -> tuple[Sequence[tuple[Scene, np.ndarray]], Point]:
+def _remaining_segments(
+    scene: Scene, resume_from: Event
+) -> tuple[Sequence[tuple[Scene, np.ndarray]], Point]:
     """The chains of segments that are left after the end of a motion, and the point to begin at:
     behind the jump, where it ended at one.
     """
-    first, point, left = 0, since.point, []
-    for acting, table in scene.chains:
-        number = int(np.searchsorted(table[:, BEGINS], since.time, side="right")) - 1
+    first, point, left = 0, resume_from.point, []
+    for acting, table in scene.continuous_segments:
+        number = int(np.searchsorted(table[:, SEGMENT_START], resume_from.time, side="right")) - 1
         if number > 0:
-            acting = scene.acting(first + number)
-        if first and number == 0 and table[0, BEGINS] == since.time:
-            point = jumped(acting, point)
+            acting = scene.segment_scene(first + number)
+        if first and number == 0 and table[0, SEGMENT_START] == resume_from.time:
+            point = point_after_jump(acting, point)
         rest = table[max(number, 0) :].copy()
-        rest[0, BEGINS] = max(rest[0, BEGINS], since.time)
-        if rest[-1, ENDS_AT] > since.time:
+        rest[0, SEGMENT_START] = max(rest[0, SEGMENT_START], resume_from.time)
+        if rest[-1, SEGMENT_END] > resume_from.time:
             left.append((acting, rest))
         first += len(table)
     return left, point
 
 
-def _up_to(table: np.ndarray, until: float) -> np.ndarray:
+def _segments_until(table: np.ndarray, until: float) -> np.ndarray:
     """Those of the segments of a chain that begin before a time, the last of which ends then."""
-    if until == math.inf or table[-1, ENDS_AT] <= until:
+    if until == math.inf or table[-1, SEGMENT_END] <= until:
         return table
-    count = max(int(np.searchsorted(table[:, BEGINS], until)), 1)
+    count = max(int(np.searchsorted(table[:, SEGMENT_START], until)), 1)
     cut = table[:count].copy()
-    cut[-1, ENDS_AT] = min(until, cut[-1, ENDS_AT])
+    cut[-1, SEGMENT_END] = min(until, cut[-1, SEGMENT_END])
     return cut
 
 
-def _begun(
+def _segment_start_events(
     event: Event,
     before: tuple[Point, Numbers],
     acting: Scene,
@@ -158,10 +176,10 @@ def _begun(
     """Events where a later segment begins: that it does, and what happens there, after a point with
     the numbers of the segment before.
     """
-    yield event._replace(kind=Kind.SEGMENT)
-    for spec, point in happening(*before, event.point, acting.numbers, specs):
+    yield event._replace(kind=EventKind.SEGMENT)
+    for spec, point in events_at_jump(*before, event.point, acting.numbers, specs):
         # slip from the first point: the spring may have jumped with the load point
-        yield event._replace(kind=spec.kind, watch=spec, point=point)
+        yield event._replace(kind=spec.kind, specification=spec, point=point)
 
 
 def _may_settle(scene: Scene, specs: Sequence[EventSpecification]) -> bool:
@@ -169,11 +187,13 @@ def _may_settle(scene: Scene, specs: Sequence[EventSpecification]) -> bool:
 
     The growth rate of small perturbations is computed only if a specification asks for settling.
     """
-    if scene.log_load_rate == -math.inf or all(spec.kind is not Kind.SETTLED for spec in specs):
+    if scene.log_load_velocity == -math.inf or all(
+        spec.kind is not EventKind.SETTLED for spec in specs
+    ):
         return True
-    growth = largest_growth_rate(scene.acting(-1), scene.log_load_rate)
+    growth = largest_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
     return growth is None or not growth.is_positive
 
 
-def _without_settling(specs: Sequence[EventSpecification]) -> list[EventSpecification]:
-    return [spec for spec in specs if spec.kind is not Kind.SETTLED]
+def _remove_settling(specs: Sequence[EventSpecification]) -> list[EventSpecification]:
+    return [spec for spec in specs if spec.kind is not EventKind.SETTLED]

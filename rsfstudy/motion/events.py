@@ -3,33 +3,42 @@
 The module ``within_steps`` detects and locates the events. The table lists the events in order,
 each with its time, slip and point. A measure can request the following events:
 
-    maximum(of), minimum(of)    extremum of a quantity
-    rise(of, to), fall(of, to)  upward or downward crossing of a level by a quantity
-    settling(part)              distance from steady sliding below a fraction of the largest
+    maximum(quantity), minimum(quantity)
+                                extremum of a quantity
+    rise(quantity, level), fall(quantity, level)
+                                upward or downward crossing of a level by a quantity
+    approach_to_steady_state(fraction)
+                                distance from steady sliding below a fraction of the largest
                                 distance so far. The event is reported at the end of each such step
                                 in the last segment of loading, unless normal stress still changes
                                 or steady sliding is unstable.
 
 Each requested event may end the motion. The available quantities are the attributes of a ``Point``.
-The attribute ``reading`` is the friction coefficient that a rig measures. Extrema are available for
-``log_slip_rate``, ``spring_stress`` and ``reading``.
+The attribute ``apparent_friction`` is the friction coefficient that a rig measures. Extrema are
+available for ``log_slip_rate``, ``spring_stress`` and ``apparent_friction``.
 
 In addition to the requested events, the table lists the start of the motion, each change of regime,
 the beginning of each segment of loading, the end of the motion, and the end of the step in which
 the last requested sample was recorded. An event at the transition between two regimes or segments
 is reported at the beginning of the later regime or segment. If a motion cannot continue, it raises
-``Halt`` with the reason.
+``MotionStopped`` with the reason.
 """
 
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
+from rsfstudy._deprecation import (
+    renamed_keywords,
+    renamed_members,
+    renamed_names,
+    renamed_value,
+)
 from rsfstudy.slider.point import Point
 
 
-class Kind(StrEnum):
+class EventKind(StrEnum):
     """Kinds of events."""
 
     START = "start"
@@ -47,56 +56,78 @@ class Kind(StrEnum):
     __hash__ = str.__hash__
 
 
+@renamed_members
 class EventSpecification(NamedTuple):
     """Event specification; whether the motion ends there; and whether whoever asks can wait for it,
     and for the beginning, until something else has happened: an engine may then tell several events
     at once.
     """
 
-    kind: Kind
-    of: str = ""
+    kind: EventKind
+    quantity: str = ""
     level: float = 0.0
-    ends: bool = False
-    waits: bool = False
+    terminal: bool = False
+    may_defer: bool = False
 
 
-def maximum(of: str, *, ends: bool = False, waits: bool = False) -> EventSpecification:
-    """A maximum of ``log_slip_rate``, ``spring_stress`` or ``reading``."""
-    return EventSpecification(Kind.MAXIMUM, of, ends=ends, waits=waits)
+@renamed_keywords
+def maximum(
+    quantity: str, *, terminal: bool = False, may_defer: bool = False
+) -> EventSpecification:
+    """A maximum of ``log_slip_rate``, ``spring_stress`` or ``apparent_friction``."""
+    return _on_quantity(EventKind.MAXIMUM, quantity, terminal=terminal, may_defer=may_defer)
 
 
-def minimum(of: str, *, ends: bool = False, waits: bool = False) -> EventSpecification:
-    """A minimum of ``log_slip_rate``, ``spring_stress`` or ``reading``."""
-    return EventSpecification(Kind.MINIMUM, of, ends=ends, waits=waits)
+@renamed_keywords
+def minimum(
+    quantity: str, *, terminal: bool = False, may_defer: bool = False
+) -> EventSpecification:
+    """A minimum of ``log_slip_rate``, ``spring_stress`` or ``apparent_friction``."""
+    return _on_quantity(EventKind.MINIMUM, quantity, terminal=terminal, may_defer=may_defer)
 
 
-def rise(of: str, to: float, *, ends: bool = False, waits: bool = False) -> EventSpecification:
+@renamed_keywords
+def rise(
+    quantity: str, level: float, *, terminal: bool = False, may_defer: bool = False
+) -> EventSpecification:
     """A quantity on its way up, at a level."""
-    return EventSpecification(Kind.RISE, of, to, ends, waits)
+    return _on_quantity(EventKind.RISE, quantity, level, terminal=terminal, may_defer=may_defer)
 
 
-def fall(of: str, to: float, *, ends: bool = False, waits: bool = False) -> EventSpecification:
+@renamed_keywords
+def fall(
+    quantity: str, level: float, *, terminal: bool = False, may_defer: bool = False
+) -> EventSpecification:
     """A quantity on its way down, at a level."""
-    return EventSpecification(Kind.FALL, of, to, ends, waits)
+    return _on_quantity(EventKind.FALL, quantity, level, terminal=terminal, may_defer=may_defer)
 
 
-def settling(part: float, *, ends: bool = False) -> EventSpecification:
+def _on_quantity(
+    kind: EventKind, quantity: str, level: float = 0.0, *, terminal: bool, may_defer: bool
+) -> EventSpecification:
+    """Return an event specification. The quantity may have its former name."""
+    return EventSpecification(kind, renamed_value(Point, quantity), level, terminal, may_defer)
+
+
+@renamed_keywords
+def approach_to_steady_state(fraction: float, *, terminal: bool = False) -> EventSpecification:
     """Return the specification of an event for motions that approach steady sliding.
 
     The event occurs if the distance from steady sliding falls below a fraction of the largest
     distance so far. The distance is measured in ln V and in each state divided by b. Unknowns
     listed in the attribute ``excluded_from_distance`` of a part are ignored.
     """
-    return EventSpecification(Kind.SETTLED, level=part, ends=ends)
+    return EventSpecification(EventKind.SETTLED, level=fraction, terminal=terminal)
 
 
+@renamed_members
 class Event(NamedTuple):
     """One row of the table.
 
     Attributes
     ----------
-    kind : Kind
-    watch : EventSpecification or None
+    kind : EventKind
+    specification : EventSpecification or None
         What was asked for, if it was.
     time, slip : float
         Since the start, in D_c/V_* and D_c; NaN in a motion without clock.
@@ -104,18 +135,22 @@ class Event(NamedTuple):
         What the slider does then.
     regime : str
         The equations in use.
-    work : int
+    evaluations : int
         Right-hand sides spent so far.
     clock : float
         Clock of those equations, since they have been in use: length along the path, or slip of a
         rigid slider.
     """
 
-    kind: Kind
-    watch: EventSpecification | None
+    kind: EventKind
+    specification: EventSpecification | None
     time: float
     slip: float
     point: Point
     regime: str
-    work: int
+    evaluations: int
     clock: float
+
+
+if not TYPE_CHECKING:
+    __getattr__ = renamed_names(__name__)

@@ -5,97 +5,98 @@ or not, with whatever stepper, events are found here. `running` calls it.
 
 To follow a rupture with a debugger, simulate a scene with ``inertia=True``, because without mass
 there is one regime only; with ``engine="scipy"``, or ``engine="python"`` to see inside of steps.
-Each step passes `cut_short` once: a breakpoint there with the condition ``motion.regime == 1``
-(`FAST`) stops at each step of a rupture, of which ``space.before`` and ``space.after`` are the
-points at both ends (columns in the order of `layout.LOG_RATE` and so on). The line ``return
-REGIME_ENDS`` of `through_regime` is its end with the same condition, and its beginning with
-``motion.regime == 0`` (`SLOW`). `layout` says who writes which field of ``motion``.
+Each step passes `truncate_step` once: a breakpoint there with the condition ``motion.regime == 1``
+(`FAST_REGIME`) stops at each step of a rupture, of which ``space.point_at_begin`` and
+``space.point_at_end`` are the points at both ends (columns in the order of `layout.LOG_SLIP_RATE`
+and so on). The line ``return REGIME_ENDED`` of `follow_regime` is its end with the same condition,
+and its beginning with ``motion.regime == 0`` (`SLOW_REGIME`). `layout` says who writes which field
+of ``motion``.
 """
 
 from __future__ import annotations
 
 import math
 
-from rsfstudy.motion.calls import copy, evaluate, first_of, moved
+from rsfstudy.motion.calls import as_pointer, copy_values, evaluate, offset_by
 from rsfstudy.motion.handover import (
-    GOES_ON,
-    Limits,
-    begins_slow,
-    has_returned,
-    margin,
-    may_return,
-    termination_of,
+    CONTINUES,
+    SwitchThresholds,
+    find_termination,
+    may_switch_back,
+    should_switch_back,
+    starts_on_manifold,
+    termination_margin,
 )
 from rsfstudy.motion.layout import (
-    BEGIN,
-    CHANGE,
-    END,
-    ENDED,
-    FAST,
-    FRICTION,
-    FUNCTIONS,
-    GROWTH,
-    HALTED,
-    KINK,
-    LOG_RATE,
-    NO_LENGTH,
-    PAUSES,
-    PSIS,
-    RATIO,
-    REGIME_ENDS,
-    SAMPLED,
-    SEGMENT_ENDS,
-    SLOW,
-    SPECIFIED,
-    SPRING,
-    TAKEN,
-    WITHIN_STEPS,
+    END_CODE,
+    FAST_REGIME,
+    FIRST_STATE,
+    FRICTIONAL_STRESS,
+    FUNCTIONS_PER_REGIME,
+    INVALID_STEP,
+    KINK_CODE,
+    LOG_SLIP_RATE,
+    LOG_SLIP_RATE_GROWTH,
+    MOTION_ENDED,
+    NORMAL_STRESS_RATIO,
+    PAUSED,
+    RECORD_WITHIN_STEPS,
+    REGIME_CODE,
+    REGIME_ENDED,
+    SAMPLED_CODE,
+    SEGMENT_ENDED,
+    SLOW_REGIME,
+    SPECIFICATION_COLUMNS,
+    SPRING_STRESS,
+    START_CODE,
+    STEP_TAKEN,
+    TERMINATED,
 )
-from rsfstudy.motion.recording import SAMPLES
+from rsfstudy.motion.recording import SAMPLES_PER_STEP
 from rsfstudy.motion.steppers import begin, retake
 from rsfstudy.motion.steps import (
-    cut,
-    elapsed,
-    halve_unresolved,
-    passed_at_begin,
-    passed_at_end,
+    halve_unresolved_step,
+    regime_time,
     take_step,
+    time_at_begin,
+    time_at_end,
+    truncate_at,
 )
 from rsfstudy.motion.within_steps import (
-    EXCESS,
-    MARGIN,
-    PASSED,
-    excess,
-    is_recorded,
-    located,
-    record,
-    record_begin,
-    report,
-    report_beginning,
-    report_end,
-    slipped,
-    waits,
+    SWITCH_CONDITION,
+    TERMINATION_CONDITION,
+    TIME_CONDITION,
+    has_deferrable_event,
+    is_step_recorded,
+    locate_crossing,
+    record_regime_start,
+    record_step,
+    report_events,
+    report_start,
+    report_step_end,
+    slip_since_start,
+    switch_excess,
 )
-from rsfstudy.motion.workspace import workspace
+from rsfstudy.motion.workspace import create_workspace
 from rsfstudy.slider.places import (
-    BEGINS,
-    ENDS_AT,
+    BOUNDARY_PRESSURE_RATE,
     LAW,
     LOAD_VELOCITY,
     LOADING,
-    LOG_LOAD_RATE,
-    LOG_VELOCITY,
-    RATE,
-    RECHARGE,
-    RELIEF,
-    VELOCITY,
+    LOG_LOAD_VELOCITY,
+    SEGMENT_END,
+    SEGMENT_LOG_VELOCITY,
+    SEGMENT_START,
+    SEGMENT_STRESS_FALL,
+    SEGMENT_STRESS_RATE,
+    SEGMENT_VELOCITY,
 )
 
 #: How often the clock at which a step is to end is looked for.
-CORRECTIONS = 2
+END_TIME_CORRECTIONS = 2
 #: Change of ln V_0 at a kink beyond which the length of steps is found anew: displacement along the
 #: path, V + V_0, is then another, and rejected steps would cost more than the first one does.
-FAR = 3.0
+MAX_LOG_LOAD_RATE_CHANGE = 3.0
 
 
 def advance(memory, y, last, block, plan, specs, kinks, samples, events, rows, stepper):
@@ -130,205 +131,242 @@ def advance(memory, y, last, block, plan, specs, kinks, samples, events, rows, s
         Why it returns.
     """
     motion = memory[0]
-    motion.events = motion.recorded = 0
+    motion.event_rows = motion.recorded_rows = 0
     scales, functions, numbers, p, p_before = plan
-    y, scales, block = first_of(y), first_of(scales), first_of(block)
-    last, p, p_before = first_of(last), first_of(p), first_of(p_before)
-    limits = Limits(*numbers)
-    given = first_of(specs), len(specs) // len(SPECIFIED), p, p_before, limits, stepper
-    if motion.at_point:
-        begin_at(motion, y, last, functions, block, limits, p)
-    end = REGIME_ENDS
-    while end == REGIME_ENDS:
+    y, scales, block = as_pointer(y), as_pointer(scales), as_pointer(block)
+    last, p, p_before = as_pointer(last), as_pointer(p), as_pointer(p_before)
+    limits = SwitchThresholds(*numbers)
+    given = (
+        as_pointer(specs),
+        len(specs) // len(SPECIFICATION_COLUMNS),
+        p,
+        p_before,
+        limits,
+        stepper,
+    )
+    if motion.starts_at_point:
+        enter_initial_regime(motion, y, last, functions, block, limits, p)
+    end = REGIME_ENDED
+    while end == REGIME_ENDED:
         unknowns, first = motion.unknowns, 0
-        if motion.regime == FAST:
+        if motion.regime == FAST_REGIME:
             unknowns, first = motion.unknowns_fast, motion.unknowns
-        own, equations = moved(scales, first), functions[motion.regime]
-        space = workspace(block, y, unknowns, own, motion.states, equations, given)
-        end = through_regime(motion, space, last, samples, events, rows)
-        if end == REGIME_ENDS:
-            motion.regime = SLOW if motion.regime == FAST else FAST
-            motion.begins, motion.length = CHANGE, 0.0
-            enter(motion, y, last)
-        elif end == SEGMENT_ENDS:
-            regime, end = motion.regime, REGIME_ENDS
-            turn(motion, space, last, kinks, rows)
-            begin_at(motion, y, last, functions, block, limits, p)
+        own, equations = offset_by(scales, first), functions[motion.regime]
+        space = create_workspace(block, y, unknowns, own, motion.states, equations, given)
+        end = follow_regime(motion, space, last, samples, events, rows)
+        if end == REGIME_ENDED:
+            motion.regime = SLOW_REGIME if motion.regime == FAST_REGIME else FAST_REGIME
+            motion.pending_start, motion.next_step_length = REGIME_CODE, 0.0
+            enter_regime(motion, y, last)
+        elif end == SEGMENT_ENDED:
+            regime, end = motion.regime, REGIME_ENDED
+            enter_segment(motion, space, last, kinks, rows)
+            enter_initial_regime(motion, y, last, functions, block, limits, p)
             if motion.regime != regime:
-                motion.length = 0.0
-        if end == REGIME_ENDS and (motion.urgent or is_full(motion, space.specified, events, rows)):
-            motion.urgent, end = 0, PAUSES
+                motion.next_step_length = 0.0
+        if end == REGIME_ENDED and (
+            motion.must_report or tables_full(motion, space.spec_count, events, rows)
+        ):
+            motion.must_report, end = 0, PAUSED
     return end
 
 
-def is_full(motion, specified, events, rows):
+def tables_full(motion, spec_count, events, rows):
     """True if the tables have no room for all that one more step may add to them."""
-    full = len(events) - motion.events < 2 * specified + 4
-    return full or (len(rows) > 0 and len(rows) - motion.recorded < 2 * SAMPLES)
+    full = len(events) - motion.event_rows < 2 * spec_count + 4
+    return full or (len(rows) > 0 and len(rows) - motion.recorded_rows < 2 * SAMPLES_PER_STEP)
 
 
-def turn(motion, space, last, kinks, rows):
+def enter_segment(motion, space, last, kinks, rows):
     """Go on to the next segment of loading, whose numbers take the place of those before it."""
-    n, p, relief = len(kinks) - motion.kinks, space.p, PSIS + motion.states - 1 - motion.behind
-    copy(space.after, last, PSIS + motion.states)
-    motion.slip = slipped(motion, motion.end, motion.lasts, last[SPRING], p)
-    motion.spring_stress, motion.time, motion.started = last[SPRING], kinks[n, BEGINS], 0.0
-    motion.lasts = kinks[n, ENDS_AT] - kinks[n, BEGINS]
-    motion.begins, motion.kinks = KINK, motion.kinks - 1
-    if motion.records == WITHIN_STEPS:  # to the last digit, too
-        rows[motion.recorded - 1, 0] = motion.time
-    copy(p, space.p_before, LAW)
+    n, p, relief = (
+        len(kinks) - motion.kinks_ahead,
+        space.parameters,
+        FIRST_STATE + motion.states - 1 - motion.unknowns_behind_fluid,
+    )
+    copy_values(space.point_at_end, last, FIRST_STATE + motion.states)
+    motion.slip = slip_since_start(motion, motion.end, motion.end_time, last[SPRING_STRESS], p)
+    motion.spring_stress, motion.time, motion.regime_start_time = (
+        last[SPRING_STRESS],
+        kinks[n, SEGMENT_START],
+        0.0,
+    )
+    motion.end_time = kinks[n, SEGMENT_END] - kinks[n, SEGMENT_START]
+    motion.pending_start, motion.kinks_ahead = KINK_CODE, motion.kinks_ahead - 1
+    if motion.recording_mode == RECORD_WITHIN_STEPS:  # to the last digit, too
+        rows[motion.recorded_rows - 1, 0] = motion.time
+    copy_values(p, space.parameters_before, LAW)
     # the length of a step goes on with the motion, unless its path has become quite another
-    if not abs(kinks[n, LOG_VELOCITY] - p[LOG_LOAD_RATE]) < FAR:
-        motion.length = 0.0
-    p[LOAD_VELOCITY], p[LOG_LOAD_RATE] = kinks[n, VELOCITY], kinks[n, LOG_VELOCITY]
-    if not math.isnan(kinks[n, RATE]):
-        p[RECHARGE if motion.behind else LOADING] = kinks[n, RATE]
-        last[relief] = kinks[n, RELIEF]
+    if not abs(kinks[n, SEGMENT_LOG_VELOCITY] - p[LOG_LOAD_VELOCITY]) < MAX_LOG_LOAD_RATE_CHANGE:
+        motion.next_step_length = 0.0
+    p[LOAD_VELOCITY], p[LOG_LOAD_VELOCITY] = (
+        kinks[n, SEGMENT_VELOCITY],
+        kinks[n, SEGMENT_LOG_VELOCITY],
+    )
+    if not math.isnan(kinks[n, SEGMENT_STRESS_RATE]):
+        p[BOUNDARY_PRESSURE_RATE if motion.unknowns_behind_fluid else LOADING] = kinks[
+            n, SEGMENT_STRESS_RATE
+        ]
+        last[relief] = kinks[n, SEGMENT_STRESS_FALL]
 
 
-def begin_at(motion, y, last, functions, below, limits, p):
+def enter_initial_regime(motion, y, last, functions, manifold, limits, p):
     """Begin in the regime that a point is for; `below` takes in the slow manifold there."""
-    motion.at_point, motion.regime = 0, SLOW
-    enter(motion, y, last)
+    motion.starts_at_point, motion.regime = 0, SLOW_REGIME
+    enter_regime(motion, y, last)
     if motion.has_mass:
-        evaluate(functions[SLOW, FUNCTIONS - 1], y, y, p, below)
-        if not begins_slow(last[LOG_RATE], below[0], last[SPRING] - below[1], limits):
-            motion.regime = FAST
-            enter(motion, y, last)
+        evaluate(functions[SLOW_REGIME, FUNCTIONS_PER_REGIME - 1], y, y, p, manifold)
+        if not starts_on_manifold(
+            last[LOG_SLIP_RATE], manifold[0], last[SPRING_STRESS] - manifold[1], limits
+        ):
+            motion.regime = FAST_REGIME
+            enter_regime(motion, y, last)
 
 
-def enter(motion, y, last):
+def enter_regime(motion, y, last):
     """Begin a regime at the last point of one before: spring stress, states and time carry over;
     between ruptures ln V and friction follow from these, and jump.
     """
-    y[0] = last[SPRING]
-    if motion.regime == FAST:
-        y[1], y[2] = last[LOG_RATE], last[FRICTION]
+    y[0] = last[SPRING_STRESS]
+    if motion.regime == FAST_REGIME:
+        y[1], y[2] = last[LOG_SLIP_RATE], last[FRICTIONAL_STRESS]
         for i in range(1, motion.states):
-            y[2 + i] = last[PSIS + i]
+            y[2 + i] = last[FIRST_STATE + i]
         y[2 + motion.states] = 0.0
     else:
         for i in range(motion.states):
-            y[1 + i] = last[PSIS + i]
+            y[1 + i] = last[FIRST_STATE + i]
         y[1 + motion.states] = 0.0
 
 
-def through_regime(motion, space, last, samples, events, rows):
+def follow_regime(motion, space, last, samples, events, rows):
     """Follow one regime; returns why it ends, or why the call has to."""
-    if motion.begins:
-        motion.pace = 0.0
+    if motion.pending_start:
+        motion.time_per_step = 0.0
         begin(motion, space)
-        if motion.begins != KINK:
-            motion.resolved = math.inf
+        if motion.pending_start != KINK_CODE:
+            motion.dense_output_limit = math.inf
     else:
-        copy(moved(space.y, space.unknowns), space.rates, space.unknowns)
-    evaluate(space.point, space.y, space.rates, space.p, space.before)
+        copy_values(offset_by(space.y, space.unknowns), space.rates, space.unknowns)
+    evaluate(space.point, space.y, space.rates, space.parameters, space.point_at_begin)
     while True:
         taken = take_step(motion, space)
-        if taken != TAKEN:
+        if taken != STEP_TAKEN:
             return taken
-        if is_recorded(motion, space, samples):
-            halve_unresolved(motion, space)
-        evaluate(space.point, space.new, space.rates_at_end, space.p, space.after)
-        if math.isnan(space.after[LOG_RATE]):
-            return NO_LENGTH
-        if motion.terminates and not goes_on(motion, space):
-            return HALTED
-        leaves, over = cut_short(motion, space)
-        if motion.begins:
-            record_begin(motion, space, rows)
-            if report_beginning(motion, space, last, events):
-                return ENDED
-        complete = motion.records and record(motion, space, rows, samples, over)
-        urgent = report(motion, space, events)
-        if motion.begins == BEGIN and not waits(space):
+        if is_step_recorded(motion, space, samples):
+            halve_unresolved_step(motion, space)
+        evaluate(space.point, space.y_end, space.rates_at_end, space.parameters, space.point_at_end)
+        if math.isnan(space.point_at_end[LOG_SLIP_RATE]):
+            return INVALID_STEP
+        if motion.may_terminate and not is_valid(motion, space):
+            return TERMINATED
+        leaves, over = truncate_step(motion, space)
+        if motion.pending_start:
+            record_regime_start(motion, space, rows)
+            if report_start(motion, space, last, events):
+                return MOTION_ENDED
+        complete = motion.recording_mode and record_step(motion, space, rows, samples, over)
+        urgent = report_events(motion, space, events)
+        if motion.pending_start == START_CODE and not has_deferrable_event(space):
             urgent = max(urgent, 2)
-        motion.begins = 0
+        motion.pending_start = 0
         if urgent == 3:
-            return ENDED
+            return MOTION_ENDED
         if complete:
             urgent = 2
-            report_end(motion, space, events, SAMPLED)
-        if over and motion.kinks > 0:
-            motion.urgent = int(urgent == 2)
-            return SEGMENT_ENDS
+            report_step_end(motion, space, events, SAMPLED_CODE)
+        if over and motion.kinks_ahead > 0:
+            motion.must_report = int(urgent == 2)
+            return SEGMENT_ENDED
         if over:
-            report_end(motion, space, events, END)
-            return ENDED
-        if leaves or returns(motion, space):
-            motion.started = passed_at_end(motion, space)
-            copy(space.after, last, PSIS + motion.states)
-            return REGIME_ENDS
-        if motion.terminates and motion.termination != GOES_ON:
-            return HALTED
-        move_on(motion, space)
-        if urgent == 2 or is_full(motion, space.specified, events, rows):
-            copy(space.rates, moved(space.y, space.unknowns), space.unknowns)
-            return PAUSES
+            report_step_end(motion, space, events, END_CODE)
+            return MOTION_ENDED
+        if leaves or has_left_rupture(motion, space):
+            motion.regime_start_time = time_at_end(motion, space)
+            copy_values(space.point_at_end, last, FIRST_STATE + motion.states)
+            return REGIME_ENDED
+        if motion.may_terminate and motion.termination != CONTINUES:
+            return TERMINATED
+        accept_step(motion, space)
+        if urgent == 2 or tables_full(motion, space.spec_count, events, rows):
+            copy_values(space.rates, offset_by(space.y, space.unknowns), space.unknowns)
+            return PAUSED
 
 
-def goes_on(motion, space):
+def is_valid(motion, space):
     """True if a motion does, if only through this step: that then ends where the motion does."""
-    columns, velocity = space.after, space.p[LOAD_VELOCITY]
-    motion.stress = columns[RATIO]
-    motion.termination = termination_of(columns[LOG_RATE], motion.stress, velocity)
-    if motion.termination == GOES_ON:
+    columns, velocity = space.point_at_end, space.parameters[LOAD_VELOCITY]
+    motion.final_normal_stress = columns[NORMAL_STRESS_RATIO]
+    motion.termination = find_termination(
+        columns[LOG_SLIP_RATE], motion.final_normal_stress, velocity
+    )
+    if motion.termination == CONTINUES:
         return True
-    at_begin = margin(space.before[LOG_RATE], space.before[RATIO], velocity)
-    at_end = margin(columns[LOG_RATE], columns[RATIO], velocity)
+    at_begin = termination_margin(
+        space.point_at_begin[LOG_SLIP_RATE], space.point_at_begin[NORMAL_STRESS_RATIO], velocity
+    )
+    at_end = termination_margin(columns[LOG_SLIP_RATE], columns[NORMAL_STRESS_RATIO], velocity)
     if at_begin <= 0.0:
         return False
-    cut(motion, space, located(MARGIN, at_begin, at_end, motion, space))
+    truncate_at(
+        motion, space, locate_crossing(TERMINATION_CONDITION, at_begin, at_end, motion, space)
+    )
     return True
 
 
-def cut_short(motion, space):
+def truncate_step(motion, space):
     """Let the step end where the regime has to be left, and where time is over; whether it is."""
-    before, after = excess(motion, space, space.before), excess(motion, space, space.after)
+    before, after = (
+        switch_excess(motion, space, space.point_at_begin),
+        switch_excess(motion, space, space.point_at_end),
+    )
     leaves = after >= 0.0 > before
     if leaves:
-        cut(motion, space, located(EXCESS, before, after, motion, space))
-    if motion.pace > 0.0 and motion.end == motion.clock + motion.taken:
+        truncate_at(motion, space, locate_crossing(SWITCH_CONDITION, before, after, motion, space))
+    if motion.time_per_step > 0.0 and motion.end == motion.clock + motion.step_length:
         return leaves, True
-    over = passed_at_end(motion, space) >= motion.lasts
+    over = time_at_end(motion, space) >= motion.end_time
     if over:
-        motion.target = motion.lasts
-        at_begin = passed_at_begin(motion, space) - motion.lasts
-        at_end = passed_at_end(motion, space) - motion.lasts
-        end_in_time(motion, space, located(PASSED, at_begin, at_end, motion, space))
+        motion.target_time = motion.end_time
+        at_begin = time_at_begin(motion, space) - motion.end_time
+        at_end = time_at_end(motion, space) - motion.end_time
+        end_at_time(motion, space, locate_crossing(TIME_CONDITION, at_begin, at_end, motion, space))
     return leaves, over
 
 
-def end_in_time(motion, space, clock):
+def end_at_time(motion, space, clock):
     """Let the step end where time is over.
 
     Dense output tells the clock. Where stability limits steps it is far less accurate than their
     ends: the step is taken anew to that clock, and again with what time it was missing.
     """
-    for _ in range(CORRECTIONS):
+    for _ in range(END_TIME_CORRECTIONS):
         retake(motion, space, clock)
-        late = passed_at_end(motion, space) - motion.lasts
-        clock -= late / elapsed(motion, space, space.rates_at_end)
-    evaluate(space.point, space.new, space.rates_at_end, space.p, space.after)
+        late = time_at_end(motion, space) - motion.end_time
+        clock -= late / regime_time(motion, space, space.rates_at_end)
+    evaluate(space.point, space.y_end, space.rates_at_end, space.parameters, space.point_at_end)
 
 
-def returns(motion, space):
+def has_left_rupture(motion, space):
     """True if the full equations have done their work."""
-    if motion.regime == SLOW or not may_return(space.after[LOG_RATE], space.limits):
+    if motion.regime == SLOW_REGIME or not may_switch_back(
+        space.point_at_end[LOG_SLIP_RATE], space.limits
+    ):
         return False
-    columns, below = space.after, space.between
-    space.within[0] = columns[SPRING]
+    columns, below = space.point_at_end, space.point_within
+    space.y_within[0] = columns[SPRING_STRESS]
     for i in range(motion.states):
-        space.within[1 + i] = columns[PSIS + i]
-    evaluate(space.balance, space.within, space.within, space.p, below)
-    missing = columns[SPRING] - below[1]
-    return has_returned(columns[LOG_RATE], columns[GROWTH], below[0], missing, space.limits)
+        space.y_within[1 + i] = columns[FIRST_STATE + i]
+    evaluate(space.balance, space.y_within, space.y_within, space.parameters, below)
+    missing = columns[SPRING_STRESS] - below[1]
+    return should_switch_back(
+        columns[LOG_SLIP_RATE], columns[LOG_SLIP_RATE_GROWTH], below[0], missing, space.limits
+    )
 
 
-def move_on(motion, space):
+def accept_step(motion, space):
     """The end of a step is the beginning of the next."""
     motion.clock = motion.end
-    copy(space.new, space.y, space.unknowns)
-    copy(space.rates_at_end, space.rates, space.unknowns)
-    copy(space.after, space.before, PSIS + motion.states)
+    copy_values(space.y_end, space.y, space.unknowns)
+    copy_values(space.rates_at_end, space.rates, space.unknowns)
+    copy_values(space.point_at_end, space.point_at_begin, FIRST_STATE + motion.states)

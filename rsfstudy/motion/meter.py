@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
+from rsfstudy._deprecation import renamed_members, renamed_names
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.motion.engines import SCIPY
 from rsfstudy.status import Status
 
 #: Local tolerance at which the longest steps of equations hold as they are; at others they change
 #: as steps of order eight do.
-TOLERANCE_OF_STRIDES = 1e-7
+STEP_LIMIT_TOLERANCE = 1e-7
 #: Local tolerance below which rounding decides, and SciPy warns.
-TIGHTEST = 5e-14
+MIN_LOCAL_TOLERANCE = 5e-14
 
 
-def more_work(budget: int) -> str:
+def larger_budget_remedy(budget: int) -> str:
     """Remedy of allowing more than a budget, to be added to a message."""
     return f"; --budget {4 * budget} (budget=) allows more"
 
 
-class Halt(RsfStudyError):
+class MotionStopped(RsfStudyError):
     """A motion that cannot go on, with the status that says why."""
 
     def __init__(self, status: Status, message: str) -> None:
@@ -29,8 +31,9 @@ class Halt(RsfStudyError):
         self.status = status
 
 
+@renamed_members
 @dataclass
-class Meter:
+class WorkMeter:
     """Work that one measurement spends, by regime, with which integrators; ends it when its budget
     is spent.
 
@@ -42,53 +45,59 @@ class Meter:
         Name of the SciPy integrator of a regime; DOP853 where none is named.
     engine : str
         What integrates.
-    by_regime : dict
+    evaluations_by_regime : dict
         Right-hand sides evaluated so far.
-    spent, steps, jacobians : int
+    evaluations, steps, jacobians : int
         Right-hand sides in all (those of numerical Jacobians too), steps, and Jacobians.
     """
 
     budget: int
     methods: Mapping[str, str] = field(default_factory=dict)
     engine: str = SCIPY
-    by_regime: dict[str, int] = field(default_factory=dict)
-    spent: int = 0
+    evaluations_by_regime: dict[str, int] = field(default_factory=dict)
+    evaluations: int = 0
     steps: int = 0
     jacobians: int = 0
 
     def charge(self, regime: str, evaluations: int) -> None:
-        """Add evaluations; raises `Halt` once more than the budget is spent."""
+        """Add evaluations; raises `MotionStopped` once more than the budget is spent."""
         self.add(regime, evaluations)
-        self.check()
+        self.check_budget()
 
     def add(self, regime: str, evaluations: int) -> None:
         """Add evaluations."""
-        self.by_regime[regime] = self.by_regime.get(regime, 0) + evaluations
-        self.spent += evaluations
+        self.evaluations_by_regime[regime] = self.evaluations_by_regime.get(regime, 0) + evaluations
+        self.evaluations += evaluations
 
-    def check(self) -> None:
-        """Raise `Halt` where more than the budget is spent."""
-        if self.spent > self.budget:
-            raise Halt(
+    def check_budget(self) -> None:
+        """Raise `MotionStopped` where more than the budget is spent."""
+        if self.evaluations > self.budget:
+            raise MotionStopped(
                 Status.WORK_BUDGET_SPENT,
                 f"more than {self.budget} right-hand sides without an answer",
             )
 
-    def settle(self, regimes: Sequence[str], known: Sequence[int], spent: Sequence[int]) -> int:
+    def charge_difference(
+        self, regimes: Sequence[str], spent_before: Sequence[int], spent: Sequence[int]
+    ) -> int:
         """Add what a motion has spent since what is known of it; returns what else is on the meter.
 
         Parameters
         ----------
         regimes : sequence of str
             Those of the motion: one, or that between ruptures and that in them.
-        known, spent : sequence of int
+        spent_before, spent : sequence of int
             Right-hand sides in one and in the other, steps, and Jacobians: before, and now.
         """
-        others = self.spent - known[0] - known[1]
-        if spent[0] > known[0]:
-            self.add(regimes[0], spent[0] - known[0])
-        if spent[1] > known[1]:
-            self.add(regimes[1], spent[1] - known[1])
-        self.steps += spent[2] - known[2]
-        self.jacobians += spent[3] - known[3]
+        others = self.evaluations - spent_before[0] - spent_before[1]
+        if spent[0] > spent_before[0]:
+            self.add(regimes[0], spent[0] - spent_before[0])
+        if spent[1] > spent_before[1]:
+            self.add(regimes[1], spent[1] - spent_before[1])
+        self.steps += spent[2] - spent_before[2]
+        self.jacobians += spent[3] - spent_before[3]
         return others
+
+
+if not TYPE_CHECKING:
+    __getattr__ = renamed_names(__name__)

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from rsfstudy.motion.engines import SCIPY, on_arrays
 from rsfstudy.motion.events import Event
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 
 #: What is recorded, in this order.
-OBSERVED = (
+MOTION_VARIABLES = (
     "time",
     "slip",
     "log10_slip_rate",
@@ -26,17 +25,21 @@ OBSERVED = (
     "state_variable",
 )
 #: Those that are shear stress.
-STRESSES = slice(OBSERVED.index("shear_stress"), OBSERVED.index("frictional_stress") + 1)
+STRESS_COLUMNS = slice(
+    MOTION_VARIABLES.index("shear_stress"), MOTION_VARIABLES.index("frictional_stress") + 1
+)
 #: The same, and what a rig reads.
-READ = (*OBSERVED, "friction_coefficient")
-#: Columns behind those: the regime; the place within a step, 0 where a regime begins and `SAMPLES`
-#: at the end of each step; and from this one on the states.
-REGIME, PLACE, STATES = range(len(READ), len(READ) + 3)
+RECORDED_VARIABLES = (*MOTION_VARIABLES, "friction_coefficient")
+#: Columns behind those: the regime; the place within a step, 0 where a regime begins and
+#: `SAMPLES_PER_STEP` at the end of each step; and from this one on the states.
+REGIME_COLUMN, SAMPLE_COLUMN, FIRST_STATE_COLUMN = range(
+    len(RECORDED_VARIABLES), len(RECORDED_VARIABLES) + 3
+)
 #: Times that follow each other differ by so many floating-point numbers, and by so much, at least:
 #: they still differ in other units, where each is rounded anew.
-_APART, _LEAST = 4, 1e-290
+_MIN_TIME_ULPS, _MIN_TIME_DIFFERENCE = 4, 1e-290
 #: Samples within each integration step of a recorded motion: enough for a smooth curve.
-SAMPLES = 6
+SAMPLES_PER_STEP = 6
 
 
 @dataclass
@@ -47,143 +50,133 @@ class Recording:
     ----------
     regimes : list of str
         Those of the motion, as they came.
-    at : ndarray, optional
+    sample_times : ndarray, optional
         Times at which to record, in D_c/V_*, or slips in D_c of a rigid slider; they must not fall.
         Without it, all of the motion is recorded, evenly within each step. Where a segment of
         loading begins at such a time, what it ends with is recorded.
     """
 
     regimes: list[str] = field(default_factory=list)
-    at: np.ndarray | None = None
+    sample_times: np.ndarray | None = None
     _rows: list[np.ndarray] = field(default_factory=list)
-    _ended: int = 0
+    _clipped_blocks: int = 0
 
-    def number(self, regime: str) -> int:
+    def regime_number(self, regime: str) -> int:
         """Place of a regime among those of the motion."""
         if regime not in self.regimes:
             self.regimes.append(regime)
         return self.regimes.index(regime)
 
-    def left(self) -> np.ndarray:
+    def remaining_times(self) -> np.ndarray:
         """Times that are still to be recorded."""
-        assert self.at is not None
-        return np.asarray(self.at, dtype=float)[sum(map(len, self._rows)) :]
+        assert self.sample_times is not None
+        return np.asarray(self.sample_times, dtype=float)[sum(map(len, self._rows)) :]
 
-    def take(self, rows: np.ndarray, regimes: Sequence[str]) -> None:
+    def append(self, rows: np.ndarray, regimes: Sequence[str]) -> None:
         """Take in rows as the loop makes them, in which regimes are numbered as in a list."""
-        if self.at is not None and not np.isnan(rows[0, 0]):
-            rows[:, 0] = self.at[len(self.at) - len(self.left()) :][: len(rows)]
-        numbers = [self.number(name) for name in regimes]
+        if self.sample_times is not None and not np.isnan(rows[0, 0]):
+            rows[:, 0] = self.sample_times[len(self.sample_times) - len(self.remaining_times()) :][
+                : len(rows)
+            ]
+        numbers = [self.regime_number(name) for name in regimes]
         if numbers != list(range(len(numbers))):
-            rows[:, REGIME] = np.array(numbers)[rows[:, REGIME].astype(int)]
+            rows[:, REGIME_COLUMN] = np.array(numbers)[rows[:, REGIME_COLUMN].astype(int)]
         self._rows.append(rows)
 
-    def ends_at(self, time: float) -> None:
+    def clip_to(self, time: float) -> None:
         """End at this time what was taken in since the last such time, or the start."""
-        if self.at is not None:
+        if self.sample_times is not None:
             return
-        for rows in self._rows[self._ended :]:
+        for rows in self._rows[self._clipped_blocks :]:
             np.minimum(rows[:, 0], time, out=rows[:, 0])
-        if self._ended < len(self._rows):
+        if self._clipped_blocks < len(self._rows):
             self._rows[-1][-1:, 0] = time
-        self._ended = len(self._rows)
+        self._clipped_blocks = len(self._rows)
 
-    def seen(self, scene: Scene, until: Event | None = None) -> np.ndarray:
-        """The quantities of `READ`, the number of the regime and the states freed of stress, in
-        columns; up to an event. Of states, those that there are in every segment of loading.
+    def table(self, scene: Scene, until: Event | None = None) -> np.ndarray:
+        """The quantities of `RECORDED_VARIABLES`, the number of the regime and the states freed of
+        stress, in columns; up to an event. Of states, those that there are in every segment of
+        loading.
         """
-        rows = self._rows or [np.empty((0, STATES + scene.states))]
+        rows = self._rows or [np.empty((0, FIRST_STATE_COLUMN + scene.state_count))]
         columns = min(part.shape[1] for part in rows)
         table = np.concatenate([part[:, :columns] for part in rows])
         if until is not None:
-            last = row(until.time, until.slip, until.point, self.number(until.regime))
-            table = up_to(table, np.array(last[:columns]))
-        return in_units_of(scene, table)
+            last = pack_row(until.time, until.slip, until.point, self.regime_number(until.regime))
+            table = truncate_table(table, np.array(last[:columns]))
+        return to_recorded_units(scene, table)
 
 
-def in_units_of(scene: Scene, rows: np.ndarray) -> np.ndarray:
+def to_recorded_units(scene: Scene, rows: np.ndarray) -> np.ndarray:
     """The same rows, of which slip rates become decimal logarithms, and stresses those that act."""
     rows[..., 2] /= math.log(10.0)
-    rows[..., STRESSES] += scene.mu_star
+    rows[..., STRESS_COLUMNS] += scene.mu_star
     return rows
 
 
-def row(time: float, slip: float, point: Point, regime: int) -> tuple[float, ...]:
-    """Row that is recorded of a point: the quantities of `READ`, less scales and offsets, the
-    regime, the place within a step, and the states.
+def pack_row(time: float, slip: float, point: Point, regime: int) -> tuple[float, ...]:
+    """Row that is recorded of a point: the quantities of `RECORDED_VARIABLES`, less scales and
+    offsets, the regime, the place within a step, and the states.
     """
-    stresses = point.spring_stress, point.friction, point.normal_stress
+    stresses = point.spring_stress, point.frictional_stress, point.normal_stress
     return (
-        *(time, slip, point.log_slip_rate, *stresses, point.state, point.reading),
+        *(time, slip, point.log_slip_rate, *stresses, point.state, point.apparent_friction),
         *(regime, 0.0, *point.psis),
     )
 
 
-def strictly_later(table: np.ndarray) -> np.ndarray:
+def with_increasing_times(table: np.ndarray) -> np.ndarray:
     """A recorded motion whose times strictly increase.
 
     A regime or segment begins with a row at the time at which another has ended. It takes the place
     of one that holds the same; where they differ, it follows a few floating-point numbers later, as
     do rows of a rupture shorter than the spacing of those numbers.
     """
-    same = (np.diff(np.delete(table, [REGIME, PLACE], axis=1), axis=0) == 0.0).all(axis=1)
+    same = (np.diff(np.delete(table, [REGIME_COLUMN, SAMPLE_COLUMN], axis=1), axis=0) == 0.0).all(
+        axis=1
+    )
     table = table[~np.append(same, np.zeros(min(len(table), 1), dtype=bool))]
     times, earliest = table[:, 0].tolist(), -math.inf
     for place, time in enumerate(times):
         times[place] = max(time, earliest)
-        earliest = times[place] + max(_APART * math.ulp(times[place]), _LEAST)
+        earliest = times[place] + max(_MIN_TIME_ULPS * math.ulp(times[place]), _MIN_TIME_DIFFERENCE)
     table[:, 0] = times
     return table
 
 
-def up_to(table: np.ndarray, last: np.ndarray) -> np.ndarray:
+def truncate_table(table: np.ndarray, last_row: np.ndarray) -> np.ndarray:
     """Rows up to one within a step, or at its end, evenly spaced in what is left of the step, whose
     rows in the table they replace. Its time tells where in the step it is.
     """
-    after = int(table[:, 0].searchsorted(last[0]))
-    place = int(table[after, PLACE]) if after < len(table) else 0
+    after = int(table[:, 0].searchsorted(last_row[0]))
+    place = int(table[after, SAMPLE_COLUMN]) if after < len(table) else 0
     begin = after - place
-    if not place or begin + SAMPLES >= len(table):  # nothing was recorded beyond it
-        return np.vstack([table[:after], last])
-    part, times = float(place), table[begin : begin + SAMPLES + 1, 0]
-    if times[place] > last[0] > times[place - 1]:
-        late = (_INVERSE @ (times - last[0])).tolist()
-        sides = (place - 1.0) / HALF - 1.0, place / HALF - 1.0
-        if _polynomial(sides[0], late) < 0.0 < _polynomial(sides[1], late):
-            part = HALF * (1.0 + brentq(_polynomial, *sides, args=(late,)))
-    within = part / SAMPLES * _PLACES[1:-1]
-    step = table[begin + 1 : begin + SAMPLES + 1]
-    step[:-1], step[-1] = _weights(within).T @ table[begin : begin + SAMPLES + 1], last
-    step[:, REGIME], step[:, PLACE] = last[REGIME], _PLACES[1:]
-    return table[: begin + SAMPLES + 1]
+    if not place or begin + SAMPLES_PER_STEP >= len(table):  # nothing was recorded beyond it
+        return np.vstack([table[:after], last_row])
+    part, times = float(place), table[begin : begin + SAMPLES_PER_STEP + 1, 0]
+    if times[place] > last_row[0] > times[place - 1]:
+        late = (_INVERSE_VANDERMONDE @ (times - last_row[0])).tolist()
+        sides = (place - 1.0) / HALF_SAMPLES - 1.0, place / HALF_SAMPLES - 1.0
+        if _evaluate_polynomial(sides[0], late) < 0.0 < _evaluate_polynomial(sides[1], late):
+            part = HALF_SAMPLES * (1.0 + brentq(_evaluate_polynomial, *sides, args=(late,)))
+    within = part / SAMPLES_PER_STEP * _SAMPLE_INDICES[1:-1]
+    step = table[begin + 1 : begin + SAMPLES_PER_STEP + 1]
+    step[:-1], step[-1] = (
+        _interpolation_weights(within).T @ table[begin : begin + SAMPLES_PER_STEP + 1],
+        last_row,
+    )
+    step[:, REGIME_COLUMN], step[:, SAMPLE_COLUMN] = last_row[REGIME_COLUMN], _SAMPLE_INDICES[1:]
+    return table[: begin + SAMPLES_PER_STEP + 1]
 
 
-def along_path(
-    table: np.ndarray, points: int, names: Sequence[str] = OBSERVED, engine: str = SCIPY
-) -> dict[str, np.ndarray]:
-    """Columns of a record, by the names of the first columns, at points spread evenly along the
-    path, half by its length in time, ln V and stress, half by the steps the integrator took, which
-    are short where the path bends. Each extreme of slip rate and of stress is one of the points.
-    """
-    if not len(table):
-        return {name: np.full(points, np.nan) for name in names}
-    columns, found = np.ascontiguousarray(table.T), np.empty((len(names), points))
-    path, at, room = np.zeros(len(table)), np.empty(points), np.empty(SAMPLES + 1)
-    seen = [columns[place] for place in (*_PATH, PLACE)]
-    on_arrays(spread_along_path, engine, columns, *seen, path, at, room, found)
-    # times of a rupture may differ by less than rounding
-    np.maximum.accumulate(found[0], out=found[0])
-    return dict(zip(names, found, strict=True))
-
-
-def spread_along_path(  # type: ignore[no-untyped-def]
-    columns, time, rate, stress, places, path, at, room, found
+def resample_along_path(  # type: ignore[no-untyped-def]
+    columns, time, log_slip_rate, stress, samples, path, row_positions, work_array, result
 ):
     """Fill in how far along the path the rows are, numbers of rows and parts that are spread evenly
     along it, and the first columns there.
     """
-    last, points, total = len(path) - 1, len(at), 0.0
-    for values in (time, rate, stress):
+    last, points, total = len(path) - 1, len(row_positions), 0.0
+    for values in (time, log_slip_rate, stress):
         lowest = highest = values[0]
         for value in values:
             lowest, highest = min(lowest, value), max(highest, value)
@@ -202,91 +195,102 @@ def spread_along_path(  # type: ignore[no-untyped-def]
     for i in range(points):
         while row < last - 1 and path[row + 1] <= i * apart:
             row += 1
-        at[i] = row + (i * apart - path[row]) / (path[row + 1] - path[row]) if last else 0.0
-    at[points - 1] = last
-    for values in (rate, stress):
+        row_positions[i] = (
+            row + (i * apart - path[row]) / (path[row + 1] - path[row]) if last else 0.0
+        )
+    row_positions[points - 1] = last
+    for values in (log_slip_rate, stress):
         top = bottom = 0
         for i in range(last + 1):
             if values[i] > values[top]:
                 top = i
             elif values[i] < values[bottom]:
                 bottom = i
-        put_nearest(at, extreme_at(values, places, top, room))
-        put_nearest(at, extreme_at(values, places, bottom, room))
-    at_rows(columns, at, found)
+        replace_nearest(row_positions, find_extreme_position(values, samples, top, work_array))
+        replace_nearest(row_positions, find_extreme_position(values, samples, bottom, work_array))
+    interpolate_rows(columns, row_positions, result)
 
 
-def put_nearest(at: Any, place: float) -> None:
+def replace_nearest(row_positions: Any, row_position: float) -> None:
     """Put a place among others that rise where the nearest of those between the ends is."""
     nearest = 1
-    while nearest < len(at) - 2 and abs(at[nearest + 1] - place) <= abs(at[nearest] - place):
+    while nearest < len(row_positions) - 2 and abs(
+        row_positions[nearest + 1] - row_position
+    ) <= abs(row_positions[nearest] - row_position):
         nearest += 1
-    if nearest < len(at) - 1:
-        at[nearest] = place
+    if nearest < len(row_positions) - 1:
+        row_positions[nearest] = row_position
 
 
-def extreme_at(values: Any, places: Any, top: int, room: Any) -> float:
+def find_extreme_position(values: Any, samples: Any, extreme_row: int, work_array: Any) -> float:
     """Number of the row, and part to the next, where values are extreme; next to an extreme row."""
-    for after in (top, top + 1):  # the step it lies in, or ends, and the one that begins with it
-        begin = after - int(places[after]) if after < len(values) else after
-        if begin == after or begin + SAMPLES >= len(values):
+    for after in (
+        extreme_row,
+        extreme_row + 1,
+    ):  # the step it lies in, or ends, and the one that begins with it
+        begin = after - int(samples[after]) if after < len(values) else after
+        if begin == after or begin + SAMPLES_PER_STEP >= len(values):
             continue
-        for power in range(SAMPLES + 1):
-            room[power] = 0.0
-            for k in range(SAMPLES + 1):
-                room[power] += COEFFICIENTS[power][k] * (values[begin + k] - values[top])
-        at = (top - begin) / HALF - 1.0
+        for power in range(SAMPLES_PER_STEP + 1):
+            work_array[power] = 0.0
+            for k in range(SAMPLES_PER_STEP + 1):
+                work_array[power] += INTERPOLATION_COEFFICIENTS[power][k] * (
+                    values[begin + k] - values[extreme_row]
+                )
+        at = (extreme_row - begin) / HALF_SAMPLES - 1.0
         for _ in range(4):
             slope = bend = 0.0
-            for power in range(SAMPLES, 1, -1):
-                slope = slope * at + power * room[power]
-                bend = bend * at + power * (power - 1) * room[power]
-            slope = slope * at + room[1]
+            for power in range(SAMPLES_PER_STEP, 1, -1):
+                slope = slope * at + power * work_array[power]
+                bend = bend * at + power * (power - 1) * work_array[power]
+            slope = slope * at + work_array[1]
             at -= slope / bend if bend != 0.0 else 0.0
-        place = HALF * (1.0 + at)
-        if abs(place - (top - begin)) < 1.0 and 0.0 <= place <= SAMPLES:
+        place = HALF_SAMPLES * (1.0 + at)
+        if abs(place - (extreme_row - begin)) < 1.0 and 0.0 <= place <= SAMPLES_PER_STEP:
             return begin + place
-    return float(top)
+    return float(extreme_row)
 
 
-def at_rows(columns: np.ndarray, at: np.ndarray, found: np.ndarray) -> None:
+def interpolate_rows(columns: np.ndarray, row_positions: np.ndarray, result: np.ndarray) -> None:
     """Fill in values of columns between rows, at numbers of rows and parts: of the polynomial
     through those of the step. The compiler has a loop in place of this (`compiled.calls`).
     """
-    columns, at, found = map(np.asarray, (columns, at, found))
-    after = np.ceil(at).astype(int)
-    within = columns[PLACE, after].astype(int)
+    columns, row_positions, result = map(np.asarray, (columns, row_positions, result))
+    after = np.ceil(row_positions).astype(int)
+    within = columns[SAMPLE_COLUMN, after].astype(int)
     # from one regime to the next there is a straight line
-    jumps = np.flatnonzero((within == 0) & (at > 0.0))
+    jumps = np.flatnonzero((within == 0) & (row_positions > 0.0))
     within[jumps] = 1
     begin = after - within
-    part = at - begin
-    columns = columns[: len(found)]
-    around = columns.take(begin + _PLACES[:, None], axis=1, mode="clip")
-    np.einsum("kp,ckp->cp", _weights(part), around, out=found)
+    part = row_positions - begin
+    columns = columns[: len(result)]
+    around = columns.take(begin + _SAMPLE_INDICES[:, None], axis=1, mode="clip")
+    np.einsum("kp,ckp->cp", _interpolation_weights(part), around, out=result)
     at_a_row = np.flatnonzero(part == np.rint(part))
-    found[:, at_a_row] = columns[:, (begin + part.astype(int))[at_a_row]]
+    result[:, at_a_row] = columns[:, (begin + part.astype(int))[at_a_row]]
     line, share = begin[jumps], part[jumps]
-    found[:, jumps] = (1.0 - share) * columns[:, line] + share * columns[:, line + 1]
+    result[:, jumps] = (1.0 - share) * columns[:, line] + share * columns[:, line + 1]
 
 
-#: Columns by which the length of a path is measured.
-_PATH = tuple(OBSERVED.index(name) for name in ("time", "log10_slip_rate", "shear_stress"))
 #: Coefficients of the polynomial through the values at the places of a step, by those values: in
 #: places from its middle, over half of them.
-HALF, _PLACES = 0.5 * SAMPLES, np.arange(SAMPLES + 1)
-_INVERSE = np.linalg.inv(np.vander(np.linspace(-1.0, 1.0, SAMPLES + 1), increasing=True))
-COEFFICIENTS = tuple(tuple(row) for row in _INVERSE.tolist())
+HALF_SAMPLES, _SAMPLE_INDICES = 0.5 * SAMPLES_PER_STEP, np.arange(SAMPLES_PER_STEP + 1)
+_INVERSE_VANDERMONDE = np.linalg.inv(
+    np.vander(np.linspace(-1.0, 1.0, SAMPLES_PER_STEP + 1), increasing=True)
+)
+INTERPOLATION_COEFFICIENTS = tuple(tuple(row) for row in _INVERSE_VANDERMONDE.tolist())
 
 
-def _polynomial(at: float, coefficients: Sequence[float]) -> float:
+def _evaluate_polynomial(x: float, coefficients: Sequence[float]) -> float:
     """Value of a polynomial, by the coefficients of rising powers."""
     value = 0.0
     for coefficient in reversed(coefficients):
-        value = coefficient + at * value
+        value = coefficient + x * value
     return value
 
 
-def _weights(parts: np.ndarray) -> np.ndarray:
+def _interpolation_weights(positions: np.ndarray) -> np.ndarray:
     """Weights of the values at the places of a step, a row each, at parts of it in places."""
-    return np.asarray(_INVERSE.T @ (parts / HALF - 1.0) ** _PLACES[:, None])
+    return np.asarray(
+        _INVERSE_VANDERMONDE.T @ (positions / HALF_SAMPLES - 1.0) ** _SAMPLE_INDICES[:, None]
+    )

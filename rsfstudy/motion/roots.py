@@ -6,10 +6,10 @@ import math
 
 from rsfstudy.slider.parts import Function
 
-_MOST_ITERATIONS = 100
+_MAX_ITERATIONS = 100
 
 
-def root_of(function: Function) -> Function:
+def build_root_finder(function: Function) -> Function:
     """``(low, high, at_low, at_high, finest, relative, given)``: where a function of a number and
     of what is `given` changes sign, by Brent's method, from its values at two numbers.
 
@@ -24,7 +24,7 @@ def root_of(function: Function) -> Function:
         latest, best, other = low, high, low
         at_latest, at_best, at_other = at_low, at_high, at_low
         move = earlier = best - latest
-        for _ in range(_MOST_ITERATIONS):
+        for _ in range(_MAX_ITERATIONS):
             if at_latest != 0.0 and at_best != 0.0 and (at_latest < 0.0) != (at_best < 0.0):
                 other, at_other = latest, at_latest
                 move = earlier = best - latest
@@ -37,7 +37,7 @@ def root_of(function: Function) -> Function:
                 return best
             tried = half
             if abs(earlier) > enough and abs(at_best) < abs(at_latest):
-                tried = guess(latest, best, other, at_latest, at_best, at_other)
+                tried = interpolation_step(latest, best, other, at_latest, at_best, at_other)
                 if not 2.0 * abs(tried) < min(abs(earlier), 3.0 * abs(half) - enough):
                     tried = move = half
             else:
@@ -51,13 +51,13 @@ def root_of(function: Function) -> Function:
     return root
 
 
-def guess(
-    latest: float, best: float, other: float, at_latest: float, at_best: float, at_other: float
+def interpolation_step(
+    previous: float, best: float, other: float, at_previous: float, at_best: float, at_other: float
 ) -> float:
     """Distance of the root from the best point, by a line or inverse quadratic interpolation."""
-    if latest == other:
-        return -at_best * (best - latest) / (at_best - at_latest)
-    to_latest = (at_latest - at_best) / (latest - best)
+    if previous == other:
+        return -at_best * (best - previous) / (at_best - at_previous)
+    to_latest = (at_previous - at_best) / (previous - best)
     to_other = (at_other - at_best) / (other - best)
-    numerator = at_other * to_other - at_latest * to_latest
-    return -at_best * numerator / (to_other * to_latest * (at_other - at_latest))
+    numerator = at_other * to_other - at_previous * to_latest
+    return -at_best * numerator / (to_other * to_latest * (at_other - at_previous))

@@ -4,99 +4,125 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from rsfstudy._deprecation import renamed_members
 from rsfstudy.motion import layout, workspace
-from rsfstudy.motion.columns import filling
-from rsfstudy.motion.engines import COMPILED, compiled_engine, stepper_of
-from rsfstudy.motion.events import Event, EventSpecification, Kind
-from rsfstudy.motion.handover import NO_MASS, Limits, halted
+from rsfstudy.motion.columns import in_place_functions
+from rsfstudy.motion.engine_factory import compiled_engine, create_stepper
+from rsfstudy.motion.engines import COMPILED
+from rsfstudy.motion.events import Event, EventKind, EventSpecification
+from rsfstudy.motion.handover import NO_SWITCHING, SwitchThresholds, termination_error
 from rsfstudy.motion.loop import advance
-from rsfstudy.motion.meter import TIGHTEST, TOLERANCE_OF_STRIDES, Halt, Meter
-from rsfstudy.motion.recording import SAMPLES, STATES, STRESSES, Recording
-from rsfstudy.motion.within_steps import BEFORE, NOWHERE, between
-from rsfstudy.slider.derived import once
-from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture
+from rsfstudy.motion.meter import (
+    MIN_LOCAL_TOLERANCE,
+    STEP_LIMIT_TOLERANCE,
+    MotionStopped,
+    WorkMeter,
+)
+from rsfstudy.motion.recording import (
+    FIRST_STATE_COLUMN,
+    SAMPLES_PER_STEP,
+    STRESS_COLUMNS,
+    Recording,
+)
+from rsfstudy.motion.within_steps import BEFORE_JUMP, NO_EVENT, find_jump_side
+from rsfstudy.slider.derived import cached_per_scene
+from rsfstudy.slider.equations import Equations, equations_between_ruptures, equations_in_rupture
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.places import RELIEF
+from rsfstudy.slider.places import SEGMENT_STRESS_FALL
 from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
 #: Rows of the tables of events and of recordings that one call may fill.
-_EVENTS, _RECORDED = 64, 4096
-_KINDS = {kind: layout.__dict__[kind.name] for kind in Kind if kind.name in layout.__dict__}
+_MIN_EVENT_ROWS, _RECORDING_ROWS = 64, 4096
+_KIND_CODES = {
+    kind: layout.__dict__[kind.name] for kind in EventKind if kind.name in layout.__dict__
+}
 #: Columns of a point, by the names of its numbers; what is asked of none reads the first.
-_COLUMNS = {name: column for column, name in enumerate(Point._fields[:-1])} | {"": 0}
+_QUANTITY_COLUMNS = {name: column for column, name in enumerate(Point._fields[:-1])} | {"": 0}
 #: What is told beside what was asked for: the codes of these count from the end.
-_BESIDE = [(k, None) for k in (Kind.SEGMENT, Kind.SAMPLED, Kind.END, Kind.REGIME, Kind.START)]
+_UNREQUESTED_EVENTS = [
+    (k, None)
+    for k in (
+        EventKind.SEGMENT,
+        EventKind.SAMPLED,
+        EventKind.END,
+        EventKind.REGIME,
+        EventKind.START,
+    )
+]
 #: Makes a named tuple of a tuple, in half the time that its name takes.
-_named = tuple.__new__
-_TOO_SHORT = "a step would be shorter than the spacing of numbers around the clock"
-_NOTHING = layout.NEVER, np.empty(0), np.empty((0, STATES))
-_NO_KINKS = np.empty((0, RELIEF + 1)), 0
+_new_named_tuple = tuple.__new__
+_STEP_TOO_SHORT_TEXT = "a step would be shorter than the spacing of numbers around the clock"
+_NO_RECORDING = layout.RECORD_NEVER, np.empty(0), np.empty((0, FIRST_STATE_COLUMN))
+_NO_KINKS = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
 
 
-class Plain:
-    """The loop as it stands, and its arguments; `compiled.machine.Compiled` is the other machine
-    that runs it.
+class PythonBackend:
+    """The loop as it stands, and its arguments; `compiled.machine.NumbaBackend` is the other
+    machine that runs it.
     """
 
-    def initial(self, fields: tuple[tuple[str, float], ...]) -> dict[str, float]:
+    def initial_values(self, fields: tuple[tuple[str, float], ...]) -> dict[str, float]:
         """Initial state of motions that have these numbers in their state, and others 0."""
         return {**dict.fromkeys(layout.MOTION.names or (), 0), **dict(fields)}
 
-    def state(self, initial: dict[str, float], called_with: tuple[float, ...]) -> PlainState:
-        """The state of a motion: its `memory`, and what it `says` of itself."""
-        called = zip(layout.CALLED_WITH_FIELDS, called_with, strict=True)
-        return PlainState(**{**initial, **dict(called)})
+    def create_state(
+        self, initial: dict[str, float], called_with: tuple[float, ...]
+    ) -> PythonMotionState:
+        """The state of a motion: its `memory`, and its `counters`."""
+        called = zip(layout.CALL_FIELDS, called_with, strict=True)
+        return PythonMotionState(**{**initial, **dict(called)})
 
-    def table(self, systems: tuple[Equations, ...]) -> np.ndarray:
+    def function_table(self, systems: tuple[Equations, ...]) -> np.ndarray:
         """The table of functions of the regimes."""
-        rows = np.zeros((2, layout.FUNCTIONS), dtype=object)
+        rows = np.zeros((2, layout.FUNCTIONS_PER_REGIME), dtype=object)
         for row, system in zip(rows, systems, strict=False):
-            row[:] = filling(system)
-        rows[layout.FAST, -1] = rows[layout.SLOW, -1]
+            row[:] = in_place_functions(system)
+        rows[layout.FAST_REGIME, -1] = rows[layout.SLOW_REGIME, -1]
         return rows
 
-    def passed(self, *arrays: np.ndarray) -> Sequence[memoryview]:
+    def as_arguments(self, *arrays: np.ndarray) -> Sequence[memoryview]:
         """Arrays as the loop takes them."""
         return [memoryview(array) for array in arrays]  # type: ignore[arg-type]
 
-    def numbers(self, p: Sequence[float]) -> Any:
+    def as_parameters(self, p: Sequence[float]) -> Any:
         """The numbers of a scene as the loop takes them."""
         return list(p)
 
-    def advance(self) -> Any:
+    def loop_function(self) -> Any:
         """The loop."""
         return advance
 
 
-class PlainState(SimpleNamespace):
+@partial(renamed_members, writable=True)
+class PythonMotionState(SimpleNamespace):
     """The state of a motion in plain Python."""
 
     @property
-    def memory(self) -> list[PlainState]:
+    def memory(self) -> list[PythonMotionState]:
         """The state as the loop takes it."""
         return [self]
 
-    def says(self) -> tuple[int, ...]:
+    def counters(self) -> tuple[int, ...]:
         """Right-hand sides by regime, steps, events, rows, and Jacobians."""
         return (
-            *(self.spent_slow, self.spent_fast, self.steps),
-            *(self.events, self.recorded, self.jacobians),
+            *(self.evaluations_slow, self.evaluations_fast, self.steps),
+            *(self.event_rows, self.recorded_rows, self.jacobians),
         )
 
-    def field(self, name: str) -> float:
+    def get_field(self, name: str) -> float:
         """One of its fields."""
         return float(getattr(self, name))
 
 
-class Runner:
+class MotionDriver:
     """Runs motions by the same equations, which may differ in their numbers and beginnings.
 
     Parameters
@@ -118,40 +144,46 @@ class Runner:
         engine: str,
         **fields: float,
     ) -> None:
-        self._systems: tuple[Equations, ...] = (slow,) if fast is None else (slow, fast)
-        self._machine = compiled_engine().Compiled() if engine == COMPILED else Plain()
-        self._states, unknowns = slow.states, [len(system.unknowns) for system in self._systems]
+        self._equations: tuple[Equations, ...] = (slow,) if fast is None else (slow, fast)
+        self._backend = compiled_engine().NumbaBackend() if engine == COMPILED else PythonBackend()
+        self._states, unknowns = (
+            slow.state_count,
+            [len(system.unknowns) for system in self._equations],
+        )
         self._unknowns = max(unknowns)
-        scales = np.array([scale for system in self._systems for scale in system.scales])
-        self._called = *self._machine.passed(scales), self._machine.table(self._systems)
-        self._p = self._machine.numbers(slow.p)
-        self._regimes = [system.regime for system in self._systems]
+        scales = np.array([scale for system in self._equations for scale in system.scales])
+        self._scales_and_functions = (
+            *self._backend.as_arguments(scales),
+            self._backend.function_table(self._equations),
+        )
+        self._p = self._backend.as_parameters(slow.parameters)
+        self._regimes = [system.regime for system in self._equations]
         fields |= {
-            "begins": layout.BEGIN,
-            "limits_steps": not slow.is_rigid,
+            "pending_start": layout.START_CODE,
+            "clock_is_path_length": not slow.is_rigid,
             "slip_is_clock": slow.is_rigid,
             "unknowns": unknowns[0],
-            "states": slow.states,
+            "states": slow.state_count,
             "unknowns_fast": sum(unknowns[1:]),
             "has_mass": fast is not None,
         }
-        self._initial = self._machine.initial(tuple(fields.items()))
+        self._initial_values = self._backend.initial_values(tuple(fields.items()))
 
     def run(
         self,
         start: Point | Numbers,
-        meter: Meter,
+        meter: WorkMeter,
         specs: Sequence[EventSpecification],
         tolerance: float,
         *,
-        times: tuple[float, float, float] = (math.inf, 0.0, 0.0),
+        start_times: tuple[float, float, float] = (math.inf, 0.0, 0.0),
         backward: bool = False,
         p: Numbers | None = None,
-        between: Limits = NO_MASS,
+        thresholds: SwitchThresholds = NO_SWITCHING,
         budget: float = math.inf,
         recording: Recording | None = None,
         kinks: tuple[np.ndarray, int] = _NO_KINKS,
-        imposed: float | None = None,
+        initial_imposed_stress: float | None = None,
     ) -> Iterator[Event]:
         """Events of a motion, a table of them by each call of the loop.
 
@@ -159,103 +191,111 @@ class Runner:
         ----------
         start : Point or tuple of float
             Where it begins: a point, whose regime is found, or the unknowns.
-        meter : Meter
+        meter : WorkMeter
             Charged with the work.
         specs : sequence of EventSpecification
         tolerance : float
             Local error per step.
-        times : tuple of float
+        start_times : tuple of float
             How long it lasts, and time and slip where it begins.
         backward : bool
             Run against the clock of the equations.
         p : tuple of float, optional
             Other numbers than those of the equations.
-        between : Limits
+        thresholds : SwitchThresholds
             When to change between the regimes.
         budget : float
             Right-hand sides it may spend, if fewer than the meter leaves.
         recording : Recording, optional
         kinks : tuple of ndarray and int
             Those of the loading, and how many of the last ones are reported.
-        imposed : float, optional
+        initial_imposed_stress : float, optional
             Where the load point moves to and fro, shear stress that this adds when the last unknown
             is zero: while steps are taken, stresses are without what it adds, told with it.
 
         Raises
         ------
-        Halt
+        MotionStopped
             Where it cannot go on.
         """
-        machine, states, systems, numbers = self._machine, self._states, self._systems, self._p
+        machine, states, systems, numbers = self._backend, self._states, self._equations, self._p
         before, turns = numbers, len(kinks[0])
         if isinstance(start, Point):
-            start = start if imposed is None else _pushed(start, imposed - start.psis[-1])
-            y, last, stress = np.empty(2 * self._unknowns), _columns_of(start), start.spring_stress
+            start = (
+                start
+                if initial_imposed_stress is None
+                else _shift_stresses(start, initial_imposed_stress - start.psis[-1])
+            )
+            y, last, stress = np.empty(2 * self._unknowns), _pack_point(start), start.spring_stress
         else:  # behind the unknowns is room for as many
-            y, last, stress = np.array((*start, *start)), np.empty(layout.PSIS + states), 0.0
+            y, last, stress = np.array((*start, *start)), np.empty(layout.FIRST_STATE + states), 0.0
         if p is not None or turns:  # numbers that are those of this motion alone
-            before = numbers = machine.numbers(systems[0].p if p is None else p)
+            before = numbers = machine.as_parameters(systems[0].parameters if p is None else p)
             if turns:
-                before = machine.numbers(numbers)
-            systems = tuple(system._replace(p=numbers) for system in systems)
-        tolerance = max(tolerance, TIGHTEST)
-        records, samples, rows = _to_record(recording, systems[0], states)
-        state = machine.state(
-            self._initial,
+                before = machine.as_parameters(numbers)
+            systems = tuple(system._replace(parameters=numbers) for system in systems)
+        tolerance = max(tolerance, MIN_LOCAL_TOLERANCE)
+        records, samples, rows = _recording_tables(recording, systems[0], states)
+        state = machine.create_state(
+            self._initial_values,
             (
-                *(*times, stress, tolerance),
+                *(*start_times, stress, tolerance),
                 # what limits a step must differ between two tolerances whose results tell errors
-                (tolerance / TOLERANCE_OF_STRIDES) ** 0.125,
+                (tolerance / STEP_LIMIT_TOLERANCE) ** 0.125,
                 -1.0 if backward else 1.0,
-                int(min(budget, meter.budget - meter.spent)),
+                int(min(budget, meter.budget - meter.evaluations)),
                 *(records, turns, kinks[1]),
             ),
         )
-        asked, meanings = _asked(tuple(specs))
-        stepper = stepper_of(meter.engine, systems, meter.methods)
-        columns = layout.POINT + layout.PSIS + states
-        events = np.empty((max(_EVENTS, 2 * len(specs) + 4), columns))
-        block = np.empty(workspace.size(self._unknowns, states, len(specs)))
+        asked, meanings = _pack_specifications(tuple(specs))
+        stepper = create_stepper(meter.engine, systems, meter.methods)
+        columns = layout.EVENT_POINT + layout.FIRST_STATE + states
+        events = np.empty((max(_MIN_EVENT_ROWS, 2 * len(specs) + 4), columns))
+        block = np.empty(workspace.workspace_size(self._unknowns, states, len(specs)))
         arguments = (
-            *machine.passed(y, last, block),
-            (*self._called, tuple(between), numbers, before),
-            *machine.passed(asked.copy(), kinks[0], samples, events, rows),
+            *machine.as_arguments(y, last, block),
+            (*self._scales_and_functions, tuple(thresholds), numbers, before),
+            *machine.as_arguments(asked.copy(), kinks[0], samples, events, rows),
             stepper,
         )
-        regimes, psis = self._regimes, layout.POINT + layout.PSIS
-        run, end, known = machine.advance(), layout.PAUSES, (0, 0, 0, 0)
-        while end == layout.PAUSES:
+        regimes, psis = self._regimes, layout.EVENT_POINT + layout.FIRST_STATE
+        run, end, known = machine.loop_function(), layout.PAUSED, (0, 0, 0, 0)
+        while end == layout.PAUSED:
             end = run(state.memory, *arguments)
-            slow, fast, steps, happened, recorded, jacobians = state.says()
+            slow, fast, steps, happened, recorded, jacobians = state.counters()
             known, settled = (slow, fast, steps, jacobians), known
-            others = meter.settle(regimes, settled, known)
+            others = meter.charge_difference(regimes, settled, known)
             if recording is not None and recorded:
                 kept = rows[:recorded].copy(order="F")  # columns are what is asked for
-                if imposed is not None:
-                    kept[:, STRESSES] += kept[:, -1:] - imposed
-                recording.take(kept, regimes)
+                if initial_imposed_stress is not None:
+                    kept[:, STRESS_COLUMNS] += kept[:, -1:] - initial_imposed_stress
+                recording.append(kept, regimes)
             for line in events[:happened].tolist():
-                code, regime, clock, time, slip, spent = line[: layout.POINT]
-                point = _named(Point, (*line[layout.POINT : psis], tuple(line[psis:])))
-                if imposed is not None:
-                    point = _pushed(point, point.psis[-1] - imposed)
+                code, regime, clock, time, slip, spent = line[: layout.EVENT_POINT]
+                point = _new_named_tuple(
+                    Point, (*line[layout.EVENT_POINT : psis], tuple(line[psis:]))
+                )
+                if initial_imposed_stress is not None:
+                    point = _shift_stresses(point, point.psis[-1] - initial_imposed_stress)
                 kind, spec = meanings[int(code)]
                 name, work = regimes[int(regime)], others + int(spent)
-                yield _named(Event, (kind, spec, time, slip, point, name, work, clock))
-            meter.check()
-        if end != layout.ENDED:
-            raise _halt(end, state, regimes, stepper)
+                yield _new_named_tuple(Event, (kind, spec, time, slip, point, name, work, clock))
+            meter.check_budget()
+        if end != layout.MOTION_ENDED:
+            raise _stop_error(end, state, regimes, stepper)
 
 
-def _pushed(point: Point, by: float) -> Point:
-    return point._replace(spring_stress=point.spring_stress + by, friction=point.friction + by)
+def _shift_stresses(point: Point, by: float) -> Point:
+    return point._replace(
+        spring_stress=point.spring_stress + by, frictional_stress=point.frictional_stress + by
+    )
 
 
-def along(
+def events_along(
     equations: Equations,
     state: Numbers,
     tolerance: float,
-    meter: Meter,
+    meter: WorkMeter,
     specs: Sequence[EventSpecification] = (),
     *,
     backward: bool = False,
@@ -265,41 +305,47 @@ def along(
 
     A rigid slider has slip for its clock: a recording that asks for values has them at slips.
     """
-    runner = Runner(equations, engine=meter.engine)
+    runner = MotionDriver(equations, engine=meter.engine)
     return runner.run(state, meter, specs, tolerance, backward=backward, recording=recording)
 
 
-@once
-def runner_of(scene: Scene, engine: str, *, clock: bool) -> Runner:
+@cached_per_scene
+def driver_of(scene: Scene, engine: str, *, with_time: bool) -> MotionDriver:
     """What runs the motions of a scene."""
-    return Runner(
-        between_ruptures(scene, clock=clock),
-        in_rupture(scene, clock=clock) if scene.has_mass else None,
+    return MotionDriver(
+        equations_between_ruptures(scene, clock=with_time),
+        equations_in_rupture(scene, clock=with_time) if scene.has_mass else None,
         engine=engine,
-        behind=len(scene.parts.fluid.unknowns) if scene.parts.loading.unknowns else 0,
-        reverses=scene.parts.law.regularised,
-        at_point=1,
-        terminates=1,
-        has_clock=clock,
+        unknowns_behind_fluid=len(scene.parts.fluid.unknowns)
+        if scene.parts.loading.unknowns
+        else 0,
+        may_reverse=scene.parts.law.regularised,
+        starts_at_point=1,
+        may_terminate=1,
+        has_clock=with_time,
     )
 
 
-def _to_record(
+def _recording_tables(
     recording: Recording | None, system: Equations, states: int
 ) -> tuple[int, np.ndarray, np.ndarray]:
     """Whether a chain of segments records, and when; the times or clocks at which to; and the table
     that the loop fills.
     """
     if recording is None:
-        return _NOTHING
-    if recording.at is None:
-        return layout.WITHIN_STEPS, np.empty(0), np.empty((_RECORDED, STATES + states))
-    samples = recording.left()
-    rows = np.empty((len(samples) + 2 * SAMPLES, STATES + states))
-    return layout.AT_CLOCKS if system.is_rigid else layout.AT_TIMES, samples, rows
+        return _NO_RECORDING
+    if recording.sample_times is None:
+        return (
+            layout.RECORD_WITHIN_STEPS,
+            np.empty(0),
+            np.empty((_RECORDING_ROWS, FIRST_STATE_COLUMN + states)),
+        )
+    samples = recording.remaining_times()
+    rows = np.empty((len(samples) + 2 * SAMPLES_PER_STEP, FIRST_STATE_COLUMN + states))
+    return layout.RECORD_AT_CLOCKS if system.is_rigid else layout.RECORD_AT_TIMES, samples, rows
 
 
-def happening(
+def events_at_jump(
     before: Point,
     p_before: Numbers,
     after: Point,
@@ -309,38 +355,49 @@ def happening(
     """Events that are watched for and happen where a motion jumps from a point to another, with the
     numbers of the scene at both; and at which of them.
     """
-    last, first = _columns_of(before).tolist(), _columns_of(after).tolist()
-    table = _asked(tuple(specs))[0].reshape(-1, len(layout.SPECIFIED)).tolist()
+    last, first = _pack_point(before).tolist(), _pack_point(after).tolist()
+    table = (
+        _pack_specifications(tuple(specs))[0]
+        .reshape(-1, len(layout.SPECIFICATION_COLUMNS))
+        .tolist()
+    )
     for spec, row in zip(specs, table, strict=True):
-        where = between(row, last, p_before, first, p_after)
-        if where != NOWHERE:
-            yield spec, before if where == BEFORE else after
+        where = find_jump_side(row, last, p_before, first, p_after)
+        if where != NO_EVENT:
+            yield spec, before if where == BEFORE_JUMP else after
 
 
 @lru_cache(maxsize=256)
-def _asked(
+def _pack_specifications(
     specs: tuple[EventSpecification, ...],
-) -> tuple[np.ndarray, list[tuple[Kind, EventSpecification | None]]]:
+) -> tuple[np.ndarray, list[tuple[EventKind, EventSpecification | None]]]:
     """The table of event specifications, and what codes of events mean."""
-    meanings = [*((spec.kind, spec) for spec in specs), *_BESIDE]
-    asked = np.zeros((len(specs), len(layout.SPECIFIED)))
+    meanings = [*((spec.kind, spec) for spec in specs), *_UNREQUESTED_EVENTS]
+    asked = np.zeros((len(specs), len(layout.SPECIFICATION_COLUMNS)))
     for row, spec in zip(asked, specs, strict=True):
-        row[layout.KIND], row[layout.OF] = _KINDS[spec.kind], _COLUMNS[spec.of]
-        row[layout.LEVEL], row[layout.ENDS] = spec.level, spec.ends
-        row[layout.WAITS] = spec.waits
+        row[layout.SPEC_KIND], row[layout.SPEC_QUANTITY] = (
+            _KIND_CODES[spec.kind],
+            _QUANTITY_COLUMNS[spec.quantity],
+        )
+        row[layout.SPEC_LEVEL], row[layout.SPEC_TERMINAL] = spec.level, spec.terminal
+        row[layout.SPEC_MAY_DEFER] = spec.may_defer
     return asked.ravel(), meanings
 
 
-def _columns_of(point: Point) -> np.ndarray:
+def _pack_point(point: Point) -> np.ndarray:
     """A point as the loop has it."""
     return np.array((*point[:-1], *point.psis))
 
 
-def _halt(end: int, state: Any, regimes: Sequence[str], stepper: Any) -> Halt:
+def _stop_error(end: int, state: Any, regimes: Sequence[str], stepper: Any) -> MotionStopped:
     """Why a motion cannot go on."""
-    if end == layout.HALTED:
-        return halted(int(state.field("termination")), state.field("stress"))
+    if end == layout.TERMINATED:
+        return termination_error(
+            int(state.get_field("termination")), state.get_field("final_normal_stress")
+        )
     why = "step without length, or a state that is not finite"
-    if end == layout.NO_STEP:
-        why = stepper.failure if stepper else _TOO_SHORT
-    return Halt(Status.INTEGRATION_FAILED, f"{regimes[int(state.field('regime'))]}: {why}")
+    if end == layout.NO_STEP_POSSIBLE:
+        why = stepper.failure if stepper else _STEP_TOO_SHORT_TEXT
+    return MotionStopped(
+        Status.INTEGRATION_FAILED, f"{regimes[int(state.get_field('regime'))]}: {why}"
+    )

@@ -11,12 +11,12 @@ from functools import cache
 from scipy.optimize import newton
 
 from rsfstudy.motion import handover
-from rsfstudy.motion.meter import Halt
+from rsfstudy.motion.meter import MotionStopped
 from rsfstudy.slider import steady
 from rsfstudy.slider.equations import (
-    between_ruptures,
+    compute_steady_states,
+    equations_between_ruptures,
     normal_stress_at,
-    steady_states_of,
 )
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.parts import Function, Numbers
@@ -24,39 +24,40 @@ from rsfstudy.slider.point import Point
 from rsfstudy.slider.scene import Scene
 from rsfstudy.status import Status
 
-_TOLD_LATER = (math.nan,) * len(Point._fields[5:-1])
+_UNEVALUATED_FIELDS = (math.nan,) * len(Point._fields[5:-1])
 
 
-def starting(scene: Scene) -> Point:
-    """The beginning of a motion the instant after the step of a scene (see `beginning`), which
-    moves the spring and imposed normal stress: with mass, slip rate follows within the inertial
-    time. Before it the slider slides steadily at V_*, or as its stated stress and state have it.
+def initial_point(scene: Scene) -> Point:
+    """The beginning of a motion the instant after the step of a scene (see `unevaluated_point`),
+    which moves the spring and imposed normal stress: with mass, slip rate follows within the
+    inertial time. Before it the slider slides steadily at V_*, or as its stated stress and state
+    have it.
 
     Raises
     ------
-    Halt
+    MotionStopped
         Where the step leaves no friction of forward slip to integrate.
     """
     check_start(scene)
-    psis, log_slip_rate = steady_states_of(scene, 0.0, 0.0), 0.0
-    if scene.begins_elsewhere:
-        psis, log_slip_rate = _stated(scene, psis)
-    psis = _with_beginning(scene, psis)
+    psis, log_slip_rate = compute_steady_states(scene, 0.0, 0.0), 0.0
+    if scene.starts_unsteady:
+        psis, log_slip_rate = _specified_initial_state(scene, psis)
+    psis = _with_loading_states(scene, psis)
     stress = scene.parts.slider.initial_stress + scene.spring_stress_step
-    stepped = beginning(scene, stress, psis)
-    return at_rate(scene, stepped, log_slip_rate) if scene.has_mass else stepped
+    stepped = unevaluated_point(scene, stress, psis)
+    return with_slip_rate(scene, stepped, log_slip_rate) if scene.has_mass else stepped
 
 
-def before_start(scene: Scene) -> Point:
+def point_before_start(scene: Scene) -> Point:
     """The point of a motion before its first step."""
-    before = scene.under(Segment(1.0))
-    psis = steady_states_of(before, 0.0, 0.0)
-    if scene.begins_elsewhere:
-        psis = _stated(scene, psis)[0]
-    return on_slow_manifold(before, scene.parts.slider.initial_stress, psis)
+    before = scene.with_segment(Segment(1.0))
+    psis = compute_steady_states(before, 0.0, 0.0)
+    if scene.starts_unsteady:
+        psis = _specified_initial_state(scene, psis)[0]
+    return manifold_point(before, scene.parts.slider.initial_stress, psis)
 
 
-def beginning(
+def unevaluated_point(
     scene: Scene,
     spring_stress: float,
     psis: Numbers,
@@ -68,26 +69,26 @@ def beginning(
     """
     psi = scene.functions.friction.state_sum(psis)
     known = log_slip_rate, math.nan, spring_stress, friction, psi
-    return Point._make((*known, *_TOLD_LATER, psis))
+    return Point._make((*known, *_UNEVALUATED_FIELDS, psis))
 
 
-def _with_beginning(scene: Scene, psis: Numbers) -> Numbers:
+def _with_loading_states(scene: Scene, psis: Numbers) -> Numbers:
     """States with those of the loading, behind those of the law, as it begins with them; without
     those of a loading that has ended.
     """
-    begun, of_law = scene.parts.loading.begins(scene), scene.parts.law.states
-    return (*psis[:of_law], *begun, *psis[of_law + len(begun) : scene.states])
+    begun, of_law = scene.parts.loading.initial_unknowns(scene), scene.parts.law.state_count
+    return (*psis[:of_law], *begun, *psis[of_law + len(begun) : scene.state_count])
 
 
-def _stated(scene: Scene, steady_states: Numbers) -> tuple[Numbers, float]:
+def _specified_initial_state(scene: Scene, steady_states: Numbers) -> tuple[Numbers, float]:
     """States freed of stress, and ln(V/V_*), of the stress and state that a scene begins with: Psi
     is sought with which the state variable is the one stated.
     """
-    before = scene.under(Segment(1.0))
-    others = steady_states[1 : before.states]
+    before = scene.with_segment(Segment(1.0))
+    others = steady_states[1 : before.state_count]
 
     def begun(psi: float) -> Point:
-        return on_slow_manifold(before, scene.initial_stress, (psi, *others))
+        return manifold_point(before, scene.initial_stress, (psi, *others))
 
     def missing(psi: float) -> float:
         return scene.initial_state - begun(psi).state
@@ -96,37 +97,37 @@ def _stated(scene: Scene, steady_states: Numbers) -> tuple[Numbers, float]:
     return (psi, *steady_states[1:]), begun(psi).log_slip_rate
 
 
-def jumped(scene: Scene, point: Point) -> Point:
+def point_after_jump(scene: Scene, point: Point) -> Point:
     """A point of a motion the instant after a step of the load point or of imposed normal stress,
     or where an oscillation begins or ends: states stay, and with mass slip rate does.
 
     Raises
     ------
-    Halt
+    MotionStopped
         As `starting` does.
     """
-    psis = _with_beginning(scene, point.psis)
+    psis = _with_loading_states(scene, point.psis)
     after = point._replace(spring_stress=point.spring_stress + scene.spring_stress_step, psis=psis)
     check_start(scene, after)
-    return at_rate(scene, after, point.log_slip_rate) if scene.has_mass else after
+    return with_slip_rate(scene, after, point.log_slip_rate) if scene.has_mass else after
 
 
-def at_rate(scene: Scene, point: Point, log_slip_rate: float) -> Point:
+def with_slip_rate(scene: Scene, point: Point, log_slip_rate: float) -> Point:
     """A point with another ln(V/V_*), and the frictional stress that goes with it."""
     excess = scene.a * log_slip_rate + point.psi
     friction = steady.stress_after_jump(scene, excess, point.psis)
     if friction is None:
-        raise Halt(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
-    return point._replace(log_slip_rate=log_slip_rate, friction=friction)
+        raise MotionStopped(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
+    return point._replace(log_slip_rate=log_slip_rate, frictional_stress=friction)
 
 
-def on_slow_manifold(scene: Scene, spring_stress: float, psis: Numbers) -> Point:
+def manifold_point(scene: Scene, spring_stress: float, psis: Numbers) -> Point:
     """The point with this spring stress and these states, where mass hardly acts."""
-    return between_ruptures(scene, clock=False).at((spring_stress, *psis))
+    return equations_between_ruptures(scene, clock=False).evaluate_point((spring_stress, *psis))
 
 
 @cache
-def point_of(rate: Function, point: Function) -> Function:
+def build_point_function(rate: Function, point: Function) -> Function:
     """``(state, p) -> Point``."""
 
     def at(state: Numbers, p: Numbers) -> Point:
@@ -143,16 +144,20 @@ def check_start(scene: Scene, start: Point | None = None) -> None:
     slider = scene.parts.slider
     begins = slider.initial_stress + scene.spring_stress_step
     spring_stress = begins if start is None else start.spring_stress
-    lost = spring_stress <= scene.parts.normal_stress.weakest(scene)
-    if lost or (start and normal_stress_at(scene, spring_stress, start.psis) <= handover.LOST):
-        raise Halt(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
+    lost = spring_stress <= scene.parts.normal_stress.min_frictional_stress(scene)
+    if lost or (
+        start and normal_stress_at(scene, spring_stress, start.psis) <= handover.MIN_NORMAL_STRESS
+    ):
+        raise MotionStopped(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
     if slider.mu_star + spring_stress > 0.0:
         return
     steps = start is None or scene.spring_stress_step
     now = "the step takes shear stress to" if steps else "shear stress has gone to"
     text = f"{now} {slider.mu_star + spring_stress:.3g} sigma_*"
     if not scene.parts.law.regularised:
-        raise Halt(Status.SHEAR_STRESS_REVERSED, f"{text}; slip may reverse where regularised=True")
+        raise MotionStopped(
+            Status.SHEAR_STRESS_REVERSED, f"{text}; slip may reverse where regularised=True"
+        )
     if scene.load_velocity == 0.0:
         text = f"{text}, where slip backwards dies out under a load point at rest"
-        raise Halt(Status.SHEAR_STRESS_REVERSED, text)
+        raise MotionStopped(Status.SHEAR_STRESS_REVERSED, text)

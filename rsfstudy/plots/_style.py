@@ -23,24 +23,24 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.transforms import blended_transform_factory, offset_copy
 
-from rsfstudy.error_boundary import check_file
-from rsfstudy.errors import InvalidValue, RsfStudyError, brief
-from rsfstudy.plots._text import length, wrapped
+from rsfstudy.error_boundary import check_regular_file
+from rsfstudy.errors import InvalidValue, RsfStudyError, shorten
+from rsfstudy.plots._text import visible_length, wrap_text
 
 #: The style sheet that ships.
-SHEET = Path(__file__).with_name("rsfstudy.mplstyle")
+STYLE_SHEET = Path(__file__).with_name("rsfstudy.mplstyle")
 #: Ending of style sheets.
-_SUFFIX = ".mplstyle"
-MM = 1.0 / 25.4
+_STYLE_SHEET_SUFFIX = ".mplstyle"
+INCHES_PER_MM = 1.0 / 25.4
 #: Between the two columns of a journal, in inches.
-_GAP = 6.0 * MM
+_COLUMN_GAP = 6.0 * INCHES_PER_MM
 _MARKERS = "os^Dv<>P*X"
 #: Part of the width of a panel that a scale of colours takes, with its label.
-_BAR = 0.24
+_COLOUR_BAR_SHARE = 0.24
 
 
 @contextlib.contextmanager
-def styled(over: Any = None) -> Iterator[None]:
+def style_context(over: Any = None) -> Iterator[None]:
     """Apply the style sheet of rsfstudy and any additional styles.
 
     Parameters
@@ -58,8 +58,8 @@ def styled(over: Any = None) -> Iterator[None]:
         installed.
     """
     others = over if isinstance(over, list | tuple) else [over]
-    settings = [_settings_of(other) for other in others if other is not None]
-    with style.context([SHEET, *settings]):
+    settings = [_to_matplotlib_style(other) for other in others if other is not None]
+    with style.context([STYLE_SHEET, *settings]):
         try:
             yield
         except (RsfStudyError, OSError):
@@ -67,12 +67,12 @@ def styled(over: Any = None) -> Iterator[None]:
         except Exception as error:  # settings that are valid alone may not be together
             if not settings:
                 raise
-            rule = f"a figure cannot be drawn in it: {brief(error).rstrip('.')}"
+            rule = f"a figure cannot be drawn in it: {shorten(error).rstrip('.')}"
             remedy = "Draw it without this style to find out if the style is the reason."
-            raise InvalidValue("style", _plain(over), rule, remedy=remedy) from error
+            raise InvalidValue("style", _printable_style(over), rule, remedy=remedy) from error
 
 
-def _settings_of(over: Any) -> str | dict[str, Any]:
+def _to_matplotlib_style(over: Any) -> str | dict[str, Any]:
     """Convert a style to an argument of ``matplotlib.style.use``.
 
     The result is the name of a style or a dictionary of checked settings. Other arguments are not
@@ -80,20 +80,20 @@ def _settings_of(over: Any) -> str | dict[str, Any]:
     sheet from a URL, or parse any text file with one warning per line.
     """
     if isinstance(over, Mapping):
-        return _checked(over)
+        return _validate_settings(over)
     if isinstance(over, str) and over in ("default", *style.available):
         return over
-    if isinstance(over, str | Path) and Path(over).suffix == _SUFFIX:
-        return _read_sheet(Path(over))
-    rule = f"is neither a style sheet, which ends in {_SUFFIX}, nor the name of a style"
-    raise InvalidValue("style", _plain(over), rule, choices=["default", *style.available])
+    if isinstance(over, str | Path) and Path(over).suffix == _STYLE_SHEET_SUFFIX:
+        return _read_style_sheet(Path(over))
+    rule = f"is neither a style sheet, which ends in {_STYLE_SHEET_SUFFIX}, nor the name of a style"
+    raise InvalidValue("style", _printable_style(over), rule, choices=["default", *style.available])
 
 
-def _plain(over: Any) -> Any:
+def _printable_style(over: Any) -> Any:
     return str(over) if isinstance(over, Path) else over
 
 
-def _checked(settings: Mapping[Any, Any]) -> dict[str, Any]:
+def _validate_settings(settings: Mapping[Any, Any]) -> dict[str, Any]:
     """Validate settings and convert the values as matplotlib does.
 
     Raises
@@ -109,15 +109,15 @@ def _checked(settings: Mapping[Any, Any]) -> dict[str, Any]:
         try:
             checked[name] = value
         except Exception as error:  # validators of matplotlib raise anything
-            reason = brief(error).removeprefix(f"Key {name}: ").rstrip(".")
+            reason = shorten(error).removeprefix(f"Key {name}: ").rstrip(".")
             rule = f"is not a valid value of {name}: {reason}"
             raise InvalidValue("style", value, rule) from error
     return dict(checked)
 
 
-def _read_sheet(path: Path) -> dict[str, Any]:
+def _read_style_sheet(path: Path) -> dict[str, Any]:
     """Read and validate the settings of a style sheet."""
-    check_file("style", path)
+    check_regular_file("style", path)
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -125,19 +125,19 @@ def _read_sheet(path: Path) -> dict[str, Any]:
         raise InvalidValue("style", str(path), f"cannot be read: {reason}") from error
     settings: dict[str, Any] = {}
     for number, line in enumerate(lines, start=1):
-        name, colon, value = _without_comment(line).partition(":")
+        name, colon, value = _strip_comment(line).partition(":")
         if not name.strip():
             continue
         try:
             if not colon:
                 raise InvalidValue("style", line, "must read NAME: VALUE")
-            settings |= _checked({name.strip(): _without_quotes(value.strip())})
+            settings |= _validate_settings({name.strip(): _strip_quotes(value.strip())})
         except InvalidValue as error:
-            raise error.at(f"{path}, line {number}") from error
+            raise error.with_location(f"{path}, line {number}") from error
     return settings
 
 
-def _without_comment(line: str) -> str:
+def _strip_comment(line: str) -> str:
     """Remove the comment from a line of a style sheet.
 
     As in matplotlib, a comment starts at the first ``#`` outside double quotes.
@@ -150,11 +150,11 @@ def _without_comment(line: str) -> str:
     return line
 
 
-def _without_quotes(value: str) -> str:
+def _strip_quotes(value: str) -> str:
     return value[1:-1] if len(value) > 1 and value[0] == value[-1] == '"' else value
 
 
-def size(columns: int, rows: int, height: float | None = None) -> tuple[float, float]:
+def figure_size(columns: int, rows: int, height: float | None = None) -> tuple[float, float]:
     """Inches of a figure of panels: one journal column wide, or two.
 
     Parameters
@@ -165,30 +165,30 @@ def size(columns: int, rows: int, height: float | None = None) -> tuple[float, f
         Of a panel, in mm; that of the style by default.
     """
     width, usual = rcParams["figure.figsize"]
-    each = usual if height is None else height * MM
-    return (width if columns == 1 else 2.0 * width + _GAP), rows * each
+    each = usual if height is None else height * INCHES_PER_MM
+    return (width if columns == 1 else 2.0 * width + _COLUMN_GAP), rows * each
 
 
-def look(number: int) -> dict[str, Any]:
+def cycle_style(number: int) -> dict[str, Any]:
     """Colour and line style of the `number`-th of several, from the cycle of the style."""
     return dict(next(itertools.islice(itertools.cycle(rcParams["axes.prop_cycle"]), number, None)))
 
 
-def marker(number: int) -> str:
+def cycle_marker(number: int) -> str:
     """Marker of the `number`-th of several."""
     return _MARKERS[number % len(_MARKERS)]
 
 
-def letter(panels: Sequence[Axes]) -> None:
+def add_panel_letters(panels: Sequence[Axes]) -> None:
     """Write (a), (b), ... left of the titles of panels, where there are several."""
     for panel, text in zip(panels, itertools.cycle(string.ascii_lowercase), strict=False):
         if len(panels) > 1:
             panel.set_title(f"({text}) ", loc="left", fontweight="bold", ha="right")
 
 
-def room(axes: Axes) -> tuple[int, int]:
+def text_capacity(axes: Axes) -> tuple[int, int]:
     """Characters that a line of text along x, and along y, may have."""
-    figure, (left, right) = cast(Figure, axes.figure), _slot(axes)
+    figure, (left, right) = cast(Figure, axes.figure), _horizontal_extent(axes)
     place = axes.get_subplotspec()
     rows = 1 if place is None else place.get_gridspec().nrows
     width, height = figure.get_size_inches()
@@ -200,7 +200,7 @@ def room(axes: Axes) -> tuple[int, int]:
 # ---- legends ------------------------------------------------------------------------------------
 
 
-def legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
+def add_legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
     """Name what is drawn below the axes, where it covers nothing; call it after the label of x.
 
     Parameters
@@ -210,14 +210,14 @@ def legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
         Most entries beside each other; fewer where they would be wider than the panel.
     title : str, optional
     """
-    shown = _named(axes)
+    shown = _legend_entries(axes)
     if not shown:
         return
-    lines = axes.get_xlabel().count("\n") + _tick_lines(axes)
+    lines = axes.get_xlabel().count("\n") + _tick_label_lines(axes)
     drop = rcParams["font.size"] * (2.9 + 1.3 * lines)
-    figure, (left, right) = cast(Figure, axes.figure), _slot(axes)
+    figure, (left, right) = cast(Figure, axes.figure), _horizontal_extent(axes)
     if getattr(axes, "_colorbars", ()):  # else the layout leaves the panel what is beside both
-        right -= _BAR * (right - left)
+        right -= _COLOUR_BAR_SHARE * (right - left)
     below = offset_copy(axes.transAxes, figure, 0.0, -drop, "points")
     made = partial(
         axes.legend,
@@ -226,10 +226,10 @@ def legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
         bbox_transform=blended_transform_factory(figure.transFigure, below),
         title=title,
     )
-    _fit(made, shown, columns, 0.97 * (right - left) * figure.bbox.width)
+    _fit_legend(made, shown, columns, 0.97 * (right - left) * figure.bbox.width)
 
 
-def _tick_lines(axes: Axes) -> float:
+def _tick_label_lines(axes: Axes) -> float:
     """Lines of text that the names of ticks along x are high."""
 
     def lines(tick: Text) -> float:
@@ -239,16 +239,18 @@ def _tick_lines(axes: Axes) -> float:
     return max([1.0, *map(lines, axes.get_xticklabels())])
 
 
-def _named(axes: Axes) -> dict[str, Any]:
+def _legend_entries(axes: Axes) -> dict[str, Any]:
     """What is drawn on the axes, by its name."""
     named: dict[str, Any] = {}
     for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-        if _is_drawn(handle):
-            named.setdefault(wrapped(label, 48), handle)
+        if _is_visible(handle):
+            named.setdefault(wrap_text(label, 48), handle)
     return named
 
 
-def _fit(made: Callable[..., Legend], named: Mapping[str, Any], columns: int, width: float) -> None:
+def _fit_legend(
+    made: Callable[..., Legend], named: Mapping[str, Any], columns: int, width: float
+) -> None:
     """Make a legend of so many columns, or of fewer, until it is no wider than that. It is read
     line by line: matplotlib fills columns.
     """
@@ -259,13 +261,13 @@ def _fit(made: Callable[..., Legend], named: Mapping[str, Any], columns: int, wi
             return
 
 
-def in_grey(axes: Axes, name: str, style: Mapping[str, Any]) -> None:
+def add_grey_legend_entry(axes: Axes, name: str, style: Mapping[str, Any]) -> None:
     """Name in the legend what is drawn in several colours; the line is out of sight."""
     line = {"color": "0.3", **style}
     axes.add_artist(Line2D([-1.0], [-1.0], transform=axes.transAxes, label=name, **line))
 
 
-def _slot(axes: Axes) -> tuple[float, float]:
+def _horizontal_extent(axes: Axes) -> tuple[float, float]:
     """From where to where a panel may reach from side to side, as fractions of the figure."""
     place = axes.get_subplotspec()
     if place is None:
@@ -274,7 +276,7 @@ def _slot(axes: Axes) -> tuple[float, float]:
     return place.colspan.start / columns, place.colspan.stop / columns
 
 
-def _is_drawn(handle: Any) -> bool:
+def _is_visible(handle: Any) -> bool:
     """True if there is anything of it to be seen."""
     if isinstance(handle, ErrorbarContainer):
         handle = handle.lines[0]
@@ -288,7 +290,7 @@ def _is_drawn(handle: Any) -> bool:
 
 def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
     """Name what most panels name, or some of it, once and below them all."""
-    named = {panel: _named(panel) for panel in panels if panel.get_legend()}
+    named = {panel: _legend_entries(panel) for panel in panels if panel.get_legend()}
     alike: list[Axes] = []
     for fullest in named:
         within = [panel for panel, texts in named.items() if texts.keys() <= named[fullest].keys()]
@@ -305,34 +307,36 @@ def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
         place: Any = "outside lower center"
         return figure.legend(shown, texts, loc=place, ncols=ncols, title=title)
 
-    _fit(made, named[chosen], 5, figure.bbox.width)
+    _fit_legend(made, named[chosen], 5, figure.bbox.width)
 
 
-def make_room(figure: Figure, rows: Sequence[Sequence[Axes]]) -> None:
+def enlarge_for_legends(figure: Figure, rows: Sequence[Sequence[Axes]]) -> None:
     """Make a figure as much taller as its legends and names of ticks are, so that they take nothing
     from the data.
     """
     beside = [[legend for panel in row if (legend := panel.get_legend())] for row in rows]
-    heights = [max(map(_height, legends), default=0.0) for legends in (*beside, figure.legends)]
+    heights = [
+        max(map(_legend_height, legends), default=0.0) for legends in (*beside, figure.legends)
+    ]
     line = 1.3 * float(rcParams["font.size"]) / 72.0
-    heights += [line * (max(map(_tick_lines, row)) - 1.0) for row in rows]
+    heights += [line * (max(map(_tick_label_lines, row)) - 1.0) for row in rows]
     figure.set_figheight(figure.get_figheight() + sum(heights))
 
 
-def _height(legend: Legend) -> float:
+def _legend_height(legend: Legend) -> float:
     """Inches, with a line and a half between it and what it belongs to."""
     figure = cast(Figure, legend.figure)
     height = float(legend.get_window_extent().height)
     return height / figure.dpi + 1.5 * float(rcParams["font.size"]) / 72.0
 
 
-def hold_ticks(axes: Axes) -> None:
+def freeze_ticks(axes: Axes) -> None:
     """Have ticks that come when the style is no longer in force look as those that come now."""
     axes.tick_params(axis="x", labelsize=rcParams["xtick.labelsize"])
     axes.tick_params(axis="y", labelsize=rcParams["ytick.labelsize"])
 
 
-def settle(figure: Figure) -> None:
+def finalize_layout(figure: Figure) -> None:
     """Give everything its place: ticks take their style when they are made, and how much room they
     need is known only then.
     """
@@ -342,11 +346,11 @@ def settle(figure: Figure) -> None:
         return
     layout.execute(figure)
     for axes in figure.axes:
-        _keep_title(axes)
+        _wrap_title(axes)
     layout.execute(figure)
 
 
-def _keep_title(axes: Axes) -> None:
+def _wrap_title(axes: Axes) -> None:
     """Break a title that would be cut where the figure ends, or touch the letter of its panel: long
     names along y move the panel, and a scale of colours makes it narrow.
     """
@@ -355,6 +359,6 @@ def _keep_title(axes: Axes) -> None:
     left = panel.x0 if axes.get_title(loc="left") else edges.x0
     free = 1.9 * min(middle - left, edges.x1 - middle)
     if title.get_text() and extent.width > free:
-        longest = max(map(length, title.get_text().split("\n")))
+        longest = max(map(visible_length, title.get_text().split("\n")))
         text = title.get_text().replace("\n", " ")
-        title.set_text(wrapped(text, int(0.95 * longest * free / extent.width)))
+        title.set_text(wrap_text(text, int(0.95 * longest * free / extent.width)))

@@ -10,31 +10,31 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from rsfstudy.declare.figure import Panel
-from rsfstudy.files.contents import declaration
+from rsfstudy.files.contents import read_declaration
 from rsfstudy.plots._axes import (
-    axis_of,
-    colour_bar,
-    colours,
+    add_colour_bar,
+    describe_point,
     flag_meanings,
+    has_numeric_points,
     is_log_spaced,
-    is_number,
-    is_numeric,
-    is_wide,
-    place,
-    varied,
+    is_numeric_variable,
+    point_colours,
+    set_up_x_axis,
+    spans_decades,
+    varying_variables,
 )
-from rsfstudy.plots._style import in_grey, look, marker
-from rsfstudy.plots._text import label, pretty
-from rsfstudy.reduce.base import stated_by
-from rsfstudy.vocabulary import quantity
+from rsfstudy.plots._style import add_grey_legend_entry, cycle_marker, cycle_style
+from rsfstudy.plots._text import axis_label, to_mathtext
+from rsfstudy.reduce.base import read_quantities
+from rsfstudy.vocabulary import find_quantity
 
 #: Most panels, and most lines that a legend names; lines along a longer axis of numbers are told
 #: apart by a scale of colours.
-_PANELS, _NAMED, _COLOURED = 4, 12, 6
+_MAX_PANELS, _MAX_LEGEND_LINES, _MAX_CYCLED_COLOURS = 4, 12, 6
 #: Most curves that lie on each other and are all named.
-_FEW = 3
+_MAX_NAMED_DUPLICATES = 3
 #: Most points of a line with markers.
-_MARKED = 60
+_MAX_POINTS_WITH_MARKERS = 60
 
 
 def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
@@ -42,82 +42,93 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     that is no number.
     """
     if variable is None:
-        names = varied(dataset)[:_PANELS] or ["status"]
+        names = varying_variables(dataset)[:_MAX_PANELS] or ["status"]
     else:
         known = variable in dataset
-        drawn = known and (is_number(dataset[variable]) or flag_meanings(dataset[variable]))
+        drawn = known and (
+            is_numeric_variable(dataset[variable]) or flag_meanings(dataset[variable])
+        )
         names = [variable] if drawn else []
-    named = len(names) == 1 and not declaration(dataset).overrides
+    named = len(names) == 1 and not read_declaration(dataset).overrides
     return [
-        _panel(dataset, name, dataset.attrs.get("title", "") if named else "") for name in names
+        _build_panel(dataset, name, dataset.attrs.get("title", "") if named else "")
+        for name in names
     ]
 
 
-def _panel(dataset: xr.Dataset, name: str, title: str) -> Panel:
+def _build_panel(dataset: xr.Dataset, name: str, title: str) -> Panel:
     """All values of a variable."""
-    along = _along(dataset, dataset[name]) if dataset[name].ndim else ""
+    along = _choose_x_dimension(dataset, dataset[name]) if dataset[name].ndim else ""
     return Panel(
         x=along,
-        marks=[partial(_lines, name, along)],
-        y_label=label(quantity(name, stated_by(dataset)), 200),
-        title=pretty(title),
+        overlays=[partial(_draw_lines, name, along)],
+        y_label=axis_label(find_quantity(name, read_quantities(dataset)), 200),
+        title=to_mathtext(title),
     )
 
 
-def _lines(name: str, along: str, dataset: xr.Dataset, axes: Axes) -> None:
+def _draw_lines(name: str, along: str, dataset: xr.Dataset, axes: Axes) -> None:
     values = dataset[name]
     if told := flag_meanings(values):
         flags, places = np.unique(values.values, return_inverse=True)
         values = values.copy(data=np.reshape(places, values.shape).astype(float))
         axes.set_yticks(range(flags.size), [told[flag] for flag in flags.tolist()])
         axes.set_ylim(-0.5, flags.size - 0.5)
-    x = axis_of(axes, dataset, along) if along else np.zeros(1)
-    numeric = bool(along) and is_numeric(dataset, along)
-    coloured = _coloured(dataset, values, along)
+    x = set_up_x_axis(axes, dataset, along) if along else np.zeros(1)
+    numeric = bool(along) and has_numeric_points(dataset, along)
+    coloured = _choose_colour_dimension(dataset, values, along)
     others = [str(d) for d in values.dims if d not in (along, coloured)]
-    curves = _different(list(_points(values, others)), others)
+    curves = _distinct_curves(list(_iterate_points(values, others)), others)
     for number, (group, text) in enumerate(curves):
-        style = look(number) | {"label": text if number < _NAMED and text else None}
-        style["marker"] = marker(number) if x.size <= _MARKED or not numeric else ""
+        style = cycle_style(number) | {
+            "label": text if number < _MAX_LEGEND_LINES and text else None
+        }
+        style["marker"] = (
+            cycle_marker(number) if x.size <= _MAX_POINTS_WITH_MARKERS or not numeric else ""
+        )
         style |= {} if numeric else {"linestyle": "none"}
         if coloured is None:
             axes.plot(x, np.atleast_1d(group.values), **style)
             continue
-        shades = colours(dataset, coloured)
-        for row, colour in zip(_points(group, [coloured]), shades, strict=True):
+        shades = point_colours(dataset, coloured)
+        for row, colour in zip(_iterate_points(group, [coloured]), shades, strict=True):
             axes.plot(x, row.values, **style | {"color": colour})
             style["label"] = None
     if coloured is not None:
-        colour_bar(dataset, axes, coloured)
+        add_colour_bar(dataset, axes, coloured)
     if numeric and is_log_spaced(x):
         axes.set_xscale("log")
-    if is_wide(np.asarray(values.values, dtype=float)):
+    if spans_decades(np.asarray(values.values, dtype=float)):
         axes.set_yscale("log")
-    if len(curves) > _NAMED:
-        in_grey(axes, f"the first {_NAMED} of {len(curves)}", {"linestyle": "none"})
+    if len(curves) > _MAX_LEGEND_LINES:
+        add_grey_legend_entry(
+            axes, f"the first {_MAX_LEGEND_LINES} of {len(curves)}", {"linestyle": "none"}
+        )
 
 
-def _along(dataset: xr.Dataset, values: xr.DataArray) -> str:
+def _choose_x_dimension(dataset: xr.Dataset, values: xr.DataArray) -> str:
     """The axis of x: the longest of numbers, or the last."""
     names = [str(dimension) for dimension in values.dims]
-    numeric = [name for name in names if name in dataset.coords and is_numeric(dataset, name)]
+    numeric = [
+        name for name in names if name in dataset.coords and has_numeric_points(dataset, name)
+    ]
     return max(reversed(numeric), key=lambda name: values.sizes[name]) if numeric else names[-1]
 
 
-def _coloured(dataset: xr.Dataset, values: xr.DataArray, along: str) -> str | None:
+def _choose_colour_dimension(dataset: xr.Dataset, values: xr.DataArray, along: str) -> str | None:
     """The axis whose points a scale of colours tells apart: one of many numbers."""
-    numeric = [str(d) for d in values.dims if d != along and is_numeric(dataset, str(d))]
-    long = [name for name in numeric if values.sizes[name] > _COLOURED]
+    numeric = [str(d) for d in values.dims if d != along and has_numeric_points(dataset, str(d))]
+    long = [name for name in numeric if values.sizes[name] > _MAX_CYCLED_COLOURS]
     return max(long, key=lambda name: values.sizes[name]) if long else None
 
 
-def _points(values: xr.DataArray, dimensions: Sequence[str]) -> Iterator[xr.DataArray]:
+def _iterate_points(values: xr.DataArray, dimensions: Sequence[str]) -> Iterator[xr.DataArray]:
     """The values at each point of some dimensions."""
     for places in np.ndindex(*(values.sizes[d] for d in dimensions)):
         yield values.isel(dict(zip(dimensions, places, strict=True)))
 
 
-def _different(
+def _distinct_curves(
     groups: Sequence[xr.DataArray], dimensions: Sequence[str]
 ) -> list[tuple[xr.DataArray, str]]:
     """Curves that differ, each with what all of its places have in common, in words."""
@@ -126,17 +137,17 @@ def _different(
         if bool(np.isfinite(group).any()):
             alike.setdefault(group.values.tobytes(), []).append(group)
     several = [d for d in dimensions if len({str(group[d].item()) for group in groups}) > 1]
-    return [(same[0], ", ".join(_named(same, several))) for same in alike.values()]
+    return [(same[0], ", ".join(_common_places(same, several))) for same in alike.values()]
 
 
-def _named(same: Sequence[xr.DataArray], dimensions: Sequence[str]) -> tuple[str, ...]:
+def _common_places(same: Sequence[xr.DataArray], dimensions: Sequence[str]) -> tuple[str, ...]:
     """Places of curves that lie on each other: what they have in common, or else all of the two or
     three that there are, or the first.
     """
-    places = [list(dict.fromkeys(place(group, d) for group in same)) for d in dimensions]
+    places = [list(dict.fromkeys(describe_point(group, d) for group in same)) for d in dimensions]
     if not places or any(len(names) == 1 for names in places):
         return tuple(names[0] for names in places if len(names) == 1)
-    every = [", ".join(place(one, d) for d in dimensions) for one in same]
-    if len(every) <= _FEW:
+    every = [", ".join(describe_point(one, d) for d in dimensions) for one in same]
+    if len(every) <= _MAX_NAMED_DUPLICATES:
         return (" and ".join(every),)
     return (f"{every[0]} and {len(every) - 1} more",)

@@ -23,63 +23,63 @@ from scipy.spatial import cKDTree
 from rsfstudy.declare.figure import Panel
 from rsfstudy.plots._axes import (
     flag_meanings,
+    has_numeric_points,
     is_log_spaced,
-    is_number,
-    is_numeric,
-    is_wide,
-    measured,
+    is_numeric_variable,
+    measured_variables,
+    spans_decades,
 )
-from rsfstudy.plots._text import label, pretty
-from rsfstudy.reduce.base import stated_by
+from rsfstudy.plots._text import axis_label, to_mathtext
+from rsfstudy.reduce.base import read_quantities
 from rsfstudy.status import Status
-from rsfstudy.vocabulary import quantity
+from rsfstudy.vocabulary import find_quantity
 
 #: Fewest points of an axis of a map, and most maps.
-_FEWEST, _MOST = 3, 12
+_MIN_POINTS, _MAX_MAPS = 3, 12
 #: Hatches of cells without a number, by the order in which their statuses are met.
 _HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "||||", "----", "++++", "oooo")
 #: Part of a panel that a label needs around it.
-_ROOM = 0.06
+_LABEL_CLEARANCE = 0.06
 #: Part of a panel that a line has to go through for one.
-_LONG = 0.2
+_MIN_LABELLED_LENGTH = 0.2
 #: Fewest points of an axis along which lines of equal value are drawn.
-_DENSE = 6
-_NAMES = {int(status): status.label for status in Status}
+_MIN_POINTS_FOR_CONTOURS = 6
+_STATUS_NAMES = {int(status): status.label for status in Status}
 
 
 def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     """A map of what is named, or of the headline, for each point of the axes that it has beside
     the two; none where there are no two.
     """
-    names = measured(dataset)[:1] if variable is None else [variable]
+    names = measured_variables(dataset)[:1] if variable is None else [variable]
     if not names or names[0] not in dataset:
         return []
     values = dataset[names[0]]
-    if not (is_number(values) or flag_meanings(values)):
+    if not (is_numeric_variable(values) or flag_meanings(values)):
         return []
-    plane, cells = _plane(dataset, values), dataset["status"].dims
+    plane, cells = _map_axes(dataset, values), dataset["status"].dims
     if plane is None or not set(values.dims) <= set(cells):
         return []
     others = [str(d) for d in values.dims if d not in plane]
-    about = quantity(names[0], stated_by(dataset))
-    places = list(np.ndindex(*(values.sizes[d] for d in others)))[:_MOST]
+    about = find_quantity(names[0], read_quantities(dataset))
+    places = list(np.ndindex(*(values.sizes[d] for d in others)))[:_MAX_MAPS]
     panel = partial(
         Panel,
         x=plane[1],
-        marks=[partial(draw_map, names[0], plane, _scale(values))],
-        y_label=label(quantity(plane[0], stated_by(dataset)), 200),
-        title=None if others else pretty(dataset.attrs.get("title", "")),
-        legend_title=label(about, 60) if flag_meanings(values) else None,
+        overlays=[partial(draw_map, names[0], plane, _colour_scale(values))],
+        y_label=axis_label(find_quantity(plane[0], read_quantities(dataset)), 200),
+        title=None if others else to_mathtext(dataset.attrs.get("title", "")),
+        legend_title=axis_label(about, 60) if flag_meanings(values) else None,
     )
-    return [panel(at=dict(zip(others, at, strict=True))) for at in places]
+    return [panel(isel=dict(zip(others, at, strict=True))) for at in places]
 
 
-def _plane(dataset: xr.Dataset, values: xr.DataArray) -> tuple[str, str] | None:
+def _map_axes(dataset: xr.Dataset, values: xr.DataArray) -> tuple[str, str] | None:
     """The axes of y and x: the last two of numbers."""
     numeric = [
         str(dimension)
         for dimension in values.dims
-        if dataset.sizes[dimension] >= _FEWEST and is_numeric(dataset, str(dimension))
+        if dataset.sizes[dimension] >= _MIN_POINTS and has_numeric_points(dataset, str(dimension))
     ]
     return (numeric[-2], numeric[-1]) if len(numeric) > 1 else None
 
@@ -95,10 +95,10 @@ def draw_map(
     dataset = dataset.sortby(list(plane))
     values = dataset[name].astype(float).transpose(*plane)
     y, x = (values[dimension].values.astype(float) for dimension in plane)
-    at = _edges(x, is_log_spaced(x)), _edges(y, is_log_spaced(y))
+    at = _cell_edges(x, is_log_spaced(x)), _cell_edges(y, is_log_spaced(y))
     axes.set(**{f"{w}scale": "log" for w, points in (("x", x), ("y", y)) if is_log_spaced(points)})
     axes.set(xlim=(at[0][0], at[0][-1]), ylim=(at[1][0], at[1][-1]))
-    if found := scale or _scale(dataset[name]):
+    if found := scale or _colour_scale(dataset[name]):
         axes.grid(False)
         known = np.ma.masked_invalid(values.values)
         drawn = axes.pcolormesh(*at, known, rasterized=True, norm=found[0])
@@ -108,16 +108,16 @@ def draw_map(
                 axes.add_collection(PolyCollection([], facecolor=colour, label=meanings[flag]))
         else:
             bar = cast(Figure, axes.figure).colorbar(drawn, ax=axes, pad=0.02)
-            bar.set_label(label(quantity(name, stated_by(dataset)), 34))
-            contours(axes, values, found[1])
+            bar.set_label(axis_label(find_quantity(name, read_quantities(dataset)), 34))
+            draw_contours(axes, values, found[1])
     status = dataset["status"]
     status = status.squeeze([d for d in status.dims if status.sizes[d] == 1 and d not in plane])
     if set(status.dims) == set(plane):
         unknown = ~np.isfinite(values.values)
-        _statuses(axes, at, status.transpose(*plane).values, unknown)
+        _hatch_statuses(axes, at, status.transpose(*plane).values, unknown)
 
 
-def _scale(data: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
+def _colour_scale(data: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
     """A scale of colours, and where contours are on it, or the flags that there are; none where
     nothing is known.
     """
@@ -126,9 +126,9 @@ def _scale(data: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
         return None
     if flag_meanings(data):
         flags = np.unique(values[np.isfinite(values)])
-        return BoundaryNorm(_edges(flags), 256), flags.tolist()
+        return BoundaryNorm(_cell_edges(flags), 256), flags.tolist()
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    if is_wide(values):
+    if spans_decades(values):
         subs = (1.0, 3.0) if high < 1e4 * low else (1.0,)
         return LogNorm(low, high), LogLocator(subs=subs).tick_values(low, high)
     return Normalize(low, high), MaxNLocator(8).tick_values(low, high)
@@ -137,7 +137,7 @@ def _scale(data: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
 # ---- what is on a map ---------------------------------------------------------------------------
 
 
-def _edges(points: np.ndarray, log: bool = False) -> np.ndarray:
+def _cell_edges(points: np.ndarray, log: bool = False) -> np.ndarray:
     """Edges of cells whose centres are these: halfway, on the scale they are drawn on."""
     if points.size < 2:
         return np.asarray(
@@ -149,21 +149,21 @@ def _edges(points: np.ndarray, log: bool = False) -> np.ndarray:
     return np.asarray(np.exp(ends) if log else ends)
 
 
-def contours(axes: Axes, values: xr.DataArray, levels: Sequence[float]) -> None:
+def draw_contours(axes: Axes, values: xr.DataArray, levels: Sequence[float]) -> None:
     """Lines of equal value, labelled, where there are points enough on both axes; x and y are the
     coordinates of the last and the first dimension.
     """
     y, x = (values[dimension].values for dimension in values.dims)
-    if min(values.shape) < _DENSE or not len(levels):
+    if min(values.shape) < _MIN_POINTS_FOR_CONTOURS or not len(levels):
         return
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "No contour levels were found")
         found = axes.contour(x, y, values, levels, colors="white", linewidths=0.6, linestyles="-")
-    for text in axes.clabel(found, fontsize=6, fmt="%.3g", manual=_clear_places(axes, found)):
+    for text in axes.clabel(found, fontsize=6, fmt="%.3g", manual=_label_positions(axes, found)):
         text.set_path_effects([withStroke(linewidth=1.0, foreground="0.2")])
 
 
-def _clear_places(axes: Axes, found: QuadContourSet) -> list[tuple[float, float]]:
+def _label_positions(axes: Axes, found: QuadContourSet) -> list[tuple[float, float]]:
     """Places where the longest line of each level is farthest from those of other levels and from
     the frame; none where that is too close for a label, or the line too short.
     """
@@ -175,13 +175,13 @@ def _clear_places(axes: Axes, found: QuadContourSet) -> list[tuple[float, float]
         line = max(level, key=len)
         apart = cKDTree(np.concatenate(others)).query(line)[0] if others else np.ones(len(line))
         room = np.minimum(apart, np.minimum(line, 1.0 - line).min(axis=1))
-        if room.max() > _ROOM and np.ptp(line, axis=0).max() > _LONG:
+        if room.max() > _LABEL_CLEARANCE and np.ptp(line, axis=0).max() > _MIN_LABELLED_LENGTH:
             x, y = panel.inverted().transform(line[room.argmax()]).tolist()
             places.append((x, y))
     return places
 
 
-def _statuses(
+def _hatch_statuses(
     axes: Axes, at: tuple[np.ndarray, np.ndarray], status: np.ndarray, unknown: np.ndarray
 ) -> None:
     """Hatch the cells without a number, each status in its own way, and name it for the legend.
@@ -197,19 +197,21 @@ def _statuses(
         The cells to hatch.
     """
     for hatch, code in zip(_HATCHES, np.unique(status[unknown]), strict=False):
-        rows = [_outline(at, *run) for run in _runs(unknown & (status == code))]
-        name = _NAMES[int(code)].replace("_", " ") if code else "no number"
+        rows = [_run_outline(at, *run) for run in _horizontal_runs(unknown & (status == code))]
+        name = _STATUS_NAMES[int(code)].replace("_", " ") if code else "no number"
         grey: dict[str, Any] = {"facecolor": "0.93", "edgecolor": "0.55", "linewidth": 0.0}
         axes.add_collection(PolyCollection(rows, hatch=hatch, label=name, **grey), autolim=False)
 
 
-def _runs(here: np.ndarray) -> list[tuple[int, int, int]]:
+def _horizontal_runs(here: np.ndarray) -> list[tuple[int, int, int]]:
     """Cells side by side: their row, and the first and the one after the last of their columns."""
     change = np.diff(np.pad(here.astype(int), ((0, 0), (1, 1))), axis=1)
     first, last = np.argwhere(change == 1), np.argwhere(change == -1)
     return [(int(r), int(a), int(b)) for (r, a), (_r, b) in zip(first, last, strict=True)]
 
 
-def _outline(at: tuple[np.ndarray, np.ndarray], row: int, a: int, b: int) -> list[tuple[Any, Any]]:
+def _run_outline(
+    at: tuple[np.ndarray, np.ndarray], row: int, a: int, b: int
+) -> list[tuple[Any, Any]]:
     (left, right), (low, high) = at[0][[a, b]], at[1][row : row + 2]
     return [(left, low), (right, low), (right, high), (left, high)]

@@ -11,17 +11,17 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 #: Number of samples at least.
-FEWEST = 4
+MIN_SAMPLES = 4
 #: Intervals on either side of the bracket in which the curve is examined.
-_NEAR = 3
+_NEIGHBOUR_INTERVALS = 3
 #: Changes of slope, relative to the largest slope, that count as rounding errors.
-_ROUNDING = 1e-9
+_SLOPE_ROUNDING_ERROR = 1e-9
 #: The same, relative to the largest change and to the smallest slope nearby, that count for an
 #: oscillation.
-_NOTICEABLE = 0.1
+_OSCILLATION_THRESHOLD = 0.1
 
 
-class Verdict(IntEnum):
+class CrossingStatus(IntEnum):
     """Outcome of the search for a crossing.
 
     Files contain the integer value, so the values must not change.
@@ -33,10 +33,10 @@ class Verdict(IntEnum):
 class Crossing(NamedTuple):
     """Position of a level crossing, with lower and upper bounds and the verdict."""
 
-    place: float
-    first: float
-    last: float
-    verdict: Verdict
+    position: float
+    lower_bound: float
+    upper_bound: float
+    status: CrossingStatus
 
 
 def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
@@ -66,32 +66,34 @@ def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
         The position and the bounds are NaN unless the samples cross the level exactly once. The
         verdict is ``UNRESOLVED`` if a hidden oscillation could reach the level in other intervals.
     """
-    if x.size < FEWEST:
-        return _nowhere(Verdict.TOO_FEW_POINTS)
-    places = crossings(x, y, level)
+    if x.size < MIN_SAMPLES:
+        return _no_crossing(CrossingStatus.TOO_FEW_POINTS)
+    places = find_all_crossings(x, y, level)
     if len(places) != 1:
-        return _nowhere(Verdict.NOT_UNIQUE if places else Verdict.OUT_OF_REACH)
+        return _no_crossing(CrossingStatus.NOT_UNIQUE if places else CrossingStatus.OUT_OF_REACH)
     place, widths = places[0], np.diff(x)
     slopes = np.diff(y) / widths
     bracket = int(np.clip(np.searchsorted(x, place) - 1, 0, slopes.size - 1))
-    near = range(max(bracket - _NEAR, 0), min(bracket + _NEAR + 1, slopes.size))
-    turns, alternates = _turns(slopes, near)
+    near = range(
+        max(bracket - _NEIGHBOUR_INTERVALS, 0), min(bracket + _NEIGHBOUR_INTERVALS + 1, slopes.size)
+    )
+    turns, alternates = _slope_changes(slopes, near)
     bounds, far = [place], False
     for n in near if alternates else (bracket,):
-        span = _span(slopes[n], turns[n], widths[n], level - y[n])
+        span = _crossing_bounds(slopes[n], turns[n], widths[n], level - y[n])
         if span:
             bounds += [x[n] + end for end in span]
-            far |= abs(n - bracket) >= _NEAR
+            far |= abs(n - bracket) >= _NEIGHBOUR_INTERVALS
     if alternates:
         bounds += [x[bracket], x[bracket + 1]]
     if bracket in (0, slopes.size - 1):
-        span = _span_at_end(slopes, widths, level - y[bracket], is_first=bracket == 0)
+        span = _crossing_bounds_at_end(slopes, widths, level - y[bracket], is_first=bracket == 0)
         bounds += [x[bracket] + end for end in span]
-    verdict = Verdict.UNRESOLVED if far else Verdict.OK
+    verdict = CrossingStatus.UNRESOLVED if far else CrossingStatus.OK
     return Crossing(place, float(min(bounds)), float(max(bounds)), verdict)
 
 
-def crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float]:
+def find_all_crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float]:
     """Return all positions at which the interpolant of the samples reaches a level."""
     off, curve = y - level, PchipInterpolator(x, y)
     places: list[float] = x[off == 0.0].tolist()
@@ -103,11 +105,11 @@ def crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float]:
     return places
 
 
-def _nowhere(verdict: Verdict) -> Crossing:
+def _no_crossing(verdict: CrossingStatus) -> Crossing:
     return Crossing(math.nan, math.nan, math.nan, verdict)
 
 
-def _turns(slopes: np.ndarray, near: range) -> tuple[dict[int, float], bool]:
+def _slope_changes(slopes: np.ndarray, near: range) -> tuple[dict[int, float], bool]:
     """Estimate the total change of slope within each of the given intervals.
 
     Returns
@@ -124,22 +126,28 @@ def _turns(slopes: np.ndarray, near: range) -> tuple[dict[int, float], bool]:
         beside = sizes[max(n - 1, 0) : n + 1]
         turns[n] = 2.0 * float(beside.mean())  # at an end, the other change is not known
     within = bends[near.start : near.stop - 1]
-    if not _reversals(within, _ROUNDING * float(np.abs(slopes).max())):
+    if not _count_sign_reversals(within, _SLOPE_ROUNDING_ERROR * float(np.abs(slopes).max())):
         return turns, False
     largest = 2.0 * max(turns.values())
     # the small changes on either side of a kink, or noise, do not make an oscillation
-    noticeable = _NOTICEABLE * float(np.abs(within).max())
-    steady = largest < 2.0 * _NOTICEABLE * float(np.abs(slopes[near.start : near.stop]).min())
-    return dict.fromkeys(near, largest), not steady and _reversals(within, noticeable) > 1
+    noticeable = _OSCILLATION_THRESHOLD * float(np.abs(within).max())
+    steady = largest < 2.0 * _OSCILLATION_THRESHOLD * float(
+        np.abs(slopes[near.start : near.stop]).min()
+    )
+    return dict.fromkeys(near, largest), not steady and _count_sign_reversals(
+        within, noticeable
+    ) > 1
 
 
-def _reversals(bends: np.ndarray, least: float) -> int:
+def _count_sign_reversals(bends: np.ndarray, least: float) -> int:
     """Count the sign reversals among changes of slope larger than a minimum."""
     counted = bends[np.abs(bends) > least]
     return int((counted[1:] * counted[:-1] < 0.0).sum())
 
 
-def _span(slope: float, turn: float, width: float, rise: float) -> tuple[float, float] | None:
+def _crossing_bounds(
+    slope: float, turn: float, width: float, rise: float
+) -> tuple[float, float] | None:
     """Return the first and last possible position of a crossing in an interval.
 
     Positions are relative to the first sample, and ``rise`` is the level minus the value of the
@@ -148,7 +156,7 @@ def _span(slope: float, turn: float, width: float, rise: float) -> tuple[float, 
     if slope < 0.0:
         slope, rise = -slope, -rise
     if rise > slope * width:  # seen from the other end, it is below the sample
-        mirrored = _span(slope, turn, width, slope * width - rise)
+        mirrored = _crossing_bounds(slope, turn, width, slope * width - rise)
         return None if mirrored is None else (width - mirrored[1], width - mirrored[0])
     if rise < 0.0:
         excess = turn - slope
@@ -165,7 +173,7 @@ def _span(slope: float, turn: float, width: float, rise: float) -> tuple[float, 
     return min(first, width), min(last, width)
 
 
-def _span_at_end(
+def _crossing_bounds_at_end(
     slopes: np.ndarray, widths: np.ndarray, rise: float, is_first: bool
 ) -> tuple[float, float]:
     """Return the first and last possible position of a crossing in an end interval.

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 import xarray as xr
 
+from rsfstudy._deprecation import adopt_former_members, renamed_members
 from rsfstudy.error_boundary import CheckedKeywords, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
@@ -22,16 +23,19 @@ Data = TypeVar("Data", xr.Dataset, xr.DataArray)
 Derivatives = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
 
 #: Fields that name what a result is measured in units of, by the end of its name.
-Fields = Mapping[str, Sequence[str]]
+UnitFields = Mapping[str, Sequence[str]]
 
 #: How a result comes by its error, for the attributes of that.
-COMMENT = "errors of the cells it draws on, each times the derivative by it, in absolute value"
+ERROR_COMMENT = (
+    "errors of the cells it draws on, each times the derivative by it, in absolute value"
+)
 #: Endings of the names of variables that hold statistical errors.
-_STATISTICAL = ("_stderr", "_low", "_high", "covariance", "correlation")
+_STATISTICAL_SUFFIXES = ("_stderr", "_low", "_high", "covariance", "correlation")
 #: Rounding error by which a coordinate value may miss a range and still count as in it.
-ROUNDING = 1e-9
+COORDINATE_RTOL = 1e-9
 
 
+@renamed_members
 @guard_methods
 @dataclass(frozen=True)
 class Reduction(CheckedKeywords):
@@ -53,7 +57,7 @@ class Reduction(CheckedKeywords):
         derivatives(self, dataset) -> Sequence[tuple[xarray.DataArray, Mapping]]
 
     ``kind`` is the name of the reduction in files. The default is the class name. ``long_names``
-    and ``measured_in`` define the long names and the units of the results. ``derivatives`` returns
+    and ``unit_fields`` define the long names and the units of the results. ``derivatives`` returns
     the derivatives with which the numerical errors of cells are propagated to ``<name>_error``.
     """
 
@@ -64,15 +68,16 @@ class Reduction(CheckedKeywords):
     long_names: ClassVar[Mapping[str, str]] = {}
     #: What its results are in units of, by what follows `name` in theirs: the variable that a field
     #: names, as `("of",)`, or over that of others, as `("of", "on")`. All others are pure numbers.
-    measured_in: ClassVar[Fields] = {}
+    unit_fields: ClassVar[UnitFields] = {}
     #: Whether it tells of cells that failed, which all others refuse to draw on.
-    of_failures: ClassVar[bool] = False
+    uses_failed_cells: ClassVar[bool] = False
 
     name: str
     of: str
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
+        adopt_former_members(cls)
         if "kind" not in vars(cls) and not cls.__name__.startswith("_"):
             cls.kind = cls.__name__
 
@@ -85,9 +90,9 @@ class Reduction(CheckedKeywords):
         described = {end: found.assign_attrs(comment=comment) for end, found in values.items()}
         return xr.Dataset({f"{self.name}{end}": found for end, found in described.items()})
 
-    def draws_on(self, status: xr.DataArray) -> xr.DataArray:
+    def support_status(self, status: xr.DataArray) -> xr.DataArray:
         """The worst status among the cells that each result draws on, from the status of all cells;
-        `worst` removes the dimensions that the results do not have.
+        `worst_status` removes the dimensions that the results do not have.
         """
         return status
 
@@ -112,17 +117,17 @@ class Reduction(CheckedKeywords):
         return {"kind": self.kind, **asdict(self)}
 
 
-def failed(status: xr.DataArray) -> xr.DataArray:
+def is_failed(status: xr.DataArray) -> xr.DataArray:
     """Cells that failed or were not computed."""
     return status >= int(Status.WORK_BUDGET_SPENT)
 
 
-def worst(status: xr.DataArray, dims: Collection[Hashable]) -> xr.DataArray:
+def worst_status(status: xr.DataArray, dims: Collection[Hashable]) -> xr.DataArray:
     """The worst status along all dimensions but `dims`; failures have the largest codes."""
     return status.max([d for d in status.dims if d not in dims])
 
 
-def known(dataset: xr.Dataset, of: str, status: xr.DataArray) -> xr.Dataset:
+def mask_unusable_values(dataset: xr.Dataset, of: str, status: xr.DataArray) -> xr.Dataset:
     """Return a copy of the dataset in which values that must not be used are NaN.
 
     The values of failed cells are replaced by NaN. If ``of`` is a standard error or the bound of a
@@ -136,25 +141,25 @@ def known(dataset: xr.Dataset, of: str, status: xr.DataArray) -> xr.Dataset:
     status : xarray.DataArray
         Status of the cells on which ``of`` depends. The status is added to the result.
     """
-    bad = failed(status)
-    if of.endswith(_STATISTICAL):
+    bad = is_failed(status)
+    if of.endswith(_STATISTICAL_SUFFIXES):
         bad = bad | (status == int(Status.ERRORS_NOT_VALID))
     if bool(bad.any()) and dataset[of].dtype.kind == "f":
         dataset = dataset.assign({of: dataset[of].where(~bad)})
     return dataset.assign(status=status)
 
 
-def refused(dataset: xr.Dataset, of: str, *along: str) -> xr.DataArray:
+def is_refused(dataset: xr.Dataset, of: str, *along: str) -> xr.DataArray:
     """True if a result must be refused because a cell failed along these dimensions, or along those
     that `of` does not have.
     """
-    bad = failed(dataset["status"])
+    bad = is_failed(dataset["status"])
     return bad.any([d for d in bad.dims if d in along or d not in dataset[of].dims])
 
 
-def without_failures(dataset: xr.Dataset) -> xr.Dataset:
+def mask_failures(dataset: xr.Dataset) -> xr.Dataset:
     """The dataset with failed cells changed to cells that have an answer but no number."""
-    lost = failed(dataset["status"]) & (dataset["status"] != int(Status.PENDING))
+    lost = is_failed(dataset["status"]) & (dataset["status"] != int(Status.PENDING))
     kept = {
         name: values.where(~lost)
         for name, values in dataset.data_vars.items()
@@ -164,7 +169,7 @@ def without_failures(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign({**kept, "status": status})
 
 
-def dimension_of(dataset: xr.Dataset | xr.DataArray, on: str) -> str:
+def dimension_of_coordinate(dataset: xr.Dataset | xr.DataArray, on: str) -> str:
     """The one dimension a coordinate lies along.
 
     Raises
@@ -180,20 +185,20 @@ def dimension_of(dataset: xr.Dataset | xr.DataArray, on: str) -> str:
     return str(dataset[on].dims[0])
 
 
-def within(dataset: Data, on: str, span: tuple[float, float] | None) -> Data:
+def select_range(dataset: Data, on: str, span: tuple[float, float] | None) -> Data:
     """The part of a dataset in a range of a coordinate, both ends included; all of what does not
     lie along that coordinate.
     """
     if span is None or on not in dataset.coords:
         return dataset
     values, (lowest, highest) = dataset[on].values, span
-    inside = (values >= lowest - ROUNDING * abs(lowest)) & (
-        values <= highest + ROUNDING * abs(highest)
+    inside = (values >= lowest - COORDINATE_RTOL * abs(lowest)) & (
+        values <= highest + COORDINATE_RTOL * abs(highest)
     )
-    return dataset.isel({dimension_of(dataset, on): np.flatnonzero(inside)})
+    return dataset.isel({dimension_of_coordinate(dataset, on): np.flatnonzero(inside)})
 
 
-def stated_by(dataset: xr.Dataset) -> dict[str, Quantity]:
+def read_quantities(dataset: xr.Dataset) -> dict[str, Quantity]:
     """Quantities that a dataset states for variables that the vocabulary does not hold, or calls
     something else, or holds in other units.
     """
@@ -206,11 +211,11 @@ def stated_by(dataset: xr.Dataset) -> dict[str, Quantity]:
             str(values.attrs.get("scale", "")),
         )
         for name, values in dataset.variables.items()
-        if values.attrs.get("long_name") and not _is_known(str(name), values.attrs)
+        if values.attrs.get("long_name") and not _is_in_vocabulary(str(name), values.attrs)
     }
 
 
-def _is_known(name: str, attrs: Mapping[Any, Any]) -> bool:
+def _is_in_vocabulary(name: str, attrs: Mapping[Any, Any]) -> bool:
     about = QUANTITIES.get(name)
     if about is None or attrs["long_name"] != about.long_name:
         return False
@@ -220,7 +225,9 @@ def _is_known(name: str, attrs: Mapping[Any, Any]) -> bool:
 # ---- numerical errors ----------------------------------------------------------------------------
 
 
-def carried(reduction: Reduction, dataset: xr.Dataset, made: xr.Dataset) -> xr.Dataset:
+def with_propagated_errors(
+    reduction: Reduction, dataset: xr.Dataset, made: xr.Dataset
+) -> xr.Dataset:
     """The results of a reduction with ``<name>_error``, what the errors of its cells make of them;
     added to the error that the reduction has of its own.
 
@@ -252,7 +259,7 @@ def carried(reduction: Reduction, dataset: xr.Dataset, made: xr.Dataset) -> xr.D
         return made
     error = sum(parts[1:], start=parts[0]).where(result.notnull()).transpose(*result.dims)
     about = {key: result.attrs[key] for key in ("refused",) if key in result.attrs}
-    comment = COMMENT
+    comment = ERROR_COMMENT
     if name in made:
-        error, comment = error + made[name], f"{made[name].attrs['comment']}; and {COMMENT}"
+        error, comment = error + made[name], f"{made[name].attrs['comment']}; and {ERROR_COMMENT}"
     return made.assign({name: error.assign_attrs(comment=comment, **about)})

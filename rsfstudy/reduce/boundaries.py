@@ -12,11 +12,17 @@ from scipy.interpolate import PchipInterpolator
 
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.quantity import Quantity
-from rsfstudy.reduce._crossing import FEWEST, Verdict, find_crossing
-from rsfstudy.reduce.base import Derivatives, Fields, Reduction, dimension_of, refused
+from rsfstudy.reduce._crossing import MIN_SAMPLES, CrossingStatus, find_crossing
+from rsfstudy.reduce.base import (
+    Derivatives,
+    Reduction,
+    UnitFields,
+    dimension_of_coordinate,
+    is_refused,
+)
 
 #: Change of ln(value) by which derivatives of an interpolant are taken.
-_STEP = 1e-6
+_LOG_STEP = 1e-6
 
 
 @guard_methods
@@ -44,7 +50,7 @@ class Boundary(Reduction):
     on: str = ""
     level: float = 0.5
     kind: ClassVar[str] = "boundary"
-    measured_in: ClassVar[Fields] = {"": ("on",)}
+    unit_fields: ClassVar[UnitFields] = {"": ("on",)}
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Bracket the boundary along the dimension of `on`, for each point of the others.
@@ -57,11 +63,11 @@ class Boundary(Reduction):
         InvalidValue
             Where `on` is no coordinate along one dimension.
         """
-        dimension = dimension_of(dataset, self.on)
-        values = dataset[self.of].where(~refused(dataset, self.of, dimension))
+        dimension = dimension_of_coordinate(dataset, self.on)
+        values = dataset[self.of].where(~is_refused(dataset, self.of, dimension))
         if f"{self.of}_error" in dataset:
             values = values.where(~(abs(values - self.level) <= dataset[f"{self.of}_error"]))
-        stable, unstable, crossings = self.bracketed(values)
+        stable, unstable, crossings = self.bracket(values)
         once = crossings == 1
         note = f"between cells of {self.of} below and above {self.level:g} along {self.on}"
         found = {
@@ -73,13 +79,13 @@ class Boundary(Reduction):
         }
         return self.results(note, found)
 
-    def bracketed(self, values: xr.DataArray) -> tuple[xr.DataArray, ...]:
+    def bracket(self, values: xr.DataArray) -> tuple[xr.DataArray, ...]:
         """The cells that say no and yes next to the first change of the answer along `on`, and how
         often it changes; NaN where no cell says so.
         """
-        dimension = dimension_of(values, self.on)
+        dimension = dimension_of_coordinate(values, self.on)
         edges: tuple[xr.DataArray, ...] = xr.apply_ufunc(
-            self._bracket,
+            self._bracket_1d,
             values,
             values[self.on].astype(float),
             input_core_dims=[[dimension], [dimension]],
@@ -88,7 +94,7 @@ class Boundary(Reduction):
         )
         return edges
 
-    def _bracket(self, values: np.ndarray, on: np.ndarray) -> tuple[float, float, float]:
+    def _bracket_1d(self, values: np.ndarray, on: np.ndarray) -> tuple[float, float, float]:
         """Ends of the bracket next to the first change of the answer, and the number of changes."""
         order = [i for i in np.argsort(on) if not np.isnan(values[i])]
         if not order:
@@ -139,11 +145,11 @@ class Inverse(Reduction):
     uncertainty: float | Mapping[str, float] = 0.0
     along: str = ""
     kind: ClassVar[str] = "inverse"
-    measured_in: ClassVar[Fields] = {"": ("on",)}
+    unit_fields: ClassVar[UnitFields] = {"": ("on",)}
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        flags = tuple(verdict.name.lower() for verdict in Verdict)
+        flags = tuple(verdict.name.lower() for verdict in CrossingStatus)
         text = f"status of {self.name.replace('_', ' ')}"
         return [Quantity(f"{self.name}_status", "", "1", text, flags=flags)]
 
@@ -155,16 +161,16 @@ class Inverse(Reduction):
         InvalidValue
             If ``on`` is not a one-dimensional coordinate.
         """
-        dimension = dimension_of(dataset, self.on)
-        if dataset.sizes[dimension] < FEWEST:
+        dimension = dimension_of_coordinate(dataset, self.on)
+        if dataset.sizes[dimension] < MIN_SAMPLES:
             return xr.Dataset()
-        values = dataset[self.of].where(~refused(dataset, self.of, dimension))
+        values = dataset[self.of].where(~is_refused(dataset, self.of, dimension))
         crossing, error, verdict = xr.apply_ufunc(
-            _inverse,
+            _invert_1d,
             values,
             dataset[self.on].astype(float),
-            self._labelled(dataset, self.levels),
-            self._labelled(dataset, self.uncertainty),
+            self._value_per_label(dataset, self.levels),
+            self._value_per_label(dataset, self.uncertainty),
             input_core_dims=[[dimension], [dimension], [], []],
             output_core_dims=[[], [], []],
             vectorize=True,
@@ -181,19 +187,21 @@ class Inverse(Reduction):
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """Those of the interpolant by its points, over its slope."""
-        dimension = dimension_of(dataset, self.on)
+        dimension = dimension_of_coordinate(dataset, self.on)
         by_cells = xr.apply_ufunc(
-            _moved,
+            _position_derivatives,
             dataset[self.of],
             dataset[self.on].astype(float),
-            self._labelled(dataset, self.levels),
+            self._value_per_label(dataset, self.levels),
             input_core_dims=[[dimension], [dimension], []],
             output_core_dims=[[dimension]],
             vectorize=True,
         )
         return [(by_cells, {})]
 
-    def _labelled(self, dataset: xr.Dataset, values: float | Mapping[str, float]) -> xr.DataArray:
+    def _value_per_label(
+        self, dataset: xr.Dataset, values: float | Mapping[str, float]
+    ) -> xr.DataArray:
         if not isinstance(values, Mapping):
             return xr.DataArray(float(values))
         labels = dataset[self.along]
@@ -201,39 +209,39 @@ class Inverse(Reduction):
         return xr.DataArray(stated, {self.along: labels}, self.along)
 
 
-def _inverse(
+def _invert_1d(
     values: np.ndarray, on: np.ndarray, level: float, uncertainty: float
 ) -> tuple[float, float, float]:
-    x, y, _places = _logarithms(values, on)
+    x, y, _places = _log_points(values, on)
     if np.isnan(level) or level <= 0.0:
-        return np.nan, np.nan, float(Verdict.OUT_OF_REACH)
+        return np.nan, np.nan, float(CrossingStatus.OUT_OF_REACH)
     found = find_crossing(x, y, np.log(level))
-    if found.verdict is not Verdict.OK:
-        return np.nan, np.nan, float(found.verdict)
-    ends = [find_crossing(x, y, np.log(level) + d).place for d in (-uncertainty, uncertainty)]
-    place, first, last = np.exp([found.place, found.first, found.last]).tolist()
+    if found.status is not CrossingStatus.OK:
+        return np.nan, np.nan, float(found.status)
+    ends = [find_crossing(x, y, np.log(level) + d).position for d in (-uncertainty, uncertainty)]
+    place, first, last = np.exp([found.position, found.lower_bound, found.upper_bound]).tolist()
     error = max(place - first, last - place)
-    error += place * float(np.max(np.abs(found.place - np.array(ends))))
-    return place, error, float(found.verdict)
+    error += place * float(np.max(np.abs(found.position - np.array(ends))))
+    return place, error, float(found.status)
 
 
-def _moved(values: np.ndarray, on: np.ndarray, level: float) -> np.ndarray:
+def _position_derivatives(values: np.ndarray, on: np.ndarray, level: float) -> np.ndarray:
     """Derivatives of the place where the level is reached by all values; 0 where there is none."""
-    x, y, places = _logarithms(values, on)
+    x, y, places = _log_points(values, on)
     slopes = np.zeros(values.size)
     if np.isnan(level) or level <= 0.0:
         return slopes
-    fine = find_crossing(x, y, np.log(level)).place
+    fine = find_crossing(x, y, np.log(level)).position
     if np.isnan(fine):
         return slopes
     # each value moved in turn: the interpolant is smooth in them, but for kinks
-    moved = PchipInterpolator(x, y + _STEP * np.eye(x.size), axis=1)(fine)
+    moved = PchipInterpolator(x, y + _LOG_STEP * np.eye(x.size), axis=1)(fine)
     rise = float(PchipInterpolator(x, y)(fine, 1)) or np.nan  # at a flat end errors have no bound
-    slopes[places] = (moved - np.log(level)) / _STEP / rise * np.exp(fine) / values[places]
+    slopes[places] = (moved - np.log(level)) / _LOG_STEP / rise * np.exp(fine) / values[places]
     return slopes
 
 
-def _logarithms(values: np.ndarray, on: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _log_points(values: np.ndarray, on: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Logarithms of the coordinate, ascending, and of the values; and which points they are of."""
     places = np.flatnonzero(np.isfinite(values) & (values > 0.0) & (on > 0.0))
     places = places[np.argsort(on[places])]

@@ -10,10 +10,17 @@ import xarray as xr
 
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.reduce.base import Derivatives, Fields, Reduction, dimension_of, refused, within
-from rsfstudy.slider.closed_forms import FORMS
+from rsfstudy.reduce.base import (
+    Derivatives,
+    Reduction,
+    UnitFields,
+    dimension_of_coordinate,
+    is_refused,
+    select_range,
+)
+from rsfstudy.slider.closed_forms import CLOSED_FORMS
 
-Pair = tuple[xr.DataArray, xr.DataArray]
+ArrayPair = tuple[xr.DataArray, xr.DataArray]
 
 
 @guard_methods
@@ -36,18 +43,18 @@ class Difference(Reduction):
     along: str = ""
     reference: str | float = ""
     kind: ClassVar[str] = "difference"
-    measured_in: ClassVar[Fields] = {"": ("of",)}
+    unit_fields: ClassVar[UnitFields] = {"": ("of",)}
     formula: ClassVar[str] = "{of} less {reference}"
 
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
         """The comparison: of - of_reference."""
         return values - reference
 
-    def slopes(self, values: xr.DataArray, reference: xr.DataArray) -> Pair:
+    def partial_derivatives(self, values: xr.DataArray, reference: xr.DataArray) -> ArrayPair:
         """Derivatives of the comparison by the value and by the reference: 1 and -1."""
         return xr.ones_like(values), -xr.ones_like(values)
 
-    def draws_on(self, status: xr.DataArray) -> xr.DataArray:
+    def support_status(self, status: xr.DataArray) -> xr.DataArray:
         """The point itself and the reference: where one failed, there is nothing to compare."""
         reference = status.sel({self.along: self.reference}, drop=True)
         return status.where(status >= reference, reference)
@@ -67,7 +74,7 @@ class Difference(Reduction):
         is.
         """
         values, place = dataset[self.of], {self.along: self.reference}
-        own, others = self.slopes(values, values.sel(place, drop=True))
+        own, others = self.partial_derivatives(values, values.sel(place, drop=True))
         apart = dataset[self.along] != self.reference
         return [(own.where(apart, 0.0), {}), (others.where(apart, 0.0), place)]
 
@@ -78,14 +85,14 @@ class RelativeDifference(Difference):
     """Difference of a variable below its value at a reference point: ``1 - of/of_reference``."""
 
     kind: ClassVar[str] = "relative_difference"
-    measured_in: ClassVar[Fields] = {}
+    unit_fields: ClassVar[UnitFields] = {}
     formula: ClassVar[str] = "1 - {of} over {reference}"
 
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
         """1 - of/of_reference."""
         return 1.0 - values / reference
 
-    def slopes(self, values: xr.DataArray, reference: xr.DataArray) -> Pair:
+    def partial_derivatives(self, values: xr.DataArray, reference: xr.DataArray) -> ArrayPair:
         """-1/of_reference and of/of_reference^2."""
         return -xr.ones_like(values) / reference, values / reference**2
 
@@ -110,19 +117,19 @@ class Range(Reduction):
     over: str = ""
     within: tuple[float, float] | None = None
     kind: ClassVar[str] = "range"
-    measured_in: ClassVar[Fields] = {"": ("of",)}
+    unit_fields: ClassVar[UnitFields] = {"": ("of",)}
 
-    def draws_on(self, status: xr.DataArray) -> xr.DataArray:
+    def support_status(self, status: xr.DataArray) -> xr.DataArray:
         """The points in range."""
-        return within(status, self.over, self.within)
+        return select_range(status, self.over, self.within)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Reduce along the dimension; nothing where fewer than two points are in range."""
-        dimension, support = self._support(dataset)
+        dimension, support = self._select_support(dataset)
         if support.sizes[dimension] < 2:
             return xr.Dataset()
         of = support[self.of].reset_coords(drop=True)
-        known = ~refused(support, self.of, dimension) & (of.notnull().sum(dimension) > 1)
+        known = ~is_refused(support, self.of, dimension) & (of.notnull().sum(dimension) > 1)
         found = (of.max(dimension) - of.min(dimension)).where(known)
         span = "" if self.within is None else " from {:g} to {:g}".format(*self.within)
         note = f"largest less least {self.of} over {self.over}{span}"
@@ -132,22 +139,22 @@ class Range(Reduction):
         """1 by the cell that, within its error, may be the largest, -1 by that which may be the
         least: the sizes of both count.
         """
-        dimension, support = self._support(dataset)
+        dimension, support = self._select_support(dataset)
         values, errors = support[self.of], support[f"{self.of}_error"]
         number = support[dimension].copy(data=np.arange(support.sizes[dimension]))
         reaches = [(sign * values + errors.fillna(np.inf)).fillna(-np.inf) for sign in (1.0, -1.0)]
         return [((number == reach.argmax(dimension)).astype(float), {}) for reach in reaches]
 
-    def _support(self, dataset: xr.Dataset) -> tuple[str, xr.Dataset]:
+    def _select_support(self, dataset: xr.Dataset) -> tuple[str, xr.Dataset]:
         """The dimension, and the points in range."""
         along = self.over in dataset[self.of].dims
-        dimension = self.over if along else dimension_of(dataset, self.over)
-        return dimension, within(dataset, self.over, self.within)
+        dimension = self.over if along else dimension_of_coordinate(dataset, self.over)
+        return dimension, select_range(dataset, self.over, self.within)
 
 
 @guard_methods
 @dataclass(frozen=True)
-class OverClosedForm(Reduction):
+class ClosedFormRatio(Reduction):
     """A variable over a published closed form.
 
     Parameters
@@ -162,29 +169,29 @@ class OverClosedForm(Reduction):
 
     form: str = ""
     kind: ClassVar[str] = "over_closed_form"
-    measured_in: ClassVar[Fields] = {"_closed_form": ("of",)}
+    unit_fields: ClassVar[UnitFields] = {"_closed_form": ("of",)}
 
     def __post_init__(self) -> None:
-        if self.form not in FORMS:
-            raise InvalidValue("form", self.form, "is no closed form", choices=FORMS)
+        if self.form not in CLOSED_FORMS:
+            raise InvalidValue("form", self.form, "is no closed form", choices=CLOSED_FORMS)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compare in every cell; nothing where the lattice lacks a field of the formula."""
-        form = FORMS[self.form]
+        form = CLOSED_FORMS[self.form]
         if not all(name in dataset.coords for name in form.fields):
             return xr.Dataset()
-        exact = self._exact(dataset)
-        note = f"{form.text}: {form.source}"
+        exact = self._evaluate_closed_form(dataset)
+        note = f"{form.formula}: {form.source}"
         ratio = (dataset[self.of] / exact).assign_attrs(comment=f"{self.of} over {note}")
         beside = {f"{self.name}_closed_form": exact.assign_attrs(comment=note)}
         return xr.Dataset({self.name: ratio, **beside})
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """One over the closed form."""
-        return [(1.0 / self._exact(dataset), {})]
+        return [(1.0 / self._evaluate_closed_form(dataset), {})]
 
-    def _exact(self, dataset: xr.Dataset) -> xr.DataArray:
-        form = FORMS[self.form]
+    def _evaluate_closed_form(self, dataset: xr.Dataset) -> xr.DataArray:
+        form = CLOSED_FORMS[self.form]
         fields = [dataset[name].astype(float) for name in form.fields]
-        exact: xr.DataArray = xr.apply_ufunc(form.value, *fields, vectorize=True)
+        exact: xr.DataArray = xr.apply_ufunc(form.function, *fields, vectorize=True)
         return exact

@@ -9,7 +9,14 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.error_boundary import guard_methods
-from rsfstudy.reduce.base import Derivatives, Fields, Reduction, dimension_of, refused, within
+from rsfstudy.reduce.base import (
+    Derivatives,
+    Reduction,
+    UnitFields,
+    dimension_of_coordinate,
+    is_refused,
+    select_range,
+)
 
 
 @guard_methods
@@ -35,20 +42,20 @@ class LinearFit(Reduction):
     on: str = ""
     within: tuple[float, float] | None = None
     #: Parameters of the law, and the law with the names of the fields of the fit.
-    unknowns: ClassVar[int] = 2
-    law: ClassVar[str] = "{of} = constant + {name} * {on}"
+    parameter_count: ClassVar[int] = 2
+    formula: ClassVar[str] = "{of} = constant + {name} * {on}"
     kind: ClassVar[str] = "linear_fit"
-    measured_in: ClassVar[Fields] = {"": ("of", "on"), "_misfit": ("of",)}
+    unit_fields: ClassVar[UnitFields] = {"": ("of", "on"), "_misfit": ("of",)}
 
-    def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
+    def centre_values(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """Values as they enter a fit through the origin: less their mean, which takes care of the
         constant.
         """
         return values - values.mean(dimension)
 
-    def draws_on(self, status: xr.DataArray) -> xr.DataArray:
+    def support_status(self, status: xr.DataArray) -> xr.DataArray:
         """The points in range."""
-        return within(status, self.on, self.within)
+        return select_range(status, self.on, self.within)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Fit along the dimension of `on`, for each point of the others; nothing where no point is
@@ -59,19 +66,19 @@ class LinearFit(Reduction):
         InvalidValue
             Where `on` is no coordinate along one dimension.
         """
-        dimension = dimension_of(dataset, self.on)
-        support = within(dataset, self.on, self.within)
+        dimension = dimension_of_coordinate(dataset, self.on)
+        support = select_range(dataset, self.on, self.within)
         if support.sizes[dimension] == 0:
             return xr.Dataset()
-        x, y = self._points(support)
+        x, y = self._centred_points(support)
         count = y.notnull().sum(dimension)
         slope = (x * y).sum(dimension) / (x**2).sum(dimension)
         misfit = y - slope * x
-        freedom = count - self.unknowns
+        freedom = count - self.parameter_count
         spread = (misfit**2).sum(dimension) / freedom.where(freedom > 0)
         error = (spread / (x**2).sum(dimension)) ** 0.5
         largest = abs(misfit).max(dimension)
-        known = (count >= self.unknowns) & ~refused(support, self.of, dimension)
+        known = (count >= self.parameter_count) & ~is_refused(support, self.of, dimension)
         found = {
             "": slope.where(known),
             "_stderr": error.where(known),
@@ -80,31 +87,31 @@ class LinearFit(Reduction):
         }
         span = "all {on}" if self.within is None else "{0:g} <= {on} <= {1:g}"
         span = span.format(*(self.within or ()), on=self.on)
-        law = self.law.format(**vars(self))
+        law = self.formula.format(**vars(self))
         result = self.results(f"least squares of {law} over {span}", found)
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """The weights of least squares."""
-        x, _y = self._points(within(dataset, self.on, self.within))
-        return [((x / (x**2).sum(dimension_of(dataset, self.on))).fillna(0.0), {})]
+        x, _y = self._centred_points(select_range(dataset, self.on, self.within))
+        return [((x / (x**2).sum(dimension_of_coordinate(dataset, self.on))).fillna(0.0), {})]
 
-    def _points(self, support: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
+    def _centred_points(self, support: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
         """Both coordinates of the points as they enter a fit through the origin; NaN for those
         without a number.
         """
-        dimension, of = dimension_of(support, self.on), support[self.of]
+        dimension, of = dimension_of_coordinate(support, self.on), support[self.of]
         # sums over arrays with another memory layout differ in the last bit
         of = of.copy(data=np.ascontiguousarray(of.values))
-        x = self.abscissa(support[self.on].astype(float))
-        y = self.offset(of).where(x.notnull())
-        return self.centred(x.where(y.notnull()), dimension), self.centred(y, dimension)
+        x = self.transform_abscissa(support[self.on].astype(float))
+        y = self.transform_ordinate(of).where(x.notnull())
+        return self.centre_values(x.where(y.notnull()), dimension), self.centre_values(y, dimension)
 
-    def offset(self, values: xr.DataArray) -> xr.DataArray:
+    def transform_ordinate(self, values: xr.DataArray) -> xr.DataArray:
         """Values less what the law holds fixed."""
         return values
 
-    def abscissa(self, on: xr.DataArray) -> xr.DataArray:
+    def transform_abscissa(self, on: xr.DataArray) -> xr.DataArray:
         """Abscissa in which the law is linear."""
         return on
 
@@ -117,32 +124,32 @@ class ProportionalFit(LinearFit):
     """
 
     minus: float = 0.0
-    unknowns: ClassVar[int] = 1
+    parameter_count: ClassVar[int] = 1
     kind: ClassVar[str] = "proportional_fit"
-    law: ClassVar[str] = "{of} = {minus:g} + {name} * {on}"
+    formula: ClassVar[str] = "{of} = {minus:g} + {name} * {on}"
 
-    def centred(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
+    def centre_values(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """As they are: the line goes through the origin."""
         return values
 
-    def offset(self, values: xr.DataArray) -> xr.DataArray:
+    def transform_ordinate(self, values: xr.DataArray) -> xr.DataArray:
         """Values less the value at the origin."""
         return values - self.minus
 
 
 @guard_methods
 @dataclass(frozen=True)
-class DecadeFit(LinearFit):
+class SemilogFit(LinearFit):
     """Least squares of ``of = constant + name * log10(on)``: the slope per decade. Points where
     `on` is 0 or less are left out. Of a power law see `PowerLaw`, not this of a `Logarithm`, which
     is natural: that slope is 2.303 times the exponent.
     """
 
     kind: ClassVar[str] = "decade_fit"
-    measured_in: ClassVar[Fields] = {"": ("of",)}
-    law: ClassVar[str] = "{of} = constant + {name} * log10({on})"
+    unit_fields: ClassVar[UnitFields] = {"": ("of",)}
+    formula: ClassVar[str] = "{of} = constant + {name} * log10({on})"
 
-    def abscissa(self, on: xr.DataArray) -> xr.DataArray:
+    def transform_abscissa(self, on: xr.DataArray) -> xr.DataArray:
         """The decimal logarithm."""
         logarithms: xr.DataArray = xr.apply_ufunc(np.log10, on.where(on > 0.0))
         return logarithms
@@ -150,21 +157,21 @@ class DecadeFit(LinearFit):
 
 @guard_methods
 @dataclass(frozen=True)
-class PowerLaw(DecadeFit):
+class PowerLaw(SemilogFit):
     """Least squares of ``log10(of) = constant + name * log10(on)``: the exponent of a power law,
     with its largest misfit in decades. Points where either is 0 or less are left out.
     """
 
     kind: ClassVar[str] = "power_law"
-    measured_in: ClassVar[Fields] = {}
-    law: ClassVar[str] = "log10({of}) = constant + {name} * log10({on})"
+    unit_fields: ClassVar[UnitFields] = {}
+    formula: ClassVar[str] = "log10({of}) = constant + {name} * log10({on})"
 
-    def offset(self, values: xr.DataArray) -> xr.DataArray:
+    def transform_ordinate(self, values: xr.DataArray) -> xr.DataArray:
         """The decimal logarithm."""
-        return self.abscissa(values)
+        return self.transform_abscissa(values)
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """The weights of least squares, over ``ln(10) of``."""
-        of = within(dataset[self.of], self.on, self.within)
+        of = select_range(dataset[self.of], self.on, self.within)
         ((weights, place),) = super().derivatives(dataset)
         return [((weights / (np.log(10.0) * of)).where(weights != 0.0, 0.0), place)]

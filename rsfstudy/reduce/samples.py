@@ -21,8 +21,8 @@ import xarray as xr
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
-from rsfstudy.reduce.base import Derivatives, Fields, Reduction, refused
-from rsfstudy.reduce.units import varied_scale
+from rsfstudy.reduce.base import Derivatives, Reduction, UnitFields, is_refused
+from rsfstudy.reduce.units import find_varying_scale
 from rsfstudy.status import Status
 
 
@@ -46,14 +46,14 @@ class _Statistic(Reduction):
         "_stderr": "standard error, by sampling, of {name}",
         "_points": "samples with a number for {name}",
     }
-    measured_in: ClassVar[Fields] = {"": ("of",), "_stderr": ("of",)}
+    unit_fields: ClassVar[UnitFields] = {"": ("of",), "_stderr": ("of",)}
     #: What it is, in words.
-    text: ClassVar[str]
+    description: ClassVar[str]
 
     #: Fewest samples of which it can be told with its error.
-    least: ClassVar[int] = 2
+    min_samples: ClassVar[int] = 2
 
-    def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+    def compute(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
         """The statistic, and its standard error."""
         raise TypeError(f"{type(self).__name__} is no statistic")
 
@@ -65,22 +65,22 @@ class _Statistic(Reduction):
         InvalidValue
             Where `of` does not lie along it.
         """
-        of, why = _of(self, dataset), ""
+        of, why = _sampled_variable(self, dataset), ""
         count = of.notnull().sum(self.over)
-        bad = refused(dataset, self.of, self.over)
-        if varied := varied_scale(dataset, of.attrs.get("scale", ""), {self.over}):
+        bad = is_refused(dataset, self.of, self.over)
+        if varied := find_varying_scale(dataset, of.attrs.get("scale", ""), {self.over}):
             bad, why = xr.ones_like(bad), f"{self.of} is in units of {varied}, which varies"
         elif bool(bad.any()):
             why = "samples failed or are missing"
-        elif bool((count < self.least).any()):
-            why = f"needs {self.least} samples with a number"
-        known, said = (count >= self.least) & ~bad, {"refused": why} if why else {}
+        elif bool((count < self.min_samples).any()):
+            why = f"needs {self.min_samples} samples with a number"
+        known, said = (count >= self.min_samples) & ~bad, {"refused": why} if why else {}
         value, stderr = (
             result.where(known).drop_attrs(deep=False).assign_attrs(said)
-            for result in self.values(of)
+            for result in self.compute(of)
         )
         found = {"": value, "_stderr": stderr, "_points": count.astype("int32")}
-        return self.results(f"{self.text} of {self.of} over {self.over}", found)
+        return self.results(f"{self.description} of {self.of} over {self.over}", found)
 
 
 def standard_deviation(of: xr.DataArray, over: str, ddof: int = 1) -> xr.DataArray:
@@ -99,16 +99,16 @@ class Mean(_Statistic):
     """Mean over samples."""
 
     kind: ClassVar[str] = "mean"
-    text: ClassVar[str] = "mean"
+    description: ClassVar[str] = "mean"
 
-    def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+    def compute(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
         """The mean, and sd/sqrt(n)."""
         count = of.notnull().sum(self.over)
         return of.mean(self.over), standard_deviation(of, self.over) / count**0.5
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """1/n."""
-        has = _of(self, dataset).notnull()
+        has = _sampled_variable(self, dataset).notnull()
         return [(has / has.sum(self.over), {})]
 
 
@@ -123,10 +123,10 @@ class StandardDeviation(_Statistic):
     """
 
     kind: ClassVar[str] = "standard_deviation"
-    text: ClassVar[str] = "standard deviation"
-    least = 3
+    description: ClassVar[str] = "standard deviation"
+    min_samples = 3
 
-    def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+    def compute(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
         """Compute the standard deviation and its standard error.
 
         The standard deviation has n - 1 degrees of freedom. Its standard error is estimated by the
@@ -141,7 +141,7 @@ class StandardDeviation(_Statistic):
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """(y - mean)/((n - 1) sd)."""
-        of = _of(self, dataset)
+        of = _sampled_variable(self, dataset)
         freedom = of.notnull().sum(self.over) - 1
         by = (of - of.mean(self.over)) / (freedom * standard_deviation(of, self.over))
         return [(by.fillna(0.0), {})]
@@ -167,20 +167,23 @@ class Quantile(_Statistic):
             raise InvalidValue("level", self.level, "must be between 0 and 1")
 
     @property
-    def text(self) -> str:  # type: ignore[override]
+    def description(self) -> str:  # type: ignore[override]
         """What it is, in words."""
         return f"quantile at {self.level:g}"
 
     @property
-    def least(self) -> int:  # type: ignore[override]
+    def min_samples(self) -> int:  # type: ignore[override]
         """So many that a standard deviation of the binomial stays between 0 and 1."""
         rarer = min(self.level, 1.0 - self.level)
         return max(2, math.ceil((1.0 - rarer) / rarer - 1e-9))
 
-    def values(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+    def compute(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
         """By the order of the samples."""
         apart = (self.level * (1.0 - self.level) / of.notnull().sum(self.over)) ** 0.5
-        found = [_between(of, self.over, self.level + sign * apart) for sign in (0.0, -1.0, 1.0)]
+        found = [
+            _interpolated_quantile(of, self.over, self.level + sign * apart)
+            for sign in (0.0, -1.0, 1.0)
+        ]
         return found[0], 0.5 * (found[2] - found[1])
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
@@ -190,10 +193,12 @@ class Quantile(_Statistic):
         found, beside = super().__call__(dataset), f"{self.of}_error"
         if beside not in dataset:
             return found
-        of, at = _of(self, dataset), xr.DataArray(self.level)
+        of, at = _sampled_variable(self, dataset), xr.DataArray(self.level)
         errors = dataset[beside].reset_coords(drop=True)
         errors = (errors + sys.float_info.epsilon * abs(of)).fillna(np.inf)
-        low, high = (_between(of + sign * errors, self.over, at) for sign in (-1.0, 1.0))
+        low, high = (
+            _interpolated_quantile(of + sign * errors, self.over, at) for sign in (-1.0, 1.0)
+        )
         down, up = found[self.name] - low, high - found[self.name]
         error = down.where(down > up, up)
         note = "by quantiles of values less and plus errors"
@@ -201,7 +206,7 @@ class Quantile(_Statistic):
         return found.assign({f"{self.name}_error": error})
 
 
-def _between(of: xr.DataArray, over: str, level: xr.DataArray) -> xr.DataArray:
+def _interpolated_quantile(of: xr.DataArray, over: str, level: xr.DataArray) -> xr.DataArray:
     """A quantile: between the two samples whose ranks are beside it, by their distance."""
     place = of.get_axis_num(over)
     ranks = of.copy(data=np.argsort(np.argsort(of.values, axis=place), axis=place).astype(float))
@@ -228,7 +233,7 @@ class StatusShares(Reduction):
 
     over: str = "sample"
     kind: ClassVar[str] = "status_shares"
-    of_failures: ClassVar[bool] = True
+    uses_failed_cells: ClassVar[bool] = True
     long_names: ClassVar[Mapping[str, str]] = {
         "": "share of samples that ended so",
         "_stderr": "standard error, by sampling, of {name}",
@@ -238,13 +243,13 @@ class StatusShares(Reduction):
     def quantities(self) -> Sequence[Quantity]:
         return [*super().quantities, Quantity("ended", "", "", "status with which a sample ended")]
 
-    def draws_on(self, status: xr.DataArray) -> xr.DataArray:
+    def support_status(self, status: xr.DataArray) -> xr.DataArray:
         """Cells that are there, however they ended."""
         return status.where(status == int(Status.PENDING), int(Status.OK))
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Count along the dimension of the samples."""
-        _of(self, dataset)
+        _sampled_variable(self, dataset)
         status = dataset["status"].reset_coords(drop=True)
         statuses = [status for status in Status if status is not Status.PENDING]
         codes = xr.DataArray(
@@ -280,7 +285,7 @@ class Logarithm(Reduction):
         return [((1.0 / of.where(of > 0.0)).fillna(0.0), {})]
 
 
-def _of(reduction: _Statistic | StatusShares, dataset: xr.Dataset) -> xr.DataArray:
+def _sampled_variable(reduction: _Statistic | StatusShares, dataset: xr.Dataset) -> xr.DataArray:
     """What is reduced, without the coordinates beside its dimensions, which sums would carry."""
     of = dataset[reduction.of].reset_coords(drop=True)
     if reduction.over not in of.dims:

@@ -13,13 +13,13 @@ import xarray as xr
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
-from rsfstudy.reduce.base import Reduction, refused
+from rsfstudy.reduce.base import Reduction, is_refused
 
 #: How often samples are drawn anew from themselves, how many such at a time, and from which seed.
-_RESAMPLED, _AT_A_TIME, _SEED = 400, 25, 2010
+_RESAMPLES, _RESAMPLES_PER_BATCH, _RESAMPLING_SEED = 400, 25, 2010
 #: Ends of the confidence interval.
-_INTERVAL = (0.025, 0.975)
-_RESULTS = ("first_order", "total")
+_INTERVAL_QUANTILES = (0.025, 0.975)
+_INDEX_NAMES = ("first_order", "total")
 
 
 @guard_methods
@@ -54,10 +54,10 @@ class SobolIndices(Reduction):
     @property
     def quantities(self) -> Sequence[Quantity]:
         about = Quantity("input", "", "", "sampled quantity")
-        return (about, *(Quantity(n, "", "1", text) for n, text in self._texts()))
+        return (about, *(Quantity(n, "", "1", text) for n, text in self._result_descriptions()))
 
-    def _texts(self) -> Iterator[tuple[str, str]]:
-        for order in _RESULTS:
+    def _result_descriptions(self) -> Iterator[tuple[str, str]]:
+        for order in _INDEX_NAMES:
             text = f"{order.replace('_', '-')} Sobol index of {self.of.replace('_', ' ')}"
             yield f"{self.name}_{order}", text
             for end in ("low", "high"):
@@ -71,17 +71,17 @@ class SobolIndices(Reduction):
         InvalidValue
             Where the samples were not drawn for Sobol indices.
         """
-        inputs = self._inputs(dataset)
+        inputs = self._sampled_inputs(dataset)
         of, d = dataset[self.of].transpose(..., self.over), len(inputs)
         others = of.dims[:-1]
-        bad = refused(dataset, self.of, self.over) | of.isnull().any(self.over)
-        found = np.full((*of.shape[:-1], len(_RESULTS), 3, d), np.nan)
+        bad = is_refused(dataset, self.of, self.over) | of.isnull().any(self.over)
+        found = np.full((*of.shape[:-1], len(_INDEX_NAMES), 3, d), np.nan)
         for place in np.ndindex(*of.shape[:-1]):
             values = of.values[place]
             if not bool(bad.isel(dict(zip(others, place, strict=True)))) and np.ptp(values) > 0.0:
-                found[place] = _indices(values.reshape(-1, d + 2).T)
+                found[place] = _indices_with_intervals(values.reshape(-1, d + 2).T)
         lost = int(of.isnull().sum())
-        about = {"comment": f"samples drawn anew {_RESAMPLED} times for the intervals"}
+        about = {"comment": f"samples drawn anew {_RESAMPLES} times for the intervals"}
         if lost:
             about["refused"] = (
                 f"{lost} of {of.size} cells have no number, and the indices need all: narrower "
@@ -89,17 +89,17 @@ class SobolIndices(Reduction):
             )
         elif np.isnan(found).any():
             about["refused"] = f"cells failed, or {self.of} is the same everywhere"
-        names = iter(name for name, _text in self._texts())
+        names = iter(name for name, _text in self._result_descriptions())
         return xr.Dataset(
             {
                 next(names): ((*others, "input"), found[..., result, end, :], about)
-                for result in range(len(_RESULTS))
+                for result in range(len(_INDEX_NAMES))
                 for end in range(3)
             },
             {**{n: c for n, c in of.coords.items() if self.over not in c.dims}, "input": inputs},
         )
 
-    def _inputs(self, dataset: xr.Dataset) -> list[str]:
+    def _sampled_inputs(self, dataset: xr.Dataset) -> list[str]:
         """The quantities that were drawn."""
         if self.over not in dataset[self.of].dims:
             raise InvalidValue("over", self.over, f"is no dimension of {self.of}")
@@ -113,7 +113,7 @@ class SobolIndices(Reduction):
         return inputs
 
 
-def _indices(points: np.ndarray) -> np.ndarray:
+def _indices_with_intervals(points: np.ndarray) -> np.ndarray:
     """First-order and total indices with the ends of their intervals.
 
     Parameters
@@ -125,17 +125,17 @@ def _indices(points: np.ndarray) -> np.ndarray:
     -------
     ndarray, shape (2, 3, inputs)
     """
-    random, count = np.random.default_rng(_SEED), points.shape[1]
+    random, count = np.random.default_rng(_RESAMPLING_SEED), points.shape[1]
     resampled = []
-    for _ in range(_RESAMPLED // _AT_A_TIME):
-        again = random.integers(count, size=(_AT_A_TIME, count))
-        resampled.append(_of_saltelli(points[:, again]))
-    ends = np.quantile(np.concatenate(resampled, axis=1), _INTERVAL, axis=1)
-    best = _of_saltelli(points[:, None, :])[:, 0]
+    for _ in range(_RESAMPLES // _RESAMPLES_PER_BATCH):
+        again = random.integers(count, size=(_RESAMPLES_PER_BATCH, count))
+        resampled.append(_saltelli_indices(points[:, again]))
+    ends = np.quantile(np.concatenate(resampled, axis=1), _INTERVAL_QUANTILES, axis=1)
+    best = _saltelli_indices(points[:, None, :])[:, 0]
     return np.stack([best, *ends], axis=1)
 
 
-def _of_saltelli(values: np.ndarray) -> np.ndarray:
+def _saltelli_indices(values: np.ndarray) -> np.ndarray:
     """Indices of first order and total, of shape (2, sets, inputs), of several sets of values of
     shape (2 + inputs, sets, points).
     """

@@ -20,61 +20,65 @@ import msgspec
 import numpy as np
 from scipy.special import lambertw
 
-from rsfstudy.error_boundary import check_file, in_words
-from rsfstudy.errors import DataError, InvalidValue, brief
-from rsfstudy.motion.events import Event, Kind
-from rsfstudy.motion.meter import Halt
-from rsfstudy.motion.starting import at_rate, on_slow_manifold
+from rsfstudy.error_boundary import check_regular_file, format_exception
+from rsfstudy.errors import DataError, InvalidValue, shorten
+from rsfstudy.motion.events import Event, EventKind
+from rsfstudy.motion.meter import MotionStopped
+from rsfstudy.motion.starting import manifold_point, with_slip_rate
 from rsfstudy.paths import check_path
-from rsfstudy.rig.laboratory import Laboratory
-from rsfstudy.rig.units import in_si
+from rsfstudy.rig.laboratory import Rig
+from rsfstudy.rig.units import convert_to_si
 from rsfstudy.slider import registry
-from rsfstudy.slider.equations import relation_of, steady_states_of
+from rsfstudy.slider.equations import compute_steady_states, friction_relation
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.scene import Scene
 
 #: Where the problems stand, each beside its answer.
-SHIPPED = Path(__file__).with_name("problems")
+PROBLEM_FOLDER = Path(__file__).with_name("problems")
 #: What may be asked for: SI units, by what is reported.
-SERIES = {
+SERIES_UNITS = {
     "time": "s", "friction": "1", "slip_rate": "m/s", "theta": "s", "theta_1": "s", "theta_2": "s",
     "slip": "m", "normal_stress": "Pa", "pore_pressure": "Pa",
 }  # fmt: skip
-PEAKS = {"event": "1", "time": "s", "slip_rate": "m/s"}
-NUMBERS = {
+PEAK_UNITS = {"event": "1", "time": "s", "slip_rate": "m/s"}
+NUMBER_UNITS = {
     "critical_stiffness": "Pa/m", "growth_rate": "1/s", "angular_frequency": "1/s",
     "critical_velocity": "m/s", "critical_displacement": "m", "recurrence_interval": "s",
     "static_stress_drop": "Pa", "dynamic_stress_drop": "Pa", "peak_slip_rate": "m/s",
     "slowest_slip_rate": "m/s",
 }  # fmt: skip
-REPORTS = {"series": SERIES, "peaks": PEAKS, "numbers": NUMBERS}
-#: What must be stated, and what a laboratory calls that, or what else it may be told.
-_STATED = {"normal_stress": "normal_stress", "D_c": "slip_distance", "V_star": "reference_velocity"}
-_RIG = {**_STATED, "stiffness": "stiffness", "period": "period", "mass": "mass"}
+REPORT_UNITS = {"series": SERIES_UNITS, "peaks": PEAK_UNITS, "numbers": NUMBER_UNITS}
+#: What must be stated, and what a rig calls that, or what else it may be told.
+_REQUIRED_RIG_FIELDS = {
+    "normal_stress": "normal_stress",
+    "D_c": "slip_distance",
+    "V_star": "reference_velocity",
+}
+_RIG_FIELDS = {**_REQUIRED_RIG_FIELDS, "stiffness": "stiffness", "period": "period", "mass": "mass"}
 #: Units of parameters that no field of a scene holds.
-_UNITS = {
+_PARAMETER_UNITS = {
     "b": "1", "b_2": "1", "D_c_2": "m", "radiation_damping": "Pa s/m", "V_c": "m/s",
     "V_unstable": "m/s",
 }  # fmt: skip
 #: Laws whose theta goes as exp(Theta/b).
-_LAWS = (
+_LAWS_WITH_THETA = (
     "slip", "slowness", "family", "perrin_rice_zheng", "composite", "two_slip_states",
     "two_slowness_states",
 )  # fmt: skip
 
 
 #: How msgspec names a mismatch, and its kinds of values in words.
-_MISMATCH = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$(.*)`)?")
-_KINDS = {
+_TYPE_ERROR_PATTERN = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$(.*)`)?")
+_TYPE_DESCRIPTIONS = {
     "array": "a list", "object": "a table", "str": "a text", "int": "a whole number",
     "float": "a number", "bool": "true or false", "null": "nothing", "date": "a date",
 }  # fmt: skip
 #: Largest number of digits of an answer, and of peaks.
-_MOST_DIGITS, _MOST_PEAKS = 15, 10_000
+_MAX_DIGITS, _MAX_PEAKS = 15, 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Problem:
+class BenchmarkProblem:
     """A problem, as its file states it.
 
     Attributes
@@ -91,12 +95,12 @@ class Problem:
     parameters : mapping
         Numbers, and texts with units: ``a``, ``b``, ``D_c``, ``V_star``, ``mu_star``,
         ``normal_stress``, and ``b_2``, ``D_c_2``, ``radiation_damping``, ``V_c``, ``V_unstable``;
-        others are fields of a scene, or of a laboratory.
+        others are fields of a scene, or of a rig.
     initial : mapping
         ``slip_rate`` and ``theta`` at the beginning (a list for two states); without it, steady
         sliding at V_star.
     loading : list of mapping
-        Segments, as `Laboratory.protocol` takes them.
+        Segments, as `Rig.protocol` takes them.
     times : list of float
         In s, of a series.
     count : int
@@ -122,13 +126,13 @@ class Problem:
     number: int = 0
 
     def __post_init__(self) -> None:
-        if self.report not in REPORTS:
-            raise InvalidValue("report", self.report, "is unknown", choices=REPORTS)
+        if self.report not in REPORT_UNITS:
+            raise InvalidValue("report", self.report, "is unknown", choices=REPORT_UNITS)
         if not self.quantities:
             rule = "must list at least one quantity"
             raise InvalidValue("quantities", self.quantities, rule, choices=self.units)
-        if not 1 <= self.digits <= _MOST_DIGITS:
-            raise InvalidValue("digits", self.digits, f"must lie between 1 and {_MOST_DIGITS}")
+        if not 1 <= self.digits <= _MAX_DIGITS:
+            raise InvalidValue("digits", self.digits, f"must lie between 1 and {_MAX_DIGITS}")
         for name in self.quantities:
             if name not in self.units:
                 raise InvalidValue("quantities", name, "is unknown", choices=self.units)
@@ -137,13 +141,13 @@ class Problem:
             raise InvalidValue("times", self.times, "must list the times of a series, in s")
         if (np.diff(times, prepend=-1e-300) <= 0.0).any():
             raise InvalidValue("times", self.times, "must increase, from 0 or later")
-        if self.report == "peaks" and not 1 <= self.count <= _MOST_PEAKS:
-            rule = f"must lie between 1 and {_MOST_PEAKS:,}: it is the number of peaks to report"
+        if self.report == "peaks" and not 1 <= self.count <= _MAX_PEAKS:
+            rule = f"must lie between 1 and {_MAX_PEAKS:,}: it is the number of peaks to report"
             raise InvalidValue("count", self.count, rule)
-        if self.law not in _LAWS:
-            raise InvalidValue("law", self.law, "is unknown", choices=_LAWS)
+        if self.law not in _LAWS_WITH_THETA:
+            raise InvalidValue("law", self.law, "is unknown", choices=_LAWS_WITH_THETA)
         two = ("b_2", "D_c_2") if self.law.startswith("two") else ()
-        for name in ("a", "b", *two, *_STATED):
+        for name in ("a", "b", *two, *_REQUIRED_RIG_FIELDS):
             if name not in self.parameters:
                 raise InvalidValue("parameters", [*self.parameters], f"must state {name}")
         if self.initial and self.initial.keys() != {"slip_rate", "theta"}:
@@ -156,20 +160,22 @@ class Problem:
     @property
     def units(self) -> Mapping[str, str]:
         """SI units of what may be asked for."""
-        return REPORTS[self.report]
+        return REPORT_UNITS[self.report]
 
     @property
-    def key(self) -> str:
+    def index_column(self) -> str:
         """The column that says which row is which."""
         return {"series": "time", "peaks": "event", "numbers": ""}[self.report]
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the columns of an answer."""
-        return (self.key, *self.quantities) if self.key else tuple(self.quantities)
+        return (
+            (self.index_column, *self.quantities) if self.index_column else tuple(self.quantities)
+        )
 
     @property
-    def rows(self) -> np.ndarray:
+    def index_values(self) -> np.ndarray:
         """Numbers of that column: times in s, or numbers of peaks."""
         rows = self.times if self.report == "series" else range(1, max(self.count, 1) + 1)
         return np.array(rows, dtype=float)
@@ -180,31 +186,39 @@ class Problem:
         return [f"{name} ({self.units[name]})" for name in self.columns]
 
     @cached_property
-    def rig(self) -> Laboratory:
+    def rig(self) -> Rig:
         """The scales of the problem, and its spring and mass."""
-        return Laboratory(**{_RIG[n]: v for n, v in self.parameters.items() if n in _RIG})
+        return Rig(**{_RIG_FIELDS[n]: v for n, v in self.parameters.items() if n in _RIG_FIELDS})
 
     @cached_property
-    def si(self) -> Mapping[str, float]:
+    def si_parameters(self) -> Mapping[str, float]:
         """Parameters that no field of a scene holds, in SI units."""
         stated = self.parameters
-        return {n: in_si(n, stated[n], units) for n, units in _UNITS.items() if n in stated}
+        return {
+            n: convert_to_si(n, stated[n], units)
+            for n, units in _PARAMETER_UNITS.items()
+            if n in stated
+        }
 
     @property
     def b(self) -> tuple[float, ...]:
         """Evolution effect of each state."""
-        return tuple(self.si[name] for name in ("b", "b_2") if name in self.si)
+        return tuple(
+            self.si_parameters[name] for name in ("b", "b_2") if name in self.si_parameters
+        )
 
     @property
-    def damping(self) -> float:
+    def radiation_damping(self) -> float:
         """Radiation damping in Pa s/m."""
-        return self.si.get("radiation_damping", 0.0)
+        return self.si_parameters.get("radiation_damping", 0.0)
 
     @cached_property
     def scene(self) -> Scene:
         """The scene that the problem states, but for how it begins."""
-        rig, si, a = self.rig, self.si, _positive("a", self.parameters["a"], "1")
-        fields = {n: v for n, v in self.parameters.items() if n not in {*_RIG, *_UNITS}}
+        rig, si, a = self.rig, self.si_parameters, _positive_in_si("a", self.parameters["a"], "1")
+        fields = {
+            n: v for n, v in self.parameters.items() if n not in {*_RIG_FIELDS, *_PARAMETER_UNITS}
+        }
         fields |= {"law": self.law, "a": a}
         if len(self.b) == 1:
             fields["b_over_a"] = self.b[0] / a
@@ -213,12 +227,12 @@ class Problem:
             fields["length_ratio"] = si["D_c_2"] / rig.slip_distance
         if "phi" in fields:
             fields["normal_stress"] = "variable"
-        if self.damping:
-            fields["radiation_damping"] = self.damping * rig.reference_velocity
+        if self.radiation_damping:
+            fields["radiation_damping"] = self.radiation_damping * rig.reference_velocity
         if "V_c" in si:
             fields["cutoff_velocity_ratio"] = si["V_c"] / rig.reference_velocity
         if "V_unstable" in si:
-            period = rig.period or registry.defaults()["period"]
+            period = rig.period or registry.field_defaults()["period"]
             norm = si["V_unstable"] * period / (2.0 * math.pi * rig.slip_distance)
             fields["instability_norm"] = norm
         if self.loading:
@@ -231,37 +245,41 @@ class Problem:
         velocity = self.rig.reference_velocity
         scale = 2.0 if self.law == "perrin_rice_zheng" else 1.0
         if self.law == "composite":
-            scale = math.exp(lambertw(math.exp(-velocity / self.si["V_c"])).real)
-        lengths = self.rig.slip_distance, self.si.get("D_c_2", math.nan)
+            scale = math.exp(lambertw(math.exp(-velocity / self.si_parameters["V_c"])).real)
+        lengths = self.rig.slip_distance, self.si_parameters.get("D_c_2", math.nan)
         return tuple(scale * length / velocity for length in lengths[: len(self.b)])
 
     @cached_property
     def log_slip_rate(self) -> float:
         """ln(V/V_star) at the beginning."""
-        rate = _positive("slip_rate", self.initial["slip_rate"], "m/s")
+        rate = _positive_in_si("slip_rate", self.initial["slip_rate"], "m/s")
         return math.log(rate / self.rig.reference_velocity)
 
     @property
-    def since(self) -> Event | None:
+    def initial_event(self) -> Event | None:
         """The beginning of the motion, where that is stated: a stress of the spring with which slip
         rate is the one stated, before any step.
         """
         if not self.initial:
             return None
-        scene, x, states = self.scene, self.log_slip_rate, self._states()
-        acting, before = scene.chains[0][0], scene.under(Segment(1.0))
+        scene, x, states = self.scene, self.log_slip_rate, self._initial_states()
+        acting, before = scene.continuous_segments[0][0], scene.with_segment(Segment(1.0))
         friction = scene.a * x + sum(states)
         if scene.parts.law.regularised:
             above = (scene.mu_star + friction) / scene.a
             friction = scene.a * math.asinh(0.5 * math.exp(above)) - scene.mu_star
-        taken = steady_states_of(before, 0.0, relation_of(before)(friction)[2])
-        psis = (*map(add, states, taken), *taken[len(states) :], *scene.parts.loading.begins(scene))
-        radiated = before.dynamics.radiated(x)
-        point = on_slow_manifold(acting, friction + radiated + acting.spring_stress_step, psis)
-        point = at_rate(acting, point, x) if scene.has_mass else point
-        return Event(Kind.START, None, 0.0, 0.0, point, "", 0, 0.0)
+        taken = compute_steady_states(before, 0.0, friction_relation(before)(friction)[2])
+        psis = (
+            *map(add, states, taken),
+            *taken[len(states) :],
+            *scene.parts.loading.initial_unknowns(scene),
+        )
+        radiated = before.dynamics.radiated_stress(x)
+        point = manifold_point(acting, friction + radiated + acting.spring_stress_step, psis)
+        point = with_slip_rate(acting, point, x) if scene.has_mass else point
+        return Event(EventKind.START, None, 0.0, 0.0, point, "", 0, 0.0)
 
-    def _states(self) -> tuple[float, ...]:
+    def _initial_states(self) -> tuple[float, ...]:
         """State variables at the beginning, 0 in steady sliding at V_star."""
         stated = self.initial["theta"]
         thetas = stated if isinstance(stated, list) else [stated]
@@ -269,17 +287,17 @@ class Problem:
             rule = f"must state {len(self.b)}, one for each b"
             raise InvalidValue("theta", stated, rule)
         known = zip(self.b, thetas, self.theta_star, strict=True)
-        return tuple(b * math.log(_positive("theta", x, "s") / star) for b, x, star in known)
+        return tuple(b * math.log(_positive_in_si("theta", x, "s") / star) for b, x, star in known)
 
 
-def _positive(name: str, value: Any, units: str) -> float:
-    found = in_si(name, value, units)
+def _positive_in_si(name: str, value: Any, units: str) -> float:
+    found = convert_to_si(name, value, units)
     if not found > 0.0:
         raise InvalidValue(name, value, "must be positive")
     return found
 
 
-def read(path: Path) -> Problem:
+def read_problem(path: Path) -> BenchmarkProblem:
     """The problem of a TOML file.
 
     Raises
@@ -289,14 +307,16 @@ def read(path: Path) -> Problem:
     InvalidValue
         For what the file does not say, or says wrongly.
     """
-    check_file("problem", path)
+    check_regular_file("problem", path)
     try:
         stated = tomllib.loads(path.read_text(encoding="utf-8"))
     except RecursionError as error:
         raise DataError(f"{path}: cannot be read as TOML (it is nested too deeply)") from error
     except (OSError, ValueError) as error:  # of the text, its encoding or the digits of a number
-        raise DataError(f"{path}: cannot be read as TOML ({brief(error)})") from error
-    known = {name: kind for name, kind in get_type_hints(Problem).items() if name != "number"}
+        raise DataError(f"{path}: cannot be read as TOML ({shorten(error)})") from error
+    known = {
+        name: kind for name, kind in get_type_hints(BenchmarkProblem).items() if name != "number"
+    }
     try:
         for name, value in stated.items():
             if name not in known:
@@ -305,14 +325,21 @@ def read(path: Path) -> Problem:
         for name in ("title", "law", "quantities", "parameters"):
             if name not in stated:
                 raise InvalidValue("problem", [*stated], f"must state {name}")
-        number = int(path.name[:2]) if path.parent == SHIPPED else 0
-        problem = Problem(**stated, number=number)
-        _ = problem.scene, problem.since
+        number = int(path.name[:2]) if path.parent == PROBLEM_FOLDER else 0
+        problem = BenchmarkProblem(**stated, number=number)
+        _ = problem.scene, problem.initial_event
         return problem
     except InvalidValue as error:
-        raise error.at(str(path)) from error
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, Halt) as error:
-        rule = f"cannot be posed ({in_words(error)})"
+        raise error.with_location(str(path)) from error
+    except (
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        TypeError,
+        ValueError,
+        MotionStopped,
+    ) as error:
+        rule = f"cannot be posed ({format_exception(error)})"
         remedy = "rsfstudy problems DIR writes files of problems to begin with."
         raise InvalidValue("problem", str(path), rule, remedy=remedy) from error
 
@@ -322,20 +349,20 @@ def _check_type(name: str, value: Any, kind: Any) -> None:
     try:
         msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
-        found = _MISMATCH.search(str(error))
+        found = _TYPE_ERROR_PATTERN.search(str(error))
         if found is None:
             raise InvalidValue(name, value, str(error)) from error
-        wanted, actual = (_KINDS.get(kind, kind) for kind in found.groups()[:2])
+        wanted, actual = (_TYPE_DESCRIPTIONS.get(kind, kind) for kind in found.groups()[:2])
         place = f"{name}{found[3] or ''}"
         raise InvalidValue(place, value, f"must be {wanted}, not {actual}") from error
 
 
-def shipped() -> dict[int, Path]:
+def shipped_problems() -> dict[int, Path]:
     """The files of the problems, by number."""
-    return {int(path.name[:2]): path for path in sorted(SHIPPED.glob("*.toml"))}
+    return {int(path.name[:2]): path for path in sorted(PROBLEM_FOLDER.glob("*.toml"))}
 
 
-def write(directory: Path) -> None:
+def write_problems(directory: Path) -> None:
     """Write all problems into ``problems``, their answers into ``answers``, a table to be filled
     for each into ``templates``, and ``example.py``.
 
@@ -354,20 +381,20 @@ def write(directory: Path) -> None:
         places = {name: directory / name for name in ("problems", "answers", "templates")}
         for place in places.values():
             place.mkdir(parents=True)
-        for path in shipped().values():
+        for path in shipped_problems().values():
             shutil.copyfile(path, places["problems"] / path.name)
             answer = path.with_suffix(".csv")
             shutil.copyfile(answer, places["answers"] / answer.name)
-            _template(read(path), places["templates"] / answer.name)
-        shutil.copyfile(SHIPPED / "example.txt", directory / "example.py")
+            _write_template(read_problem(path), places["templates"] / answer.name)
+        shutil.copyfile(PROBLEM_FOLDER / "example.txt", directory / "example.py")
     except OSError as error:
         raise DataError(f"{directory}: cannot be written ({error})") from error
 
 
-def _template(problem: Problem, path: Path) -> None:
+def _write_template(problem: BenchmarkProblem, path: Path) -> None:
     """The header of an answer, and which row is which."""
     empty = [""] * len(problem.quantities)
-    rows = [f"{row:.12g}" for row in problem.rows] if problem.key else []
+    rows = [f"{row:.12g}" for row in problem.index_values] if problem.index_column else []
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(problem.header)

@@ -13,22 +13,26 @@ from rsfstudy.errors import RsfStudyError
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
 from rsfstudy.referee import ours
-from rsfstudy.referee.ours import Table
-from rsfstudy.referee.problem import Problem
-from rsfstudy.referee.theirs import Reported
+from rsfstudy.referee.ours import AnswerTable
+from rsfstudy.referee.problem import BenchmarkProblem
+from rsfstudy.referee.theirs import ReportedQuantity
 from rsfstudy.rig.table import read_table
 
 #: Digits that make a problem passed, unless others are asked for.
-ENOUGH = 6
+DEFAULT_REQUIRED_DIGITS = 6
 #: A candidate explains a difference if it leaves so many digits, and so many more than there were.
-_EXPLAINS, _MORE = 3.0, 1.5
+_MIN_EXPLAINED_DIGITS, _MIN_DIGITS_GAINED = 3.0, 1.5
 #: Units in the last place by which what is written in decimals may differ: one of rounding in the
 #: code, and half of rounding in the file, a little more for ours.
-_ROUNDED = 1.51
+_MAX_LAST_PLACE_DIFFERENCE = 1.51
 #: Of these, differences are told over the largest of the column: they begin at zero.
-_FROM_ZERO = ("slip", "pore_pressure")
+_QUANTITIES_FROM_ZERO = ("slip", "pore_pressure")
 #: Conventions of radiation damping, and factors of eta.
-_DAMPING = {"twice as much (G/c_s for G/(2 c_s))": 2.0, "half as much": 0.5, "left out": 0.0}
+_DAMPING_FACTORS = {
+    "twice as much (G/c_s for G/(2 c_s))": 2.0,
+    "half as much": 0.5,
+    "left out": 0.0,
+}
 #: Factors between usual conventions: units, decades, angles, and kinds of logarithms.
 _USUAL_FACTORS = {
     "2": 2.0, "0.5": 0.5, "pi": math.pi, "1/pi": 1.0 / math.pi, "2 pi": 2.0 * math.pi,
@@ -38,9 +42,9 @@ _USUAL_FACTORS = {
     **{f"{10.0**power:g}": 10.0**power for power in range(-15, 16) if power},
 }  # fmt: skip
 #: Relative difference below which a factor is a usual one: of many values, and of a single value.
-_SAME_FACTOR, _SIMILAR_FACTOR = 1e-6, 1e-3
+_FACTOR_RTOL, _SINGLE_VALUE_FACTOR_RTOL = 1e-6, 1e-3
 #: Accuracies of ours where a problem has no answer yet; what candidates need.
-_TWICE, _ROUGH = (1e-9, 1e-11), 1e-8
+_REFERENCE_RTOLS, _EXPLANATION_RTOL = (1e-9, 1e-11), 1e-8
 
 
 @dataclass(frozen=True)
@@ -52,41 +56,41 @@ class Agreement:
     quantity : str
     digits : float
         To which all of it agrees, no more than are known.
-    row : int
+    worst_row : int
         Where it agrees least.
-    parts : int or None
+    first_failing_row : int or None
         The first row that has fewer digits than make a pass.
-    to_the_last_place : bool
+    agrees_as_written : bool
         Whether it agrees as far as it is written.
-    off : ndarray
+    relative_differences : ndarray
         Relative differences.
     """
 
     quantity: str
     digits: float
-    row: int
-    parts: int | None
-    to_the_last_place: bool
-    off: np.ndarray
+    worst_row: int
+    first_failing_row: int | None
+    agrees_as_written: bool
+    relative_differences: np.ndarray
 
 
 @dataclass(frozen=True)
-class Verdict:
+class AnswerComparison:
     """Agreement of an answer, and what would explain that it fails.
 
     Attributes
     ----------
-    problem : Problem
+    problem : BenchmarkProblem
     agreements : tuple of Agreement
-    enough : float
+    required_digits : float
         Digits that make a pass.
     explanation : str
         What would explain that it does not pass, or nothing.
     """
 
-    problem: Problem
+    problem: BenchmarkProblem
     agreements: tuple[Agreement, ...]
-    enough: float
+    required_digits: float
     explanation: str = ""
 
     @property
@@ -97,10 +101,12 @@ class Verdict:
     @property
     def passes(self) -> bool:
         """True if every quantity has digits enough, or all that are known."""
-        return self.digits >= min(self.enough, self.problem.digits)
+        return self.digits >= min(self.required_digits, self.problem.digits)
 
 
-def known(problem: Problem, path: Path | None) -> tuple[Problem, Table]:
+def known_answer(
+    problem: BenchmarkProblem, path: Path | None
+) -> tuple[BenchmarkProblem, AnswerTable]:
     """A problem and its answer: the one that is shipped; or ours, with the digits to which two
     motions of different accuracy agree.
 
@@ -114,28 +120,36 @@ def known(problem: Problem, path: Path | None) -> tuple[Problem, Table]:
         return problem, {name: column.values for name, column in table.items()}
     engine = COMPILED if is_installed(COMPILED) else SCIPY
     rough, fine = (
-        ours.answer(problem, Accuracy(rtol, ours.BUDGET, engine=engine)) for rtol in _TWICE
+        ours.compute_answer(problem, Accuracy(rtol, ours.WORK_BUDGET, engine=engine))
+        for rtol in _REFERENCE_RTOLS
     )
-    both = [a.digits for a in _agreements(problem, rough, fine, 0.0)]
+    both = [a.digits for a in _compute_agreements(problem, rough, fine, 0.0)]
     return replace(problem, digits=max(1, math.floor(min(both)))), fine
 
 
-def verdict(
-    problem: Problem, answer: Table, told: Mapping[str, Reported], enough: float
-) -> Verdict:
+def compare_answers(
+    problem: BenchmarkProblem,
+    answer: AnswerTable,
+    reported: Mapping[str, ReportedQuantity],
+    required_digits: float,
+) -> AnswerComparison:
     """Agreement of what another code told with an answer, and what would explain a difference."""
-    values = {name: column.values for name, column in told.items()}
-    places = {name: column.last_place for name, column in told.items()}
-    found = Verdict(problem, _agreements(problem, values, answer, enough, places), enough)
+    values = {name: column.values for name, column in reported.items()}
+    places = {name: column.resolution for name, column in reported.items()}
+    found = AnswerComparison(
+        problem,
+        _compute_agreements(problem, values, answer, required_digits, places),
+        required_digits,
+    )
     if found.passes:
         return found
-    best, words = max(_explained(problem, values, answer), default=(0.0, ""))
-    better = best >= max(_EXPLAINS, found.digits + _MORE)
-    explanation = f"{words}. With that undone, {shown_digits(best):.1f} digits agree"
+    best, words = max(_iterate_explanations(problem, values, answer), default=(0.0, ""))
+    better = best >= max(_MIN_EXPLAINED_DIGITS, found.digits + _MIN_DIGITS_GAINED)
+    explanation = f"{words}. With that undone, {round_digits_down(best):.1f} digits agree"
     return replace(found, explanation=explanation if better else "")
 
 
-def shown_digits(digits: float) -> float:
+def round_digits_down(digits: float) -> float:
     """Round a number of digits down to one decimal place.
 
     Rounding down ensures that a failed problem never displays enough digits to pass.
@@ -143,25 +157,29 @@ def shown_digits(digits: float) -> float:
     return math.floor(10.0 * digits) / 10.0
 
 
-def _agreements(
-    problem: Problem,
-    theirs: Table,
-    answer: Table,
-    enough: float,
-    places: Mapping[str, float] | None = None,
+def _compute_agreements(
+    problem: BenchmarkProblem,
+    reported: AnswerTable,
+    answer: AnswerTable,
+    required_digits: float,
+    resolutions: Mapping[str, float] | None = None,
 ) -> tuple[Agreement, ...]:
     found = []
     for name in problem.quantities:
-        apart = _relative_differences(name, theirs[name], answer[name], problem.digits)
-        few = np.flatnonzero(apart > 10.0**-enough)
-        place = (places or {}).get(name, 0.0)
+        apart = _relative_differences(name, reported[name], answer[name], problem.digits)
+        few = np.flatnonzero(apart > 10.0**-required_digits)
+        place = (resolutions or {}).get(name, 0.0)
         found.append(
             Agreement(
                 name,
                 min(max(0.0, -math.log10(max(apart.max(), 1e-300))), float(problem.digits)),
                 int(np.argmax(apart)),
                 int(few[0]) if len(few) else None,
-                bool((np.abs(theirs[name] - answer[name]) <= _ROUNDED * place).all()),
+                bool(
+                    (
+                        np.abs(reported[name] - answer[name]) <= _MAX_LAST_PLACE_DIFFERENCE * place
+                    ).all()
+                ),
                 apart,
             )
         )
@@ -169,55 +187,61 @@ def _agreements(
 
 
 def _relative_differences(
-    name: str, theirs: np.ndarray, ours: np.ndarray, digits: int
+    name: str, reported: np.ndarray, reference: np.ndarray, digits: int
 ) -> np.ndarray:
     """Differences of a quantity beyond what ours are rounded by, to so many digits, relative to
     each number.
     """
-    size = np.abs(ours)
+    size = np.abs(reference)
     rounded = 0.5 * 10.0 ** (np.floor(np.log10(np.maximum(size, 1e-300))) + 1.0 - digits)
-    scale = np.full(len(ours), size.max() or 1.0) if name in _FROM_ZERO else size
-    return np.asarray(np.maximum(np.abs(theirs - ours) - rounded, 0.0) / scale)
+    scale = np.full(len(reference), size.max() or 1.0) if name in _QUANTITIES_FROM_ZERO else size
+    return np.asarray(np.maximum(np.abs(reported - reference) - rounded, 0.0) / scale)
 
 
-def _explained(problem: Problem, theirs: Table, answer: Table) -> Iterator[tuple[float, str]]:
+def _iterate_explanations(
+    problem: BenchmarkProblem, reported: AnswerTable, answer: AnswerTable
+) -> Iterator[tuple[float, str]]:
     """Digits to which what is told agrees with other conventions, and these."""
-    for words, table in _read_otherwise(problem, theirs, answer):
-        yield min(a.digits for a in _agreements(problem, table, answer, 0.0)), words
-    for words, other in _posed_otherwise(problem):
+    for words, table in _reinterpret_answer(problem, reported, answer):
+        yield min(a.digits for a in _compute_agreements(problem, table, answer, 0.0)), words
+    for words, other in _reformulate_problem(problem):
         try:
-            table = ours.answer(other, Accuracy(_ROUGH, ours.BUDGET))
+            table = ours.compute_answer(other, Accuracy(_EXPLANATION_RTOL, ours.WORK_BUDGET))
         except RsfStudyError:
             continue
-        yield min(a.digits for a in _agreements(problem, theirs, table, 0.0)), words
+        yield min(a.digits for a in _compute_agreements(problem, reported, table, 0.0)), words
 
 
-def _read_otherwise(problem: Problem, theirs: Table, answer: Table) -> Iterator[tuple[str, Table]]:
+def _reinterpret_answer(
+    problem: BenchmarkProblem, reported: AnswerTable, answer: AnswerTable
+) -> Iterator[tuple[str, AnswerTable]]:
     """Tables of what is told, read by other conventions, each with words for it."""
     shift, stress = sum(problem.b) * math.log(2.0), problem.rig.normal_stress
-    if "friction" in theirs:
+    if "friction" in reported:
         for sign, place in ((1.0, "left out of"), (-1.0, "left in")):
-            moved = theirs["friction"] + sign * shift
+            moved = reported["friction"] + sign * shift
             words = f"friction is shifted by b ln 2, as where 2 D_c is {place} the logarithm"
-            yield words, theirs | {"friction": moved}
-        if problem.damping and "slip_rate" in theirs:
-            at_fault = theirs["friction"] - problem.damping * theirs["slip_rate"] / stress
+            yield words, reported | {"friction": moved}
+        if problem.radiation_damping and "slip_rate" in reported:
+            at_fault = (
+                reported["friction"] - problem.radiation_damping * reported["slip_rate"] / stress
+            )
             words = "friction is that of the spring, which holds eta V/sigma too"
-            yield words, theirs | {"friction": at_fault}
+            yield words, reported | {"friction": at_fault}
     for name in problem.quantities:
-        factor = float(np.median(theirs[name] / np.where(answer[name], answer[name], np.nan)))
+        factor = float(np.median(reported[name] / np.where(answer[name], answer[name], np.nan)))
         # any factor and any shift would explain a quantity of one value
         several = len(answer[name]) > 1
-        usual = _usual_factor(factor, _SAME_FACTOR if several else _SIMILAR_FACTOR)
+        usual = _usual_factor(factor, _FACTOR_RTOL if several else _SINGLE_VALUE_FACTOR_RTOL)
         if usual is not None:
-            yield f"{name} {usual[0]}", theirs | {name: theirs[name] / usual[1]}
+            yield f"{name} {usual[0]}", reported | {name: reported[name] / usual[1]}
         elif several and math.isfinite(factor) and factor:
             words = f"{name} is {_format_factor(factor)} times the known answer"
-            yield words, theirs | {name: theirs[name] / factor}
+            yield words, reported | {name: reported[name] / factor}
         if several:
-            apart = float(np.median(theirs[name] - answer[name]))
+            apart = float(np.median(reported[name] - answer[name]))
             words = f"{name} is shifted by {apart:.6g} {problem.units[name]}".removesuffix(" 1")
-            yield words, theirs | {name: theirs[name] - apart}
+            yield words, reported | {name: reported[name] - apart}
 
 
 def _usual_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
@@ -243,15 +267,15 @@ def _format_factor(factor: float) -> str:
     return text if text != "1" else f"(1 {'-' if beyond < 0.0 else '+'} {abs(beyond):.2g})"
 
 
-def _posed_otherwise(problem: Problem) -> Iterator[tuple[str, Problem]]:
+def _reformulate_problem(problem: BenchmarkProblem) -> Iterator[tuple[str, BenchmarkProblem]]:
     """Problems with other conventions, each with words for it."""
 
-    def changed(**parameters: object) -> Problem:
+    def changed(**parameters: object) -> BenchmarkProblem:
         return replace(problem, parameters={**problem.parameters, **parameters})
 
-    if problem.damping:
-        for words, factor in _DAMPING.items():
-            eta = f"{factor * problem.damping!r} Pa s/m"
+    if problem.radiation_damping:
+        for words, factor in _DAMPING_FACTORS.items():
+            eta = f"{factor * problem.radiation_damping!r} Pa s/m"
             yield f"damping is {words}", changed(radiation_damping=eta)
     if problem.initial:
         steady = [f"{theta!r} s" for theta in problem.theta_star]

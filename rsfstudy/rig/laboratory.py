@@ -10,40 +10,44 @@ from typing import Any
 
 import xarray as xr
 
+from rsfstudy._deprecation import renamed_members, renamed_names
 from rsfstudy.axes.axis import Axis
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import Quantity, ShownAsTable
+from rsfstudy.quantity import HtmlTableMixin, Quantity
 from rsfstudy.rig import axes
 from rsfstudy.rig.quantities import (
-    FIELDS,
-    FULL,
-    ON_AXIS,
-    STATED,
-    UNITS,
-    check_together,
-    in_si_of,
-    of_scene,
-    stated,
-    units_of,
+    AXIS_NAME,
+    RATIO_FIELD,
+    RIG_QUANTITIES,
+    SCENE_QUANTITIES,
+    SI_UNITS,
+    check_consistency,
+    convert_rig_value,
+    derive_scene_fields,
+    field_si_units,
+    to_si_checked,
 )
-from rsfstudy.rig.scales import Scale, in_units, scales_of, scales_of_rig
-from rsfstudy.rig.units import in_si
+from rsfstudy.rig.scales import Scale, convert_units, read_scales, rig_scales
+from rsfstudy.rig.units import convert_to_si
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.protocol import Protocol, protocol
-from rsfstudy.slider.registry import completed
+from rsfstudy.slider.registry import with_field_signature
 from rsfstudy.slider.scene import Scene
 
+__getattr__ = renamed_names(__name__)
+
 #: Units of the slider of what a segment of a protocol states.
-SEGMENT = {
+SEGMENT_UNITS = {
     "velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c",
     "normal_stress": "sigma_*",
 }  # fmt: skip
 
 
+@renamed_members
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
-class Laboratory(ShownAsTable):
+class Rig(HtmlTableMixin):
     """A rig, in its own units.
 
     Every quantity is a plain number in SI units, a text with units ("5 MPa", "10 um", "1 um/s"), or
@@ -86,21 +90,23 @@ class Laboratory(ShownAsTable):
     density: Any = None
 
     def __post_init__(self) -> None:
-        for name in STATED:
+        for name in RIG_QUANTITIES:
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, stated(name, getattr(self, name), self._stress))
-        check_together(self.as_dict())
+                object.__setattr__(
+                    self, name, to_si_checked(name, getattr(self, name), self._normal_stress_in_pa)
+                )
+        check_consistency(self.as_dict())
 
-    def shown(self) -> Iterator[tuple[Quantity, object]]:
+    def quantities_with_values(self) -> Iterator[tuple[Quantity, object]]:
         """What the rig states, in SI units."""
         for name, value in self.as_dict().items():
-            about = STATED[name]
+            about = RIG_QUANTITIES[name]
             yield Quantity(name, about.symbol, about.units, about.meaning), value
 
     @property
     def scales(self) -> dict[str, Scale]:
         """Scales of dimensionless quantities, in SI units."""
-        return scales_of_rig(self.as_dict())
+        return rig_scales(self.as_dict())
 
     def dimensionless(self, value: Any, scale: str = "D_c/V_*", name: str = "value") -> float:
         """A quantity in units of a scale: of time, unless ``D_c``, ``V_*``, ``sigma_*`` or
@@ -108,9 +114,12 @@ class Laboratory(ShownAsTable):
         """
         if scale not in self.scales:
             raise InvalidValue("scale", scale, "is no scale of a rig", choices=self.scales)
-        return float(in_si_of(name, value, UNITS[scale], self._stress) / self.scales[scale].factor)
+        return float(
+            convert_rig_value(name, value, SI_UNITS[scale], self._normal_stress_in_pa)
+            / self.scales[scale].factor
+        )
 
-    @completed(*FULL)
+    @with_field_signature(*RATIO_FIELD)
     def scene(self, **fields: Any) -> Scene:
         """A scene of this rig.
 
@@ -124,21 +133,26 @@ class Laboratory(ShownAsTable):
             Normal stress is constant, or imposed where the loading changes it, unless a field says
             otherwise.
         """
-        if units_of("instability_norm", norm := fields.get("instability_norm")):
+        if field_si_units("instability_norm", norm := fields.get("instability_norm")):
             scene = self.scene(**{n: v for n, v in fields.items() if n != "instability_norm"})
-            return scene.with_(instability_norm=instability_norm(self, norm, scene))
-        for name in FULL.keys() & fields.keys():
-            if FULL[name] in fields:
-                raise InvalidValue(name, fields[name], f"give {name} or {FULL[name]}, not both")
-        fields = {FULL.get(n, n): self._field(FULL.get(n, n), v) for n, v in fields.items()}
-        fields = {**of_scene(self.as_dict()), **fields}
+            return scene.with_(instability_norm=compute_instability_norm(self, norm, scene))
+        for name in RATIO_FIELD.keys() & fields.keys():
+            if RATIO_FIELD[name] in fields:
+                raise InvalidValue(
+                    name, fields[name], f"give {name} or {RATIO_FIELD[name]}, not both"
+                )
+        fields = {
+            RATIO_FIELD.get(n, n): self._to_field_value(RATIO_FIELD.get(n, n), v)
+            for n, v in fields.items()
+        }
+        fields = {**derive_scene_fields(self.as_dict()), **fields}
         for simplest in ("constant", "imposed") if "normal_stress" not in fields else ():
             with contextlib.suppress(InvalidValue):
                 return Scene(normal_stress=simplest, **fields)
         return Scene(**fields)
 
     def axis(self, dimension: str, values: Any, units: Mapping[str, str] | None = None) -> Axis:
-        """An axis of a study of this rig, in the units stated; see `rsfstudy.rig.axes.axis`.
+        """An axis of a study of this rig, in the units stated; see `rsfstudy.rig.axes.make_axis`.
 
         Parameters
         ----------
@@ -152,14 +166,14 @@ class Laboratory(ShownAsTable):
         units : mapping of str to str, optional
             Of columns of a table that do not state them; SI units by default.
         """
-        return axes.axis(dimension, values, units or "")
+        return axes.make_axis(dimension, values, units or "")
 
     def protocol(
         self, segments: Sequence[Segment | Mapping[str, Any]], name: str = "protocol"
     ) -> Protocol:
         """A loading history whose segments state quantities: see `rsfstudy.protocol`."""
         if isinstance(segments, list | tuple):
-            segments = [self._segment(n, s) for n, s in enumerate(segments, start=1)]
+            segments = [self._to_segment(n, s) for n, s in enumerate(segments, start=1)]
         return protocol(segments, name)
 
     def in_units(
@@ -183,8 +197,8 @@ class Laboratory(ShownAsTable):
             For a dataset that is in other units already, or not of rsfstudy.
         """
         rate = self.reference_velocity / self.slip_distance
-        si = scales_of(dataset, self.normal_stress, self.slip_distance, rate)
-        found = in_units(dataset, si, stress, length, time)
+        si = read_scales(dataset, self.normal_stress, self.slip_distance, rate)
+        found = convert_units(dataset, si, stress, length, time)
         return found.assign_attrs(laboratory=json.dumps(self.as_dict()))
 
     def as_dict(self) -> dict[str, float]:
@@ -193,37 +207,41 @@ class Laboratory(ShownAsTable):
         return {name: value for name, value in found.items() if value is not None}
 
     @property
-    def on_axis(self) -> dict[str, float]:
+    def axis_fields(self) -> dict[str, float]:
         """Quantities that were stated, by the names that they have on axes, in SI units."""
-        return {ON_AXIS.get(name, name): value for name, value in self.as_dict().items()}
+        return {AXIS_NAME.get(name, name): value for name, value in self.as_dict().items()}
 
     @property
-    def _stress(self) -> float | None:
+    def _normal_stress_in_pa(self) -> float | None:
         """sigma_* in Pa, once it is known."""
         return self.normal_stress if isinstance(self.normal_stress, float) else None
 
-    def _field(self, name: str, value: Any) -> Any:
-        units = units_of(name, value)
+    def _to_field_value(self, name: str, value: Any) -> Any:
+        units = field_si_units(name, value)
         if units is None or value is None:
             return value
-        scale = FIELDS[name].scale
-        return self.dimensionless(value, scale, name) if scale else in_si(name, value, units)
+        scale = SCENE_QUANTITIES[name].scale
+        return (
+            self.dimensionless(value, scale, name) if scale else convert_to_si(name, value, units)
+        )
 
-    def _segment(self, number: int, stated: Any) -> Any:
+    def _to_segment(self, number: int, stated: Any) -> Any:
         if not isinstance(stated, Mapping):
             return stated  # a Segment is in units of the slider
         try:
             return {
-                key: self.dimensionless(value, SEGMENT[key], key) if key in SEGMENT else value
+                key: self.dimensionless(value, SEGMENT_UNITS[key], key)
+                if key in SEGMENT_UNITS
+                else value
                 for key, value in stated.items()
             }
         except InvalidValue as error:
-            raise error.at(f"segment {number}") from error
+            raise error.with_location(f"segment {number}") from error
 
 
-def instability_norm(rig: Laboratory, stated: Any, scene: Scene) -> float:
+def compute_instability_norm(rig: Rig, stated: Any, scene: Scene) -> float:
     """The norm V T/(2 pi D_c) of a scene of a rig, where it may be stated as the slip rate V."""
     try:
-        return in_si("instability_norm", stated, "1")
+        return convert_to_si("instability_norm", stated, "1")
     except InvalidValue:
         return rig.dimensionless(stated, "V_*", "instability_norm") * scene.inertial_time

@@ -10,65 +10,65 @@ import numpy as np
 
 from rsfstudy.error_boundary import user_stacklevel
 from rsfstudy.errors import InvalidValue, RsfStudyWarning
-from rsfstudy.rig.units import in_si
-from rsfstudy.slider.numbers import SPRING
-from rsfstudy.slider.registry import QUANTITIES
+from rsfstudy.rig.units import convert_to_si
+from rsfstudy.slider.numbers import STIFFNESS_FIELDS
+from rsfstudy.slider.registry import FIELD_QUANTITIES
 
 
-class Stated(NamedTuple):
-    """What a laboratory may state: SI units, the range that is usual, beyond which it warns, a
+class RigQuantity(NamedTuple):
+    """What a rig may state: SI units, the range that is usual, beyond which it warns, a
     symbol, and what it is.
     """
 
     units: str
-    least: float
-    most: float
+    min_usual: float
+    max_usual: float
     symbol: str
     meaning: str
 
 
-STATED: Mapping[str, Stated] = {
-    "normal_stress": Stated("Pa", 1e2, 1e10, r"$\sigma_*$", "normal stress"),
-    "slip_distance": Stated("m", 1e-9, 1e-1, "$D_c$", "slip distance"),
-    "reference_velocity": Stated(
+RIG_QUANTITIES: Mapping[str, RigQuantity] = {
+    "normal_stress": RigQuantity("Pa", 1e2, 1e10, r"$\sigma_*$", "normal stress"),
+    "slip_distance": RigQuantity("m", 1e-9, 1e-1, "$D_c$", "slip distance"),
+    "reference_velocity": RigQuantity(
         "m/s", 1e-13, 1e1, "$V_*$", "velocity of the load point before the test"
     ),
-    "stiffness": Stated("Pa/m", 1e4, 1e15, "$k$", "stiffness of the machine with its sample"),
-    "period": Stated("s", 1e-6, 1e3, "$T$", "period of free oscillation"),
-    "mass": Stated("kg/m^2", 1e-2, 1e9, "$m$", "mass over the area of the fault"),
-    "shear_modulus": Stated("Pa", 1e5, 1e12, "$G$", "shear modulus of the medium"),
-    "density": Stated("kg/m^3", 1e2, 2e4, r"$\rho$", "density of the medium"),
+    "stiffness": RigQuantity("Pa/m", 1e4, 1e15, "$k$", "stiffness of the machine with its sample"),
+    "period": RigQuantity("s", 1e-6, 1e3, "$T$", "period of free oscillation"),
+    "mass": RigQuantity("kg/m^2", 1e-2, 1e9, "$m$", "mass over the area of the fault"),
+    "shear_modulus": RigQuantity("Pa", 1e5, 1e12, "$G$", "shear modulus of the medium"),
+    "density": RigQuantity("kg/m^3", 1e2, 2e4, r"$\rho$", "density of the medium"),
 }
 #: What it must state: the scales of all else.
-SCALES = ("normal_stress", "slip_distance", "reference_velocity")
+REQUIRED_QUANTITIES = ("normal_stress", "slip_distance", "reference_velocity")
 #: What axes call those that are fields of scenes in another sense.
-ON_AXIS = {"normal_stress": "sigma_star"}
+AXIS_NAME = {"normal_stress": "sigma_star"}
 #: Quantities by the names that they have on axes.
-OF_AXIS = {ON_AXIS.get(name, name): name for name in STATED}
+RIG_NAME = {AXIS_NAME.get(name, name): name for name in RIG_QUANTITIES}
 #: SI units of fields of a scene, by what they are measured in or their own units.
-UNITS = {
+SI_UNITS = {
     "sigma_*": "Pa", "D_c": "m", "V_*": "m/s", "D_c/V_*": "s", "sigma_*/D_c": "Pa/m",
     "V_*/D_c": "1/s", "s": "s", "s-1": "1/s",
 }  # fmt: skip
 #: Units in which what a rig states is shown, by its SI units.
-SHOWN = {"Pa": "MPa", "m": "um", "m/s": "um/s", "Pa/m": "MPa/um"}
+DISPLAY_UNITS = {"Pa": "MPa", "m": "um", "m/s": "um/s", "Pa/m": "MPa/um"}
 #: What fields of scenes are.
-FIELDS = {about.name: about for about in QUANTITIES}
+SCENE_QUANTITIES = {about.name: about for about in FIELD_QUANTITIES}
 #: Slip rates of a scene, by the names that they have where they are no ratios.
-FULL = {
+RATIO_FIELD = {
     name.removesuffix("_ratio"): name
-    for name, about in FIELDS.items()
+    for name, about in SCENE_QUANTITIES.items()
     if about.scale == "V_*" and name.endswith("_ratio")
 }
 #: What states the same as another field does: of slip rates and of the spring.
-ALSO = {
-    **FULL,
-    **{ratio: name for name, ratio in FULL.items()},
-    **dict(zip(SPRING, SPRING[::-1], strict=True)),
+EQUIVALENT_FIELD = {
+    **RATIO_FIELD,
+    **{ratio: name for name, ratio in RATIO_FIELD.items()},
+    **dict(zip(STIFFNESS_FIELDS, STIFFNESS_FIELDS[::-1], strict=True)),
 }
 
 
-def stated(name: str, value: Any, stress: float | None = None) -> float:
+def to_si_checked(name: str, value: Any, stress: float | None = None) -> float:
     """A quantity of a rig in SI units; warns of what is unusual.
 
     Raises
@@ -76,8 +76,8 @@ def stated(name: str, value: Any, stress: float | None = None) -> float:
     InvalidValue
         For what is no quantity, of another kind, or not positive.
     """
-    units, least, most, *_words = STATED[name]
-    found = in_si_of(name, value, units, stress)
+    units, least, most, *_words = RIG_QUANTITIES[name]
+    found = convert_rig_value(name, value, units, stress)
     if not found > 0.0:
         raise InvalidValue(name, value, "must be positive", remedy=f"Give it in {units}.")
     if not least <= found <= most:
@@ -86,28 +86,28 @@ def stated(name: str, value: Any, stress: float | None = None) -> float:
     return found
 
 
-def in_si_of(name: str, value: Any, units: str, stress: float | None) -> float:
+def convert_rig_value(name: str, value: Any, units: str, stress: float | None) -> float:
     """A quantity in SI units; a stiffness may be of friction, over the normal stress in Pa."""
     try:
-        return in_si(name, value, units)
+        return convert_to_si(name, value, units)
     except InvalidValue:
-        if units == "Pa/m" and stress is not None and is_friction(value):
-            return in_si(name, value, "1/m") * stress
+        if units == "Pa/m" and stress is not None and is_friction_stiffness(value):
+            return convert_to_si(name, value, "1/m") * stress
         raise
 
 
-def is_friction(stiffness: Any) -> bool:
+def is_friction_stiffness(stiffness: Any) -> bool:
     """True if a stiffness is friction over displacement, in 1/length."""
     if not isinstance(stiffness, str) and not hasattr(stiffness, "magnitude"):
         return False
     try:
-        in_si("stiffness", stiffness, "1/m")
+        convert_to_si("stiffness", stiffness, "1/m")
     except InvalidValue:
         return False
     return True
 
 
-def check_together(rig: Mapping[str, Any]) -> None:
+def check_consistency(rig: Mapping[str, Any]) -> None:
     """Refuse quantities that do not go with one another.
 
     Raises
@@ -126,7 +126,7 @@ def check_together(rig: Mapping[str, Any]) -> None:
         raise InvalidValue("density", rig.get("density"), "goes with shear_modulus", remedy=remedy)
 
 
-def of_scene(rig: Mapping[str, Any]) -> dict[str, Any]:
+def derive_scene_fields(rig: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a scene that a rig decides; arrays where its quantities are."""
     found = {"reference_rate": rig["reference_velocity"] / rig["slip_distance"]}
     if "stiffness" in rig:
@@ -142,20 +142,26 @@ def of_scene(rig: Mapping[str, Any]) -> dict[str, Any]:
     return plain | ({"inertia": True} if "period" in found else {})
 
 
-def is_scaled(name: str) -> bool:
+def is_scaled_field(name: str) -> bool:
     """True of a field of a scene that is measured in a unit of the slider, and no ratio."""
-    return name in FIELDS and bool(FIELDS[name].scale) and not name.endswith("_ratio")
+    return (
+        name in SCENE_QUANTITIES
+        and bool(SCENE_QUANTITIES[name].scale)
+        and not name.endswith("_ratio")
+    )
 
 
-def units_of(name: str, value: Any) -> str | None:
+def field_si_units(name: str, value: Any) -> str | None:
     """SI units of a value of a field of a scene; None where it is none in units: a ratio that is a
     plain number, or a field of another kind.
     """
-    about = FIELDS.get(name)
+    about = SCENE_QUANTITIES.get(name)
     plain = isinstance(value, int | float | np.number)
     if about is None or isinstance(value, type) or (plain and name.endswith("_ratio")):
         return None
     if about.scale:
-        return UNITS[about.scale]
+        return SI_UNITS[about.scale]
     with_units = hasattr(value, "magnitude") or (isinstance(value, str) and about.units)
-    return (UNITS.get(about.units) or ("1" if about.units == "1" else None)) if with_units else None
+    return (
+        (SI_UNITS.get(about.units) or ("1" if about.units == "1" else None)) if with_units else None
+    )

@@ -12,8 +12,8 @@ from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantity import Quantity
 from rsfstudy.reduce.base import Derivatives, Reduction
-from rsfstudy.rig.scales import scale_of, scales_of
-from rsfstudy.rig.units import factor
+from rsfstudy.rig.scales import read_scales, variable_scale
+from rsfstudy.rig.units import unit_factor
 
 
 @guard_methods
@@ -39,15 +39,15 @@ class InUnits(Reduction):
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """The variable times its scale."""
         about = {"units": self.units, "comment": f"{self.of}, each cell by its own scales"}
-        values = (dataset[self.of] * self._size(dataset)).drop_attrs(deep=False)
+        values = (dataset[self.of] * self._scale_factor(dataset)).drop_attrs(deep=False)
         return xr.Dataset({self.name: values.assign_attrs(about)})
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
         """The scale."""
-        return [(self._size(dataset) * xr.ones_like(dataset[self.of]), {})]
+        return [(self._scale_factor(dataset) * xr.ones_like(dataset[self.of]), {})]
 
-    def _size(self, dataset: xr.Dataset) -> xr.DataArray:
-        scale = scale_of(dataset[self.of], scales_of(dataset))
+    def _scale_factor(self, dataset: xr.Dataset) -> xr.DataArray:
+        scale = variable_scale(dataset[self.of], read_scales(dataset))
         if scale is None:
             raise InvalidValue("of", self.of, "is a pure number, in no units of a rig")
-        return xr.DataArray(scale.factor / float(factor(self.name, self.units, scale.units)))
+        return xr.DataArray(scale.factor / float(unit_factor(self.name, self.units, scale.units)))

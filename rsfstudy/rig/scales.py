@@ -12,25 +12,25 @@ import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.netcdf import with_cf_encoding
-from rsfstudy.quantity import factors, quotient
-from rsfstudy.rig.units import factor
+from rsfstudy.quantity import format_unit_quotient, split_unit_quotient
+from rsfstudy.rig.units import unit_factor
 
 #: What ratios of the slider are, once they are in other units. Scenes have another `normal_stress`.
-_RATIOS = {"velocity_ratio": "velocity", "normal_stress_ratio": "effective_normal_stress"}
+_RATIO_RENAMES = {"velocity_ratio": "velocity", "normal_stress_ratio": "effective_normal_stress"}
 #: Names of logarithms of slip rates, and how their descriptions begin and end.
-_LOGARITHM = re.compile(r"(\w+_)?log10_slip_rate")
-_WORDS = re.compile(r"^decimal logarithm of (the )?| over V_star")
+_LOG_SLIP_RATE_PATTERN = re.compile(r"(\w+_)?log10_slip_rate")
+_LOG_DESCRIPTION_PATTERN = re.compile(r"^decimal logarithm of (the )?| over V_star")
 
 #: What stands before the name of a field where that is the name of an axis in units.
-BESIDE = "dimensionless_"
+DIMENSIONLESS_PREFIX = "dimensionless_"
 #: Units in which results and motions of a rig are told, in tables and figures.
-TOLD_IN = {"stress": "MPa", "length": "um", "time": "s"}
+DISPLAY_BASE_UNITS = {"stress": "MPa", "length": "um", "time": "s"}
 #: Attribute of a dataset in other units that tells their scales.
-SCALES = "scales"
+SCALES_ATTRIBUTE = "scales"
 
 
 #: Relative difference of two reference rates that are one: of rounding, and of what was printed.
-_ROUNDING = 1e-9
+_REFERENCE_RATE_RTOL = 1e-9
 
 
 class Scale(NamedTuple):
@@ -40,7 +40,7 @@ class Scale(NamedTuple):
     units: str
 
 
-def scales_of(
+def read_scales(
     dataset: xr.Dataset,
     normal_stress: float | None = None,
     slip_distance: float | None = None,
@@ -59,14 +59,14 @@ def scales_of(
     InvalidValue
         Where it does not hold one that is not stated, or another is stated.
     """
-    return scales(
-        _held(dataset, "sigma_star", "normal_stress", normal_stress, "Pa"),
-        _held(dataset, "slip_distance", "slip_distance", slip_distance, "m"),
-        _held(dataset, "reference_rate", "reference_rate", reference_rate, "1/s"),
+    return build_scales(
+        _resolve_scale(dataset, "sigma_star", "normal_stress", normal_stress, "Pa"),
+        _resolve_scale(dataset, "slip_distance", "slip_distance", slip_distance, "m"),
+        _resolve_scale(dataset, "reference_rate", "reference_rate", reference_rate, "1/s"),
     )
 
 
-def _held(
+def _resolve_scale(
     dataset: xr.Dataset, held_as: str, name: str, stated: float | None, units: str
 ) -> float | xr.Variable:
     if held_as not in dataset.variables:
@@ -75,39 +75,43 @@ def _held(
             raise InvalidValue(name, None, "is not in the dataset", remedy=remedy)
         return stated
     variable = dataset[held_as].variable.to_base_variable()
-    held = variable * float(factor(held_as, variable.attrs.get("units", units), units))
+    held = variable * float(unit_factor(held_as, variable.attrs.get("units", units), units))
     known = np.unique(held.values[np.isfinite(held.values)])
     if known.size == 1:  # that of the rig, which cells without need of it do not tell
         held = xr.Variable((), known[0])
-    if stated is not None and not np.allclose(held, stated, rtol=_ROUNDING, atol=0.0):
-        rule = f"contradicts that of the dataset, {_range(held)} {units}"
+    if stated is not None and not np.allclose(held, stated, rtol=_REFERENCE_RATE_RTOL, atol=0.0):
+        rule = f"contradicts that of the dataset, {_format_range(held)} {units}"
         remedy = "Each cell is converted by its own: state another to the scenes."
         raise InvalidValue(name, stated, rule, remedy=remedy)
     return held
 
 
-def scales_of_rig(rig: Mapping[str, Any]) -> dict[str, Scale]:
+def rig_scales(rig: Mapping[str, Any]) -> dict[str, Scale]:
     """The scales of a rig, in SI units; of arrays of its quantities arrays."""
     rate = rig["reference_velocity"] / rig["slip_distance"]
-    return scales(rig["normal_stress"], rig["slip_distance"], rate)
+    return build_scales(rig["normal_stress"], rig["slip_distance"], rate)
 
 
-def in_units(
+def convert_units(
     dataset: xr.Dataset, si: Mapping[str, Scale], stress: str, length: str, time: str
 ) -> xr.Dataset:
-    """A dataset in units of stress, length and time, by its scales in SI units; see `scaled`."""
+    """A dataset in units of stress, length and time, by its scales in SI units; see
+    `apply_scales`.
+    """
     units = {
         "sigma_*": stress, "D_c": length, "D_c/V_*": time, "V_*/D_c": f"{time}-1",
         "V_*": f"{length} {time}-1", "sigma_*/D_c": f"{stress} {length}-1",
     }  # fmt: skip
-    size = {n: float(factor("units", units[n], si[n].units)) for n in ("sigma_*", "D_c", "D_c/V_*")}
+    size = {
+        n: float(unit_factor("units", units[n], si[n].units)) for n in ("sigma_*", "D_c", "D_c/V_*")
+    }
     size["V_*"] = size["D_c"] / size["D_c/V_*"]
     size["sigma_*/D_c"] = size["sigma_*"] / size["D_c"]
     size["V_*/D_c"] = 1.0 / size["D_c/V_*"]
-    return scaled(dataset, {n: Scale(s.factor / size[n], units[n]) for n, s in si.items()})
+    return apply_scales(dataset, {n: Scale(s.factor / size[n], units[n]) for n, s in si.items()})
 
 
-def scales(
+def build_scales(
     normal_stress: float | xr.Variable,
     slip_distance: float | xr.Variable,
     reference_rate: float | xr.Variable,
@@ -131,7 +135,7 @@ def scales(
     for of, value in (
         ("sigma_*", normal_stress), ("D_c", slip_distance), ("V_*/D_c", reference_rate),
     ):  # fmt: skip
-        _check(of, value)
+        _check_positive(of, value)
     found = {
         "sigma_*": Scale(normal_stress, "Pa"),
         "D_c": Scale(slip_distance, "m"),
@@ -141,51 +145,55 @@ def scales(
         "sigma_*/D_c": Scale(normal_stress / slip_distance, "Pa m-1"),
     }
     for of, scale in found.items():
-        _check(of, scale.factor)
+        _check_positive(of, scale.factor)
     return found
 
 
-def _check(of: str, factor: float | xr.Variable) -> None:
+def _check_positive(of: str, factor: float | xr.Variable) -> None:
     values = np.asarray(factor)
     if not (np.isfinite(values) & (values > 0.0)).all():
         raise InvalidValue(of, values.tolist(), "must be positive and finite")
 
 
-def _range(factor: float | xr.Variable) -> str:
+def _format_range(factor: float | xr.Variable) -> str:
     """A number, or the least and the largest where it varies."""
     ends = np.unique([np.min(factor), np.max(factor)])
     return " to ".join(f"{end:g}" for end in ends)
 
 
-def scale_of(values: xr.DataArray | xr.Variable, by: Mapping[str, Scale]) -> Scale | None:
+def variable_scale(values: xr.DataArray | xr.Variable, by: Mapping[str, Scale]) -> Scale | None:
     """What 1 of a variable is, in its units: of ``D_c/V_* (V_*)-1``, that of the first over that of
     the other; None of what says no scale, or one that is not known.
     """
-    named = factors(values.attrs.get("scale", ""))
+    named = split_unit_quotient(values.attrs.get("scale", ""))
     known = {"1": Scale(1.0, "1"), **by}
     if not {*named} <= {*known}:
         return None
     first, *others = (known[each] for each in named)
-    beside = factors(values.attrs.get("units", "1"))[1:]
+    beside = split_unit_quotient(values.attrs.get("units", "1"))[1:]
     size = first.factor / math.prod(each.factor for each in others)
-    return Scale(size, quotient([first.units, *(each.units for each in others), *beside]))
+    return Scale(
+        size, format_unit_quotient([first.units, *(each.units for each in others), *beside])
+    )
 
 
-def in_units_of_rig(dataset: xr.Dataset) -> xr.Dataset:
+def convert_to_display_units(dataset: xr.Dataset) -> xr.Dataset:
     """Results of a rig as tables and figures show them, in MPa, um and s; others as they are."""
-    if "sigma_star" not in dataset.variables or SCALES in dataset.attrs:
+    if "sigma_star" not in dataset.variables or SCALES_ATTRIBUTE in dataset.attrs:
         return dataset
-    return in_units(dataset, scales_of(dataset), **TOLD_IN)
+    return convert_units(dataset, read_scales(dataset), **DISPLAY_BASE_UNITS)
 
 
-def is_in_other_units(dataset: xr.Dataset) -> bool:
+def has_unexpected_units(dataset: xr.Dataset) -> bool:
     """True of results in units that figures of their study do not expect."""
-    told = dataset.attrs.get(SCALES, "")
-    as_shown = "sigma_star" in dataset.variables and all(f" {u}," in told for u in TOLD_IN.values())
+    told = dataset.attrs.get(SCALES_ATTRIBUTE, "")
+    as_shown = "sigma_star" in dataset.variables and all(
+        f" {u}," in told for u in DISPLAY_BASE_UNITS.values()
+    )
     return bool(told) and not as_shown
 
 
-def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
+def apply_scales(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
     """A dataset in other units, all of it.
 
     What says its ``scale`` is multiplied by it and says its units instead; its name no longer calls
@@ -199,11 +207,15 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
     DataError
         Where nothing says its scale, or that of an axis varies along another.
     """
-    beside = [n for n in map(str, dataset.coords) if renamed(n) != n and renamed(n) in dataset]
+    beside = [
+        n
+        for n in map(str, dataset.coords)
+        if drop_ratio_from_name(n) != n and drop_ratio_from_name(n) in dataset
+    ]
     dataset = dataset.drop_vars(beside)
     result = dataset.copy()
-    logarithms = [n for n in map(str, dataset.variables) if _LOGARITHM.fullmatch(n)]
-    sizes = {n: scale for n, v in dataset.variables.items() if (scale := scale_of(v, by))}
+    logarithms = [n for n in map(str, dataset.variables) if _LOG_SLIP_RATE_PATTERN.fullmatch(n)]
+    sizes = {n: scale for n, v in dataset.variables.items() if (scale := variable_scale(v, by))}
     if not sizes:
         text = "nothing in the dataset says its scale: it is in other units already, or not ours"
         raise DataError(text)
@@ -223,30 +235,30 @@ def scaled(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
         words = dataset[name].attrs | {"units": by[held[name]].units}
         result[name] = one.dims, one.values, words
     for name in logarithms:
-        result = result.assign(slip_rate_of(dataset, name, by["V_*"]))
-    new = {str(name): renamed(str(name)) for name in sizes}
+        result = result.assign(slip_rate_from_log(dataset, name, by["V_*"]))
+    new = {str(name): drop_ratio_from_name(str(name)) for name in sizes}
     result = result.rename({old: name for old, name in new.items() if name != old})
     for variable in result.variables.values():
         named = str(variable.attrs.get("ancillary_variables", "")).split()
         if named:
             variable.attrs["ancillary_variables"] = " ".join(new.get(name, name) for name in named)
-    told = ", ".join(f"{n} = {_range(s.factor)} {s.units}" for n, s in by.items())
-    return with_cf_encoding(result.assign_attrs({SCALES: told}))
+    told = ", ".join(f"{n} = {_format_range(s.factor)} {s.units}" for n, s in by.items())
+    return with_cf_encoding(result.assign_attrs({SCALES_ATTRIBUTE: told}))
 
 
-def renamed(name: str) -> str:
+def drop_ratio_from_name(name: str) -> str:
     """A name for what is no ratio any more."""
-    name = name.removeprefix(BESIDE)
-    for ratio, quantity in _RATIOS.items():
+    name = name.removeprefix(DIMENSIONLESS_PREFIX)
+    for ratio, quantity in _RATIO_RENAMES.items():
         name = name.replace(ratio, quantity)
     return name
 
 
-def slip_rate_of(dataset: xr.Dataset, name: str, scale: Scale) -> dict[str, xr.Variable]:
+def slip_rate_from_log(dataset: xr.Dataset, name: str, scale: Scale) -> dict[str, xr.Variable]:
     """The slip rate of a logarithm of one, and of its error, if there is one."""
     log, plain = dataset[name].variable, name.replace("log10_", "")
     words = str(log.attrs.get("long_name", plain))
-    about = {"long_name": re.sub(_WORDS, "", words), "units": scale.units}
+    about = {"long_name": re.sub(_LOG_DESCRIPTION_PATTERN, "", words), "units": scale.units}
     rates = xr.Variable(log.dims, 10.0**log.values) * scale.factor
     found = {plain: xr.Variable(rates.dims, rates.values, about)}
     if f"{name}_error" in dataset:

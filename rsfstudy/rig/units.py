@@ -16,62 +16,76 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes.axis import plain
+from rsfstudy.axes.axis import to_plain_value
 from rsfstudy.errors import InvalidValue
 
 #: A factor to SI, and the exponents of kilogram, metre and second.
 Unit = tuple[Fraction, tuple[int, int, int]]
 
-_STRESS, _FORCE, _LENGTH, _TIME = (1, -1, -2), (1, 1, -2), (0, 1, 0), (0, 0, 1)
-_SIZES: Mapping[str, tuple[str | int, tuple[int, int, int]]] = {
+_STRESS_EXPONENTS, _FORCE_EXPONENTS, _LENGTH_EXPONENTS, _TIME_EXPONENTS = (
+    (1, -1, -2),
+    (1, 1, -2),
+    (0, 1, 0),
+    (0, 0, 1),
+)
+_UNIT_SIZES: Mapping[str, tuple[str | int, tuple[int, int, int]]] = {
     "kg": (1, (1, 0, 0)),
-    **{f"{p}Pa": (x, _STRESS) for p, x in (("", "1"), ("k", "1e3"), ("M", "1e6"), ("G", "1e9"))},
-    "bar": ("1e5", _STRESS),
-    **{f"{p}N": (x, _FORCE) for p, x in (("", "1"), ("k", "1e3"), ("M", "1e6"))},
-    "m": (1, _LENGTH),
-    "cm": ("1e-2", _LENGTH),
-    "mm": ("1e-3", _LENGTH),
-    **dict.fromkeys(("um", "\u00b5m", "\u03bcm", "micron", "microns"), ("1e-6", _LENGTH)),
-    "nm": ("1e-9", _LENGTH),
-    "ms": ("1e-3", _TIME),
-    "s": (1, _TIME),
-    "min": (60, _TIME),
-    "h": (3600, _TIME),
-    "day": (86400, _TIME),
-    "year": (31557600, _TIME),
+    **{
+        f"{p}Pa": (x, _STRESS_EXPONENTS)
+        for p, x in (("", "1"), ("k", "1e3"), ("M", "1e6"), ("G", "1e9"))
+    },
+    "bar": ("1e5", _STRESS_EXPONENTS),
+    **{f"{p}N": (x, _FORCE_EXPONENTS) for p, x in (("", "1"), ("k", "1e3"), ("M", "1e6"))},
+    "m": (1, _LENGTH_EXPONENTS),
+    "cm": ("1e-2", _LENGTH_EXPONENTS),
+    "mm": ("1e-3", _LENGTH_EXPONENTS),
+    **dict.fromkeys(("um", "\u00b5m", "\u03bcm", "micron", "microns"), ("1e-6", _LENGTH_EXPONENTS)),
+    "nm": ("1e-9", _LENGTH_EXPONENTS),
+    "ms": ("1e-3", _TIME_EXPONENTS),
+    "s": (1, _TIME_EXPONENTS),
+    "min": (60, _TIME_EXPONENTS),
+    "h": (3600, _TIME_EXPONENTS),
+    "day": (86400, _TIME_EXPONENTS),
+    "year": (31557600, _TIME_EXPONENTS),
 }
-_KNOWN: Mapping[str, Unit] = {name: (Fraction(size), of) for name, (size, of) in _SIZES.items()}
-_NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|nan|[-+]?inf")
+_KNOWN_UNITS: Mapping[str, Unit] = {
+    name: (Fraction(size), of) for name, (size, of) in _UNIT_SIZES.items()
+}
+_NUMBER_PATTERN = re.compile(
+    r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|nan|[-+]?inf"
+)
 #: A name with its power: of one digit, so that no power overflows.
-_POWER = (
+_POWER_PATTERN = (
     r"([A-Za-z\u00b5\u03bc](?:[A-Za-z\u00b5\u03bc0-9_]*[A-Za-z\u00b5\u03bc])?)"
     r"(?:(?:\^|\*\*)?([-+]?[1-9]))?"
 )
-_POWERS = re.compile(rf"(/?)\s*{_POWER}")
+_SIGNED_POWER_PATTERN = re.compile(rf"(/?)\s*{_POWER_PATTERN}")
 #: A product, over others one by one: what ``Pa/m s`` means is not agreed upon.
-_UNIT = re.compile(
-    rf"(?:1(?=\s*/)|{_POWER}(?:(?:\s*[*.\u00b7]\s*|\s+){_POWER})*)?(?:\s*/\s*{_POWER})*"
+_UNIT_PATTERN = re.compile(
+    rf"(?:1(?=\s*/)|{_POWER_PATTERN}(?:(?:\s*[*.\u00b7]\s*|\s+){_POWER_PATTERN})*)?(?:\s*/\s*{_POWER_PATTERN})*"
 )
-_SPACED = "must read start:stop:count, two finite numbers and a count"
-_LOGARITHMIC = "For logarithmic spacing write start:stop:count:log, as in hold_time=1:1e5:30:log."
-_MOST_POINTS = 1_000_000
+_RANGE_RULE = "must read start:stop:count, two finite numbers and a count"
+_LOG_RANGE_REMEDY = (
+    "For logarithmic spacing write start:stop:count:log, as in hold_time=1:1e5:30:log."
+)
+_MAX_POINTS = 1_000_000
 #: Most characters of a quantity; the patterns above take quadratic time on longer texts.
-_LONGEST_TEXT = 200
-_PINT = "Install pint (pip install 'rsfstudy[units]')"
+_MAX_QUANTITY_LENGTH = 200
+_PINT_REMEDY = "Install pint (pip install 'rsfstudy[units]')"
 
 
-def number(text: str) -> float | None:
+def parse_number(text: str) -> float | None:
     """The number that a text is, in the digits and with the point of ASCII; None of others."""
-    return float(text) if _NUMBER.fullmatch(text.strip()) else None
+    return float(text) if _NUMBER_PATTERN.fullmatch(text.strip()) else None
 
 
-def number_and_units(text: str) -> tuple[float | None, str]:
+def split_number_and_units(text: str) -> tuple[float | None, str]:
     """The number that a text begins with, if it does, and the units that follow."""
-    match = _NUMBER.match(text.strip())
+    match = _NUMBER_PATTERN.match(text.strip())
     return (float(match[0]), text.strip()[match.end() :].strip()) if match else (None, "")
 
 
-def spaced(name: str, text: str, values: str) -> list[float] | list[str]:
+def expand_range(name: str, text: str, values: str) -> list[float] | list[str]:
     """Numbers by their first, their last, how many there are and, perhaps, ``log``; with their
     units, where such follow.
 
@@ -83,18 +97,18 @@ def spaced(name: str, text: str, values: str) -> list[float] | list[str]:
     """
     *before, last = values.split(":")
     last, _, units = last.strip().partition(" ")
-    found = _numbers(name, text, [*before, last])
+    found = _expand_numbers(name, text, [*before, last])
     return [f"{number!r} {units.strip()}" for number in found] if units.strip() else found
 
 
-def _numbers(name: str, text: str, parts: Sequence[str]) -> list[float]:
+def _expand_numbers(name: str, text: str, parts: Sequence[str]) -> list[float]:
     spacing = parts[3].strip().lower() if len(parts) == 4 else ""
-    first, last, points = map(number, parts[:3] if len(parts) in (3, 4) else ["", "", ""])
+    first, last, points = map(parse_number, parts[:3] if len(parts) in (3, 4) else ["", "", ""])
     if first is None or last is None or points is None or spacing not in ("", "log"):
-        raise InvalidValue(name, text, _SPACED, remedy=_LOGARITHMIC)
+        raise InvalidValue(name, text, _RANGE_RULE, remedy=_LOG_RANGE_REMEDY)
     finite = math.isfinite(first) and math.isfinite(last)
-    if not finite or points not in range(1, _MOST_POINTS + 1):
-        raise InvalidValue(name, text, f"{_SPACED}, from 1 to {_MOST_POINTS:,}")
+    if not finite or points not in range(1, _MAX_POINTS + 1):
+        raise InvalidValue(name, text, f"{_RANGE_RULE}, from 1 to {_MAX_POINTS:,}")
     if spacing and min(first, last) <= 0.0:
         remedy = "Leave :log out, or start above 0."
         raise InvalidValue(name, text, "has no logarithm of 0 or less", remedy=remedy)
@@ -102,7 +116,7 @@ def _numbers(name: str, text: str, parts: Sequence[str]) -> list[float]:
     return [float(x) for x in laid(first, last, int(points))]
 
 
-def in_si(name: str, value: Any, units: str) -> float:
+def convert_to_si(name: str, value: Any, units: str) -> float:
     """A quantity in SI units.
 
     Parameters
@@ -120,61 +134,63 @@ def in_si(name: str, value: Any, units: str) -> float:
     InvalidValue
         For what is no finite number, and for units that are unknown or of another kind.
     """
-    return float(exact(name, value, units))
+    return float(convert_to_si_exactly(name, value, units))
 
 
-def exact(name: str, value: Any, units: str) -> Fraction:
-    """A quantity in SI units before it is rounded; raises as `in_si`."""
+def convert_to_si_exactly(name: str, value: Any, units: str) -> Fraction:
+    """A quantity in SI units before it is rounded; raises as `convert_to_si`."""
     if isinstance(value, str):
-        found: Any = _of_text(name, value, units)
+        found: Any = _parse_quantity(name, value, units)
     elif hasattr(value, "to") and hasattr(value, "magnitude"):
-        found = _converted(name, value, value, units)
+        found = _convert_pint_quantity(name, value, value, units)
     else:
-        found = plain(name, value)
+        found = to_plain_value(name, value)
     if isinstance(found, bool) or not isinstance(found, int | float | Fraction):
         remedy = f"Give a number in {units}, or a text with units."
         raise InvalidValue(name, value, "is no quantity", remedy=remedy)
-    if not math.isfinite(_rounded(found)):
+    if not math.isfinite(_to_float(found)):
         raise InvalidValue(name, value, "must be finite")
     return Fraction(found)
 
 
-def factor(name: str, stated: str, units: str) -> Fraction:
-    """Factor from the units that were stated to SI units; raises as `in_si`."""
-    return exact(name, f"1 {stated}", units)
+def unit_factor(name: str, stated: str, units: str) -> Fraction:
+    """Factor from the units that were stated to SI units; raises as `convert_to_si`."""
+    return convert_to_si_exactly(name, f"1 {stated}", units)
 
 
-def times(values: Any, factor: Fraction) -> Any:
+def multiply_exactly(values: Any, factor: Fraction) -> Any:
     """A number or an array in other units, each as a text of its digits would be."""
     if isinstance(values, np.ndarray):  # with what stands in it many times
         each, places = np.unique(values, return_inverse=True)
-        return np.array([times(x, factor) for x in each.tolist()])[places].reshape(values.shape)
-    return _rounded(_shortest(values) * factor) if math.isfinite(values) else values
+        return np.array([multiply_exactly(x, factor) for x in each.tolist()])[places].reshape(
+            values.shape
+        )
+    return _to_float(_shortest_fraction(values) * factor) if math.isfinite(values) else values
 
 
-def _shortest(number: float) -> Fraction:
+def _shortest_fraction(number: float) -> Fraction:
     """The shortest digits that round to a number: of as many as were written there may be any."""
     return Fraction(repr(float(number)))
 
 
-def _rounded(number: Fraction | float) -> float:
+def _to_float(number: Fraction | float) -> float:
     try:
         return float(number)
     except OverflowError:
         return math.inf
 
 
-def _of_text(name: str, text: str, units: str) -> Fraction | float:
+def _parse_quantity(name: str, text: str, units: str) -> Fraction | float:
     """Convert a string with a number and units to SI units.
 
     A number that is not finite is returned unchanged.
     """
-    if len(text) > _LONGEST_TEXT:
-        rule = f"is no quantity, because it has more than {_LONGEST_TEXT} characters"
+    if len(text) > _MAX_QUANTITY_LENGTH:
+        rule = f"is no quantity, because it has more than {_MAX_QUANTITY_LENGTH} characters"
         remedy = f"Write a number and its units, as in '2.5 {units.removesuffix('1')}'."
         raise InvalidValue(name, text, rule, remedy=remedy)
-    match = _NUMBER.match(text.strip())
-    powers = _powers(text.strip()[match.end() :].strip()) if match else None
+    match = _NUMBER_PATTERN.match(text.strip())
+    powers = _parse_unit_powers(text.strip()[match.end() :].strip()) if match else None
     if match is None or powers is None:
         example = f"2.5 {units}".removesuffix(" 1")
         remedy = f"Write a number and its units, as in '{example}', with a decimal point."
@@ -182,50 +198,50 @@ def _of_text(name: str, text: str, units: str) -> Fraction | float:
     number = float(match[0])
     if not math.isfinite(number):
         return number
-    stated = _shortest(number)
-    if not all(unit in _KNOWN for unit, _power in powers):
-        size = _factor_of_pint(name, text, powers, units)
+    stated = _shortest_fraction(number)
+    if not all(unit in _KNOWN_UNITS for unit, _power in powers):
+        size = _pint_factor(name, text, powers, units)
         return stated * Fraction(size) if math.isfinite(size) else size
-    scale, exponents = _product(powers)
-    wanted = _product(_powers(units.removeprefix("1")) or [])[1]
+    scale, exponents = _multiply_units(powers)
+    wanted = _multiply_units(_parse_unit_powers(units.removeprefix("1")) or [])[1]
     if exponents == (wanted[0], wanted[1] + 2, wanted[2]):
         rule = "is of force, and stress is force over area"
         raise InvalidValue(name, text, rule, remedy="Divide it by the area of the fault.")
     if exponents != wanted:
-        raise _misfit(name, text, units)
+        raise _incompatible_units_error(name, text, units)
     return stated * scale
 
 
-def _misfit(name: str, value: Any, units: str) -> InvalidValue:
+def _incompatible_units_error(name: str, value: Any, units: str) -> InvalidValue:
     rule = f"has units of another kind than {units}"
     return InvalidValue(name, value, rule, remedy=f"Give it in {units}, or a multiple of it.")
 
 
-def _powers(units: str) -> list[tuple[str, int]] | None:
+def _parse_unit_powers(units: str) -> list[tuple[str, int]] | None:
     """The units that a text multiplies and divides, with their powers; None where it does not."""
-    if not _UNIT.fullmatch(units):
+    if not _UNIT_PATTERN.fullmatch(units):
         return None
-    found = _POWERS.findall(units)
+    found = _SIGNED_POWER_PATTERN.findall(units)
     return [(name, int(power or 1) * (-1 if over else 1)) for over, name, power in found]
 
 
-def _product(powers: Iterable[tuple[str, int]]) -> Unit:
+def _multiply_units(powers: Iterable[tuple[str, int]]) -> Unit:
     """Units that are known here, multiplied."""
     scale, exponents = Fraction(1), [0, 0, 0]
     for name, power in powers:
-        size, of = _KNOWN[name]
+        size, of = _KNOWN_UNITS[name]
         scale *= size**power
         exponents = [e + power * o for e, o in zip(exponents, of, strict=True)]
     return scale, (exponents[0], exponents[1], exponents[2])
 
 
-def _factor_of_pint(name: str, text: str, powers: Iterable[tuple[str, int]], units: str) -> float:
+def _pint_factor(name: str, text: str, powers: Iterable[tuple[str, int]], units: str) -> float:
     try:
         pint = importlib.import_module("pint")
     except ImportError as error:
-        usual = ", ".join(n for n in _KNOWN if n != "kg" and n.isascii())
-        remedy = f"{_PINT}, write it in {usual}, or give a number in {units}."
-        remedy = _known_as(powers) or remedy
+        usual = ", ".join(n for n in _KNOWN_UNITS if n != "kg" and n.isascii())
+        remedy = f"{_PINT_REMEDY}, write it in {usual}, or give a number in {units}."
+        remedy = _suggest_unit(powers) or remedy
         raise InvalidValue(
             name, text, "has units that are not known here", remedy=remedy
         ) from error
@@ -233,27 +249,29 @@ def _factor_of_pint(name: str, text: str, powers: Iterable[tuple[str, int]], uni
     try:
         unit = math.prod(registry.parse_units(unit) ** power for unit, power in powers)
     except Exception as error:  # of its own, and of Python's parser
-        remedy = _known_as(powers) or f"Write it as in '2.5 {units}'."
+        remedy = _suggest_unit(powers) or f"Write it as in '2.5 {units}'."
         rule = f"has units that pint does not know ({error})"
         raise InvalidValue(name, text, rule, remedy=remedy) from error
-    if _converted(name, text, registry.Quantity(0.0, unit), units) != 0.0:
-        raise _misfit(name, text, units)  # a logarithm, of which none is a multiple
-    return float(_converted(name, text, registry.Quantity(1.0, unit), units))
+    if _convert_pint_quantity(name, text, registry.Quantity(0.0, unit), units) != 0.0:
+        raise _incompatible_units_error(
+            name, text, units
+        )  # a logarithm, of which none is a multiple
+    return float(_convert_pint_quantity(name, text, registry.Quantity(1.0, unit), units))
 
 
-def _known_as(powers: Iterable[tuple[str, int]]) -> str:
+def _suggest_unit(powers: Iterable[tuple[str, int]]) -> str:
     """The units that differ from what was written by capital letters only, if there are any."""
     for name, _power in powers:
-        meant = [known for known in _KNOWN if known.lower() == name.lower() and known != name]
+        meant = [known for known in _KNOWN_UNITS if known.lower() == name.lower() and known != name]
         if meant:
             return f"Did you mean {' or '.join(meant)}, instead of {name}?"
     return ""
 
 
-def _converted(name: str, value: Any, quantity: Any, units: str) -> Any:
+def _convert_pint_quantity(name: str, value: Any, quantity: Any, units: str) -> Any:
     """Magnitude of a quantity of pint in SI units."""
     try:
         magnitude = quantity.to(units).magnitude
     except Exception as error:
-        raise _misfit(name, value, units) from error
-    return plain(name, magnitude)
+        raise _incompatible_units_error(name, value, units) from error
+    return to_plain_value(name, magnitude)

@@ -11,16 +11,17 @@ others have published.
 From a law to a motion, each hop a function that the next one holds:
 
 1. ``evolution`` of a file in `laws`: the change of the state per unit slip.
-2. `states.evolutions_of_one_state` makes ``evolutions`` of it, which takes a tuple of states and
-   returns one; a law of several states states that itself. `system.functions` chooses.
-3. `friction.friction_of` adds the unknowns of a fluid or a loading behind those of the law:
-   ``Friction.evolutions``.
-4. `system` makes rates of it: `system.against_displacement` between ruptures, and of a rigid slider
-   `system.rate_of_rigid`. In a rupture `dynamics.inertia.rupture_rate` calls it; between ruptures
-   with mass, `dynamics.inertia.slip_rate` as well.
+2. `states.evolutions_from_single_state` makes ``evolutions`` of it, which takes a tuple of states
+   and returns one; a law of several states states that itself. `system.build_scene_functions`
+   chooses.
+3. `friction.build_friction_functions` adds the unknowns of a fluid or a loading behind those of the
+   law: ``FrictionFunctions.evolutions``.
+4. `system` makes rates of it: `system.displacement_rate_function` between ruptures, and of a rigid
+   slider `system.rigid_rate_function`. In a rupture `dynamics.inertia.rupture_rate` calls it;
+   between ruptures with mass, `dynamics.inertia.slip_rate` as well.
 5. `equations` puts the rates of a scene, its unknowns and its numbers together.
 6. `motion.columns` makes functions of them that fill arrays; a stepper calls these (the one of
-   SciPy calls ``Equations.rate`` itself), and `motion.loop` the stepper, step by step.
+   SciPy calls ``Equations.rate_function`` itself), and `motion.loop` the stepper, step by step.
 
 Where the equations of the paper are:
 

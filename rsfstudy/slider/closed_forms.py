@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 #: Points at which normal stress is looked at for a critical fall, and the smallest and the largest
 #: of them as sigma_*/sigma - 1.
-_FALLS, _SMALLEST_FALL, _LARGEST_FALL = 400, 1e-9, 1e3
+_STRESS_FALL_COUNT, _MIN_STRESS_FALL, _MAX_STRESS_FALL = 400, 1e-9, 1e3
 
 
 @dataclass(frozen=True)
@@ -19,19 +19,19 @@ class ClosedForm:
 
     Attributes
     ----------
-    text : str
+    formula : str
         The formula.
     fields : tuple of str
         Names of the fields it takes, in order.
-    value : callable
+    function : callable
         The formula as a function of those fields.
     source : str
         Where it is published.
     """
 
-    text: str
+    formula: str
     fields: tuple[str, ...]
-    value: Callable[..., float]
+    function: Callable[..., float]
     source: str
 
 
@@ -61,7 +61,9 @@ def critical_stiffness(
     return above / ((1.0 - mu_ss * cot_phi) * (1.0 - (mu_ss - alpha) * cot_phi))
 
 
-def displacement_step(b_over_a: float, exponent: float = 0.0, ratio: float = 0.0) -> float:
+def critical_displacement_step(
+    b_over_a: float, law_exponent: float = 0.0, stiffness_ratio: float = 0.0
+) -> float:
     """Critical displacement step of the family of laws, over D_c; NaN where there is none.
 
     ``a/(b-a) [-ln(1 - eps r)]/(eps r)`` with r = k/k_cr, at constant normal stress, under a load
@@ -71,23 +73,23 @@ def displacement_step(b_over_a: float, exponent: float = 0.0, ratio: float = 0.0
     ----------
     b_over_a : float
         b/a, above 1.
-    exponent : float
+    law_exponent : float
         eps of the family, from 0 (slip law) to 1 (slowness law).
-    ratio : float
+    stiffness_ratio : float
         k/k_cr.
 
     References
     ----------
     Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196, for the slip law.
     """
-    product = exponent * ratio
+    product = law_exponent * stiffness_ratio
     if math.isnan(product) or product >= 1.0:
         return math.nan
     longer = -math.log1p(-product) / product if product else 1.0
     return longer / (b_over_a - 1.0)
 
 
-def velocity_step(b_over_a: float, exponent: float = 0.0) -> float:
+def critical_velocity_step(b_over_a: float, law_exponent: float = 0.0) -> float:
     """Critical V_0/V_* of the family of laws at critical stiffness; NaN where there is none.
 
     ``V_0/V_* = 1 + a/[(1 - eps)(b - a)]``, at constant normal stress and with an infinite norm.
@@ -98,9 +100,9 @@ def velocity_step(b_over_a: float, exponent: float = 0.0) -> float:
     ----------
     Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196, for the slip law, eps = 0.
     """
-    if math.isnan(exponent) or exponent >= 1.0:
+    if math.isnan(law_exponent) or law_exponent >= 1.0:
         return math.nan
-    return 1.0 + 1.0 / ((1.0 - exponent) * (b_over_a - 1.0))
+    return 1.0 + 1.0 / ((1.0 - law_exponent) * (b_over_a - 1.0))
 
 
 def effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
@@ -114,55 +116,63 @@ def effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
     return mu_star - alpha * (1.0 - 1.0 / b_over_a) if alpha else mu_star
 
 
-def threshold(exponent: float, pull: float) -> float:
+def instability_threshold(law_exponent: float, stiffness_ratio: float) -> float:
     """``u = Theta/b + ln V`` at which the family of laws falls no faster than a spring pulls,
-    ``h(u) = -pull``; infinite where it never does.
+    ``h(u) = -stiffness_ratio``; infinite where it never does.
     """
-    product = exponent * pull
+    product = law_exponent * stiffness_ratio
     if product >= 1.0:
         return math.inf
-    return -math.log1p(-product) / exponent if exponent else pull
+    return -math.log1p(-product) / law_exponent if law_exponent else stiffness_ratio
 
 
-def after_fall(mu_star: float, a: float, b_over_a: float, alpha: float, quotient: float) -> float:
+def offset_after_stress_fall(
+    mu_star: float, a: float, b_over_a: float, alpha: float, stress_quotient: float
+) -> float:
     """``u = Theta/b + ln V`` just after steady sliding at V_* has its normal stress changed to
     sigma_*/quotient: ``mu_* (q - 1)/a - alpha (1/a - 1/b) ln q``.
     """
-    taken = alpha * (1.0 - 1.0 / b_over_a) * math.log(quotient)
-    return (mu_star * (quotient - 1.0) - taken) / a
+    taken = alpha * (1.0 - 1.0 / b_over_a) * math.log(stress_quotient)
+    return (mu_star * (stress_quotient - 1.0) - taken) / a
 
 
-def normal_stress_step(
-    mu_star: float, a: float, b_over_a: float, alpha: float, exponent: float, ratio: float
+def critical_normal_stress_step(
+    mu_star: float,
+    a: float,
+    b_over_a: float,
+    alpha: float,
+    law_exponent: float,
+    stiffness_ratio: float,
 ) -> float:
     """Critical fall of imposed normal stress, over sigma_* and negative, by the family of laws:
-    where `after_fall` first is at the `threshold` of ``q k/k_cr``; NaN where it never is.
+    where `offset_after_stress_fall` first is at the `instability_threshold` of ``q k/k_cr``; NaN
+    where it never is.
 
     With the load point at rest u obeys ``du/d(slip) = (1 - b/a)[h(u) + q k/k_cr]`` over D_c: where
     it begins above the threshold, slip rate grows without bound.
     """
 
-    def excess(growth: float) -> float:
+    def excess_over_threshold(growth: float) -> float:
         quotient = 1.0 + growth
-        needed = threshold(exponent, quotient * ratio)
-        return after_fall(mu_star, a, b_over_a, alpha, quotient) - needed
+        needed = instability_threshold(law_exponent, quotient * stiffness_ratio)
+        return offset_after_stress_fall(mu_star, a, b_over_a, alpha, quotient) - needed
 
-    factor = (_LARGEST_FALL / _SMALLEST_FALL) ** (1.0 / _FALLS)
-    smaller = _SMALLEST_FALL
-    while smaller < _LARGEST_FALL:
+    factor = (_MAX_STRESS_FALL / _MIN_STRESS_FALL) ** (1.0 / _STRESS_FALL_COUNT)
+    smaller = _MIN_STRESS_FALL
+    while smaller < _MAX_STRESS_FALL:
         larger = factor * smaller
-        if excess(larger) >= 0.0:
-            growth = float(brentq(excess, smaller, larger, xtol=1e-18, rtol=1e-14))
+        if excess_over_threshold(larger) >= 0.0:
+            growth = float(brentq(excess_over_threshold, smaller, larger, xtol=1e-18, rtol=1e-14))
             return -growth / (1.0 + growth)
         smaller = larger
     return math.nan
 
 
-FORMS: Mapping[str, ClosedForm] = {
+CLOSED_FORMS: Mapping[str, ClosedForm] = {
     "velocity_step_at_critical_stiffness": ClosedForm(
         "V_0/V_* = 1 + a/(b-a)",
         ("b_over_a",),
-        velocity_step,
+        critical_velocity_step,
         "Gu et al. (1984), slip law, constant normal stress, k = k_cr",
     ),
     "velocity_step_for_b_over_a_of_e": ClosedForm(
@@ -174,19 +184,19 @@ FORMS: Mapping[str, ClosedForm] = {
     "displacement_step": ClosedForm(
         "D_c a/(b-a)",
         ("b_over_a",),
-        displacement_step,
+        critical_displacement_step,
         "Gu et al. (1984), slip law, constant normal stress, load point held",
     ),
     "displacement_step_of_the_family": ClosedForm(
         "D_c a/(b-a) [-ln(1 - eps k/k_cr)]/(eps k/k_cr)",
         ("b_over_a", "law_exponent", "stiffness_ratio"),
-        displacement_step,
+        critical_displacement_step,
         "h(u*) = -k/k_cr, constant normal stress, load point held, infinite norm",
     ),
     "velocity_step_of_the_family": ClosedForm(
         "V_0/V_* = 1 + a/[(1 - eps)(b-a)]",
         ("b_over_a", "law_exponent"),
-        velocity_step,
+        critical_velocity_step,
         "invariant line of the orbits at k = k_cr, constant normal stress, infinite norm; eps = 0 "
         "is that of Gu et al. (1984)",
     ),

@@ -10,10 +10,10 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 if TYPE_CHECKING:
-    derived = cached_property
+    cached_attribute = cached_property
 else:
 
-    class derived(cached_property):  # noqa: N801
+    class cached_attribute(cached_property):  # noqa: N801
         """A cached property whose first reading takes no lock: that of Python before 3.12 costs a
         microsecond, and a scene has a dozen.
         """
@@ -25,15 +25,17 @@ else:
             return value
 
 
-def once(make: Callable[Concatenate[Any, P], T]) -> Callable[Concatenate[Any, P], T]:
+def cached_per_scene(
+    function: Callable[Concatenate[Any, P], T],
+) -> Callable[Concatenate[Any, P], T]:
     """A function of a scene that is called once for each scene and what is stated beside it."""
 
-    @wraps(make)
-    def known(scene: Any, /, *stated: P.args, **named: P.kwargs) -> T:
-        made, key = scene.made, (make, *stated, *named.values())
+    @wraps(function)
+    def wrapper(scene: Any, /, *stated: P.args, **named: P.kwargs) -> T:
+        made, key = scene.cache, (function, *stated, *named.values())
         found = made.get(key)  # a key may take long to hash
         if found is None:
-            found = made[key] = make(scene, *stated, **named)
+            found = made[key] = function(scene, *stated, **named)
         return found
 
-    return known
+    return wrapper

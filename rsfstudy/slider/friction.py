@@ -29,28 +29,30 @@ import math
 from functools import cache, reduce
 from typing import NamedTuple
 
+from rsfstudy._deprecation import renamed_members
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.places import (
-    LARGEST_EXCESS,
+    LARGEST_NORMAL_STRESS_EXCESS,
     LOADING,
     MU_STAR,
-    SMALLEST_EXCESS,
+    SMALLEST_NORMAL_STRESS_EXCESS,
     STRESS_DEPENDENCE,
     A,
 )
 from rsfstudy.slider.states import (
-    contribution_of,
-    states_at_of,
-    sum_of,
-    with_auxiliary,
-    with_auxiliary_at_rest,
+    state_contribution_function,
+    states_from_strength_function,
+    sum_function,
+    with_auxiliary_evolutions,
+    with_auxiliary_steady_states,
 )
 
 #: Friction coefficient below which none is told from zero, where slip reverses.
-_LEAST = 1e-280
+_MIN_FRICTION_COEFFICIENT = 1e-280
 
 
-class Friction(NamedTuple):
+@renamed_members
+class FrictionFunctions(NamedTuple):
     """The functions of friction.
 
     Attributes
@@ -58,10 +60,10 @@ class Friction(NamedTuple):
     strength : callable
         ``(g, psis, p) -> (strength, its slope, shift, its slope)``, slopes being derivatives with
         respect to g. The first of the states may be missing.
-    effective_stress, outer_stress : callable
+    effective_normal_stress, rig_normal_stress : callable
         ``(g, psis, p) -> (s - 1, its slope)`` of effective normal stress, and of normal stress less
         the pore pressure outside the fault, which is what a rig knows of.
-    outer_pressure : callable
+    boundary_pressure : callable
         ``(psis) -> P`` outside the fault.
     evolutions : callable
         ``(log_slip_rate, psis, shift, fraction, p)``: changes of all states per unit slip in D_c,
@@ -70,82 +72,85 @@ class Friction(NamedTuple):
         ``(log_slip_rate, shift, p)``: all states in steady sliding.
     state_sum : callable
         ``(psis) -> Psi``, the sum of the states of the law.
-    contribution : callable
+    state_contribution : callable
         ``(changes, g, psis, p)``: what changes of the states take from a ln(V/V_*), so that
-        ``a d ln V = strength'(g) dg - contribution``.
-    by_pressure : callable
+        ``a d ln V = strength'(g) dg - state_contribution``.
+    pressure_derivatives : callable
         ``(g, psis, p)``: derivatives of strength and of shift with respect to P.
-    states_at : callable
+    states_from_strength : callable
         ``(strength, log_slip_rate, others, p)``: all states; the first is what the others leave.
-    imposed : callable
+    load_point_stress : callable
         ``(psis, p) -> K D`` that is no part of g, and
-    imposed_change : callable
+    load_point_stress_change : callable
         its change, ``(changes)``.
-    states : int
+    state_count : int
         How many states there are.
-    counted : tuple of int
+    distance_indices : tuple of int
         Places of the states that count for the distance from steady sliding.
     """
 
     strength: Function
-    effective_stress: Function
-    outer_stress: Function
-    outer_pressure: Function
+    effective_normal_stress: Function
+    rig_normal_stress: Function
+    boundary_pressure: Function
     evolutions: Function
     steady_states: Function
     state_sum: Function
-    contribution: Function
-    by_pressure: Function
-    states_at: Function
-    imposed: Function
-    imposed_change: Function
-    states: int
-    counted: tuple[int, ...]
+    state_contribution: Function
+    pressure_derivatives: Function
+    states_from_strength: Function
+    load_point_stress: Function
+    load_point_stress_change: Function
+    state_count: int
+    distance_indices: tuple[int, ...]
 
 
 # ---- the friction relation -----------------------------------------------------------------------
 
 
-def constant(g: float, p: Numbers) -> tuple[float, float]:
+def constant_normal_stress(g: float, p: Numbers) -> tuple[float, float]:
     """No excess of normal stress over its reference value, and no slope."""
     return 0.0, 0.0
 
 
 @cache
-def stress_of(normal_stress: Function, place: int) -> Function:
+def normal_stress_function(normal_stress: Function, pressure_index: int) -> Function:
     """``(g, psis, p) -> (s - 1, its slope)``, made of ``(g, p) -> (sigma/sigma_* - 1, its slope)``
     and the pore pressure at a place among the states, from their end; 0 where there is none.
     """
 
-    def total_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    def total_normal_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
         return normal_stress(g, p)
 
-    def effective_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    def effective_normal_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
         excess, change = normal_stress(g, p)
-        return min(max(excess - psis[place], SMALLEST_EXCESS), LARGEST_EXCESS), change
+        return min(
+            max(excess - psis[pressure_index], SMALLEST_NORMAL_STRESS_EXCESS),
+            LARGEST_NORMAL_STRESS_EXCESS,
+        ), change
 
-    return effective_stress if place else total_stress
+    return effective_normal_stress if pressure_index else total_normal_stress
 
 
 @cache
-def pressure_at(place: int) -> Function:
+def pressure_function(pressure_index: int) -> Function:
     """``(psis) -> P`` at a place; 0 where there is none."""
 
     def pressure(psis: Numbers) -> float:
-        return psis[place]
+        return psis[pressure_index]
 
-    return pressure if place else no_pressure
+    return pressure if pressure_index else zero_pressure
 
 
-def no_pressure(psis: Numbers) -> float:
+def zero_pressure(psis: Numbers) -> float:
     """P where there is none."""
     return 0.0
 
 
-Relation = tuple[float, float, float, float]
+FrictionRelation = tuple[float, float, float, float]
 
 
-def at_constant_stress(g: float, psis: Numbers, p: Numbers) -> Relation:
+def relation_at_constant_stress(g: float, psis: Numbers, p: Numbers) -> FrictionRelation:
     """The friction relation at constant normal stress, of a state that stress does not change."""
     return g, 1.0, 0.0, 0.0
 
@@ -155,7 +160,7 @@ def no_state_effect(g: float, ratio: float, change: float, p: Numbers) -> tuple[
     return 0.0, 0.0
 
 
-def strength_of(stress: Function, state_effect: Function) -> Function:
+def strength_function(stress: Function, state_effect: Function) -> Function:
     """The friction relation ``(g, psis, p) -> (strength, its slope, shift, its slope)``, of normal
     stress that changes, and of the effect of stress on the state.
 
@@ -164,7 +169,7 @@ def strength_of(stress: Function, state_effect: Function) -> Function:
     g ``(1 - mu_* s' + bend)/s**2``.
     """
 
-    def coupled(g: float, psis: Numbers, p: Numbers) -> Relation:
+    def strength(g: float, psis: Numbers, p: Numbers) -> FrictionRelation:
         excess, change = stress(g, psis, p)
         ratio, mu_star = 1.0 + excess, p[MU_STAR]
         bend, support = excess - change * g, 1.0 - mu_star * change
@@ -172,10 +177,12 @@ def strength_of(stress: Function, state_effect: Function) -> Function:
         shift, shift_slope = state_effect(g, ratio, change, p)
         return value + shift, slope + shift_slope, shift, shift_slope
 
-    return coupled
+    return strength
 
 
-def stress_dependence(g: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
+def stress_dependence_effect(
+    g: float, ratio: float, change: float, p: Numbers
+) -> tuple[float, float]:
     """State variable lost to the present shear stress, and its derivative.
 
     ``dTheta = -c dtau/sigma`` integrates to a shift of ``c g ln(s)/(s - 1)`` where the normal
@@ -190,18 +197,18 @@ def stress_dependence(g: float, ratio: float, change: float, p: Numbers) -> tupl
     return c * g * mean, c / ratio
 
 
-def added(effect: Function, other: Function) -> Function:
+def add_state_effects(effect: Function, other: Function) -> Function:
     """Two effects of stress on the state at once: ``(g, ratio, change, p) -> (shift, slope)``."""
 
-    def effects(g: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
+    def combined_effect(g: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
         shift, slope = effect(g, ratio, change, p)
         other_shift, other_slope = other(g, ratio, change, p)
         return shift + other_shift, slope + other_slope
 
-    return effects
+    return combined_effect
 
 
-def reversible(one_way: Function) -> Function:
+def make_reversible(forward_relation: Function) -> Function:
     """The relation of slip that may reverse, of that of slip forward: ln(V/V_*) is that of the
     magnitude of V.
 
@@ -216,19 +223,19 @@ def reversible(one_way: Function) -> Function:
     Rice and Ben-Zion (1996), Proc. Natl. Acad. Sci. 93, 3811-3818.
     """
 
-    def either_way(g: float, psis: Numbers, p: Numbers) -> Relation:
-        forward, slope, shift, shift_slope = one_way(g, psis, p)
+    def reversible_relation(g: float, psis: Numbers, p: Numbers) -> FrictionRelation:
+        forward, slope, shift, shift_slope = forward_relation(g, psis, p)
         a, mu_star = p[A], p[MU_STAR]
         coefficient_now = mu_star + forward - shift
-        size = max(abs(coefficient_now), _LEAST)
+        size = max(abs(coefficient_now), _MIN_FRICTION_COEFFICIENT)
         value = size + a * math.log(-math.expm1(-2.0 * size / a)) - mu_star + shift
         steeper = math.copysign(1.0 / math.tanh(size / a), coefficient_now)
         return value, (slope - shift_slope) * steeper + shift_slope, shift, shift_slope
 
-    return either_way
+    return reversible_relation
 
 
-def by_pressure_of(stress: Function, state_effect: Function) -> Function:
+def pressure_derivatives_function(stress: Function, state_effect: Function) -> Function:
     """Derivatives of strength, ``(mu_* + g)/s**2`` and that of the shift, and of the shift with
     respect to P, at constant frictional stress.
 
@@ -236,16 +243,16 @@ def by_pressure_of(stress: Function, state_effect: Function) -> Function:
     none.
     """
 
-    def slopes(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    def pressure_derivatives(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
         ratio = 1.0 + stress(g, psis, p)[0]
         along = state_effect(g, ratio, -1.0, p)[1]
         shift = along - state_effect(g, ratio, 0.0, p)[1]
         return (p[MU_STAR] + g) / ratio**2 + shift, shift
 
-    return slopes
+    return pressure_derivatives
 
 
-def no_load_point_stress(psis: Numbers, p: Numbers) -> float:
+def zero_load_point_stress(psis: Numbers, p: Numbers) -> float:
     """K D where the load point moves steadily."""
     return 0.0
 
@@ -255,35 +262,35 @@ def load_point_stress(psis: Numbers, p: Numbers) -> float:
     return psis[-1] - p[LOADING + 2]
 
 
-def with_load_point_stress(function: Function) -> Function:
+def add_load_point_stress(function: Function) -> Function:
     """A function ``(g, psis, p)`` of frictional stress, of g without `load_point_stress`."""
 
-    def loaded(g: float, psis: Numbers, p: Numbers) -> Numbers:
+    def function_with_load_point_stress(g: float, psis: Numbers, p: Numbers) -> Numbers:
         return function(g + load_point_stress(psis, p), psis, p)
 
-    return loaded
+    return function_with_load_point_stress
 
 
-def slopes_of(strength: Function) -> Function:
+def load_point_derivatives_function(strength: Function) -> Function:
     """Derivatives of strength and of the shift with respect to K D, which are those by g."""
 
-    def slopes(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
+    def load_point_derivatives(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
         _value, slope, _shift, shift_slope = strength(g, psis, p)
         return slope, shift_slope
 
-    return slopes
+    return load_point_derivatives
 
 
 # ---- all of it -----------------------------------------------------------------------------------
 
 
-class Parts(NamedTuple):
+class FrictionTerms(NamedTuple):
     """Friction as the parts of a scene state it (see their bases): functions, and how many states a
     law has and what may change normal stress beside shear stress.
 
     Attributes
     ----------
-    states : int
+    state_count : int
         How many states the law has.
     evolutions, steady_states : callable
         Of the law.
@@ -293,66 +300,78 @@ class Parts(NamedTuple):
         Whether slip may reverse.
     normal_stress : callable or None
         Of the case of normal stress.
-    unknowns : int
+    unknown_count : int
         How many states end in P.
     auxiliary_rates, auxiliary_steady_states : callable or None
         Theirs: auxiliary rates, and what they are in steady sliding.
-    outside : int
+    boundary_pressure_index : int
         Place of the pressure outside the fault, which a rig knows of, among all states and from
         their end: -1 where P is that; 0 where there is none.
-    displaces : bool
+    has_load_point_unknown : bool
         Whether the unknown that stands last is shear stress K D, and no pressure.
-    excluded : tuple of int
+    excluded_indices : tuple of int
         Places, among all states, of those that do not count for the distance from steady sliding.
     """
 
-    states: int
+    state_count: int
     evolutions: Function
     steady_states: Function
     state_effects: tuple[Function, ...]
     regularised: bool
     normal_stress: Function | None
-    unknowns: int
+    unknown_count: int
     auxiliary_rates: Function | None
     auxiliary_steady_states: Function | None
-    outside: int
-    displaces: bool = False
-    excluded: tuple[int, ...] = ()
+    boundary_pressure_index: int
+    has_load_point_unknown: bool = False
+    excluded_indices: tuple[int, ...] = ()
 
 
 @cache
-def friction_of(parts: Parts) -> Friction:
+def build_friction_functions(terms: FrictionTerms) -> FrictionFunctions:
     """Friction, made of what the parts of a scene say of it."""
-    effect = reduce(added, parts.state_effects) if parts.state_effects else no_state_effect
-    pressure, outside = parts.unknowns > 0 and not parts.displaces, parts.outside
-    total = parts.normal_stress or constant
-    effective, outer = stress_of(total, -1 if pressure else 0), stress_of(total, outside)
-    changes = pressure or total is not constant or len(parts.state_effects) > 0
-    strength = strength_of(effective, effect) if changes else at_constant_stress
-    if parts.regularised:
-        strength = reversible(strength)
-    evolutions, steady_states = parts.evolutions, parts.steady_states
-    if parts.auxiliary_rates is not None and parts.auxiliary_steady_states is not None:
-        evolutions = with_auxiliary(evolutions, parts.auxiliary_rates, parts.states)
-        steady_states = with_auxiliary_at_rest(steady_states, parts.auxiliary_steady_states)
-    by_last = by_pressure_of(effective, effect) if pressure else None
-    states = parts.states + parts.unknowns
-    if parts.displaces:
-        strength, effective, outer = map(with_load_point_stress, (strength, effective, outer))
-        by_last = slopes_of(strength)
-    return Friction(
+    effect = (
+        reduce(add_state_effects, terms.state_effects) if terms.state_effects else no_state_effect
+    )
+    pressure, outside = (
+        terms.unknown_count > 0 and not terms.has_load_point_unknown,
+        terms.boundary_pressure_index,
+    )
+    total = terms.normal_stress or constant_normal_stress
+    effective, outer = (
+        normal_stress_function(total, -1 if pressure else 0),
+        normal_stress_function(total, outside),
+    )
+    changes = pressure or total is not constant_normal_stress or len(terms.state_effects) > 0
+    strength = strength_function(effective, effect) if changes else relation_at_constant_stress
+    if terms.regularised:
+        strength = make_reversible(strength)
+    evolutions, steady_states = terms.evolutions, terms.steady_states
+    if terms.auxiliary_rates is not None and terms.auxiliary_steady_states is not None:
+        evolutions = with_auxiliary_evolutions(evolutions, terms.auxiliary_rates, terms.state_count)
+        steady_states = with_auxiliary_steady_states(steady_states, terms.auxiliary_steady_states)
+    by_last = pressure_derivatives_function(effective, effect) if pressure else None
+    states = terms.state_count + terms.unknown_count
+    if terms.has_load_point_unknown:
+        strength, effective, outer = map(add_load_point_stress, (strength, effective, outer))
+        by_last = load_point_derivatives_function(strength)
+    return FrictionFunctions(
         strength=strength,
-        effective_stress=effective,
-        outer_stress=outer,
-        outer_pressure=pressure_at(outside),
+        effective_normal_stress=effective,
+        rig_normal_stress=outer,
+        boundary_pressure=pressure_function(outside),
         evolutions=evolutions,
         steady_states=steady_states,
-        state_sum=sum_of(parts.states),
-        contribution=contribution_of(parts.states, by_last),
-        by_pressure=by_last or by_pressure_of(effective, effect),
-        states_at=states_at_of(parts.states),
-        imposed=load_point_stress if parts.displaces else no_load_point_stress,
-        imposed_change=pressure_at(-1 if parts.displaces else 0),
-        states=states,
-        counted=tuple(place for place in range(states) if place not in parts.excluded),
+        state_sum=sum_function(terms.state_count),
+        state_contribution=state_contribution_function(terms.state_count, by_last),
+        pressure_derivatives=by_last or pressure_derivatives_function(effective, effect),
+        states_from_strength=states_from_strength_function(terms.state_count),
+        load_point_stress=load_point_stress
+        if terms.has_load_point_unknown
+        else zero_load_point_stress,
+        load_point_stress_change=pressure_function(-1 if terms.has_load_point_unknown else 0),
+        state_count=states,
+        distance_indices=tuple(
+            place for place in range(states) if place not in terms.excluded_indices
+        ),
     )

@@ -17,19 +17,21 @@ import numpy as np
 
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import Quantity, is_name
+from rsfstudy.quantity import Quantity, is_variable_name
 from rsfstudy.slider.loading import Segment, ramp
 from rsfstudy.slider.parts import Numbers, Scene
-from rsfstudy.slider.places import LOG_VELOCITY, RELIEF
-from rsfstudy.slider.protocol import Stated
+from rsfstudy.slider.places import SEGMENT_LOG_VELOCITY, SEGMENT_STRESS_FALL
+from rsfstudy.slider.protocol import UserLoading
 
 #: Columns of samples: time from the first, load point velocity from then on, and by how much normal
 #: stress is below sigma_* then, and at which rate it rises from then on.
-TIME, VELOCITY, FALL, RISING = range(4)
-_UNKNOWNS = (Quantity("recorded_fall", "$P$", "1", "imposed fall of normal stress", "sigma_*"),)
+TIME_COLUMN, VELOCITY_COLUMN, STRESS_FALL_COLUMN, STRESS_RATE_COLUMN = range(4)
+_STRESS_UNKNOWNS = (
+    Quantity("recorded_fall", "$P$", "1", "imposed fall of normal stress", "sigma_*"),
+)
 
 
-class Segments(Sequence[Segment]):
+class LazySegments(Sequence[Segment]):
     """The segments of a table, each made when it is asked for."""
 
     def __init__(self, table: np.ndarray) -> None:
@@ -45,7 +47,7 @@ class Segments(Sequence[Segment]):
 
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
-class History(Stated):
+class SampledHistory(UserLoading):
     """A loading history by its samples.
 
     Attributes
@@ -59,7 +61,7 @@ class History(Stated):
     of_pressure : bool
         Whether it is pore pressure alone. Beside a fluid that has pressure too, that is the
         pressure around the fault; fluid flows in or out until both are the same.
-    back : tuple of (str, float, str), optional
+    first_reversal : tuple of (str, float, str), optional
         Name, value and place of the first sample that moves the load point back.
     """
 
@@ -67,7 +69,7 @@ class History(Stated):
     digest: str
     of_stress: bool
     of_pressure: bool = False  # type: ignore[misc]
-    back: tuple[str, float, str] | None = field(default=None, compare=False, repr=False)
+    first_reversal: tuple[str, float, str] | None = field(default=None, compare=False, repr=False)
 
     auxiliary_rates = staticmethod(ramp.auxiliary_rates)
     auxiliary_steady_states = staticmethod(ramp.auxiliary_steady_states)
@@ -75,55 +77,57 @@ class History(Stated):
     @property
     def unknowns(self) -> tuple[Quantity, ...]:  # type: ignore[override]
         """The fall of normal stress, where that is sampled."""
-        return _UNKNOWNS if self.of_stress else ()
+        return _STRESS_UNKNOWNS if self.of_stress else ()
 
-    def stated_at(self, number: int) -> tuple[str, float, str]:
-        velocity = float(self.columns[number, VELOCITY])
-        return self.back or ("velocity", velocity, f"sample {number + 1}")
+    def describe_reversal(self, index: int) -> tuple[str, float, str]:
+        velocity = float(self.sample_table[index, VELOCITY_COLUMN])
+        return self.first_reversal or ("velocity", velocity, f"sample {index + 1}")
 
-    def begins(self, scene: Scene) -> Numbers:
+    def initial_unknowns(self, scene: Scene) -> Numbers:
         """The fall at the first sample."""
-        return (float(self.columns[0, FALL]),) if self.of_stress else ()
+        return (float(self.sample_table[0, STRESS_FALL_COLUMN]),) if self.of_stress else ()
 
     def numbers(self, scene: Scene) -> Numbers:
         """The rate from the first sample on."""
-        return (float(self.columns[0, RISING]),) if self.of_stress else ()
+        return (float(self.sample_table[0, STRESS_RATE_COLUMN]),) if self.of_stress else ()
 
     def __getstate__(self) -> dict[str, Any]:
         return {f.name: vars(self)[f.name] for f in fields(self)}
 
     @property
-    def columns(self) -> np.ndarray:
+    def sample_table(self) -> np.ndarray:
         """The samples, shape (samples, 4)."""
-        return np.frombuffer(self.samples).reshape(-1, RISING + 1)
+        return np.frombuffer(self.samples).reshape(-1, STRESS_RATE_COLUMN + 1)
 
     @cached_property
-    def table(self) -> np.ndarray:
-        columns = self.columns
-        table = np.full((len(columns), RELIEF + 1), math.nan)
-        table[:, : LOG_VELOCITY + 1].T[:] = (
-            columns[:, TIME],
-            np.append(columns[1:, TIME], math.inf),
-            columns[:, VELOCITY],
-            _log(columns[:, VELOCITY]),
+    def segment_table(self) -> np.ndarray:
+        columns = self.sample_table
+        table = np.full((len(columns), SEGMENT_STRESS_FALL + 1), math.nan)
+        table[:, : SEGMENT_LOG_VELOCITY + 1].T[:] = (
+            columns[:, TIME_COLUMN],
+            np.append(columns[1:, TIME_COLUMN], math.inf),
+            columns[:, VELOCITY_COLUMN],
+            _log_velocity(columns[:, VELOCITY_COLUMN]),
         )
         if self.of_stress:
-            table[:, LOG_VELOCITY + 1 :] = columns[:, [RISING, FALL]]
+            table[:, SEGMENT_LOG_VELOCITY + 1 :] = columns[
+                :, [STRESS_RATE_COLUMN, STRESS_FALL_COLUMN]
+            ]
         return table
 
     @property
     def segments(self) -> Any:
         """What is between samples; the last segment goes on for ever."""
-        return Segments(self.table)
+        return LazySegments(self.segment_table)
 
     @property
-    def jumps(self) -> np.ndarray:
-        return np.zeros(len(self.columns), dtype=bool)
+    def jump_mask(self) -> np.ndarray:
+        return np.zeros(len(self.sample_table), dtype=bool)
 
     @property
-    def told(self) -> int:
+    def reported_segment_count(self) -> int:
         """The end of the record alone: each sample would be an event."""
-        return min(1, len(self.columns) - 1)
+        return min(1, len(self.sample_table) - 1)
 
     def _check_durations(self) -> None:
         """Nothing: samples are too many, and were checked where they were read."""
@@ -133,32 +137,32 @@ class History(Stated):
         return {"samples": self.digest}
 
     @property
-    def lasts(self) -> float:
-        return float(self.columns[-1, TIME])
+    def duration(self) -> float:
+        return float(self.sample_table[-1, TIME_COLUMN])
 
     @property
-    def imposes(self) -> bool:
+    def changes_normal_stress(self) -> bool:
         return self.of_stress
 
     @property
-    def is_a_step(self) -> bool:
+    def perturbs_steady_sliding(self) -> bool:
         return True
 
-    def alone(self, number: int) -> History:
-        one = self.columns[number].copy()
-        one[TIME] = 0.0
+    def isolate_segment(self, index: int) -> SampledHistory:
+        one = self.sample_table[index].copy()
+        one[TIME_COLUMN] = 0.0
         return replace(self, samples=one.tobytes())
 
 
-def sampled(
+def build_sampled_history(
     time: np.ndarray,
     velocity: np.ndarray,
-    fall: np.ndarray | None,
+    stress_fall: np.ndarray | None,
     name: str,
     *,
     of_pressure: bool = False,
-    back: tuple[str, float, str] | None = None,
-) -> History:
+    first_reversal: tuple[str, float, str] | None = None,
+) -> SampledHistory:
     """A loading history of samples.
 
     Parameters
@@ -167,13 +171,13 @@ def sampled(
         In D_c/V_*; the history begins with the first.
     velocity : ndarray
         Of the load point from each sample on, in V_*; the last goes on for ever.
-    fall : ndarray or None
+    stress_fall : ndarray or None
         By how much normal stress is below sigma_* at the samples, over that; the last stays.
     name : str
         What the history is called in results.
     of_pressure : bool
         Whether all of the fall is pore pressure.
-    back : tuple of (str, float, str), optional
+    first_reversal : tuple of (str, float, str), optional
         Name, value and place of the first sample that moves the load point back.
 
     Raises
@@ -181,28 +185,28 @@ def sampled(
     InvalidValue
         For a name that is none.
     """
-    if not is_name(name):
+    if not is_variable_name(name):
         raise InvalidValue("name", name, "must be a Python identifier: it names the history")
-    columns = np.zeros((len(time), RISING + 1))
-    columns[:, TIME], columns[:, VELOCITY] = time - time[0], velocity
-    if fall is not None:
-        columns[:, FALL] = fall
-        columns[:-1, RISING] = -np.diff(fall) / np.diff(time)
-    history = of_samples(columns, fall is not None, name, of_pressure=of_pressure)
-    return replace(history, back=back)
+    columns = np.zeros((len(time), STRESS_RATE_COLUMN + 1))
+    columns[:, TIME_COLUMN], columns[:, VELOCITY_COLUMN] = time - time[0], velocity
+    if stress_fall is not None:
+        columns[:, STRESS_FALL_COLUMN] = stress_fall
+        columns[:-1, STRESS_RATE_COLUMN] = -np.diff(stress_fall) / np.diff(time)
+    history = history_from_table(columns, stress_fall is not None, name, of_pressure=of_pressure)
+    return replace(history, first_reversal=first_reversal)
 
 
-def of_samples(
-    columns: np.ndarray, of_stress: bool, name: str, *, of_pressure: bool = False
-) -> History:
-    """A loading history of its columns (see `History.columns`)."""
-    samples = np.ascontiguousarray(columns, dtype=float).tobytes()
+def history_from_table(
+    sample_table: np.ndarray, of_stress: bool, name: str, *, of_pressure: bool = False
+) -> SampledHistory:
+    """A loading history of its columns (see `SampledHistory.sample_table`)."""
+    samples = np.ascontiguousarray(sample_table, dtype=float).tobytes()
     digest = hashlib.sha256(samples).hexdigest()[:16]
-    return History(
+    return SampledHistory(
         name=name, samples=samples, digest=digest, of_stress=of_stress, of_pressure=of_pressure
     )
 
 
-def _log(velocity: np.ndarray) -> np.ndarray:
+def _log_velocity(velocity: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(abs(velocity)))

@@ -6,20 +6,20 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple, cast
 
-from rsfstudy.slider.equations import relation_of, steady_states_of
+from rsfstudy.slider.equations import compute_steady_states, friction_relation
 from rsfstudy.slider.parts import Numbers, Scene
-from rsfstudy.slider.steady import Steady
+from rsfstudy.slider.steady import SteadySliding
 
 #: Largest step of the differences, relative to the scale of each argument, and the weights of
 #: central differences of order eight.
-_STEP = 0.05
-_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
+_MAX_RELATIVE_STEP = 0.05
+_DIFFERENCE_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
 #: Scale of a state relative to b, and the change of a steady state with ln V, relative to b, below
 #: which the scale of a state does not follow that change.
-_PART, _MOVES = 0.05, 1e-9
+_STATE_SCALE_OVER_B, _MIN_STATE_CHANGE = 0.05, 1e-9
 #: Most halvings of a step, the relative difference between two steps that counts as converged, and
 #: the rounding error of a difference in units of the machine precision.
-_HALVINGS, _CONVERGED, _ROUNDED = 9, 1e-12, 8.0 * 2.0**-52
+_MAX_HALVINGS, _CONVERGENCE_TOLERANCE, _ROUNDING_ERROR = 9, 1e-12, 8.0 * 2.0**-52
 
 Matrix = list[list[float]]
 
@@ -42,37 +42,40 @@ class LawSlopes(NamedTuple):
     by_state: Matrix
     relative_error: float
 
-    def with_relative_change(self, part: float) -> LawSlopes:
+    def with_relative_change(self, relative_change: float) -> LawSlopes:
         """Return a copy in which all derivatives are changed by a relative amount.
 
-        The derivatives with respect to ln V and to the shift are multiplied by ``1 + part``. The
-        derivatives with respect to the states are multiplied by ``1 - part``.
+        The derivatives with respect to ln V and to the shift are multiplied by ``1 +
+        relative_change``. The derivatives with respect to the states are multiplied by ``1 -
+        relative_change``.
         """
-        by_rate, by_shift = ([x * (1.0 + part) for x in row] for row in self[:2])
-        by_state = [[x * (1.0 - part) for x in row] for row in self.by_state]
+        by_rate, by_shift = ([x * (1.0 + relative_change) for x in row] for row in self[:2])
+        by_state = [[x * (1.0 - relative_change) for x in row] for row in self.by_state]
         return self._replace(by_rate=by_rate, by_shift=by_shift, by_state=by_state)
 
 
-def slopes_of_law(scene: Scene, steady: Steady) -> LawSlopes:
+def compute_law_slopes(scene: Scene, steady: SteadySliding) -> LawSlopes:
     """Compute the derivatives of the state evolution in steady sliding.
 
     The step of the finite differences is halved until two successive estimates agree. Laws whose
     evolution varies over a fraction of a unit of ln V are therefore resolved.
     """
-    evolutions, p = scene.functions.friction.evolutions, scene.numbers_of_friction
-    shift = relation_of(scene)(steady.friction)[2]
+    evolutions, p = scene.functions.friction.evolutions, scene.friction_numbers
+    shift = friction_relation(scene)(steady.frictional_stress)[2]
     arguments = [steady.log_slip_rate, shift, *steady.psis]
-    scales, columns, errors = _scales(scene, steady, shift), [], []
+    scales, columns, errors = _difference_scales(scene, steady, shift), [], []
     # changes that count as much as a unit of ln V, to which rounding errors are relative
-    units = [scales[0], *(scale / _PART for scale in scales[1:])]
-    rounding = _ROUNDED * (1.0 + max(abs(x) / y for x, y in zip(arguments, units, strict=True)))
+    units = [scales[0], *(scale / _STATE_SCALE_OVER_B for scale in scales[1:])]
+    rounding = _ROUNDING_ERROR * (
+        1.0 + max(abs(x) / y for x, y in zip(arguments, units, strict=True))
+    )
     for place, (scale, unit) in enumerate(zip(scales, units, strict=True)):
 
         def evolve(change: float, place: int = place) -> Numbers:
             x, shift, *psis = (y + change * (n == place) for n, y in enumerate(arguments))
             return cast(Numbers, evolutions(x, tuple(psis), shift, 1.0, p))
 
-        derivatives, error = _derivatives(evolve, _STEP * scale, rounding * unit)
+        derivatives, error = _differentiate(evolve, _MAX_RELATIVE_STEP * scale, rounding * unit)
         columns.append(derivatives)
         errors.append(error)
     by_rate, by_shift, *by_state = columns
@@ -80,7 +83,7 @@ def slopes_of_law(scene: Scene, steady: Steady) -> LawSlopes:
     return LawSlopes(by_rate, by_shift, rows, max(errors))
 
 
-def _derivatives(
+def _differentiate(
     function: Callable[[float], Numbers], step: float, rounding: float
 ) -> tuple[list[float], float]:
     """Differentiate a function at zero, and estimate the relative error.
@@ -90,13 +93,13 @@ def _derivatives(
     smaller rounding error. If no two successive steps agree, the function uses the pair of steps
     with the smallest difference, and returns the derivatives of the shorter step.
     """
-    (coarse, _sizes), best, smallest = _order_eight(function, step), list[float](), math.inf
-    for _ in range(_HALVINGS):
+    (coarse, _sizes), best, smallest = _central_differences(function, step), list[float](), math.inf
+    for _ in range(_MAX_HALVINGS):
         step *= 0.5
-        fine, sizes = _order_eight(function, step)
+        fine, sizes = _central_differences(function, step)
         pairs = zip(fine, coarse, sizes, strict=True)
         error = max(abs(x - y) / size if x != y else 0.0 for x, y, size in pairs)
-        noise = _CONVERGED + rounding / step
+        noise = _CONVERGENCE_TOLERANCE + rounding / step
         if error <= noise:
             return coarse, noise
         if not best or error + noise < smallest:
@@ -105,7 +108,7 @@ def _derivatives(
     return best, smallest
 
 
-def _order_eight(
+def _central_differences(
     function: Callable[[float], Numbers], step: float
 ) -> tuple[list[float], list[float]]:
     """Differentiate a function at zero by central differences of order eight.
@@ -120,7 +123,7 @@ def _order_eight(
     """
     slopes = [0.0] * len(function(0.0))
     sizes = slopes
-    for number, weight in _WEIGHTS:
+    for number, weight in _DIFFERENCE_WEIGHTS:
         ahead, behind = function(number * step), function(-number * step)
         changes = zip(slopes, ahead, behind, strict=True)
         slopes = [slope + weight * (more - less) / step for slope, more, less in changes]
@@ -129,13 +132,17 @@ def _order_eight(
     return slopes, sizes
 
 
-def _scales(scene: Scene, steady: Steady, shift: float) -> list[float]:
+def _difference_scales(scene: Scene, steady: SteadySliding, shift: float) -> list[float]:
     """Return the scales of ln V, the shift and each state for finite differences."""
-    size = _PART * scene.a * scene.parts.law.size_over_a
+    size = _STATE_SCALE_OVER_B * scene.a * scene.parts.law.state_change_over_a
     # b of several states may be next to nothing where each has a large one
-    of_shift = size if scene.parts.law.states > 1 else _PART * abs(scene.b) or size
+    of_shift = (
+        size if scene.parts.law.state_count > 1 else _STATE_SCALE_OVER_B * abs(scene.b) or size
+    )
     if len(steady.psis) == 1:
         return [1.0, of_shift, size]
-    slow, fast = (steady_states_of(scene, steady.log_slip_rate + x, shift) for x in (-1.0, 1.0))
+    slow, fast = (
+        compute_steady_states(scene, steady.log_slip_rate + x, shift) for x in (-1.0, 1.0)
+    )
     moved = [0.5 * abs(y - x) for x, y in zip(slow, fast, strict=True)]
-    return [1.0, of_shift, *(by if by > _MOVES * size else size for by in moved)]
+    return [1.0, of_shift, *(by if by > _MIN_STATE_CHANGE * size else size for by in moved)]

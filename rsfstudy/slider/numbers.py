@@ -10,7 +10,7 @@ from rsfstudy.slider.parts import POSITIVE, Part, Scene, number
 
 
 @dataclass(frozen=True, kw_only=True)
-class Slider(Part):
+class SliderParameters(Part):
     """The numbers that every slider has."""
 
     a: float = number(0.0145, "$a$", "1", "direct effect parameter", rule=POSITIVE)
@@ -56,20 +56,20 @@ class Slider(Part):
         """Stress and a state to begin with."""
         if self.initial_stress <= -self.mu_star:
             rule = f"must exceed -mu_star = {-self.mu_star:g}: shear stress is that of forward slip"
-            raise self.invalid("initial_stress", rule)
-        if self.initial_state and scene.parts.law.states > 1:
+            raise self.field_error("initial_stress", rule)
+        if self.initial_state and scene.parts.law.state_count > 1:
             rule = f"has no meaning for {scene.parts.law.name}, whose states share it"
             remedy = "Leave it out, and come to it by a protocol."
-            raise self.invalid("initial_state", rule, remedy)
+            raise self.field_error("initial_state", rule, remedy)
 
 
 #: The fields of which one sets the spring.
-SPRING = ("stiffness_ratio", "stiffness")
+STIFFNESS_FIELDS = ("stiffness_ratio", "stiffness")
 
 
-def with_spring(values: dict[str, Any]) -> dict[str, Any]:
+def with_stiffness_default(values: dict[str, Any]) -> dict[str, Any]:
     """The numbers of a slider with one field for its spring."""
-    given = [name for name in SPRING if name in values]
+    given = [name for name in STIFFNESS_FIELDS if name in values]
     if len(given) == 2:
         rule = f"give stiffness or stiffness_ratio (here {values['stiffness_ratio']:g}), not both"
         raise InvalidValue("stiffness", values["stiffness"], rule)

@@ -10,68 +10,89 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from rsfstudy._deprecation import renamed_names
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import Numbers, Part, Scene, numbers_of
+from rsfstudy.slider.parts import Numbers, Part, Scene, collect_numbers
 
 if TYPE_CHECKING:
-    from rsfstudy.slider.fluid._recharged import Recharged
+    from rsfstudy.slider.fluid._recharged import FluidWithBoundaryPressure
 
 #: Direct effect parameter a; how far ln V moves the states, which is b for one; mu_*, K = k
 #: D_c/sigma_*, V_0/V_*, its logarithm, the effect c of shear stress on the state, and by how much
 #: the loading has raised normal stress, over sigma_*.
-A, B, MU_STAR, STIFFNESS, LOAD_VELOCITY, LOG_LOAD_RATE, STRESS_DEPENDENCE, IMPOSED = range(8)
+(
+    A,
+    B,
+    MU_STAR,
+    STIFFNESS,
+    LOAD_VELOCITY,
+    LOG_LOAD_VELOCITY,
+    STRESS_DEPENDENCE,
+    IMPOSED_NORMAL_STRESS,
+) = range(8)
 
 #: Where the numbers of each slot begin, by its name. A loading that has unknowns has the places of
 #: the fluid, which then has none. There are few: compiled functions hand on all of `p`.
 NORMAL_STRESS, FLUID, DYNAMICS, LAW = 8, 10, 13, 15
 LOADING = FLUID
 #: Where both have some, the rate of the loading stands behind the numbers of the fluid.
-RECHARGE = DYNAMICS - 1
+BOUNDARY_PRESSURE_RATE = DYNAMICS - 1
 
 #: Columns of the table of segments of a loading: when each begins and ends, V_0/V_* and its
 #: logarithm, and the rate and the fall of normal stress that a loading with unknowns imposes as it
 #: begins, NaN of others.
-BEGINS, ENDS_AT, VELOCITY, LOG_VELOCITY, RATE, RELIEF = range(6)
+(
+    SEGMENT_START,
+    SEGMENT_END,
+    SEGMENT_VELOCITY,
+    SEGMENT_LOG_VELOCITY,
+    SEGMENT_STRESS_RATE,
+    SEGMENT_STRESS_FALL,
+) = range(6)
 
 #: Slip rates of which ln(V/V_*) is beyond this occur in trial steps only, which the integrator
 #: rejects: a motion ends at 276 (`slip_rate_unbounded`).
 LARGEST_LOG_SLIP_RATE = 300.0
 #: The same of time over slip, 1/V: slip that no load moves stops at 10^-290 V_*.
-LARGEST_SLOWNESS = 680.0
+LARGEST_LOG_SLOWNESS = 680.0
 #: Normal stress over its reference value, less 1: outside of these in trial steps only; clamps keep
 #: it finite.
-SMALLEST_EXCESS, LARGEST_EXCESS = 1e-12 - 1.0, 1e12
+SMALLEST_NORMAL_STRESS_EXCESS, LARGEST_NORMAL_STRESS_EXCESS = 1e-12 - 1.0, 1e12
 
 
-def numbers(scene: Scene) -> Numbers:
+def pack_numbers(scene: Scene) -> Numbers:
     """The numbers of a scene, each in its place."""
-    p = scene.numbers_of_friction
-    of_load = scene.stiffness, scene.load_velocity, scene.log_load_rate
+    p = scene.friction_numbers
+    of_load = scene.stiffness, scene.load_velocity, scene.log_load_velocity
     return (*p[:STIFFNESS], *of_load, *p[STRESS_DEPENDENCE:])
 
 
-def numbers_of_friction(scene: Scene) -> Numbers:
+def pack_friction_numbers(scene: Scene) -> Numbers:
     """Numbers for functions that friction alone decides: NaN for spring and load point."""
     parts, slider, law = scene.parts, scene.parts.slider, scene.parts.law
-    size = slider.a * law.size_over_a
-    size = math.copysign(size, law.b_over_a) if law.states == 1 else size
+    size = slider.a * law.state_change_over_a
+    size = math.copysign(size, law.b_over_a) if law.state_count == 1 else size
     of_load = math.nan, math.nan, math.nan
     of_stress = law.stress_dependence, scene.imposed_normal_stress
     common = slider.a, size, slider.mu_star, *of_load, *of_stress
     own = (
-        *_filled_up(parts.normal_stress, scene, FLUID - NORMAL_STRESS),
-        *_filled_up(scene.pressure_source, scene, DYNAMICS - FLUID),
-        *_filled_up(parts.dynamics, scene, LAW - DYNAMICS),
+        *_pad_with_nan(parts.normal_stress, scene, FLUID - NORMAL_STRESS),
+        *_pad_with_nan(scene.pressure_source, scene, DYNAMICS - FLUID),
+        *_pad_with_nan(parts.dynamics, scene, LAW - DYNAMICS),
     )
-    return (*common, *own, *numbers_of(law, scene))
+    return (*common, *own, *collect_numbers(law, scene))
 
 
-def _filled_up(part: Part | Recharged, scene: Scene, most: int) -> Numbers:
+def _pad_with_nan(part: Part | FluidWithBoundaryPressure, scene: Scene, length: int) -> Numbers:
     """The numbers of a part, and NaN in the places that it leaves, so that who reads there reads
     nothing.
     """
-    own = numbers_of(part, scene) if isinstance(part, Part) else part.numbers(scene)
-    if len(own) > most:
-        rule = f"states {len(own)} numbers, and there are places for {most}"
+    own = collect_numbers(part, scene) if isinstance(part, Part) else part.numbers(scene)
+    if len(own) > length:
+        rule = f"states {len(own)} numbers, and there are places for {length}"
         raise InvalidValue("numbers", part.name, rule, remedy="Make fewer of them, as quotients.")
-    return (*own, *(math.nan,) * (most - len(own)))
+    return (*own, *(math.nan,) * (length - len(own)))
+
+
+if not TYPE_CHECKING:
+    __getattr__ = renamed_names(__name__)

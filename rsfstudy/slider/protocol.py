@@ -17,18 +17,18 @@ import numpy as np
 
 from rsfstudy.error_boundary import error_boundary, guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import is_name
+from rsfstudy.quantity import is_variable_name
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parts import Scene
-from rsfstudy.slider.places import VELOCITY
+from rsfstudy.slider.places import SEGMENT_VELOCITY
 
 #: What a segment of a protocol may state.
-KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
+SEGMENT_KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
 
 
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
-class Stated(Loading, ABC):
+class UserLoading(Loading, ABC):
     """Base of loading histories of a user's own, which are data.
 
     Attributes
@@ -41,50 +41,50 @@ class Stated(Loading, ABC):
 
     def check(self, scene: Scene) -> None:
         """A load point that moves back only where slip may; see `Loading`."""
-        back = np.asarray(self.table)[:, VELOCITY] < 0.0
+        back = np.asarray(self.segment_table)[:, SEGMENT_VELOCITY] < 0.0
         if back.any() and not scene.parts.law.regularised:
-            name, value, place = self.stated_at(int(np.argmax(back)))
+            name, value, place = self.describe_reversal(int(np.argmax(back)))
             rule = "moves the load point back, and friction is that of forward slip"
             remedy = "Set regularised=True, by which slip reverses with shear stress."
-            raise InvalidValue(name, value, rule, remedy=remedy).at(place)
+            raise InvalidValue(name, value, rule, remedy=remedy).with_location(place)
         super().check(scene)
 
-    def stated_at(self, number: int) -> tuple[str, float, str]:
+    def describe_reversal(self, index: int) -> tuple[str, float, str]:
         """Name and value of what was stated of a segment that moves back, and where."""
-        return "velocity", self.segments[number].load_velocity, f"segment {number + 1}"
+        return "velocity", self.segments[index].load_velocity, f"segment {index + 1}"
 
     @property
     @abstractmethod
-    def lasts(self) -> float:
+    def duration(self) -> float:
         """Duration in D_c/V_* of all that was stated."""
 
 
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
-class Protocol(Stated):
+class Protocol(UserLoading):
     """A loading history as it was stated, segment by segment.
 
     Attributes
     ----------
-    history : tuple of Segment
+    input_segments : tuple of Segment
         Its segments; the last may say how long it lasts.
     """
 
-    history: tuple[Segment, ...]
+    input_segments: tuple[Segment, ...]
 
     def describe(self) -> dict[str, Any]:
         """Its segments as they were stated: the last may say how long it lasts."""
-        return {"segments": [segment.as_dict() for segment in self.history]}
+        return {"segments": [segment.as_dict() for segment in self.input_segments]}
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
         """As they were stated, the last without end."""
-        return *self.history[:-1], self.history[-1]._replace(duration=math.inf)
+        return *self.input_segments[:-1], self.input_segments[-1]._replace(duration=math.inf)
 
     @property
-    def lasts(self) -> float:
+    def duration(self) -> float:
         """Duration in D_c/V_* of all segments that state one."""
-        return math.fsum(s.duration for s in self.history if s.duration < math.inf)
+        return math.fsum(s.duration for s in self.input_segments if s.duration < math.inf)
 
 
 @error_boundary
@@ -109,7 +109,7 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
         For a protocol without segments, a segment that lasts no time, has no normal stress, or says
         twice or not at all how long it lasts.
     """
-    if not is_name(name):
+    if not is_variable_name(name):
         raise InvalidValue("name", name, "must be a Python identifier: it names the protocol")
     if isinstance(segments, str | Mapping) or not isinstance(segments, Sequence):
         remedy = "Read a file by rsfstudy.read_protocol."
@@ -120,29 +120,31 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
     history: list[Segment] = []
     for number, stated in enumerate(segments, start=1):
         before = history[-1].normal_stress if history else 0.0
-        history.append(_segment(stated, before, f"segment {number}"))
+        history.append(_parse_segment(stated, before, f"segment {number}"))
     for number, segment in enumerate(history[:-1], start=1):
         if segment.duration == math.inf:
             remedy = "State its duration or its distance; only the last goes on for ever."
-            raise InvalidValue("duration", math.inf, "never ends", remedy=remedy).at(
+            raise InvalidValue("duration", math.inf, "never ends", remedy=remedy).with_location(
                 f"segment {number}"
             )
-    return Protocol(name=name, history=tuple(history))
+    return Protocol(name=name, input_segments=tuple(history))
 
 
-def _segment(stated: Any, normal_stress: float, place: str) -> Segment:
+def _parse_segment(stated: Any, normal_stress: float, place: str) -> Segment:
     """A segment that is stated, after one with so much imposed normal stress."""
     try:
         if isinstance(stated, Segment):
-            return _checked(*stated)
+            return _validated_segment(*stated)
         if not isinstance(stated, Mapping):
             remedy = 'Write {"velocity": 10, "duration": 2}.'
             raise InvalidValue("segment", stated, "is no segment", remedy=remedy)
         for key in stated:
-            if key not in KEYS:
-                raise InvalidValue("segment", key, "is unknown", choices=KEYS)
+            if key not in SEGMENT_KEYS:
+                raise InvalidValue("segment", key, "is unknown", choices=SEGMENT_KEYS)
         if "normal_stress" in stated:
-            normal_stress = _positive(stated, "normal_stress", "greater than 0, and finite") - 1.0
+            normal_stress = (
+                _read_positive(stated, "normal_stress", "greater than 0, and finite") - 1.0
+            )
         velocity, duration = stated.get("velocity"), stated.get("duration", math.inf)
         if velocity is None:
             raise InvalidValue("velocity", None, "must be stated", remedy="0 holds the load point.")
@@ -151,23 +153,23 @@ def _segment(stated: Any, normal_stress: float, place: str) -> Segment:
             if "duration" in stated:
                 rule = f"give duration or distance (here {distance!r}), not both"
                 raise InvalidValue("duration", duration, rule)
-            distance = _positive(stated, "distance", "positive and finite")
-            duration = distance / _positive(
+            distance = _read_positive(stated, "distance", "positive and finite")
+            duration = distance / _read_positive(
                 stated, "velocity", "positive where a distance is stated"
             )
-        return _checked(velocity, stated.get("step", 0.0), duration, normal_stress)
+        return _validated_segment(velocity, stated.get("step", 0.0), duration, normal_stress)
     except InvalidValue as error:
-        raise error.at(place) from error
+        raise error.with_location(place) from error
 
 
-def _positive(stated: Mapping[str, Any], name: str, what: str) -> float:
+def _read_positive(stated: Mapping[str, Any], name: str, what: str) -> float:
     value = stated[name]
     if not (_is_number(value) and 0.0 < value < math.inf):
         raise InvalidValue(name, value, f"must be {what}")
     return float(value)
 
 
-def _checked(velocity: Any, step: Any, duration: Any, normal_stress: Any) -> Segment:
+def _validated_segment(velocity: Any, step: Any, duration: Any, normal_stress: Any) -> Segment:
     if not _is_number(velocity) or not math.isfinite(velocity):
         remedy = "0 holds the load point."
         raise InvalidValue("velocity", velocity, "must be a finite number", remedy=remedy)

@@ -16,18 +16,18 @@ from types import FunctionType
 from typing import Any, TypeVar
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import Quantity, is_name
+from rsfstudy.quantity import Quantity, is_variable_name
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
-from rsfstudy.slider.numbers import Slider
-from rsfstudy.slider.parts import Part, is_flag, names_of, quantities_of
-from rsfstudy.slider.protocol import Stated
-from rsfstudy.slider.requirements import check_declaration
-from rsfstudy.slider.synonyms import law_name
+from rsfstudy.slider.numbers import SliderParameters
+from rsfstudy.slider.parts import Part, field_names, field_quantities, is_boolean_field
+from rsfstudy.slider.protocol import UserLoading
+from rsfstudy.slider.requirements import check_declared_needs
+from rsfstudy.slider.synonyms import canonical_law_name
 
 F = TypeVar("F", bound=Callable[..., Any])
 #: A part of a user's own: its class, whose fields are fields of the scene; or a loading, which is
 #: data.
-Own = type[Part] | Stated
+UserPart = type[Part] | UserLoading
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Slot:
         The one that is meant where none is named.
     long_name : str
         What it is.
-    own : dict of str to type or Stated
+    user_parts : dict of str to type or UserLoading
         Parts of the user's own, by name, as far as they are known in this process.
     """
 
@@ -55,7 +55,7 @@ class Slot:
     choices: Mapping[str, type[Part]]
     default: str
     long_name: str
-    own: dict[str, Own] = field(default_factory=dict)
+    user_parts: dict[str, UserPart] = field(default_factory=dict)
 
     @property
     def quantity(self) -> Quantity:
@@ -63,101 +63,101 @@ class Slot:
         return Quantity(self.name, "", "", self.long_name)
 
     @cached_property
-    def callers(self) -> Mapping[str, type[Part]]:
+    def selectors(self) -> Mapping[str, type[Part]]:
         """The fields that call for a part by their values."""
-        return {part.called_by: part for part in self.choices.values() if part.called_by}
+        return {part.selected_by: part for part in self.choices.values() if part.selected_by}
 
 
 SLOTS: tuple[Slot, ...] = (
-    Slot("law", laws.LawOfStates, laws.PARTS, "slip", "state evolution law"),
+    Slot("law", laws.LawBase, laws.BUILT_IN_PARTS, "slip", "state evolution law"),
     Slot(
         "normal_stress",
         normal_stress.NormalStress,
-        normal_stress.PARTS,
+        normal_stress.BUILT_IN_PARTS,
         "variable",
         "normal stress condition",
     ),
-    Slot("fluid", fluid.Fluid, fluid.PARTS, "drained", "fluid in the pores of the fault"),
+    Slot("fluid", fluid.Fluid, fluid.BUILT_IN_PARTS, "drained", "fluid in the pores of the fault"),
     Slot(
         "dynamics",
         dynamics.Dynamics,
-        dynamics.PARTS,
+        dynamics.BUILT_IN_PARTS,
         "quasi_static",
         "what balances the spring besides friction",
     ),
-    Slot("loading", loading.Loading, loading.PARTS, "step", "what the load point does"),
+    Slot("loading", loading.Loading, loading.BUILT_IN_PARTS, "step", "what the load point does"),
 )
 #: Slots whose choice a field of a scene names; that in others is called for by other fields.
-NAMED = tuple(slot for slot in SLOTS if not slot.callers)
-_EVERY_PART: tuple[type[Part], ...] = (
-    Slider,
+NAMED_SLOTS = tuple(slot for slot in SLOTS if not slot.selectors)
+_ALL_PARTS: tuple[type[Part], ...] = (
+    SliderParameters,
     *(part for slot in SLOTS for part in slot.choices.values()),
 )
 #: The part of rsfstudy that owns each field.
-OWNERS: Mapping[str, type[Part]] = {
-    name: part for part in reversed(_EVERY_PART) for name in names_of(part)
+FIELD_OWNERS: Mapping[str, type[Part]] = {
+    name: part for part in reversed(_ALL_PARTS) for name in field_names(part)
 }
 #: What the fields of a scene mean.
-QUANTITIES: tuple[Quantity, ...] = (
-    *(slot.quantity for slot in NAMED),
-    *(about for part in _EVERY_PART for about in quantities_of(part)),
+FIELD_QUANTITIES: tuple[Quantity, ...] = (
+    *(slot.quantity for slot in NAMED_SLOTS),
+    *(about for part in _ALL_PARTS for about in field_quantities(part)),
 )
 #: Their names.
-FIELDS: tuple[str, ...] = tuple(dict.fromkeys(about.name for about in QUANTITIES))
+FIELD_NAMES: tuple[str, ...] = tuple(dict.fromkeys(about.name for about in FIELD_QUANTITIES))
 #: Those that are among the values of a scene only if they were stated.
-IF_STATED: frozenset[str] = frozenset(
+OMITTED_IF_NONE: frozenset[str] = frozenset(
     name
-    for name, part in OWNERS.items()
-    if part.__dataclass_fields__[name].metadata.get("if_stated")
+    for name, part in FIELD_OWNERS.items()
+    if part.__dataclass_fields__[name].metadata.get("omit_if_none")
 )
 #: What names a part of the user's own in each slot.
 SLOT_NAMES: frozenset[str] = frozenset(slot.name for slot in SLOTS)
 #: Those that call for a part by their values.
-CALLERS: tuple[str, ...] = tuple(name for slot in SLOTS for name in slot.callers)
+SELECTOR_FIELDS: tuple[str, ...] = tuple(name for slot in SLOTS for name in slot.selectors)
 
 
-def defaults() -> dict[str, Any]:
+def field_defaults() -> dict[str, Any]:
     """What a scene may state, and what is meant where it does not."""
-    choices = {slot.name: slot.default if slot in NAMED else None for slot in SLOTS}
-    fields = {name: part.__dataclass_fields__[name].default for name, part in OWNERS.items()}
-    return {name: {**choices, **fields}[name] for name in dict.fromkeys((*FIELDS, *choices))}
+    choices = {slot.name: slot.default if slot in NAMED_SLOTS else None for slot in SLOTS}
+    fields = {name: part.__dataclass_fields__[name].default for name, part in FIELD_OWNERS.items()}
+    return {name: {**choices, **fields}[name] for name in dict.fromkeys((*FIELD_NAMES, *choices))}
 
 
-def completed(*more: str) -> Callable[[F], F]:
+def with_field_signature(*extra_names: str) -> Callable[[F], F]:
     """A decorator that gives a function which takes fields a signature that names those of every
     scene, and more: what editors complete.
     """
 
-    def named(function: F) -> F:
+    def decorate(function: F) -> F:
         stated = signature(function)
         *first, last = stated.parameters.values()
-        names = (*defaults(), *more)
+        names = (*field_defaults(), *extra_names)
         fields = [Parameter(name, Parameter.KEYWORD_ONLY, default=...) for name in names]
         function.__signature__ = stated.replace(parameters=[*first, *fields, last])  # type: ignore[attr-defined]
         return function
 
-    return named
+    return decorate
 
 
 # ---- parts of a user's own -----------------------------------------------------------------------
 
 #: Names that every scene has beside its fields; `scene` states them.
-RESERVED: set[str] = set()
+RESERVED_NAMES: set[str] = set()
 #: Classes that were checked.
-_CHECKED: set[type[Part]] = set()
+_CHECKED_CLASSES: set[type[Part]] = set()
 
 
-def kind_of(part: Own) -> type[Part]:
+def part_class(part: UserPart) -> type[Part]:
     """The class of a part."""
     return part if isinstance(part, type) else type(part)
 
 
-def slot_of(kind: type[Part]) -> Slot:
+def find_slot(part_class: type[Part]) -> Slot:
     """The slot that parts of a class fill."""
-    return next(slot for slot in SLOTS if issubclass(kind, slot.base))
+    return next(slot for slot in SLOTS if issubclass(part_class, slot.base))
 
 
-def resolve(slot: Slot, part: Any) -> Own:
+def resolve_part(slot: Slot, part: Any) -> UserPart:
     """A part that is given itself, not by its name; from its first use on, its name stands for it.
 
     Raises
@@ -165,18 +165,18 @@ def resolve(slot: Slot, part: Any) -> Own:
     InvalidValue
         Where it cannot fill the slot.
     """
-    found: Own = part
-    if part in slot.choices.values() and slot in NAMED:
+    found: UserPart = part
+    if part in slot.choices.values() and slot in NAMED_SLOTS:
         return found
-    if isinstance(part, Stated) and slot.base is loading.Loading:
-        _check_name(slot, part)
-    elif part not in _CHECKED or slot_of(part) is not slot:
-        _check(slot, part)
-    register([found])
+    if isinstance(part, UserLoading) and slot.base is loading.Loading:
+        _check_part_name(slot, part)
+    elif part not in _CHECKED_CLASSES or find_slot(part) is not slot:
+        _check_part(slot, part)
+    register_parts([found])
     return found
 
 
-def _check(slot: Slot, part: Any) -> None:
+def _check_part(slot: Slot, part: Any) -> None:
     """Raise InvalidValue for what cannot fill a slot."""
     if not isinstance(part, type) or not issubclass(part, slot.base):
         rule = f"is no class that fills the slot {slot.name}"
@@ -186,18 +186,18 @@ def _check(slot: Slot, part: Any) -> None:
     if params is None or not params.frozen:
         remedy = "Write @dataclass(frozen=True, kw_only=True) above its class."
         raise InvalidValue(slot.name, part, "must be a frozen dataclass", remedy=remedy)
-    _check_name(slot, part)
-    _check_fields(slot, part)
-    _check_excluded(slot, part)
-    check_declaration(slot.name, part)
-    for name in part.functions():
+    _check_part_name(slot, part)
+    _check_part_fields(slot, part)
+    _check_excluded_unknowns(slot, part)
+    check_declared_needs(slot.name, part)
+    for name in part.required_functions():
         function = getattr_static(part, name, None)
         if not isinstance(getattr(function, "__func__", None), FunctionType):
             rule, remedy = f"states no {name}", f"Write {name} = staticmethod(a plain function)."
             raise InvalidValue(slot.name, part, rule, remedy=remedy)
 
 
-def _check_excluded(slot: Slot, part: type[Part]) -> None:
+def _check_excluded_unknowns(slot: Slot, part: type[Part]) -> None:
     """Raise ``InvalidValue`` if ``excluded_from_distance`` contains an invalid name.
 
     Each name must be the name of an unknown of the part.
@@ -213,41 +213,45 @@ def _check_excluded(slot: Slot, part: type[Part]) -> None:
             raise InvalidValue("excluded_from_distance", name, rule, choices=unknowns)
 
 
-def _check_name(slot: Slot, part: Own) -> None:
+def _check_part_name(slot: Slot, part: UserPart) -> None:
     """Raise InvalidValue for a name that no part may have, or that something else has."""
     name: object = getattr(part, "name", None)
-    rule = "" if is_name(name) else f"must be named by a Python identifier, not {name!r}"
+    rule = "" if is_variable_name(name) else f"must be named by a Python identifier, not {name!r}"
     for other in SLOTS:
         if name in other.choices:
             rule = f"takes the name of a part of rsfstudy, {name!r}"
-        elif name in other.own and _origin(other.own[name]) != _origin(part):
-            rule = f"takes the name {name!r} of {'.'.join(_origin(other.own[name]))}"
+        elif name in other.user_parts and _origin(other.user_parts[name]) != _origin(part):
+            rule = f"takes the name {name!r} of {'.'.join(_origin(other.user_parts[name]))}"
     if rule:
         remedy = f'Write name = "..." in {_origin(part)[1]}.'
         raise InvalidValue(slot.name, part, rule, remedy=remedy)
 
 
-def _origin(part: Own) -> tuple[str, str]:
+def _origin(part: UserPart) -> tuple[str, str]:
     """Return the module and the qualified name of the definition of a part.
 
     Both remain the same if a notebook cell with the definition is run again.
     """
-    return kind_of(part).__module__, kind_of(part).__qualname__
+    return part_class(part).__module__, part_class(part).__qualname__
 
 
-def _check_fields(slot: Slot, part: type[Part]) -> None:
+def _check_part_fields(slot: Slot, part: type[Part]) -> None:
     """Refuse fields that say nothing of themselves, or have the name of something else."""
     what = f"field of {part.__qualname__}"
     for stated in fields(part):
-        name, about, owner = stated.name, stated.metadata.get("about"), OWNERS.get(stated.name)
+        name, about, owner = (
+            stated.name,
+            stated.metadata.get("about"),
+            FIELD_OWNERS.get(stated.name),
+        )
         if about is None:
             rule, state = "says neither what it is nor its rule", "State it by number() or flag()."
             raise InvalidValue(what, name, rule, remedy=state)
-        if not is_name(name):
+        if not is_variable_name(name):
             rule = "must be a Python identifier, its accents composed (NFC)"
             raise InvalidValue(what, name, rule)
         if owner is None:
-            taken = name in RESERVED | SLOT_NAMES
+            taken = name in RESERVED_NAMES | SLOT_NAMES
         else:  # another part of the slot may have it, with another rule
             known = owner.__dataclass_fields__[name].metadata["about"]
             taken = about != known or owner not in slot.choices.values()
@@ -257,16 +261,16 @@ def _check_fields(slot: Slot, part: type[Part]) -> None:
             raise InvalidValue(what, name, rule, remedy="Give it another name.")
 
 
-def register(parts: Iterable[Own]) -> None:
+def register_parts(parts: Iterable[UserPart]) -> None:
     """Have the names of parts that were checked stand for them, whatever they stood for."""
     for part in parts:
-        slot = slot_of(kind_of(part))
-        if slot.own.get(part.name) is not part:
-            slot.own[part.name] = part
-            _CHECKED.add(kind_of(part))
+        slot = find_slot(part_class(part))
+        if slot.user_parts.get(part.name) is not part:
+            slot.user_parts[part.name] = part
+            _CHECKED_CLASSES.add(part_class(part))
 
 
-def name_of(field: str, value: Any) -> Any:
+def normalise_field_value(field: str, value: Any) -> Any:
     """A value of a field; a part that is given itself by its name, which it has from now on, and a
     law by its name here.
 
@@ -275,20 +279,24 @@ def name_of(field: str, value: Any) -> Any:
     InvalidValue
         Where the part cannot fill the slot.
     """
-    for slot in SLOTS if isinstance(value, type | Stated) else ():
+    for slot in SLOTS if isinstance(value, type | UserLoading) else ():
         if slot.name == field:
-            return resolve(slot, value).name
-    return law_name(value) if field == "law" and isinstance(value, str) else value
+            return resolve_part(slot, value).name
+    return canonical_law_name(value) if field == "law" and isinstance(value, str) else value
 
 
-def own_named(names: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> dict[str, Own]:
+def find_named_user_parts(
+    names: Iterable[str], rows: Iterable[Mapping[str, Any]]
+) -> dict[str, UserPart]:
     """The parts of the user's own that rows name in some fields, by name."""
-    slots = [slot for slot in SLOTS if slot.own and slot.name in names]
+    slots = [slot for slot in SLOTS if slot.user_parts and slot.name in names]
     places = ((slot, row.get(slot.name)) for row in rows for slot in slots)
-    return {n: slot.own[n] for slot, n in places if isinstance(n, str) and n in slot.own}
+    return {
+        n: slot.user_parts[n] for slot, n in places if isinstance(n, str) and n in slot.user_parts
+    }
 
 
-def by_class(values: Mapping[str, Any], parts: Mapping[str, Own]) -> Mapping[str, Any]:
+def names_to_parts(values: Mapping[str, Any], parts: Mapping[str, UserPart]) -> Mapping[str, Any]:
     """Values of fields, with these parts themselves instead of their names."""
     if not parts:
         return values
@@ -296,7 +304,7 @@ def by_class(values: Mapping[str, Any], parts: Mapping[str, Own]) -> Mapping[str
     return {**values, **{name: parts.get(text, text) for name, text in texts.items()}}
 
 
-def fields_with(parts: Iterable[Own]) -> dict[str, Quantity]:
+def scene_fields(parts: Iterable[UserPart]) -> dict[str, Quantity]:
     """Fields of scenes that may have these parts of the user's own, by name, with what they mean.
 
     Raises
@@ -304,54 +312,54 @@ def fields_with(parts: Iterable[Own]) -> dict[str, Quantity]:
     InvalidValue
         Where one name means several things.
     """
-    found = {about.name: about for about in QUANTITIES}
-    for kind in map(kind_of, parts):
-        for about in (slot_of(kind).quantity, *quantities_of(kind)):
+    found = {about.name: about for about in FIELD_QUANTITIES}
+    for kind in map(part_class, parts):
+        for about in (find_slot(kind).quantity, *field_quantities(kind)):
             if found.setdefault(about.name, about) != about:
                 rule = "is the name of something else, of another part"
                 raise InvalidValue(f"field of {kind.name}", about.name, rule)
     return found
 
 
-def quantities_with(parts: Iterable[Own]) -> Iterator[Quantity]:
+def user_field_quantities(parts: Iterable[UserPart]) -> Iterator[Quantity]:
     """Quantities of the fields that parts of the user's own add to those of every scene."""
-    return (about for name, about in fields_with(parts).items() if name not in FIELDS)
+    return (about for name, about in scene_fields(parts).items() if name not in FIELD_NAMES)
 
 
-def kinds_with(parts: Iterable[Own]) -> Mapping[str, Any]:
+def field_types(parts: Iterable[UserPart]) -> Mapping[str, Any]:
     """Types of those fields; with None, where a part that fills the slot does without."""
     kinds: dict[str, Any] = dict.fromkeys(SLOT_NAMES, str)
-    classes = tuple(map(kind_of, parts))
-    filling: dict[str, list[type[Part]]] = {"": [Slider]}
+    classes = tuple(map(part_class, parts))
+    filling: dict[str, list[type[Part]]] = {"": [SliderParameters]}
     filling |= {slot.name: [*slot.choices.values()] for slot in SLOTS}
     for own_kind in classes:
-        filling[slot_of(own_kind).name].append(own_kind)
+        filling[find_slot(own_kind).name].append(own_kind)
     for every in filling.values():
         for part in every:
-            for name in names_of(part):
-                kind: Any = bool if is_flag(part, name) else float
-                stated = name == part.called_by or all(name in names_of(one) for one in every)
+            for name in field_names(part):
+                kind: Any = bool if is_boolean_field(part, name) else float
+                stated = name == part.selected_by or all(name in field_names(one) for one in every)
                 default = part.__dataclass_fields__[name].default
                 kinds[name] = kind if stated and default is not None else kind | None
-    return {name: kinds[name] for name in fields_with(classes)}
+    return {name: kinds[name] for name in scene_fields(classes)}
 
 
 #: What the fields of scenes without such parts hold.
-KINDS = kinds_with(())
+FIELD_TYPES = field_types(())
 
 
-def shown(
-    values: Mapping[str, Any], parts: Iterable[Own] = ()
+def quantities_with_values(
+    values: Mapping[str, Any], parts: Iterable[UserPart] = ()
 ) -> Iterator[tuple[Quantity, object]]:
     """Fields that hold something, as quantities, with their values.
 
     Parameters
     ----------
     values : mapping of str to value
-    parts : iterable of type or Stated
+    parts : iterable of type or UserLoading
         Parts of the user's own whose fields may be among those.
     """
-    about = fields_with(parts)
+    about = scene_fields(parts)
     for name, value in values.items():
         if value is not None:
             yield about.get(name, Quantity(name, "", "", "")), value

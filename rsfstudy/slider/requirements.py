@@ -1,9 +1,10 @@
 """Check that a scene provides the quantities that its parts need.
 
-The functions of a part receive the quantities in its attribute ``receives``. If effective
-normal stress is constant, shear stress can be computed from the friction coefficient and the normal
-stress. A part can list further quantities in ``needs``. The part is then rejected in every scene
-where these quantities are not known, because the rates would be computed from wrong values.
+The functions of a part receive the quantities in its attribute ``received_quantities``. If
+effective normal stress is constant, shear stress can be computed from the friction coefficient and
+the normal stress. A part can list further quantities in ``needs``. The part is then rejected in
+every scene where these quantities are not known, because the rates would be computed from wrong
+values.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ SHEAR_STRESS, NORMAL_STRESS = "shear_stress", "normal_stress"
 PORE_PRESSURE, EFFECTIVE_NORMAL_STRESS = "pore_pressure", "effective_normal_stress"
 
 #: The quantities that a part may need.
-QUANTITIES: Mapping[str, str] = {
+PART_QUANTITIES: Mapping[str, str] = {
     SLIP_RATE: "ln(V/V_*)",
     STATE: "the states of the law",
     FRICTION_COEFFICIENT: "tau/sigma = mu_* + a ln(V/V_*) + the sum of the states",
@@ -31,34 +32,34 @@ QUANTITIES: Mapping[str, str] = {
     EFFECTIVE_NORMAL_STRESS: "normal stress less pore pressure, over sigma_*",
 }
 #: Quantities that the functions of a law receive; the friction coefficient is a sum of the others.
-LAW_RECEIVES = frozenset({SLIP_RATE, STATE, FRICTION_COEFFICIENT})
+LAW_QUANTITIES = frozenset({SLIP_RATE, STATE, FRICTION_COEFFICIENT})
 #: Quantities that follow from others.
-_FOLLOWS: Mapping[str, frozenset[str]] = {
+_COMPUTED_FROM: Mapping[str, frozenset[str]] = {
     EFFECTIVE_NORMAL_STRESS: frozenset({NORMAL_STRESS, PORE_PRESSURE}),
     SHEAR_STRESS: frozenset({FRICTION_COEFFICIENT, NORMAL_STRESS, PORE_PRESSURE}),
 }
 
 
-def check_declaration(slot: str, part: type[Part]) -> None:
+def check_declared_needs(slot: str, part: type[Part]) -> None:
     """Raise ``InvalidValue`` if ``needs`` of a part is not a set of known quantities."""
     needs: Any = part.needs
     if isinstance(needs, str):
         raise InvalidValue("needs", needs, "must be a set of names", remedy=f"Write {{{needs!r}}}.")
     for name in needs:
-        if name not in QUANTITIES:
+        if name not in PART_QUANTITIES:
             rule = f"is not a quantity that rates of the {slot} {part.name} can need"
-            raise InvalidValue("needs", name, rule, choices=QUANTITIES)
+            raise InvalidValue("needs", name, rule, choices=PART_QUANTITIES)
 
 
 def check_needs(scene: Scene) -> None:
     """Raise ``InvalidValue`` if a scene lacks a quantity that one of its parts needs."""
     for slot, part in zip(scene.parts._fields, scene.parts, strict=True):
-        missing = sorted(set(part.needs) - provided(scene, part)) if part.needs else []
+        missing = sorted(set(part.needs) - provided_quantities(scene, part)) if part.needs else []
         if missing:
-            raise _refusal(scene, slot, part, missing)
+            raise _missing_quantities_error(scene, slot, part, missing)
 
 
-def provided(scene: Scene, part: Part) -> frozenset[str]:
+def provided_quantities(scene: Scene, part: Part) -> frozenset[str]:
     """Return the quantities that are known to the functions of a part.
 
     These are the quantities that the functions receive, and the quantities that can be computed
@@ -70,14 +71,16 @@ def provided(scene: Scene, part: Part) -> frozenset[str]:
     part : Part
         One of the parts of the scene.
     """
-    constant = {NORMAL_STRESS, PORE_PRESSURE} - {change.quantity for change in _changes(scene)}
-    found = constant | part.receives
+    constant = {NORMAL_STRESS, PORE_PRESSURE} - {
+        change.quantity for change in _unknown_quantities(scene)
+    }
+    found = constant | part.received_quantities
     if part is scene.parts.law and scene.parts.law.regularised:
         found -= {FRICTION_COEFFICIENT}  # that of forward slip does not hold where slip reverses
-    return frozenset(found | {name for name, terms in _FOLLOWS.items() if found >= terms})
+    return frozenset(found | {name for name, terms in _COMPUTED_FROM.items() if found >= terms})
 
 
-class _Change(NamedTuple):
+class _UnknownQuantity(NamedTuple):
     """Field of a scene that makes a quantity unknown to the rates, with its remedy."""
 
     quantity: str
@@ -85,31 +88,33 @@ class _Change(NamedTuple):
     remedy: str
 
 
-def _changes(scene: Scene) -> list[_Change]:
+def _unknown_quantities(scene: Scene) -> list[_UnknownQuantity]:
     """Return the fields of a scene that make normal stress or friction variable."""
     parts, found = scene.parts, []
     if parts.normal_stress.normal_stress is not None:
         cause = f"normal_stress={parts.normal_stress.name!r}"
-        found.append(_Change(NORMAL_STRESS, cause, "set normal_stress='constant'"))
-    if parts.loading.imposes:
+        found.append(_UnknownQuantity(NORMAL_STRESS, cause, "set normal_stress='constant'"))
+    if parts.loading.changes_normal_stress:
         cause = f"the loading {parts.loading.name!r}"
         remedy = "leave normal stress and pore pressure out of the loading"
-        found += [_Change(name, cause, remedy) for name in (NORMAL_STRESS, PORE_PRESSURE)]
+        found += [_UnknownQuantity(name, cause, remedy) for name in (NORMAL_STRESS, PORE_PRESSURE)]
     if parts.fluid.unknowns:
         cause = f"fluid={parts.fluid.name!r}"
-        found.append(_Change(PORE_PRESSURE, cause, "set fluid='drained'"))
+        found.append(_UnknownQuantity(PORE_PRESSURE, cause, "set fluid='drained'"))
     if parts.law.regularised:
         cause = "regularised=True"
-        found.append(_Change(FRICTION_COEFFICIENT, cause, "set regularised=False"))
+        found.append(_UnknownQuantity(FRICTION_COEFFICIENT, cause, "set regularised=False"))
     return found
 
 
-def _refusal(scene: Scene, slot: str, part: Part, missing: list[str]) -> InvalidValue:
+def _missing_quantities_error(
+    scene: Scene, slot: str, part: Part, missing: list[str]
+) -> InvalidValue:
     """Return the error for a part that needs quantities its rates do not receive."""
-    known = provided(scene, part)
+    known = provided_quantities(scene, part)
     # terms that are missing, of which a change of the scene may be the cause
-    wanted = set[str]().union(*(_FOLLOWS.get(name, {name}) for name in missing)) - known
-    changes = [change for change in _changes(scene) if change.quantity in wanted]
+    wanted = set[str]().union(*(_COMPUTED_FROM.get(name, {name}) for name in missing)) - known
+    changes = [change for change in _unknown_quantities(scene) if change.quantity in wanted]
     causes = "with " + " and ".join(dict.fromkeys(change.cause for change in changes))
     remedies = ", ".join(dict.fromkeys(change.remedy for change in changes))
     if wanted > {change.quantity for change in changes}:

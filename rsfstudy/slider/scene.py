@@ -25,25 +25,25 @@ from rsfstudy.slider import (
     stability,
     system,
 )
-from rsfstudy.slider.assembly import Assembled, Parts
-from rsfstudy.slider.derived import derived
+from rsfstudy.slider.assembly import SceneBase, SceneParts
+from rsfstudy.slider.derived import cached_attribute
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
-from rsfstudy.slider.fluid._recharged import Recharged
-from rsfstudy.slider.loading.step import Step
-from rsfstudy.slider.numbers import Slider
+from rsfstudy.slider.fluid._recharged import FluidWithBoundaryPressure
+from rsfstudy.slider.loading.step import StepLoading
+from rsfstudy.slider.numbers import SliderParameters
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.requirements import check_needs
 from rsfstudy.slider.states import check_steady_states
 
 #: Critical stiffnesses that are kept: studies come back to those along their other axes.
-_KEPT = 4096
+_CACHE_SIZE = 4096
 #: Table of the one segment of most loadings, which does not end.
-FOR_EVER = np.array([[0.0, math.inf, *[math.nan] * 4]])
+ENDLESS_SEGMENT_TABLE = np.array([[0.0, math.inf, *[math.nan] * 4]])
 
 
 @guard_methods
 @dataclass(frozen=True, init=False, repr=False)
-class Scene(Assembled):
+class Scene(SceneBase):
     """A spring-slider with rate- and state-dependent friction, sliding steadily at V_* until a step
     is imposed.
 
@@ -150,7 +150,7 @@ class Scene(Assembled):
 
     Attributes
     ----------
-    parts : Parts
+    parts : SceneParts
         What it is made of: ``slider``, ``law``, ``normal_stress``, ``fluid``, ``dynamics`` and
         ``loading``; each field is that of one of them.
 
@@ -160,11 +160,14 @@ class Scene(Assembled):
         For a value that is wrong or means nothing, with the rule it breaks and the remedy.
     """
 
-    parts: Parts
+    parts: SceneParts
 
     #: What editors complete.
     __signature__: ClassVar[Signature] = Signature(
-        [Parameter(n, Parameter.KEYWORD_ONLY, default=d) for n, d in registry.defaults().items()]
+        [
+            Parameter(n, Parameter.KEYWORD_ONLY, default=d)
+            for n, d in registry.field_defaults().items()
+        ]
     )
 
     def _check(self) -> None:
@@ -172,7 +175,7 @@ class Scene(Assembled):
         # the law last: it may ask what all of friction makes of steady sliding
         for part in (*self.parts[:1], *reversed(self.parts[2:]), self.parts.law):
             part.check(self)
-        if self.parts.law.name not in laws.PARTS:
+        if self.parts.law.name not in laws.BUILT_IN_PARTS:
             check_steady_states(self)
 
     if TYPE_CHECKING:
@@ -189,9 +192,9 @@ class Scene(Assembled):
         """This slider in quasi-static motion, if it has mass."""
         return Scene(self.parts._replace(dynamics=QuasiStatic())) if self.has_mass else self
 
-    def under(self, segment: loading.Segment) -> Scene:
+    def with_segment(self, segment: loading.Segment) -> Scene:
         """This slider, loaded by one segment."""
-        step = Step(
+        step = StepLoading(
             load_velocity_ratio=segment.load_velocity,
             displacement_step=segment.displacement,
             normal_stress_step=segment.normal_stress,
@@ -199,62 +202,64 @@ class Scene(Assembled):
         return Scene(self.parts._replace(loading=step))
 
     @property
-    def unforced(self) -> Scene:
+    def under_steady_loading(self) -> Scene:
         """This slider under a load point that moves steadily, where its loading goes on
         changing normal stress: what steady sliding and its stability are asked of.
         """
         if not self.parts.loading.unknowns:
             return self
-        return self.under(loading.Segment(self.load_velocity))
+        return self.with_segment(loading.Segment(self.load_velocity))
 
-    def acting(self, number: int) -> Scene:
+    def segment_scene(self, index: int) -> Scene:
         """The scene as a segment of its loading has it."""
-        alone = self.parts.loading.alone(number)
+        alone = self.parts.loading.isolate_segment(index)
         if alone is self.parts.loading:
             return self
         if isinstance(alone, loading.Segment):
-            return self.under(alone)
+            return self.with_segment(alone)
         return Scene(self.parts._replace(loading=alone))
 
-    @derived
-    def chains(self) -> tuple[tuple[Scene, np.ndarray], ...]:
+    @cached_attribute
+    def continuous_segments(self) -> tuple[tuple[Scene, np.ndarray], ...]:
         """Its segments of loading as far as each follows on another without a jump: the scene as
         the first of them has it, and their table (see `places`).
         """
-        if len(self._history) == 1:
-            return ((self, FOR_EVER),)
-        table, breaks = map(np.array, (self.parts.loading.table, self.parts.loading.jumps))
+        if len(self._segments) == 1:
+            return ((self, ENDLESS_SEGMENT_TABLE),)
+        table, breaks = map(
+            np.array, (self.parts.loading.segment_table, self.parts.loading.jump_mask)
+        )
         if self.parts.law.regularised:  # where slip has reversed, a hold may have no answer
-            breaks = breaks | (table[:, places.VELOCITY] == 0.0)
+            breaks = breaks | (table[:, places.SEGMENT_VELOCITY] == 0.0)
         first = np.flatnonzero(breaks[1:]) + 1
-        acting = map(self.acting, (0, *first.tolist()))
+        acting = map(self.segment_scene, (0, *first.tolist()))
         return tuple(zip(acting, np.split(table, first), strict=True))
 
-    @derived
-    def _history(self) -> tuple[loading.Segment, ...]:
+    @cached_attribute
+    def _segments(self) -> tuple[loading.Segment, ...]:
         return self.parts.loading.segments
 
     # ---- its equations --------------------------------------------------------------------------
 
-    @derived
-    def made(self) -> dict[tuple[Any, ...], Any]:
+    @cached_attribute
+    def cache(self) -> dict[tuple[Any, ...], Any]:
         """Cache of what others make of it once and for all."""
         return {}
 
-    @derived
+    @cached_attribute
     def numbers(self) -> Numbers:
         """All numbers, as the functions of the equations read them (see `places`)."""
-        return places.numbers(self)
+        return places.pack_numbers(self)
 
-    @derived
-    def numbers_of_friction(self) -> Numbers:
+    @cached_attribute
+    def friction_numbers(self) -> Numbers:
         """Numbers for functions that friction alone decides."""
-        return places.numbers_of_friction(self)
+        return places.pack_friction_numbers(self)
 
-    @derived
-    def functions(self) -> system.System:
+    @cached_attribute
+    def functions(self) -> system.SceneFunctions:
         """The functions of the equations, by name (see `system`)."""
-        return system.functions(self)
+        return system.build_scene_functions(self)
 
     # ---- what follows from its fields -----------------------------------------------------------
 
@@ -263,39 +268,39 @@ class Scene(Assembled):
         """The part that balances the spring besides friction."""
         return self.parts.dynamics
 
-    @derived
-    def pressure_source(self) -> fluid.Fluid | loading.Loading | Recharged:
+    @cached_attribute
+    def pressure_source(self) -> fluid.Fluid | loading.Loading | FluidWithBoundaryPressure:
         """The part whose last unknown takes from normal stress, if any has unknowns; two, where the
         loading imposes the pressure around a fluid.
         """
         imposed, pores = self.parts.loading, self.parts.fluid
         if not imposed.unknowns:
             return pores
-        return Recharged(imposed, pores) if pores.unknowns else imposed
+        return FluidWithBoundaryPressure(imposed, pores) if pores.unknowns else imposed
 
     @property
     def has_mass(self) -> bool:
         """True if mass acts in ruptures."""
         return self.parts.dynamics.rupture_rate is not None
 
-    @derived
-    def states(self) -> int:
+    @cached_attribute
+    def state_count(self) -> int:
         """Number of states: those of the law, and the unknowns of a loading that goes on changing
         normal stress and of the fluid.
         """
-        return self.parts.law.states + len(self.pressure_source.unknowns)
+        return self.parts.law.state_count + len(self.pressure_source.unknowns)
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that act in this scene."""
         return tuple(effect for part in self.parts for effect in part.effects)
 
-    @derived
+    @cached_attribute
     def a(self) -> float:
         """Direct effect parameter."""
         return self.parts.slider.a
 
-    @derived
+    @cached_attribute
     def b(self) -> float:
         """Evolution effect parameter, of all states together."""
         return float(self.parts.slider.a * self.parts.law.b_over_a)
@@ -304,10 +309,10 @@ class Scene(Assembled):
     def stiffness(self) -> float:
         """K = k D_c/sigma_*."""
         given = self.parts.slider.stiffness
-        return float(given) if given is not None else self._relative_stiffness
+        return float(given) if given is not None else self._stiffness_from_ratio
 
-    @derived
-    def _relative_stiffness(self) -> float:
+    @cached_attribute
+    def _stiffness_from_ratio(self) -> float:
         ratio = self.parts.slider.stiffness_ratio
         assert ratio is not None  # one of the two is given
         if not 0.0 < self.critical_stiffness < math.inf:
@@ -325,37 +330,37 @@ class Scene(Assembled):
             return float(given)
         return self.stiffness / self.critical_stiffness if self.critical_stiffness else math.inf
 
-    @derived
+    @cached_attribute
     def load_velocity(self) -> float:
         """V_0/V_* after the last step."""
-        return self._history[-1].load_velocity
+        return self._segments[-1].load_velocity
 
-    @derived
-    def log_load_rate(self) -> float:
+    @cached_attribute
+    def log_load_velocity(self) -> float:
         """ln(V_0/V_*) of the magnitude of V_0, and -inf for a load point at rest."""
         return math.log(abs(self.load_velocity)) if self.load_velocity else -math.inf
 
-    @derived
+    @cached_attribute
     def imposed_normal_stress(self) -> float:
         """By how much imposed normal stress exceeds sigma_* after the last step, over sigma_*."""
-        return self._history[-1].normal_stress
+        return self._segments[-1].normal_stress
 
     @property
     def spring_stress_step(self) -> float:
         """Change of spring stress over sigma_* by the first displacement step, K d."""
-        return self.stiffness * self._history[0].displacement
+        return self.stiffness * self._segments[0].displacement
 
     @property
-    def is_disturbed(self) -> bool:
+    def is_perturbed(self) -> bool:
         """True if it does anything but slide on steadily at V_*."""
-        return self.begins_elsewhere or self.parts.loading.is_a_step
+        return self.starts_unsteady or self.parts.loading.perturbs_steady_sliding
 
     @property
-    def begins_elsewhere(self) -> bool:
+    def starts_unsteady(self) -> bool:
         """True if it begins with other stress or state than those of steady sliding at V_*."""
         return bool(self.parts.slider.initial_stress or self.parts.slider.initial_state)
 
-    @derived
+    @cached_attribute
     def inertial_time(self) -> float:
         """Time scale of inertia in units of D_c/V_*: T V_*/(2 pi D_c).
 
@@ -364,12 +369,12 @@ class Scene(Assembled):
         slider = self.parts.slider
         return slider.period * slider.reference_rate / (2.0 * math.pi)
 
-    @derived
-    def log_norm_rate(self) -> float:
+    @cached_attribute
+    def log_instability_rate(self) -> float:
         """ln(V/V_*) at which the instability norm is reached."""
         return math.log(self.parts.slider.instability_norm / self.inertial_time)
 
-    @derived
+    @cached_attribute
     def critical_stiffness(self) -> float:
         """Dimensionless critical stiffness k_cr(V_*) D_c/sigma_*.
 
@@ -379,20 +384,20 @@ class Scene(Assembled):
         return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores)
 
 
-registry.RESERVED.update(dir(Scene), Scene.__annotations__)
+registry.RESERVED_NAMES.update(dir(Scene), Scene.__annotations__)
 
 
-@lru_cache(_KEPT)
+@lru_cache(_CACHE_SIZE)
 def _critical_stiffness(
     a: float,
     mu_star: float,
-    law: laws.LawOfStates,
+    law: laws.LawBase,
     stress: normal_stress.NormalStress,
     pores: fluid.Fluid,
 ) -> float:
     """That of any slider with this friction: of one whose spring is as stiff as a."""
-    slider = Slider(a=a, mu_star=mu_star, stiffness=a)
-    scene = Scene(Parts(slider, law, stress, pores, QuasiStatic(), Step()))
+    slider = SliderParameters(a=a, mu_star=mu_star, stiffness=a)
+    scene = Scene(SceneParts(slider, law, stress, pores, QuasiStatic(), StepLoading()))
     return stability.critical_stiffness(scene, 0.0, quasi_static=True)
 
 

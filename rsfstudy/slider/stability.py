@@ -32,20 +32,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.slider.derived import once
-from rsfstudy.slider.equations import relation_of
-from rsfstudy.slider.law_slopes import LawSlopes, Matrix, slopes_of_law
+from rsfstudy.slider.derived import cached_per_scene
+from rsfstudy.slider.equations import friction_relation
+from rsfstudy.slider.law_slopes import LawSlopes, Matrix, compute_law_slopes
 from rsfstudy.slider.parts import Scene
-from rsfstudy.slider.steady import Steady, steady_sliding
+from rsfstudy.slider.steady import SteadySliding, steady_sliding
 
 #: Critical stiffness over a, and growth per slip in D_c, that rounding leaves where there is none.
-_ROUNDING, _STILL = 1e-12, 1e-9
+_MIN_CRITICAL_STIFFNESS_OVER_A, _GROWTH_RATE_FLOOR = 1e-12, 1e-9
 #: Rounding error of growth rates, relative to the largest.
-_ROUNDING_OF_ROOTS = 64.0 * 2.0**-52
+_ROOT_ROUNDING_ERROR = 64.0 * 2.0**-52
 
 #: Part of the next coefficient below which the one of mass is small, and steps of Newton from the
 #: growth rates without it.
-_LIGHT, _POLISHED = 1e-6, 2
+_SMALL_MASS_RATIO, _NEWTON_STEPS = 1e-6, 2
 
 Polynomial = list[float]
 
@@ -73,17 +73,17 @@ def critical_stiffness(scene: Scene, log_slip_rate: float, *, quasi_static: bool
     Dieterich and Linker (1992), Geophys. Res. Lett. 19, 1691-1694, for one state variable without
     mass: ``(b - a) sigma_ss / (D_c [1 - cot(phi) (mu_ss - alpha)])``.
     """
-    scene = scene.unforced
+    scene = scene.under_steady_loading
     steady = steady_sliding(scene, log_slip_rate)
     if steady is None:
         return math.nan
-    around = _around(scene, steady, quasi_static=quasi_static)
-    crossings = _crossings(around, _ROUNDING * scene.a)
+    around = _linearise(scene, steady, quasi_static=quasi_static)
+    crossings = _find_critical_stiffnesses(around, _MIN_CRITICAL_STIFFNESS_OVER_A * scene.a)
     critical = crossings[-1] if crossings else 0.0
     # of one state drained, no perturbation grows beyond the only crossing
-    if scene.states == 1 or critical == math.inf:
+    if scene.state_count == 1 or critical == math.inf:
         return critical
-    return math.inf if _grows(around, 2.0 * critical or scene.a) else critical
+    return math.inf if _is_unstable(around, 2.0 * critical or scene.a) else critical
 
 
 def critical_stiffnesses(scene: Scene, log_slip_rate: float) -> list[float]:
@@ -92,72 +92,88 @@ def critical_stiffnesses(scene: Scene, log_slip_rate: float) -> list[float]:
 
     Those K at which a root of ``K (1 + w**2 p**2) + eta V p + G(p) = 0`` is imaginary.
     """
-    scene = scene.unforced
+    scene = scene.under_steady_loading
     steady = steady_sliding(scene, log_slip_rate)
-    return [] if steady is None else _crossings(_around(scene, steady), _ROUNDING * scene.a)
+    return (
+        []
+        if steady is None
+        else _find_critical_stiffnesses(
+            _linearise(scene, steady), _MIN_CRITICAL_STIFFNESS_OVER_A * scene.a
+        )
+    )
 
 
-class _Around(NamedTuple):
+class _LinearisedBalance(NamedTuple):
     """Terms that balance a spring around steady sliding: friction above/below, waves and mass."""
 
-    above: Polynomial
-    below: Polynomial
+    numerator: Polynomial
+    denominator: Polynomial
     damping: float
-    norm: float
+    slip_rate_norm: float
 
 
-def _around(
-    scene: Scene, steady: Steady, slopes: LawSlopes | None = None, *, quasi_static: bool = False
-) -> _Around:
-    damping = 0.0 if quasi_static else scene.dynamics.damping(steady.log_slip_rate)
-    norm = 0.0 if quasi_static else scene.dynamics.norm(scene, steady.log_slip_rate)
-    return _Around(*response(scene, steady, slopes), damping, norm)
+def _linearise(
+    scene: Scene,
+    steady: SteadySliding,
+    slopes: LawSlopes | None = None,
+    *,
+    quasi_static: bool = False,
+) -> _LinearisedBalance:
+    damping = 0.0 if quasi_static else scene.dynamics.radiated_stress_slope(steady.log_slip_rate)
+    norm = 0.0 if quasi_static else scene.dynamics.slip_rate_norm(scene, steady.log_slip_rate)
+    return _LinearisedBalance(*friction_response(scene, steady, slopes), damping, norm)
 
 
-def _crossings(around: _Around, least: float) -> list[float]:
+def _find_critical_stiffnesses(around: _LinearisedBalance, least: float) -> list[float]:
     """Stiffnesses above the least at which a growth rate is imaginary, from the smallest up;
     ``math.inf`` for one that mass leaves none for.
     """
     # at p = i omega, as polynomials in omega**2
-    (a_even, a_odd), (b_even, b_odd) = _parts(around.above), _parts(around.below)
-    size = _sum(_product(b_even, b_even), [0.0, *_product(b_odd, b_odd)])
-    resists = _sum(_product(a_even, b_even), [0.0, *_product(a_odd, b_odd)])
-    turns = _sum(_product(a_odd, b_even), [-x for x in _product(a_even, b_odd)])
+    (a_even, a_odd), (b_even, b_odd) = (
+        _split_even_odd(around.numerator),
+        _split_even_odd(around.denominator),
+    )
+    size = _add(_multiply(b_even, b_even), [0.0, *_multiply(b_odd, b_odd)])
+    resists = _add(_multiply(a_even, b_even), [0.0, *_multiply(a_odd, b_odd)])
+    turns = _add(_multiply(a_odd, b_even), [-x for x in _multiply(a_even, b_odd)])
     crossings = []
-    for squared in _positive_roots(_sum(resists, [around.damping * x for x in size])):
-        elastic = squared * _value(turns, squared) / _value(size, squared)
-        inertial = 1.0 - around.norm**2 * squared
+    for squared in _positive_roots(_add(resists, [around.damping * x for x in size])):
+        elastic = squared * _evaluate(turns, squared) / _evaluate(size, squared)
+        inertial = 1.0 - around.slip_rate_norm**2 * squared
         crossings.append(elastic / inertial if inertial > 0.0 else math.inf)
     return sorted(stiffness for stiffness in crossings if stiffness > least)
 
 
-def _rates(around: _Around, stiffness: float) -> np.ndarray:
+def _compute_growth_rates(around: _LinearisedBalance, stiffness: float) -> np.ndarray:
     """Growth rates p at a stiffness, the fastest first."""
-    spring_stress = [stiffness, around.damping, stiffness * around.norm**2]
-    polynomial = _sum(_product(spring_stress, around.below), [0.0, *around.above])
-    light = 0.0 < abs(polynomial[-1]) < _LIGHT * abs(polynomial[-2]) and around.norm > 0.0
-    roots = _with_one_far_off(polynomial) if light else np.roots(polynomial[::-1])
+    spring_stress = [stiffness, around.damping, stiffness * around.slip_rate_norm**2]
+    polynomial = _add(_multiply(spring_stress, around.denominator), [0.0, *around.numerator])
+    light = (
+        0.0 < abs(polynomial[-1]) < _SMALL_MASS_RATIO * abs(polynomial[-2])
+        and around.slip_rate_norm > 0.0
+    )
+    roots = _roots_with_distant_root(polynomial) if light else np.roots(polynomial[::-1])
     return np.asarray(roots[np.argsort(-roots.real)])
 
 
-def _with_one_far_off(polynomial: Polynomial) -> np.ndarray:
+def _roots_with_distant_root(polynomial: Polynomial) -> np.ndarray:
     """Roots of which a small mass makes one, 1e20 of the others: next to it they would lose digits,
     and are found without it.
     """
     falling = polynomial[::-1]
     roots = np.append(np.roots(falling[1:]), -falling[1] / falling[0]).astype(complex)
-    for _ in range(_POLISHED):
+    for _ in range(_NEWTON_STEPS):
         off, slope = np.polyval(falling, roots), np.polyval(np.polyder(falling), roots)
         roots -= np.divide(off, slope, out=np.zeros_like(roots), where=slope != 0.0)
     return roots
 
 
-def _grows(around: _Around, stiffness: float) -> bool:
-    return bool(_rates(around, stiffness)[0].real > _STILL)
+def _is_unstable(around: _LinearisedBalance, stiffness: float) -> bool:
+    return bool(_compute_growth_rates(around, stiffness)[0].real > _GROWTH_RATE_FLOOR)
 
 
-def response(
-    scene: Scene, steady: Steady, slopes: LawSlopes | None = None
+def friction_response(
+    scene: Scene, steady: SteadySliding, slopes: LawSlopes | None = None
 ) -> tuple[Polynomial, Polynomial]:
     """Compute the response of friction to small changes of slip in steady sliding.
 
@@ -168,7 +184,7 @@ def response(
     Parameters
     ----------
     scene : Scene
-    steady : Steady
+    steady : SteadySliding
     slopes : LawSlopes, optional
         Derivatives of the state evolution. By default the derivatives are computed.
 
@@ -181,10 +197,10 @@ def response(
     ----------
     Rice and Ruina (1983), J. Appl. Mech. 50, 343-349.
     """
-    _value, slope, _shift, shift_slope = relation_of(scene)(steady.friction)
-    by_rate, by_shift, by_state, _error = slopes or slopes_of_law(scene, steady)
+    _value, slope, _shift, shift_slope = friction_relation(scene)(steady.frictional_stress)
+    by_rate, by_shift, by_state, _error = slopes or compute_law_slopes(scene, steady)
     by_state = [list(row) for row in by_state]
-    weights, shifting = _actions(scene, steady)
+    weights, shifting = _state_weights(scene, steady)
     for row, of_shift in zip(by_state, by_shift, strict=True):
         row[-1] += of_shift * shifting
     denominator, adjugate = resolvent(by_state)
@@ -197,13 +213,13 @@ def response(
     return above, below
 
 
-def _actions(scene: Scene, steady: Steady) -> tuple[list[float], float]:
+def _state_weights(scene: Scene, steady: SteadySliding) -> tuple[list[float], float]:
     """Change of a ln V by each state, and by how much the last moves the shift."""
-    law, fluid = scene.parts.law.states, len(scene.parts.fluid.unknowns)
+    law, fluid = scene.parts.law.state_count, len(scene.parts.fluid.unknowns)
     if not fluid:
         return [1.0] * law, 0.0
-    by_pressure = scene.functions.friction.by_pressure
-    gained, shifted = by_pressure(steady.friction, steady.psis, scene.numbers_of_friction)
+    by_pressure = scene.functions.friction.pressure_derivatives
+    gained, shifted = by_pressure(steady.frictional_stress, steady.psis, scene.friction_numbers)
     return [*[1.0] * law, *[0.0] * (fluid - 1), -gained], shifted
 
 
@@ -249,8 +265,10 @@ def growth_rates(scene: Scene, log_slip_rate: float) -> np.ndarray:
     ValueError
         Where there is no steady sliding.
     """
-    scene = scene.unforced
-    return _rates(_around(scene, _sliding(scene, log_slip_rate)), scene.stiffness)
+    scene = scene.under_steady_loading
+    return _compute_growth_rates(
+        _linearise(scene, _require_steady_sliding(scene, log_slip_rate)), scene.stiffness
+    )
 
 
 class GrowthRate(NamedTuple):
@@ -278,7 +296,7 @@ class GrowthRate(NamedTuple):
         return abs(self.value) <= self.error
 
 
-@once
+@cached_per_scene
 def largest_growth_rate(scene: Scene, log_slip_rate: float) -> GrowthRate | None:
     """Compute the largest growth rate of small perturbations of steady sliding.
 
@@ -296,23 +314,25 @@ def largest_growth_rate(scene: Scene, log_slip_rate: float) -> GrowthRate | None
     GrowthRate or None
         None if steady sliding does not exist at this slip rate.
     """
-    scene = scene.unforced
+    scene = scene.under_steady_loading
     steady = steady_sliding(scene, log_slip_rate)
     if steady is None:
         return None
-    slopes = slopes_of_law(scene, steady)
+    slopes = compute_law_slopes(scene, steady)
     error = slopes.relative_error
 
-    def rates(part: float) -> np.ndarray:
+    def perturbed_growth_rates(part: float) -> np.ndarray:
         changed = slopes.with_relative_change(part)
-        return _rates(_around(scene, steady, changed), scene.stiffness)
+        return _compute_growth_rates(_linearise(scene, steady, changed), scene.stiffness)
 
-    found = rates(0.0)
-    changes = [abs(rates(part)[0].real - found[0].real) for part in (error, -error)]
+    found = perturbed_growth_rates(0.0)
+    changes = [
+        abs(perturbed_growth_rates(part)[0].real - found[0].real) for part in (error, -error)
+    ]
     # the root that a small mass sends far off is found apart from the others
     sizes = np.sort(np.abs(found))[: -1 if scene.has_mass else None]
-    rounding = _ROUNDING_OF_ROOTS * float(sizes.max(initial=0.0))
-    return GrowthRate(float(found[0].real), float(max(changes)) + rounding + _STILL)
+    rounding = _ROOT_ROUNDING_ERROR * float(sizes.max(initial=0.0))
+    return GrowthRate(float(found[0].real), float(max(changes)) + rounding + _GROWTH_RATE_FLOOR)
 
 
 def response_to_normal_stress(scene: Scene, log_slip_rate: float, frequency: float) -> complex:
@@ -336,27 +356,27 @@ def response_to_normal_stress(scene: Scene, log_slip_rate: float, frequency: flo
     ValueError
         Where there is no steady sliding.
     """
-    still = scene.unforced
-    steady = _sliding(still, log_slip_rate)
+    still = scene.under_steady_loading
+    steady = _require_steady_sliding(still, log_slip_rate)
     psis = (*steady.psis, *(0.0 for _unknown in scene.pressure_source.unknowns))
-    by_pressure, p = scene.functions.friction.by_pressure, scene.numbers_of_friction
-    gained, shifted = by_pressure(steady.friction, psis, p)
-    _by_rate, by_shift, by_state, _error = slopes_of_law(still, steady)
+    by_pressure, p = scene.functions.friction.pressure_derivatives, scene.friction_numbers
+    gained, shifted = by_pressure(steady.frictional_stress, psis, p)
+    _by_rate, by_shift, by_state, _error = compute_law_slopes(still, steady)
     denominator, adjugate = resolvent(by_state)
     forced = [gained * x for x in denominator]
     for power, matrix in enumerate(adjugate):
         forced[power] -= shifted * math.fsum(_dot(row, by_shift) for row in matrix)
-    around, stiffness = _around(still, steady), scene.stiffness
-    spring_stress = [stiffness, around.damping, stiffness * around.norm**2]
+    around, stiffness = _linearise(still, steady), scene.stiffness
+    spring_stress = [stiffness, around.damping, stiffness * around.slip_rate_norm**2]
     at = 1j * frequency * math.exp(-log_slip_rate)
     left, above, below, balance = (
         complex(np.polyval(polynomial[::-1], at))
-        for polynomial in (forced, around.above, around.below, spring_stress)
+        for polynomial in (forced, around.numerator, around.denominator, spring_stress)
     )
     return stiffness * left / (balance * below + at * above)
 
 
-def _sliding(scene: Scene, log_slip_rate: float) -> Steady:
+def _require_steady_sliding(scene: Scene, log_slip_rate: float) -> SteadySliding:
     """Steady sliding, which there must be."""
     steady = steady_sliding(scene, log_slip_rate)
     if steady is None:
@@ -364,14 +384,14 @@ def _sliding(scene: Scene, log_slip_rate: float) -> Steady:
     return steady
 
 
-def _parts(polynomial: Polynomial) -> tuple[Polynomial, Polynomial]:
+def _split_even_odd(polynomial: Polynomial) -> tuple[Polynomial, Polynomial]:
     """Real part, and imaginary part over omega, of a polynomial at i omega, in omega**2."""
     even = [x * (-1.0) ** n for n, x in enumerate(polynomial[0::2])]
     odd = [x * (-1.0) ** n for n, x in enumerate(polynomial[1::2])]
     return even, odd
 
 
-def _product(first: Polynomial, second: Polynomial) -> Polynomial:
+def _multiply(first: Polynomial, second: Polynomial) -> Polynomial:
     product = [0.0] * (len(first) + len(second) - 1)
     for i, x in enumerate(first):
         for j, y in enumerate(second):
@@ -379,11 +399,11 @@ def _product(first: Polynomial, second: Polynomial) -> Polynomial:
     return product
 
 
-def _sum(first: Polynomial, second: Polynomial) -> Polynomial:
+def _add(first: Polynomial, second: Polynomial) -> Polynomial:
     return [x + y for x, y in zip_longest(first, second, fillvalue=0.0)]
 
 
-def _value(polynomial: Polynomial, at: float) -> float:
+def _evaluate(polynomial: Polynomial, at: float) -> float:
     return math.fsum([x * at**n for n, x in enumerate(polynomial)])
 
 

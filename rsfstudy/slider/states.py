@@ -16,11 +16,11 @@ from rsfstudy.slider.places import A, B
 
 #: ln(V/V_*) at which a law must rest in its steady states, and the change of a state per slip of
 #: D_c, over a, that is still rest: far above rounding.
-_RATES, _AT_REST = (0.0, -0.5, 0.5), 1e-6
+_CHECKED_LOG_SLIP_RATES, _REST_TOLERANCE = (0.0, -0.5, 0.5), 1e-6
 
 
 @cache
-def evolutions_of_one_state(evolution: Function) -> Function:
+def evolutions_from_single_state(evolution: Function) -> Function:
     """``dPsi/d(delta)`` times a fraction, of a law of one state."""
 
     def evolutions(
@@ -31,26 +31,28 @@ def evolutions_of_one_state(evolution: Function) -> Function:
     return evolutions
 
 
-def usual_steady_state(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
+def default_steady_state(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
     """Psi in steady sliding by most laws, where Theta = -b ln(V/V_*)."""
     return (shift - p[B] * log_slip_rate,)
 
 
-def with_auxiliary(evolutions: Function, auxiliary: Function, of_law: int) -> Function:
+def with_auxiliary_evolutions(
+    evolutions: Function, auxiliary: Function, law_state_count: int
+) -> Function:
     """Changes of the states of the law, and of those that end in P behind them."""
 
     def all_evolutions(
         log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
     ) -> Numbers:
         return (
-            *evolutions(log_slip_rate, psis[:of_law], shift, fraction, p),
-            *auxiliary(log_slip_rate, psis[of_law:], fraction, p),
+            *evolutions(log_slip_rate, psis[:law_state_count], shift, fraction, p),
+            *auxiliary(log_slip_rate, psis[law_state_count:], fraction, p),
         )
 
     return all_evolutions
 
 
-def with_auxiliary_at_rest(steady_states: Function, auxiliary: Function) -> Function:
+def with_auxiliary_steady_states(steady_states: Function, auxiliary: Function) -> Function:
     """All states in steady sliding: those of the law, and those that end in P."""
 
     def all_steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
@@ -60,69 +62,71 @@ def with_auxiliary_at_rest(steady_states: Function, auxiliary: Function) -> Func
 
 
 @cache
-def sum_of(count: int) -> Function:
+def sum_function(count: int) -> Function:
     """Sum of the first so many numbers."""
-    return _written("numbers", _sum("numbers", count))
+    return _function_from_expression("numbers", _sum_expression("numbers", count))
 
 
 @cache
-def scaled(count: int) -> Function:
+def scaling_function(count: int) -> Function:
     """``(numbers, by) -> tuple``: so many times each of the first so many numbers."""
     each = (f"by * numbers[{i}], " for i in range(count))
-    return _written("numbers, by", f"({''.join(each)})")
+    return _function_from_expression("numbers, by", f"({''.join(each)})")
 
 
 @cache
-def moved(count: int) -> Function:
+def state_step_function(count: int) -> Function:
     """``(psis, changes, by) -> tuple``: so many states after so many times their changes."""
     each = (f"psis[{i}] + by * changes[{i}], " for i in range(count))
-    return _written("psis, changes, by", f"({''.join(each)})")
+    return _function_from_expression("psis, changes, by", f"({''.join(each)})")
 
 
-def _sum(numbers: str, count: int) -> str:
+def _sum_expression(numbers: str, count: int) -> str:
     """Text of the sum of the first so many numbers."""
     return " + ".join(f"{numbers}[{i}]" for i in range(count))
 
 
-def _written(arguments: str, value: str) -> Function:
+def _function_from_expression(arguments: str, value: str) -> Function:
     """A function without a loop, which a compiler needs for tuples."""
     function: Function = eval(f"lambda {arguments}: {value}", {"__name__": __name__})
     return function
 
 
-def contribution_of(count: int, by_pressure: Function | None) -> Function:
+def state_contribution_function(count: int, pressure_derivatives: Function | None) -> Function:
     """``(changes, g, psis, p)``: what changes of so many states of the law take from a ln(V/V_*),
     less what the change of P, or of imposed shear stress, gives, if there is any.
     """
-    if by_pressure is None:
-        return _written("changes, g, psis, p", _sum("changes", count))
-    state_sum = sum_of(count)
+    if pressure_derivatives is None:
+        return _function_from_expression("changes, g, psis, p", _sum_expression("changes", count))
+    state_sum = sum_function(count)
 
-    def with_pressure(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
-        return state_sum(changes) - by_pressure(g, psis, p)[0] * changes[-1]
+    def contribution_with_pressure(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
+        return state_sum(changes) - pressure_derivatives(g, psis, p)[0] * changes[-1]
 
-    return with_pressure
+    return contribution_with_pressure
 
 
-def states_at_of(count: int) -> Function:
+def states_from_strength_function(count: int) -> Function:
     """``(strength, log_slip_rate, others, p)``: all states, of which so many are of the law, where
     friction has a strength: the first is what the others leave of it.
     """
     if count == 1:
 
-        def left(strength: float, log_slip_rate: float, others: Numbers, p: Numbers) -> Numbers:
+        def single_law_state(
+            strength: float, log_slip_rate: float, others: Numbers, p: Numbers
+        ) -> Numbers:
             return (strength - p[A] * log_slip_rate, *others)
 
-        return left
+        return single_law_state
 
-    sum_of_others = sum_of(count - 1)
+    sum_of_others = sum_function(count - 1)
 
-    def left_by_others(
+    def several_law_states(
         strength: float, log_slip_rate: float, others: Numbers, p: Numbers
     ) -> Numbers:
         return (strength - p[A] * log_slip_rate - sum_of_others(others), *others)
 
-    return left_by_others
+    return several_law_states
 
 
 def check_steady_states(scene: Scene) -> None:
@@ -130,10 +134,10 @@ def check_steady_states(scene: Scene) -> None:
     given, as those of steady sliding, or moves away from them: critical stiffness and cycles would
     contradict each other.
     """
-    law, p, still = scene.parts.law, scene.numbers, _AT_REST * scene.a
-    evolutions = law.evolutions or evolutions_of_one_state(law.evolution)
-    for rate in _RATES:
-        psis = (law.steady_states or usual_steady_state)(rate, 0.0, p)
+    law, p, still = scene.parts.law, scene.numbers, _REST_TOLERANCE * scene.a
+    evolutions = law.evolutions or evolutions_from_single_state(law.evolution)
+    for rate in _CHECKED_LOG_SLIP_RATES:
+        psis = (law.steady_states or default_steady_state)(rate, 0.0, p)
         change = max(map(abs, evolutions(rate, psis, 0.0, 1.0, p)))
         if not change <= still:
             rule = f"changes by {change:.3g} per D_c in steady sliding at ln(V/V_*) = {rate:g}"
@@ -142,14 +146,14 @@ def check_steady_states(scene: Scene) -> None:
         if rate == 0.0 and not abs(sum(psis)) <= still:
             rule = f"has states that add up to {sum(psis):.3g} at V_*, where friction is mu_*"
             raise InvalidValue("law", law.name, rule, remedy="Measure them from V_*.")
-        away = np.linalg.eigvals(_slopes(evolutions, rate, psis, scene.a, p)).real.max()
-        if away > _AT_REST:
+        away = np.linalg.eigvals(_evolution_jacobian(evolutions, rate, psis, scene.a, p)).real.max()
+        if away > _REST_TOLERANCE:
             rule = f"moves away from steady sliding at ln(V/V_*) = {rate:g}, by {away:.3g} per D_c"
             remedy = "See whether its evolution has the sign of dPsi/d(delta)."
             raise InvalidValue("law", law.name, rule, remedy=remedy)
 
 
-def _slopes(
+def _evolution_jacobian(
     evolutions: Function, rate: float, psis: Numbers, size: float, p: Numbers
 ) -> list[list[float]]:
     """Derivatives of the change of each state by each, central differences of 1e-4 of a size."""

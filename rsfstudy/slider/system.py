@@ -17,8 +17,8 @@ of ln V would cost more steps than one that bends within six (four to twelve do 
 
 A rigid slider has its slip rate prescribed, and slip for a clock.
 
-Functions here take functions and return one of floats, as in `friction`; `functions` puts all of
-them together.
+Functions here take functions and return one of floats, as in `friction`; `build_scene_functions`
+puts all of them together.
 """
 
 from __future__ import annotations
@@ -29,34 +29,38 @@ from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 from rsfstudy.slider import friction
-from rsfstudy.slider.friction import Friction, friction_of
+from rsfstudy.slider.friction import FrictionFunctions, build_friction_functions
 from rsfstudy.slider.parts import Function, Numbers, Scene
-from rsfstudy.slider.places import LOAD_VELOCITY, LOG_LOAD_RATE, MU_STAR, STIFFNESS, A
+from rsfstudy.slider.places import LOAD_VELOCITY, LOG_LOAD_VELOCITY, MU_STAR, STIFFNESS, A
 from rsfstudy.slider.point import Point
-from rsfstudy.slider.states import evolutions_of_one_state, scaled, usual_steady_state
+from rsfstudy.slider.states import (
+    default_steady_state,
+    evolutions_from_single_state,
+    scaling_function,
+)
 
 if TYPE_CHECKING:
     from rsfstudy.slider.dynamics import Dynamics
 
 #: ln(V/V_*) below which slip counts as stopped, 10^-290: a motion ends there if nothing loads it.
-SLOWEST = -290.0 * math.log(10.0)
+STOPPED_LOG_SLIP_RATE = -290.0 * math.log(10.0)
 
 #: Where slip is slower than V_0 by this in ln V, contact is stationary: the state then changes by
 #: less than exp(-100) of itself over all the slip there is.
-STATIONARY = 100.0
+STATIONARY_LOG_RATIO = 100.0
 
 #: Units of ln V that are as long a way as slip of D_c, or inertial time.
-UNITS = 6.0
+PATH_LOG_RATE_SCALE = 6.0
 #: From where on the square of a slant, and 1 more than that, are the same number.
-STEEP = 1e9
+STEEP_SLANT = 1e9
 
 
 # ---- clocks --------------------------------------------------------------------------------------
 
-Ratios = tuple[float, float, float]
+VelocityRatios = tuple[float, float, float]
 
 
-def velocity_ratios(log_slip_rate: float, p: Numbers) -> Ratios:
+def velocity_ratios(log_slip_rate: float, p: Numbers) -> VelocityRatios:
     """ln(V/V_*), V_0/V, and the fraction V/(V + V_0) that slip has in slip and load point
     displacement together.
 
@@ -64,23 +68,23 @@ def velocity_ratios(log_slip_rate: float, p: Numbers) -> Ratios:
     unit slip may grow like 1/V there, so that its product with the fraction has a limit, whose
     factors would underflow and overflow.
     """
-    least = p[LOG_LOAD_RATE] - STATIONARY
+    least = p[LOG_LOAD_VELOCITY] - STATIONARY_LOG_RATIO
     x = least if log_slip_rate < least else log_slip_rate
-    slower = math.exp(p[LOG_LOAD_RATE] - x)
+    slower = math.exp(p[LOG_LOAD_VELOCITY] - x)
     return x, slower, 1.0 / (1.0 + slower)
 
 
-def duration(ratios: Ratios, p: Numbers) -> float:
+def time_per_displacement(ratios: VelocityRatios, p: Numbers) -> float:
     """Time over slip and load point displacement together, ``1/(V + V_0)``."""
     x, slower, fraction = ratios
     if p[LOAD_VELOCITY] != 0.0:
         return slower * fraction / abs(p[LOAD_VELOCITY])
-    return math.exp(-max(x, SLOWEST))
+    return math.exp(-max(x, STOPPED_LOG_SLIP_RATE))
 
 
 def path_metric(slant: float) -> float:
     """Displacement along a path that is so steep: its square may overflow where slip stops."""
-    if abs(slant) > STEEP:
+    if abs(slant) > STEEP_SLANT:
         return 1.0 / abs(slant)
     return 1.0 / math.sqrt(1.0 + slant * slant)
 
@@ -88,15 +92,21 @@ def path_metric(slant: float) -> float:
 # ---- rates between ruptures ----------------------------------------------------------------------
 
 
-def against_displacement(made: Friction, balance: Function, *, reverses: bool) -> Function:
+def displacement_rate_function(
+    friction_functions: FrictionFunctions, balance: Function, *, allows_reversed_slip: bool
+) -> Function:
     """``(state, p) -> (df/ds, dPsi/ds, velocity ratios)``.
 
     Where slip may reverse, so may the load point, and displacement is the magnitudes of both
     together: ``df/ds = K (V_0 - V)/(|V| + |V_0|)``, V having the sign of shear stress.
     """
-    evolutions, imposed, end = made.evolutions, made.imposed, 1 + made.states
+    evolutions, imposed, end = (
+        friction_functions.evolutions,
+        friction_functions.load_point_stress,
+        1 + friction_functions.state_count,
+    )
 
-    def forward(state: Numbers, p: Numbers) -> tuple[float, Numbers, Ratios]:
+    def forward_rates(state: Numbers, p: Numbers) -> tuple[float, Numbers, VelocityRatios]:
         psis = state[1:end]
         log_slip_rate, _g, shift = balance(state[0], psis, p)
         ratios = velocity_ratios(log_slip_rate, p)
@@ -104,69 +114,74 @@ def against_displacement(made: Friction, balance: Function, *, reverses: bool) -
         loading = p[STIFFNESS] * (slower - 1.0) * fraction
         return loading, evolutions(x, psis, shift, fraction, p), ratios
 
-    def either_way(state: Numbers, p: Numbers) -> tuple[float, Numbers, Ratios]:
-        _loading, changes, ratios = forward(state, p)
+    def reversible_rates(state: Numbers, p: Numbers) -> tuple[float, Numbers, VelocityRatios]:
+        _loading, changes, ratios = forward_rates(state, p)
         _x, slower, fraction = ratios
         slip = math.copysign(1.0, p[MU_STAR] + state[0] + imposed(state[1:end], p))
         load = math.copysign(slower, p[LOAD_VELOCITY])
         return p[STIFFNESS] * (load - slip) * fraction, changes, ratios
 
-    return either_way if reverses else forward
+    return reversible_rates if allows_reversed_slip else forward_rates
 
 
-def rates_between_ruptures(
-    made: Friction, against: Function
+def rate_functions_between_ruptures(
+    friction_functions: FrictionFunctions, displacement_rates: Function
 ) -> tuple[Function, Function, Function]:
     """``(state, p) -> tuple``: derivatives of f and the states against displacement, along the
     path, and along the path with time as a passenger.
     """
-    state_sum, times = made.state_sum, scaled(made.states)
+    state_sum, times = (
+        friction_functions.state_sum,
+        scaling_function(friction_functions.state_count),
+    )
 
-    def by_displacement(state: Numbers, p: Numbers) -> Numbers:
-        loading, changes, _ratios = against(state, p)
+    def rates_by_displacement(state: Numbers, p: Numbers) -> Numbers:
+        loading, changes, _ratios = displacement_rates(state, p)
         return (loading, *changes)
 
-    def along_path(state: Numbers, p: Numbers) -> Numbers:
-        loading, changes, _ratios = against(state, p)
-        along = path_metric((loading - state_sum(changes)) / (UNITS * p[A]))
+    def rates_along_path(state: Numbers, p: Numbers) -> Numbers:
+        loading, changes, _ratios = displacement_rates(state, p)
+        along = path_metric((loading - state_sum(changes)) / (PATH_LOG_RATE_SCALE * p[A]))
         return (along * loading, *times(changes, along))
 
-    def along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
-        loading, changes, ratios = against(state, p)
-        along = path_metric((loading - state_sum(changes)) / (UNITS * p[A]))
-        return (along * loading, *times(changes, along), along * duration(ratios, p))
+    def rates_along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
+        loading, changes, ratios = displacement_rates(state, p)
+        along = path_metric((loading - state_sum(changes)) / (PATH_LOG_RATE_SCALE * p[A]))
+        return (along * loading, *times(changes, along), along * time_per_displacement(ratios, p))
 
-    return by_displacement, along_path, along_path_with_time
+    return rates_by_displacement, rates_along_path, rates_along_path_with_time
 
 
 # ---- rates in ruptures, and of a rigid slider ----------------------------------------------------
 
 
-def rates_in_rupture(made: Friction, rupture_rate: Function) -> tuple[Function, Function, Function]:
+def rate_functions_in_rupture(
+    friction_functions: FrictionFunctions, rupture_rate: Function
+) -> tuple[Function, Function, Function]:
     """``(state, p) -> tuple``: derivatives of the unknowns f, x, g and the states but the first
     against inertial time, along the path in that and ln V, and so with that time as a passenger.
     """
-    end = 2 + made.states
-    times = scaled(end)
+    end = 2 + friction_functions.state_count
+    times = scaling_function(end)
 
-    def along_path(state: Numbers, p: Numbers) -> Numbers:
+    def rates_along_path(state: Numbers, p: Numbers) -> Numbers:
         by = rupture_rate(state, p)
-        return times(by, path_metric(by[1] / UNITS))
+        return times(by, path_metric(by[1] / PATH_LOG_RATE_SCALE))
 
-    def along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
+    def rates_along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
         by = rupture_rate(state[:end], p)
-        along = path_metric(by[1] / UNITS)
+        along = path_metric(by[1] / PATH_LOG_RATE_SCALE)
         return (*times(by, along), along)
 
-    return rupture_rate, along_path, along_path_with_time
+    return rupture_rate, rates_along_path, rates_along_path_with_time
 
 
-def rate_of_rigid(made: Friction) -> Function:
+def rigid_rate_function(friction_functions: FrictionFunctions) -> Function:
     """``(state, p) -> tuple``: derivatives of g and the states but the first, against slip at the
     ln(V/V_*) that stands last in `p`: ``strength'(g) dg = dPsi``.
     """
-    strength, states_at = made.strength, made.states_at
-    evolutions, contribution = made.evolutions, made.contribution
+    strength, states_at = friction_functions.strength, friction_functions.states_from_strength
+    evolutions, contribution = friction_functions.evolutions, friction_functions.state_contribution
 
     def rigid_rate(state: Numbers, p: Numbers) -> Numbers:
         others = state[1:]
@@ -180,16 +195,27 @@ def rate_of_rigid(made: Friction) -> Function:
 # ---- points --------------------------------------------------------------------------------------
 
 
-def point_of(made: Friction) -> Function:
+def point_function(friction_functions: FrictionFunctions) -> Function:
     """``(x, growth, forces, states, changes, shift, p) -> Point`` at x = ln(V/V_*), which grows so:
     of forces, f and its change, g and its change; the states, their changes, and what stress has
     taken from them.
 
     A rig reads the friction coefficient ``(mu_* + f)/s``, s outside the fault.
     """
-    steady_states, state_sum, counted = made.steady_states, made.state_sum, made.counted
-    effective_stress, stress = made.effective_stress, made.outer_stress
-    pressure, imposed, imposed_change = made.outer_pressure, made.imposed, made.imposed_change
+    steady_states, state_sum, counted = (
+        friction_functions.steady_states,
+        friction_functions.state_sum,
+        friction_functions.distance_indices,
+    )
+    effective_stress, stress = (
+        friction_functions.effective_normal_stress,
+        friction_functions.rig_normal_stress,
+    )
+    pressure, imposed, imposed_change = (
+        friction_functions.boundary_pressure,
+        friction_functions.load_point_stress,
+        friction_functions.load_point_stress_change,
+    )
 
     def point_at(
         x: float,
@@ -230,13 +256,17 @@ def point_of(made: Friction) -> Function:
     return point_at
 
 
-def point_between_ruptures(
-    made: Friction, balance: Function, growth: Function, point_at: Function
+def point_function_between_ruptures(
+    friction_functions: FrictionFunctions, balance: Function, growth: Function, point_at: Function
 ) -> Function:
     """``(state, rates, p) -> Point`` between ruptures, where ``a dx = strength'(g) dg -
     contribution`` says how g changes.
     """
-    strength, contribution, end = made.strength, made.contribution, 1 + made.states
+    strength, contribution, end = (
+        friction_functions.strength,
+        friction_functions.state_contribution,
+        1 + friction_functions.state_count,
+    )
 
     def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
         unknowns, changes = state[:end], rates[1:end]
@@ -250,9 +280,15 @@ def point_between_ruptures(
     return point
 
 
-def point_in_rupture(made: Friction, point_at: Function) -> Function:
+def point_function_in_rupture(
+    friction_functions: FrictionFunctions, point_at: Function
+) -> Function:
     """``(state, rates, p) -> Point`` of the full equations."""
-    strength, states_at, end = made.strength, made.states_at, 2 + made.states
+    strength, states_at, end = (
+        friction_functions.strength,
+        friction_functions.states_from_strength,
+        2 + friction_functions.state_count,
+    )
 
     def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
         f, x, g, others = state[0], state[1], state[2], state[3:end]
@@ -263,9 +299,9 @@ def point_in_rupture(made: Friction, point_at: Function) -> Function:
     return point
 
 
-def point_of_rigid(made: Friction, point_at: Function) -> Function:
+def rigid_point_function(friction_functions: FrictionFunctions, point_at: Function) -> Function:
     """``(state, rates, p) -> Point`` of a rigid slider, whose f is g."""
-    strength, states_at = made.strength, made.states_at
+    strength, states_at = friction_functions.strength, friction_functions.states_from_strength
 
     def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
         g, others, x = state[0], state[1:], p[-1]
@@ -279,94 +315,96 @@ def point_of_rigid(made: Friction, point_at: Function) -> Function:
 # ---- all of it -----------------------------------------------------------------------------------
 
 
-class Form(NamedTuple):
+class RegimeFunctions(NamedTuple):
     """Equations of a scene between ruptures, or the full ones in them.
 
     Attributes
     ----------
-    against_clock, rate, rate_with_time : callable
+    clock_rates, path_rates, path_rates_with_time : callable
         ``(state, p)``: derivatives of the unknowns against slip and load point displacement
         together, or inertial time; along the path; and so with time as a passenger.
-    point : callable
+    point_function : callable
         ``(state, derivatives, p) -> Point``.
     """
 
-    against_clock: Function
-    rate: Function
-    rate_with_time: Function
-    point: Function
+    clock_rates: Function
+    path_rates: Function
+    path_rates_with_time: Function
+    point_function: Function
 
 
-class System(NamedTuple):
+class SceneFunctions(NamedTuple):
     """The functions of a scene.
 
     Attributes
     ----------
-    friction : Friction
+    friction : FrictionFunctions
         What they are made of.
-    balance : callable
+    balance_function : callable
         ``(spring, psis, p)``: ln(V/V_*), frictional stress and the state lost to stress, between
         ruptures.
-    between_ruptures : Form
-    in_rupture : Form or None
+    between_ruptures : RegimeFunctions
+    in_rupture : RegimeFunctions or None
         Where mass acts.
-    rigid_rate, rigid_point : callable
+    rigid_rate_function, rigid_point_function : callable
         Those of a rigid slider, against slip.
     """
 
-    friction: Friction
-    balance: Function
-    between_ruptures: Form
-    in_rupture: Form | None
-    rigid_rate: Function
-    rigid_point: Function
+    friction: FrictionFunctions
+    balance_function: Function
+    between_ruptures: RegimeFunctions
+    in_rupture: RegimeFunctions | None
+    rigid_rate_function: Function
+    rigid_point_function: Function
 
 
 @cache
-def system_of(
-    parts: friction.Parts,
-    slip_rate: Callable[[Friction], tuple[Function, Function]],
-    rupture_rate: Callable[[Friction], Function] | None,
-) -> System:
+def assemble_functions(
+    terms: friction.FrictionTerms,
+    slip_rate: Callable[[FrictionFunctions], tuple[Function, Function]],
+    rupture_rate: Callable[[FrictionFunctions], Function] | None,
+) -> SceneFunctions:
     """The functions of a combination of parts; the same ones whenever it is asked for."""
-    made = friction_of(parts)
+    made = build_friction_functions(terms)
     balance, growth = slip_rate(made)
-    against = against_displacement(made, balance, reverses=parts.regularised)
-    point_at = point_of(made)
-    point = point_between_ruptures(made, balance, growth, point_at)
-    slow, full = Form(*rates_between_ruptures(made, against), point), None
+    against = displacement_rate_function(made, balance, allows_reversed_slip=terms.regularised)
+    point_at = point_function(made)
+    point = point_function_between_ruptures(made, balance, growth, point_at)
+    slow, full = RegimeFunctions(*rate_functions_between_ruptures(made, against), point), None
     if rupture_rate is not None:
-        rates = rates_in_rupture(made, rupture_rate(made))
-        full = Form(*rates, point_in_rupture(made, point_at))
-    of_rigid = rate_of_rigid(made), point_of_rigid(made, point_at)
-    return System(made, balance, slow, full, *of_rigid)
+        rates = rate_functions_in_rupture(made, rupture_rate(made))
+        full = RegimeFunctions(*rates, point_function_in_rupture(made, point_at))
+    of_rigid = rigid_rate_function(made), rigid_point_function(made, point_at)
+    return SceneFunctions(made, balance, slow, full, *of_rigid)
 
 
-def excluded_places(scene: Scene) -> tuple[int, ...]:
+def excluded_state_indices(scene: Scene) -> tuple[int, ...]:
     """Return the indices of states excluded from the distance from steady sliding."""
     law, source = scene.parts.law, scene.pressure_source
-    unknowns = enumerate(source.unknowns, start=law.states)
+    unknowns = enumerate(source.unknowns, start=law.state_count)
     return tuple(n for n, about in unknowns if about.name in source.excluded_from_distance)
 
 
-def functions(scene: Scene, dynamics: Dynamics | None = None) -> System:
+def build_scene_functions(scene: Scene, dynamics: Dynamics | None = None) -> SceneFunctions:
     """The functions of a scene, with other dynamics than its own where some are given."""
     law, stress, source = scene.parts.law, scene.parts.normal_stress, scene.pressure_source
-    of_shear_stress = friction.stress_dependence if law.stress_dependence else None
+    of_shear_stress = friction.stress_dependence_effect if law.stress_dependence else None
     effects = stress.state_effect, law.state_effect, of_shear_stress
     acting = scene.dynamics if dynamics is None else dynamics
-    parts = friction.Parts(
-        states=law.states,
-        evolutions=law.evolutions or evolutions_of_one_state(law.evolution),
-        steady_states=law.steady_states or usual_steady_state,
+    parts = friction.FrictionTerms(
+        state_count=law.state_count,
+        evolutions=law.evolutions or evolutions_from_single_state(law.evolution),
+        steady_states=law.steady_states or default_steady_state,
         state_effects=tuple(effect for effect in effects if effect is not None),
         regularised=law.regularised,
         normal_stress=stress.normal_stress,
-        unknowns=len(source.unknowns),
+        unknown_count=len(source.unknowns),
         auxiliary_rates=source.auxiliary_rates,
         auxiliary_steady_states=source.auxiliary_steady_states,
-        outside=-1 - len(scene.parts.fluid.unknowns) if scene.parts.loading.presses else 0,
-        displaces=scene.parts.loading.displaces,
-        excluded=excluded_places(scene),
+        boundary_pressure_index=-1 - len(scene.parts.fluid.unknowns)
+        if scene.parts.loading.has_stress_unknowns
+        else 0,
+        has_load_point_unknown=scene.parts.loading.has_load_point_unknown,
+        excluded_indices=excluded_state_indices(scene),
     )
-    return system_of(parts, acting.slip_rate, acting.rupture_rate)
+    return assemble_functions(parts, acting.slip_rate, acting.rupture_rate)

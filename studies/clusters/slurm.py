@@ -19,7 +19,7 @@ from rsfstudy.cli import assignments, options
 from rsfstudy.declare import catalogue
 
 #: One job: 16 worker processes of one thread each, because a cell keeps its thread busy.
-JOB = {
+JOB_OPTIONS = {
     "cores": 16,
     "processes": 16,
     "memory": "32GB",
@@ -43,7 +43,7 @@ def main(
     **job: object,
 ) -> None:
     """Start a cluster, run a study on it as `rsfstudy.run` does, and say what came out."""
-    with cluster(**{**JOB, **job}) as nodes, distributed.Client(nodes) as client:
+    with cluster(**{**JOB_OPTIONS, **job}) as nodes, distributed.Client(nodes) as client:
         nodes.scale(jobs=jobs)
         client.wait_for_workers(1)
         dataset = rsfstudy.run(study, client=client, **choices)
@@ -52,13 +52,13 @@ def main(
 
 @click.command()
 @click.argument("study")
-@options.settings
-@options.rtol
-@options.engine
-@options.output
+@options.set_option
+@options.rtol_option
+@options.engine_option
+@options.output_option
 def command(study: str, settings: tuple[str, ...], **choices: Any) -> None:
     """Run a study on SLURM, by its NAME or file."""
-    overrides = assignments.overrides(catalogue.load(study), settings)
+    overrides = assignments.parse_overrides(catalogue.load_study(study), settings)
     main(study, {**choices, **overrides, "command": shlex.join(sys.argv)})
 
 

@@ -21,22 +21,22 @@ from rsfstudy import measures, reduce
 from rsfstudy.cli.command_line import cli
 from rsfstudy.declare import catalogue, names
 from rsfstudy.declare.study import Study
-from rsfstudy.declare.verdicts import published
+from rsfstudy.declare.verdicts import format_published_value
 from rsfstudy.measures import Measure
 from rsfstudy.quantity import Output, Quantity
-from rsfstudy.quantity import symbol as in_html
-from rsfstudy.quantity import unit as unit_in_html
+from rsfstudy.quantity import html_symbol as in_html
+from rsfstudy.quantity import html_unit as unit_in_html
 from rsfstudy.reduce import Reduction
 from rsfstudy.rig import quantities
 from rsfstudy.slider import registry
-from rsfstudy.slider.parts import Part, names_of
+from rsfstudy.slider.parts import Part, field_names
 from rsfstudy.status import Status
-from rsfstudy.vocabulary import QUANTITIES, quantity
+from rsfstudy.vocabulary import QUANTITIES, find_quantity
 
 #: Where classes stand that parts, measures and studies of one's own are derived from or made of.
 CLASSES = {
     "Law": "rsfstudy.slider.laws",
-    "LawOfStates": "rsfstudy.slider.laws",
+    "LawBase": "rsfstudy.slider.laws",
     "NormalStress": "rsfstudy.slider.normal_stress",
     "Fluid": "rsfstudy.slider.fluid",
     "Dynamics": "rsfstudy.slider.dynamics",
@@ -49,7 +49,7 @@ CLASSES = {
 }
 
 
-def filled(text: str) -> str:
+def fill_page(text: str) -> str:
     """A page with what is made.
 
     Raises
@@ -60,7 +60,7 @@ def filled(text: str) -> str:
     return re.sub(r"<!-- made: (\w+) -->", lambda found: MADE[found[1]](), text)
 
 
-def escaped(text: str) -> str:
+def escape_asterisks(text: str) -> str:
     """A page on which the asterisk of V_* begins no emphasis: code is left as it is."""
     parts = re.split(
         r"((?:^    [^\n]*\n)+|^```.*?^```|`[^`\n]+(?:\n[^`\n]+)*`)",
@@ -70,7 +70,7 @@ def escaped(text: str) -> str:
     return "".join(part if n % 2 else part.replace("_*", "_\\*") for n, part in enumerate(parts))
 
 
-def table(headings: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+def markdown_table(headings: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     """A table in Markdown; empty without rows."""
     lines = [[_cell(value) for value in row] for row in rows]
     head = list(headings)
@@ -87,7 +87,7 @@ def _cell(value: object) -> str:
     return re.sub(r"\s+", " ", text).replace("|", "\\|")
 
 
-def plain(text: str) -> str:
+def strip_markup(text: str) -> str:
     """A text without meaning to Markdown but what stands in ``double`` or `single` quotes."""
     parts = re.split(r"(``.+?``|`.+?`)", text, flags=re.DOTALL)
     return "".join(
@@ -95,19 +95,19 @@ def plain(text: str) -> str:
     )
 
 
-def symbol(formula: str) -> str:
+def html_symbol(formula: str) -> str:
     """A symbol in HTML that Markdown leaves alone."""
     return in_html(formula).replace("*", "&ast;")
 
 
-def unit(about: Quantity) -> str:
+def html_unit(about: Quantity) -> str:
     """A unit in HTML that Markdown leaves alone."""
     return unit_in_html(about).replace("*", "&ast;")
 
 
-def summary(thing: object) -> str:
+def first_paragraph(thing: object) -> str:
     """The first paragraph of a docstring."""
-    return plain((inspect.getdoc(thing) or "").split("\n\n")[0])
+    return strip_markup((inspect.getdoc(thing) or "").split("\n\n")[0])
 
 
 # ---- the slider ----------------------------------------------------------------------------------
@@ -115,14 +115,21 @@ def summary(thing: object) -> str:
 
 def scene_fields() -> str:
     """Every field of a scene, in the order of its parts."""
-    abouts = {about.name: about for about in registry.QUANTITIES}
-    defaults = registry.defaults()
+    abouts = {about.name: about for about in registry.FIELD_QUANTITIES}
+    defaults = registry.field_defaults()
     rows = (
-        (f"`{name}`", symbol(about.symbol), unit(about), _default(name, defaults), _rule(name),
-         plain(about.long_name), _parts_with(name))
-        for name, about in ((name, abouts[name]) for name in registry.FIELDS)
-    )  # fmt: skip
-    return table(("field", "symbol", "unit", "default", "rule", "meaning", "of"), rows)
+        (
+            f"`{name}`",
+            html_symbol(about.symbol),
+            html_unit(about),
+            _default(name, defaults),
+            _rule(name),
+            strip_markup(about.long_name),
+            _parts_with(name),
+        )
+        for name, about in ((name, abouts[name]) for name in registry.FIELD_NAMES)
+    )
+    return markdown_table(("field", "symbol", "unit", "default", "rule", "meaning", "of"), rows)
 
 
 def _default(name: str, defaults: Mapping[str, Any]) -> object:
@@ -131,7 +138,7 @@ def _default(name: str, defaults: Mapping[str, Any]) -> object:
 
 
 def _rule(name: str) -> str:
-    owner = registry.OWNERS.get(name)
+    owner = registry.FIELD_OWNERS.get(name)
     if owner is None:
         return ""
     return (
@@ -147,7 +154,7 @@ def _parts_with(name: str) -> str:
         f"`{part.name}`"
         for slot in registry.SLOTS
         for part in slot.choices.values()
-        if name in names_of(part)
+        if name in field_names(part)
     ]
     return ", ".join(owners)
 
@@ -159,12 +166,12 @@ def parts() -> str:
 
 def _slot(slot: registry.Slot) -> str:
     rows = (
-        (f"`{name}`" + (" (default)" if name == slot.default else ""), summary(part),
-         equation(part), ", ".join(f"`{own}`" for own in names_of(part)), f"`{SCENES[name]}`")
+        (f"`{name}`" + (" (default)" if name == slot.default else ""), first_paragraph(part),
+         equation(part), ", ".join(f"`{own}`" for own in field_names(part)), f"`{SCENES[name]}`")
         for name, part in slot.choices.items()
     )  # fmt: skip
-    made = table(("choice", "what it is", "equation", "its fields", "example"), rows)
-    called = "" if not slot.callers else " A field of the choice, stated, calls for it."
+    made = markdown_table(("choice", "what it is", "equation", "its fields", "example"), rows)
+    called = "" if not slot.selectors else " A field of the choice, stated, calls for it."
     return f"### {slot.name}\n\n{slot.long_name.capitalize()}.{called}\n\n{made}"
 
 
@@ -179,18 +186,18 @@ def equation(part: type[Part]) -> str:
 
 def rig() -> str:
     """The quantities of a rig."""
-    must = {name: name in quantities.SCALES for name in quantities.STATED}
+    must = {name: name in quantities.REQUIRED_QUANTITIES for name in quantities.RIG_QUANTITIES}
     rows = (
         (f"`{name}`", units, must[name], f"{least:g} to {most:g}")
-        for name, (units, least, most, *_words) in quantities.STATED.items()
+        for name, (units, least, most, *_words) in quantities.RIG_QUANTITIES.items()
     )
-    return table(("quantity", "SI unit", "must be stated", "usual, in that unit"), rows)
+    return markdown_table(("quantity", "SI unit", "must be stated", "usual, in that unit"), rows)
 
 
 # ---- measures, reductions, statuses --------------------------------------------------------------
 
 
-def kinds() -> dict[str, type[Measure]]:
+def measure_classes() -> dict[str, type[Measure]]:
     """The measures of rsfstudy, by name."""
     found: dict[str, type[Measure]] = {}
     for module in sorted(m.name for m in pkgutil.iter_modules(measures.__path__)):
@@ -207,7 +214,7 @@ def kinds() -> dict[str, type[Measure]]:
 def _examples() -> dict[type[Measure], Measure]:
     """A measure of each kind: as it is without fields, or as a named study states it."""
     stated = {type(study.measure): study.measure for study in _studies().values()}
-    for kind in kinds().values():
+    for kind in measure_classes().values():
         if all(f.default is not MISSING or f.default_factory is not MISSING for f in fields(kind)):
             stated[kind] = kind()
     return stated
@@ -216,29 +223,31 @@ def _examples() -> dict[type[Measure], Measure]:
 def every_measure() -> str:
     """Every measure: what it finds, its fields, its numbers."""
     examples = _examples()
-    return "\n\n".join(_measure(kind, examples.get(kind)) for kind in kinds().values())
+    return "\n\n".join(_measure(kind, examples.get(kind)) for kind in measure_classes().values())
 
 
 def _measure(kind: type[Measure], example: Measure | None) -> str:
-    taken = table(("field", "default", "meaning"), _taken(kind))
-    given = table(
+    taken = markdown_table(("field", "default", "meaning"), _describe_fields(kind))
+    given = markdown_table(
         ("number", "symbol", "unit", "error estimate", "over", "meaning"),
         map(_output, example.outputs if example else ()),
     )
-    headline = f"Headline: `{example.headline}`." if example else "Its numbers follow its fields."
+    headline = (
+        f"Headline: `{example.primary_output}`." if example else "Its numbers follow its fields."
+    )
     home = f"`from {kind.__module__} import {kind.__name__}`"
     stated = (study.measure for study in _studies().values())
-    words = f"{summary(kind)} {headline} {home}{_called(kind, stated)}"
+    words = f"{first_paragraph(kind)} {headline} {home}{_format_call(kind, stated)}"
     return "\n\n".join(filter(None, (f"### {kind.__name__}", words, taken, given)))
 
 
 @cache
 def _studies() -> dict[str, Study]:
     """The named studies."""
-    return {name: catalogue.load(name) for name in names.names()}
+    return {name: catalogue.load_study(name) for name in names.study_names()}
 
 
-def _called(kind: type[Any], stated: Iterable[Measure | Reduction]) -> str:
+def _format_call(kind: type[Any], stated: Iterable[Measure | Reduction]) -> str:
     """An example, with what the first study states that leaves not all to defaults."""
     found = [
         ", ".join(
@@ -253,7 +262,7 @@ def _called(kind: type[Any], stated: Iterable[Measure | Reduction]) -> str:
     return f" Example: `{call}`."
 
 
-def _taken(kind: type[Any]) -> Iterator[tuple[object, ...]]:
+def _describe_fields(kind: type[Any]) -> Iterator[tuple[object, ...]]:
     """Fields of a measure or a reduction, with what its docstring says of them."""
     told = parameters(kind)
     for one in fields(kind):
@@ -275,14 +284,16 @@ def parameters(kind: type[Any]) -> dict[str, str]:
             else []
         )
         for named, meaning in entries:
-            told |= {name.strip(): plain(" ".join(meaning.split())) for name in named.split(",")}
+            told |= {
+                name.strip(): strip_markup(" ".join(meaning.split())) for name in named.split(",")
+            }
     return told
 
 
 def _output(output: Output) -> tuple[object, ...]:
-    about: Quantity = output if output.long_name else quantity(output.name)
-    return (f"`{output.name}`", symbol(about.symbol), unit(about), output.error,
-            ", ".join(output.dims), plain(about.long_name))  # fmt: skip
+    about: Quantity = output if output.long_name else find_quantity(output.name)
+    return (f"`{output.name}`", html_symbol(about.symbol), html_unit(about), output.error,
+            ", ".join(output.dims), strip_markup(about.long_name))  # fmt: skip
 
 
 def reductions() -> str:
@@ -293,8 +304,8 @@ def reductions() -> str:
     )
     stated = [one for study in _studies().values() for one in study.reductions]
     return "\n\n".join(
-        f"### {kind.__name__}\n\n{summary(kind)}{_called(kind, stated)}\n\n"
-        + table(("field", "default", "meaning"), _taken(kind))
+        f"### {kind.__name__}\n\n{first_paragraph(kind)}{_format_call(kind, stated)}\n\n"
+        + markdown_table(("field", "default", "meaning"), _describe_fields(kind))
         for kind in own
     )
 
@@ -302,20 +313,20 @@ def reductions() -> str:
 def claims() -> str:
     """Every claim of the named studies."""
     rows = (
-        (f"`{name}`", claim.id, plain(claim.statement), plain(claim.source),
-         published(claim.describe()), claim.tolerance, plain(claim.because))
+        (f"`{name}`", claim.id, strip_markup(claim.statement), strip_markup(claim.source),
+         format_published_value(claim.describe()), claim.tolerance, strip_markup(claim.because))
         for name, study in _studies().items()
         for claim in study.claims
     )  # fmt: skip
     headings = ("study", "id", "claim", "source", "published", "tolerance", "differs because")
-    return table(headings, rows)
+    return markdown_table(headings, rows)
 
 
 def statuses() -> str:
     """Every status of a cell."""
-    return table(
+    return markdown_table(
         ("status", "flag", "kind", "meaning"),
-        ((f"`{s.label}`", int(s), "answer" if s.is_answer else "failure", plain(s.meaning))
+        ((f"`{s.label}`", int(s), "answer" if s.is_answer else "failure", strip_markup(s.meaning))
          for s in Status),
     )  # fmt: skip
 
@@ -323,11 +334,16 @@ def statuses() -> str:
 def vocabulary() -> str:
     """Every number of datasets that several studies share, but for fields of scenes."""
     rows = (
-        (f"`{about.name}`", symbol(about.symbol), unit(about), plain(about.long_name))
+        (
+            f"`{about.name}`",
+            html_symbol(about.symbol),
+            html_unit(about),
+            strip_markup(about.long_name),
+        )
         for about in QUANTITIES.values()
-        if about.name not in registry.FIELDS
+        if about.name not in registry.FIELD_NAMES
     )
-    return table(("name", "symbol", "unit", "meaning"), rows)
+    return markdown_table(("name", "symbol", "unit", "meaning"), rows)
 
 
 # ---- the command line, and Python ----------------------------------------------------------------
@@ -342,17 +358,20 @@ def _command(name: str, command: click.Command) -> str:
     # without "[OPTIONS]", which the table lists
     taken = " ".join(command.collect_usage_pieces(click.Context(command))[1:])
     rows = (
-        (", ".join(f"`{text}`" for text in (*option.opts, *option.secondary_opts)), _given(option),
-         plain(option.help or ""))
+        (
+            ", ".join(f"`{text}`" for text in (*option.opts, *option.secondary_opts)),
+            _describe_option(option),
+            strip_markup(option.help or ""),
+        )
         for option in command.params
         if isinstance(option, click.Option) and not option.hidden
-    )  # fmt: skip
-    words = plain(inspect.cleandoc((command.help or "").split("\f")[0]).replace("\b\n", ""))
-    made = table(("option", "default", "meaning"), rows)
+    )
+    words = strip_markup(inspect.cleandoc((command.help or "").split("\f")[0]).replace("\b\n", ""))
+    made = markdown_table(("option", "default", "meaning"), rows)
     return f"### rsfstudy {name}\n\n`rsfstudy {name} {taken}`\n\n{words}\n\n{made}"
 
 
-def _given(option: click.Option) -> str:
+def _describe_option(option: click.Option) -> str:
     if option.is_flag or option.default in (None, (), []) or callable(option.default):
         return ""
     return "" if type(option.default).__name__ == "Sentinel" else f"`{option.default}`"

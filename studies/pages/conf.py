@@ -55,7 +55,7 @@ CONTENTS = {
 }
 
 
-def _contents() -> str:
+def _site_contents() -> str:
     """The contents of the site, as the first page has them."""
     named = {page for pages in CONTENTS.values() for page in pages}
     others = {f"pages/{file.stem}" for file in HERE.glob("*.md")} - named
@@ -68,22 +68,22 @@ def _contents() -> str:
     )
 
 
-def _source(app: Any, page: str, text: list[str]) -> None:
+def _fill_source(app: Any, page: str, text: list[str]) -> None:
     """Fill in what is made; a notebook becomes Markdown, and the first page has the contents."""
     if str(app.env.doc2path(page)).endswith(".ipynb"):
-        text[0] = _markdown(text[0])
-    text[0] = _made.filled(_made.escaped(text[0]))
+        text[0] = _notebook_to_markdown(text[0])
+    text[0] = _made.fill_page(_made.escape_asterisks(text[0]))
     if page == root_doc:
-        text[0] += _contents()
+        text[0] += _site_contents()
 
 
-def _markdown(notebook: str) -> str:
+def _notebook_to_markdown(notebook: str) -> str:
     """The texts and the code of a notebook, with what it prints and draws."""
     parts: list[str] = []
     for cell in json.loads(notebook)["cells"]:
         text = "".join(cell["source"])
         if cell["cell_type"] == "markdown":
-            parts.append(re.sub(r"\$[^$]+\$", lambda formula: _made.symbol(formula[0]), text))
+            parts.append(re.sub(r"\$[^$]+\$", lambda formula: _made.html_symbol(formula[0]), text))
             continue
         parts.append(f"```python\n{text}\n```")
         for output in cell["outputs"]:
@@ -96,12 +96,14 @@ def _markdown(notebook: str) -> str:
     return "\n\n".join(parts)
 
 
-def _style(app: Any, page: str, template: str, context: dict[str, Any], tree: Any) -> None:
+def _add_table_style(
+    app: Any, page: str, template: str, context: dict[str, Any], tree: Any
+) -> None:
     """Lay the style of tables over that of the theme."""
     context["metatags"] = context.get("metatags", "") + f"<style>{TABLES}</style>"
 
 
-def _entrance(app: Any, error: Exception | None) -> None:
+def _write_redirect(app: Any, error: Exception | None) -> None:
     """Send who opens the folder to the first page."""
     if error is None:
         to_first = f'<meta http-equiv="refresh" content="0; url={root_doc}.html">'
@@ -112,6 +114,6 @@ def _entrance(app: Any, error: Exception | None) -> None:
 
 def setup(app: Any) -> None:
     """Have Sphinx ask for the source and the style of each page, and tell when it has ended."""
-    app.connect("source-read", _source)
-    app.connect("html-page-context", _style)
-    app.connect("build-finished", _entrance)
+    app.connect("source-read", _fill_source)
+    app.connect("html-page-context", _add_table_style)
+    app.connect("build-finished", _write_redirect)

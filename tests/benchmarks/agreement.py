@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from rsfstudy.named_studies._random_scenes import QUESTIONS, random_scene
+from rsfstudy.named_studies._random_scenes import MOTION_QUESTIONS, random_scene
 
 from rsfstudy import Scene
 from rsfstudy.declare import catalogue
@@ -27,13 +27,15 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 
 #: What random scenes are like.
-LIKE = [
+RANDOM_SCENE_TEMPLATES = [
     Scene(law=law, **stress, **dynamics)
     for law in ("slip", "slowness")
     for stress in ({"normal_stress": "constant"}, {"normal_stress": "variable"})
     for dynamics in ({}, {"inertia": True}, {"radiation_damping": 1e-9})
 ]
-DILATANT = [like.with_(fluid="dilatant", dilatancy=0.001) for like in LIKE]
+DILATANT_TEMPLATES = [
+    like.with_(fluid="dilatant", dilatancy=0.001) for like in RANDOM_SCENE_TEMPLATES
+]
 #: Studies whose cells are neither timed nor compared with other integrators.
 STUDIES = (
     "rate_step_boundary",
@@ -49,7 +51,7 @@ STUDIES = (
 )
 
 
-class Compared(NamedTuple):
+class EngineComparison(NamedTuple):
     """Two outcomes of one scene.
 
     Attributes
@@ -65,22 +67,24 @@ class Compared(NamedTuple):
     """
 
     same_end: bool
-    worst: float
-    more_work: float
-    what: str
+    largest_error_ratio: float
+    work_ratio: float
+    description: str
 
 
-def compared(measure: Measure, scene: Scene, accuracy: Accuracy) -> Compared:
+def compare_engines(measure: Measure, scene: Scene, accuracy: Accuracy) -> EngineComparison:
     """Measure one scene with both engines."""
     plain, compiled = (
         measure(scene, replace(accuracy, engine=engine)) for engine in ("scipy", "compiled")
     )
     what = f"{measure.name} {plain.status.label}/{compiled.status.label} {scene!r}"
     more = compiled.rhs_evaluations / max(1, plain.rhs_evaluations)
-    return Compared(plain.status is compiled.status, _worst(plain, compiled), more, what)
+    return EngineComparison(
+        plain.status is compiled.status, _largest_error_ratio(plain, compiled), more, what
+    )
 
 
-def _worst(plain: Outcome, compiled: Outcome) -> float:
+def _largest_error_ratio(plain: Outcome, compiled: Outcome) -> float:
     ratios = [math.nan]
     for name, value in plain.values.items():
         if f"{name}_error" not in plain.values or name not in compiled.values:
@@ -93,27 +97,27 @@ def _worst(plain: Outcome, compiled: Outcome) -> float:
 
 
 def random_scenes(
-    count: int, likes: list[Scene] = LIKE
+    count: int, likes: list[Scene] = RANDOM_SCENE_TEMPLATES
 ) -> Iterator[tuple[Measure, Scene, Accuracy]]:
     """So many random scenes, over all questions, kinds of scenes and three accuracies."""
-    kinds = [(question, like) for question in QUESTIONS for like in likes]
+    kinds = [(question, like) for question in MOTION_QUESTIONS for like in likes]
     for number in range(count):
         question, like = kinds[number % len(kinds)]
         scene = random_scene(like, question, 10_000 + number)
         accuracy = Accuracy((1e-4, 1e-7, 1e-9)[number // len(kinds) % 3])
-        yield QUESTIONS[question].measure, scene, accuracy
+        yield MOTION_QUESTIONS[question].measure, scene, accuracy
 
 
 def cells_of(name: str) -> Iterator[tuple[Measure, Scene, Accuracy]]:
     """The cells of a named study."""
-    study = catalogue.load(name)
+    study = catalogue.load_study(name)
     for scene, changes in study.cells():
         yield study.measure.with_(**changes), scene, study.accuracy
 
 
 def hard_cases() -> Iterator[tuple[Measure, Scene, Accuracy]]:
     """The scenes of the study of hard cases, each with the measure it is hard for."""
-    study: Any = catalogue.load("hard_cases")
+    study: Any = catalogue.load_study("hard_cases")
     for problem in study.measure.problems:
         yield problem.measure, problem.scene, study.accuracy
 
@@ -127,18 +131,18 @@ def main() -> None:
     sources = {
         "hard cases": hard_cases(),
         "random scenes": random_scenes(asked.scenes),
-        "random dilatant scenes": random_scenes(asked.scenes // 6, DILATANT),
+        "random dilatant scenes": random_scenes(asked.scenes // 6, DILATANT_TEMPLATES),
     }
     sources |= {name: cells_of(name) for name in (STUDIES if asked.studies else ())}
     console = Console()
     table = Table("", "scenes", "end alike", "worst difference over errors", "work")
     for name, source in sources.items():
-        every = [compared(*one) for one in source]
+        every = [compare_engines(*one) for one in source]
         for one in every:
-            if not one.same_end or one.worst > 1.0:
-                console.print(f"{one.worst:.3g} {one.what}")
-        worst = float(np.fmax.reduce([one.worst for one in every]))
-        work = f"{min(o.more_work for o in every):.2f} to {max(o.more_work for o in every):.2f}"
+            if not one.same_end or one.largest_error_ratio > 1.0:
+                console.print(f"{one.largest_error_ratio:.3g} {one.description}")
+        worst = float(np.fmax.reduce([one.largest_error_ratio for one in every]))
+        work = f"{min(o.work_ratio for o in every):.2f} to {max(o.work_ratio for o in every):.2f}"
         alike = sum(one.same_end for one in every)
         table.add_row(name, str(len(every)), str(alike), f"{worst:.2f}", work)
     console.print(table)

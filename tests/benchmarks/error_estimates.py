@@ -26,8 +26,8 @@ from rsfstudy.measures.elasticities import Elasticities
 from rsfstudy.measures.healing import Healing
 from rsfstudy.measures.limit_cycle import LimitCycle
 from rsfstudy.measures.velocity_step import VelocityStep
-from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
-from rsfstudy.reduce import Inverse, reduced
+from rsfstudy.motion.accuracy import MIN_RTOL, Accuracy
+from rsfstudy.reduce import Inverse, apply_reductions
 from rsfstudy.status import Status
 
 Random = np.random.Generator
@@ -78,7 +78,7 @@ def random_slider(random: Random) -> dict[str, Any]:
 # ---- elasticities --------------------------------------------------------------------------------
 
 
-def elasticities(random: Random) -> Iterator[Number]:
+def elasticity_number(random: Random) -> Iterator[Number]:
     """Compute an elasticity of a random critical step or limit cycle, and its reference value."""
     fields = random_slider(random)
     measure: Measure = CriticalStep(
@@ -99,19 +99,19 @@ def elasticities(random: Random) -> Iterator[Number]:
         return
     names_of_both = "elasticity", "elasticity_error"
     value, estimate = (float(np.ravel(outcome.values[key])[0]) for key in names_of_both)
-    reference, uncertainty = extrapolated(measure, scene, name)
+    reference, uncertainty = extrapolated_elasticity(measure, scene, name)
     if math.isfinite(value + reference):
         label = f"{measure.name} by {name} at {accuracy.rtol:g}: {fields}"
         yield Number(label, value, estimate, reference, uncertainty, outcome.rhs_evaluations)
 
 
-def extrapolated(measure: Measure, scene: Scene, name: str) -> tuple[float, float]:
+def extrapolated_elasticity(measure: Measure, scene: Scene, name: str) -> tuple[float, float]:
     """Extrapolate central differences of ln|y| to zero step, and estimate the uncertainty."""
-    accuracy = Accuracy(TIGHTEST_RTOL, engine="compiled", budget=20_000_000)
+    accuracy = Accuracy(MIN_RTOL, engine="compiled", budget=20_000_000)
 
     def level(by: float) -> float:
         outcome = measure(scene.with_(**{name: getattr(scene, name) * math.exp(by)}), accuracy)
-        value = float(outcome.values.get(measure.headline, math.nan))
+        value = float(outcome.values.get(measure.primary_output, math.nan))
         return math.log(abs(value))
 
     best, rows = (math.inf, math.nan), list[list[float]]()
@@ -128,7 +128,7 @@ def extrapolated(measure: Measure, scene: Scene, name: str) -> tuple[float, floa
 # ---- readings with inertia -----------------------------------------------------------------------
 
 
-def inertia(random: Random) -> Iterator[Number]:
+def inertia_numbers(random: Random) -> Iterator[Number]:
     """Measure a random hold or velocity step with inertia, and yield all values."""
     fields = random_slider(random) | {"inertia": True, "reference_rate": 1e-3}
     fields["stiffness_ratio"] = decades(random, 1.1, 100.0)
@@ -140,12 +140,12 @@ def inertia(random: Random) -> Iterator[Number]:
     rtol, scene = 10.0 ** -random.integers(4, 9), Scene(**fields)
     outcomes = [
         measure(scene, Accuracy(tolerance, engine="compiled", budget=60_000_000))
-        for tolerance in (rtol, max(1e-3 * rtol, TIGHTEST_RTOL))
+        for tolerance in (rtol, max(1e-3 * rtol, MIN_RTOL))
     ]
     if any(outcome.status is not Status.OK for outcome in outcomes):
         return
     (found, exact), work = (each.values for each in outcomes), outcomes[0].rhs_evaluations
-    for name in measure.estimated:
+    for name in measure.outputs_with_error:
         value, estimate, reference, uncertainty = (
             float(values[key]) for values in (found, exact) for key in (name, f"{name}_error")
         )
@@ -157,7 +157,7 @@ def inertia(random: Random) -> Iterator[Number]:
 # ---- inverse -------------------------------------------------------------------------------------
 
 
-def curve_of(kind: str, random: Random, length: float, cells: int) -> Callable[[Any], Any]:
+def draw_curve(kind: str, random: Random, length: float, cells: int) -> Callable[[Any], Any]:
     """Draw an increasing curve of ln y as a function of ln x between 0 and `length`."""
     slope, bend = random.uniform(0.3, 3.0), random.uniform(-0.4, 0.5)
     if kind == "smooth" and random.uniform() < 0.5:
@@ -176,13 +176,13 @@ def curve_of(kind: str, random: Random, length: float, cells: int) -> Callable[[
     )
 
 
-def inverse(kind: str, random: Random) -> tuple[list[Number], int]:
+def inverse_numbers(kind: str, random: Random) -> tuple[list[Number], int]:
     """Apply `Inverse` to a random curve, and compare the result with each exact crossing.
 
     The second return value is the status of the result.
     """
     cells, length = int(random.integers(5, 17)), math.log(10.0) * random.uniform(0.7, 3.0)
-    curve = curve_of(kind, random, length, cells)
+    curve = draw_curve(kind, random, length, cells)
     x = np.linspace(0.0, length, cells)
     if random.uniform() < 0.5:
         x[1:-1] = np.sort(random.uniform(0.02, 0.98, cells - 2)) * length
@@ -191,7 +191,7 @@ def inverse(kind: str, random: Random) -> tuple[list[Number], int]:
         {"y": ("x", np.exp(curve(x))), "status": ("x", np.zeros(cells, np.int8))},
         coords={"x": np.exp(x)},
     )
-    found = reduced(dataset, (Inverse(name="at", of="y", on="x", levels=math.exp(level)),))
+    found = apply_reductions(dataset, (Inverse(name="at", of="y", on="x", levels=math.exp(level)),))
     fine = np.linspace(0.0, length, 4001)
     off = curve(fine) - level
     roots = [
@@ -206,7 +206,7 @@ def inverse(kind: str, random: Random) -> tuple[list[Number], int]:
 # ---- all of them ---------------------------------------------------------------------------------
 
 
-def report(title: str, numbers: list[Number], least: float) -> bool:
+def print_coverage(title: str, numbers: list[Number], least: float) -> bool:
     """Print the coverage of the error estimates, and return True if it is at least `least`."""
     missed = [number for number in numbers if number.error > number.estimate]
     for number in missed:
@@ -226,12 +226,12 @@ def check_inverse(count: int, random: Random) -> bool:
         numbers, flagged = list[Number](), 0
         for _ in range(count):
             # if the curve has several crossings, count the largest error
-            found, status = inverse(kind, random)
+            found, status = inverse_numbers(kind, random)
             flagged += status != 0
             numbers += sorted(found, key=lambda number: number.error)[-1:]
         uncovered = sum(number.error > number.estimate for number in numbers)
         print(f"inverse, {kind}: {flagged} of {count} flagged")
-        report(f"inverse, {kind}", numbers, 0.0)
+        print_coverage(f"inverse, {kind}", numbers, 0.0)
         passed &= flagged <= most * count and uncovered <= 0.05 * count
     return passed
 
@@ -243,7 +243,7 @@ def check_random(
     numbers, random = list[Number](), np.random.default_rng(seed)
     while len(numbers) < count:
         numbers += draw(random)
-    return report(title, numbers, 0.99)
+    return print_coverage(title, numbers, 0.99)
 
 
 def main(kind: str, count: int, seed: int) -> int:
@@ -251,7 +251,7 @@ def main(kind: str, count: int, seed: int) -> int:
     passed = True
     if kind in ("inverse", "all"):
         passed &= check_inverse(count, np.random.default_rng(seed))
-    for title, draw in (("elasticities", elasticities), ("inertia", inertia)):
+    for title, draw in (("elasticities", elasticity_number), ("inertia", inertia_numbers)):
         if kind in (title, "all"):
             passed &= check_random(title, draw, count, seed)
     return 0 if passed else 1

@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 from rsfstudy.named_studies.hard_cases import CASES
 
-L = np.longdouble
+LongDouble = np.longdouble
 State = np.ndarray
 Rates = Callable[[State], State]
 
-_A, _MU = L("0.0145"), L("0.76")
-_INERTIAL_TIME = L(5) * L("1.17e-8") / (2 * np.arccos(L(-1)))
-_NONE = L(0)
+_A, _MU = LongDouble("0.0145"), LongDouble("0.76")
+_INERTIAL_TIME = LongDouble(5) * LongDouble("1.17e-8") / (2 * np.arccos(LongDouble(-1)))
+_ZERO = LongDouble(0)
 _SEQUENCE = (2, 4, 6, 8, 10, 12, 14)
 
 
@@ -95,7 +95,9 @@ class Slider:
         return np.array([self.stiffness * (self.load * self.inertial_time - w), growth, evolving])
 
 
-def step(rates: Rates, state: State, first: State, size: np.longdouble) -> tuple[State, float]:
+def extrapolated_step(
+    rates: Rates, state: State, first: State, size: np.longdouble
+) -> tuple[State, float]:
     """One extrapolated step, and its error over the scales of the unknowns."""
     rows: list[State] = []
     table: list[State] = []
@@ -106,43 +108,47 @@ def step(rates: Rates, state: State, first: State, size: np.longdouble) -> tuple
             before, now = now, before + 2 * h * rates(now)
         table = [(before + now + h * rates(now)) / 2, *table]
         for j in range(1, len(table)):
-            ratio = (L(count) / _SEQUENCE[len(table) - 1 - j]) ** 2
+            ratio = (LongDouble(count) / _SEQUENCE[len(table) - 1 - j]) ** 2
             table[j] = table[j - 1] + (table[j - 1] - table[j]) / (ratio - 1)
         rows.append(table[-1])
     return rows[-1], float((np.abs(rows[-1] - rows[-2]) / (1 + np.abs(rows[-1]))).max())
 
 
-def path(
+def integrate_steps(
     rates: Rates, state: State, tolerance: float
 ) -> Iterator[tuple[State, State, np.longdouble]]:
     """Steps: the states before and after, and the size."""
-    size = L("1e-3")
+    size = LongDouble("1e-3")
     while True:
         first = rates(state)
         while True:
-            ahead, error = step(rates, state, first, size)
+            ahead, error = extrapolated_step(rates, state, first, size)
             if error <= tolerance:
                 break
             shrink = 0.8 * (tolerance / error) ** (1 / 13) if np.isfinite(error) else 0.2
-            size = size * L(max(0.2, shrink))
+            size = size * LongDouble(max(0.2, shrink))
         yield state, ahead, size
         state = ahead
-        size = size * L(min(3.0, 0.8 * (tolerance / max(error, 1e-40)) ** (1 / 13)))
+        size = size * LongDouble(min(3.0, 0.8 * (tolerance / max(error, 1e-40)) ** (1 / 13)))
 
 
-def locate(
+def locate_zero(
     rates: Rates, state: State, size: np.longdouble, what: Callable[[State], np.longdouble]
 ) -> tuple[np.longdouble, State]:
     """Part of a step after which ``what(state)`` vanishes, by the secant method on step sizes."""
     first = rates(state)
-    low, high = L(0), size
-    at_low, at_high = what(state), what(step(rates, state, first, size)[0])
+    low, high = LongDouble(0), size
+    at_low, at_high = what(state), what(extrapolated_step(rates, state, first, size)[0])
     side = 0
     for _ in range(200):
         middle = (low * at_high - high * at_low) / (at_high - at_low)
-        found = step(rates, state, first, middle)[0]
+        found = extrapolated_step(rates, state, first, middle)[0]
         value = what(found)
-        if value == 0 or abs(high - low) <= L("1e-18") * abs(size) or abs(value) < L("1e-18"):
+        if (
+            value == 0
+            or abs(high - low) <= LongDouble("1e-18") * abs(size)
+            or abs(value) < LongDouble("1e-18")
+        ):
             return middle, found
         if value * at_low > 0:
             low, at_low = middle, value
@@ -160,15 +166,15 @@ class Motion:
 
     def __init__(self, slider: Slider, norm: float, tolerance: float) -> None:
         self.slider, self.tolerance = slider, tolerance
-        self.switch = np.log(L(norm) / slider.inertial_time)
+        self.switch = np.log(LongDouble(norm) / slider.inertial_time)
         self.load = np.log(slider.load)
-        self.began = self.top = self.lowest = self.at_peak = L(0)
+        self.began = self.top = self.lowest = self.at_peak = LongDouble(0)
         self.events = 0
 
     def numbers(self, count: int) -> np.ndarray:
         """Recurrence interval, static and dynamic drop of the given cycle."""
-        nudge = self.slider.stiffness / 10 if self.slider.load == 1 else L(0)
-        state = np.array([nudge, L(0), L(0)])
+        nudge = self.slider.stiffness / 10 if self.slider.load == 1 else LongDouble(0)
+        state = np.array([nudge, LongDouble(0), LongDouble(0)])
         while True:
             state, done = self._slow(state, count)
             if done:
@@ -181,10 +187,10 @@ class Motion:
 
     def _slow(self, state: State, count: int) -> tuple[State, bool]:
         rates, load = self.slider.slow, self.load
-        for before, after, size in path(rates, state, self.tolerance):
+        for before, after, size in integrate_steps(rates, state, self.tolerance):
             x0, x1 = self._slow_rate(before), self._slow_rate(after)
             if (x0 - load) * (x1 - load) <= 0:
-                turning = locate(rates, before, size, lambda y: self._slow_rate(y) - load)[1]
+                turning = locate_zero(rates, before, size, lambda y: self._slow_rate(y) - load)[1]
                 self.lowest = min(self.lowest, turning[0])
                 if x0 < load:
                     if self.events == count:
@@ -192,7 +198,7 @@ class Motion:
                     self.events, self.began = self.events + 1, turning[2]
                     self.top = self.lowest = turning[0]
             if x1 >= self.switch:
-                return locate(rates, before, size, lambda y: self._slow_rate(y) - self.switch)[
+                return locate_zero(rates, before, size, lambda y: self._slow_rate(y) - self.switch)[
                     1
                 ], False
         raise AssertionError
@@ -202,29 +208,31 @@ class Motion:
         x = slider.rate_at(start[0], start[1])
         friction = slider.slow_friction(start[0], x, start[1])
         state = np.array([start[0], slider.rate_at(friction, start[1]), start[1]])
-        elapsed, falls = L(0), False
-        for before, after, size in path(slider.fast, state, self.tolerance):
+        elapsed, falls = LongDouble(0), False
+        for before, after, size in integrate_steps(slider.fast, state, self.tolerance):
             elapsed = elapsed + size
             growth = slider.fast(before)[1], slider.fast(after)[1]
             if growth[0] > 0 >= growth[1]:
-                self.at_peak = locate(slider.fast, before, size, lambda y: slider.fast(y)[1])[1][0]
+                self.at_peak = locate_zero(slider.fast, before, size, lambda y: slider.fast(y)[1])[
+                    1
+                ][0]
                 falls = True
             if before[1] > load >= after[1]:
-                turning = locate(slider.fast, before, size, lambda y: y[1] - load)[1]
+                turning = locate_zero(slider.fast, before, size, lambda y: y[1] - load)[1]
                 self.lowest = min(self.lowest, turning[0])
             # at rest: what slip the approach to the slow manifold still takes is below rounding,
             # and so is what Theta still changes with normal stress
             below = slider.rate_at(after[0], after[2])
             below = slider.rate_at(slider.slow_friction(after[0], below, after[2]), after[2])
             slip = slider.stiffness * (np.exp(after[1]) * slider.inertial_time) ** 2
-            settled = abs(after[1] - below) < L("1e-12") or slider.cot_phi == 0
-            left = slip * abs(after[1] - below) < L("1e-20")
+            settled = abs(after[1] - below) < LongDouble("1e-12") or slider.cot_phi == 0
+            left = slip * abs(after[1] - below) < LongDouble("1e-20")
             if falls and settled and left and after[1] < self.switch - 3:
                 return np.array([after[0], after[2], start[2] + elapsed * slider.inertial_time])
         raise AssertionError
 
 
-def cycle(slider: Slider, norm: float, count: int) -> dict[str, tuple[str, str]]:
+def cycle_numbers(slider: Slider, norm: float, count: int) -> dict[str, tuple[str, str]]:
     """Numbers of a cycle, the error of the switch removed, and by how much that moved them."""
     coarse, fine = (Motion(slider, w, 1e-16).numbers(count) for w in (norm, norm / 2))
     best = fine + (fine - coarse) / 15
@@ -241,77 +249,81 @@ def critical_velocity(slider: Slider, norm: float) -> np.longdouble:
     Bisection between motions whose first peak passes the norm and motions whose first peak does
     not.
     """
-    log_norm = np.log(L(norm) / slider.inertial_time)
+    log_norm = np.log(LongDouble(norm) / slider.inertial_time)
 
     def reaches(load: np.longdouble) -> bool:
-        loaded = replace(slider, load=load, inertial_time=L(0))
+        loaded = replace(slider, load=load, inertial_time=LongDouble(0))
 
         def growth(y: State) -> np.longdouble:
             x = loaded.rate_at(y[0], y[1])
             return loaded._slow_growth(y[0], x, y[1])[0]
 
-        for before, after, size in path(loaded.slow, np.array([L(0), L(0), L(0)]), 1e-16):
+        for before, after, size in integrate_steps(
+            loaded.slow, np.array([LongDouble(0), LongDouble(0), LongDouble(0)]), 1e-16
+        ):
             if loaded.rate_at(after[0], after[1]) >= log_norm:
                 return True
             if growth(before) > 0 >= growth(after):
-                peak = locate(loaded.slow, before, size, growth)[1]
+                peak = locate_zero(loaded.slow, before, size, growth)[1]
                 return bool(loaded.rate_at(peak[0], peak[1]) >= log_norm)
         raise AssertionError
 
-    low, high = L(1) + L("1e-3"), L(200)
+    low, high = LongDouble(1) + LongDouble("1e-3"), LongDouble(200)
     for _ in range(66):
         middle = np.sqrt(low * high)
         low, high = (low, middle) if reaches(middle) else (middle, high)
     return middle
 
 
-def paper(law: str, *, constant: bool, ratio: str = "0.8", load: str = "2") -> Slider:
+def paper_slider(law: str, *, constant: bool, ratio: str = "0.8", load: str = "2") -> Slider:
     """The slider of Figs. 9 and 10: b/a = 2, k = 0.8 k_cr, V_0 = 2 V_*."""
     if constant:
-        return slider(law, ratio=ratio, load=load)
-    return slider(law, ratio=ratio, load=load, cot_phi=1 / np.sqrt(L(3)), alpha="0.56")
+        return make_slider(law, ratio=ratio, load=load)
+    return make_slider(
+        law, ratio=ratio, load=load, cot_phi=1 / np.sqrt(LongDouble(3)), alpha="0.56"
+    )
 
 
-def slider(
+def make_slider(
     law: str = "slip",
     *,
     ratio: str = "1",
     load: str = "2",
-    cot_phi: np.longdouble = _NONE,
+    cot_phi: np.longdouble = _ZERO,
     alpha: str = "0",
     a: str = "0.0145",
     b_over_a: str = "2",
     period: str = "5",
 ) -> Slider:
     """A slider by the parameters its users state."""
-    direct, state = L(a), L(alpha)
-    critical = direct * (L(b_over_a) - 1) / (1 - cot_phi * (_MU - state))
+    direct, state = LongDouble(a), LongDouble(alpha)
+    critical = direct * (LongDouble(b_over_a) - 1) / (1 - cot_phi * (_MU - state))
     return Slider(
         law,
         cot_phi,
         state,
-        L(ratio) * critical,
-        L(load),
-        direct * L(b_over_a),
+        LongDouble(ratio) * critical,
+        LongDouble(load),
+        direct * LongDouble(b_over_a),
         direct,
-        inertial_time=_INERTIAL_TIME * L(period) / 5,
+        inertial_time=_INERTIAL_TIME * LongDouble(period) / 5,
     )
 
 
 #: Critical velocities of `hard_cases`: what differs from the slip law at k = k_cr, b/a = 2.
-_SIXTY = {"cot_phi": 1 / np.sqrt(L(3)), "alpha": "0.56"}
-_STEEP = 1 / np.tan(np.arctan(_MU) + L("0.01") * np.arccos(L(-1)) / 180)
+_ANGLE_60 = {"cot_phi": 1 / np.sqrt(LongDouble(3)), "alpha": "0.56"}
+_STEEP_COT_PHI = 1 / np.tan(np.arctan(_MU) + LongDouble("0.01") * np.arccos(LongDouble(-1)) / 180)
 HARD_STEPS = {
     "lambda = 0.01": {"b_over_a": "1.01"},
     "lambda = 20": {"b_over_a": "21"},
-    "a = 1e-4": {**_SIXTY, "a": "1e-4"},
-    "a = 0.1": {**_SIXTY, "a": "0.1"},
-    "alpha = 0": {**_SIXTY, "alpha": "0"},
-    "alpha = mu_*": {**_SIXTY, "alpha": "0.76"},
-    "alpha = 1": {**_SIXTY, "alpha": "1"},
-    "phi = atan(mu_*) + 0.01": {"cot_phi": _STEEP, "alpha": "0.56"},
-    "T = 1e-6 s": {**_SIXTY, "period": "1e-6"},
-    "T = 1e4 s": {**_SIXTY, "period": "1e4"},
+    "a = 1e-4": {**_ANGLE_60, "a": "1e-4"},
+    "a = 0.1": {**_ANGLE_60, "a": "0.1"},
+    "alpha = 0": {**_ANGLE_60, "alpha": "0"},
+    "alpha = mu_*": {**_ANGLE_60, "alpha": "0.76"},
+    "alpha = 1": {**_ANGLE_60, "alpha": "1"},
+    "phi = atan(mu_*) + 0.01": {"cot_phi": _STEEP_COT_PHI, "alpha": "0.56"},
+    "T = 1e-6 s": {**_ANGLE_60, "period": "1e-6"},
+    "T = 1e4 s": {**_ANGLE_60, "period": "1e4"},
 }
 #: Limit cycles of `hard_cases`, slip law, constant normal stress.
 HARD_CYCLES = {
@@ -320,42 +332,57 @@ HARD_CYCLES = {
     "T = 1e-6 s": {"ratio": "0.8", "period": "1e-6"},
     "T = 1e4 s": {"ratio": "0.8", "period": "1e4"},
 }
-#: Limit cycles of `hard_cases` at any parameters: what `stated` makes a slider of, the cycle, and
-#: two norms at which to switch. With normal stress that varies their error goes with the square.
+#: Limit cycles of `hard_cases` at any parameters: what `slider_from_fields` makes a slider of, the
+#: cycle, and two norms at which to switch. With normal stress that varies their error goes with the
+#: square.
 DEEP_CYCLES = {
     "slip law, down to 10^-137 V_*": (4, ("2.5e-4", "1.25e-4")),
     "slowness law, down to 10^-1745 V_*": (9, ("1e-3", "5e-4")),
 }
 
 
-def stated(fields: Mapping[str, Any]) -> Slider:
+def slider_from_fields(fields: Mapping[str, Any]) -> Slider:
     """The slider that a scene with an angle states."""
-    a, mu, alpha = (L(fields[name]) for name in ("a", "mu_star", "alpha"))
-    cot_phi = 1 / np.tan(L(fields["phi"]) * np.arccos(L(-1)) / 180)
-    b = a * L(fields["b_over_a"])
-    stiffness = L(fields["stiffness_ratio"]) * (b - a) / (1 - cot_phi * (mu - alpha))
-    inertial_time = L(fields["period"]) * L(fields["reference_rate"]) / (2 * np.arccos(L(-1)))
-    load = L(fields["load_velocity_ratio"])
+    a, mu, alpha = (LongDouble(fields[name]) for name in ("a", "mu_star", "alpha"))
+    cot_phi = 1 / np.tan(LongDouble(fields["phi"]) * np.arccos(LongDouble(-1)) / 180)
+    b = a * LongDouble(fields["b_over_a"])
+    stiffness = LongDouble(fields["stiffness_ratio"]) * (b - a) / (1 - cot_phi * (mu - alpha))
+    inertial_time = (
+        LongDouble(fields["period"])
+        * LongDouble(fields["reference_rate"])
+        / (2 * np.arccos(LongDouble(-1)))
+    )
+    load = LongDouble(fields["load_velocity_ratio"])
     return Slider(fields["law"], cot_phi, alpha, stiffness, load, b, a, mu, inertial_time)
 
 
 def deep_cycle(fields: Mapping[str, Any], count: int, norms: tuple[str, str]) -> np.longdouble:
     """Recurrence interval, the error of the switch removed."""
-    coarse, fine = (Motion(stated(fields), float(w), 1e-16).numbers(count)[0] for w in norms)
+    coarse, fine = (
+        Motion(slider_from_fields(fields), float(w), 1e-16).numbers(count)[0] for w in norms
+    )
     return fine + (fine - coarse) / 3
 
 
 if __name__ == "__main__":
     for ratio in ("1.25", "1"):
         for constant in (True, False):
-            still = paper("slip", constant=constant, ratio=ratio)
+            still = paper_slider("slip", constant=constant, ratio=ratio)
             print(ratio, constant, "critical velocity", critical_velocity(still, 5e-4), flush=True)
     for law, count in (("slip", 4), ("slowness", 14)):
         for norm in (0.02, 0.01):
-            print(law, "switch at", norm, cycle(paper(law, constant=True), norm, count), flush=True)
+            print(
+                law,
+                "switch at",
+                norm,
+                cycle_numbers(paper_slider(law, constant=True), norm, count),
+                flush=True,
+            )
     for label, fields in HARD_STEPS.items():
-        print(label, "critical velocity", critical_velocity(slider(**fields), 5e-4), flush=True)
+        print(
+            label, "critical velocity", critical_velocity(make_slider(**fields), 5e-4), flush=True
+        )
     for label, fields in HARD_CYCLES.items():
-        print(label, cycle(slider(**fields), 0.02, 8), flush=True)
+        print(label, cycle_numbers(make_slider(**fields), 0.02, 8), flush=True)
     for label, (count, norms) in DEEP_CYCLES.items():
         print(label, deep_cycle(CASES[label][0], count, norms), flush=True)

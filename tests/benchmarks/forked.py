@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 #: Limits of a call: CPU time in s, wall time relative to CPU time, and memory in bytes.
-LIMIT, PATIENCE, MEMORY = 20, 4.0, 8 * 2**30
+CPU_TIME_LIMIT, WALL_TIME_FACTOR, MEMORY_LIMIT = 20, 15.0, 8 * 2**30
 
 
 def call_in_child(function: Callable[[], Any], place: Path) -> tuple[Any, str]:
@@ -41,7 +41,7 @@ def call_in_child(function: Callable[[], Any], place: Path) -> tuple[Any, str]:
         os.close(reads)
         _run(function, place, writes)
     os.close(writes)
-    content = _received(reads)
+    content = _receive(reads)
     with contextlib.suppress(ProcessLookupError):
         os.killpg(child, signal.SIGKILL)
     os.close(reads)
@@ -59,8 +59,8 @@ def _run(function: Callable[[], Any], place: Path, writes: int) -> None:
     try:
         os.chdir(place)
         os.setsid()
-        resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT))
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        resource.setrlimit(resource.RLIMIT_CPU, (CPU_TIME_LIMIT, CPU_TIME_LIMIT))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_LIMIT, MEMORY_LIMIT))
         content = pickle.dumps(function())
         with os.fdopen(writes, "wb") as pipe:
             pipe.write(content)
@@ -68,9 +68,9 @@ def _run(function: Callable[[], Any], place: Path, writes: int) -> None:
         os._exit(0)
 
 
-def _received(reads: int) -> bytes:
+def _receive(reads: int) -> bytes:
     """Read from a pipe until the other end closes it or the time limit is reached."""
-    content, end = b"", time.monotonic() + PATIENCE * LIMIT
+    content, end = b"", time.monotonic() + WALL_TIME_FACTOR * CPU_TIME_LIMIT
     while select.select([reads], [], [], max(0.0, end - time.monotonic()))[0]:
         part = os.read(reads, 2**16)
         if not part:

@@ -45,18 +45,18 @@ from rsfstudy.cli.command_line import cli
 
 STUDIES = Path(__file__).parents[2] / "studies"
 #: Columns of the terminal.
-WIDTH = 80
+TERMINAL_WIDTH = 80
 #: Largest memory and file size of a command, in bytes.
-MEMORY, FILE_SIZE = 6 * 2**30, 2**28
+MEMORY_LIMIT, FILE_SIZE_LIMIT = 6 * 2**30, 2**28
 #: Documented exit statuses.
-STATUSES = (0, 1, 2, 3)
+EXIT_STATUSES = (0, 1, 2, 3)
 #: Wall time limit relative to the CPU time limit, because other processes may use the machine.
-PATIENCE = 4.0
+PATIENCE = 15.0
 
 # ---- values --------------------------------------------------------------------------------------
 
 ESCAPE = "\x1b]0;title\x07\x1b[2J"
-LONG = "x" * 300
+LONG_STRING = "x" * 300
 NUMBERS = ("1", "2", "0.5", "1e-7", "3", "10", "60", "0.01", "1e-3")
 ODD_NUMBERS = (
     "0", "-1", "-0", "nan", "inf", "-inf", "1e400", "1e308", "-1e308", "1e-320", "1e999999999",
@@ -79,13 +79,69 @@ RANGES = (
     "1:1e400:2", "-1e308:1e308:3", "1:2:2.5", "a:b:c", "1:2:3:lin", "1:2:" + "9" * 400,
 )  # fmt: skip
 HOSTILE = (
-    "", " ", "\n", "\t", "-", "--", "-x", "--x", "---", "=", "==", ",", ",,", ":", ".", "..", "/",
-    ESCAPE, f"a{ESCAPE}=1", "\x9b2J", "\x7f", "\r", "a\nb", "\u202e", "\u200b", "\ufeff", "\ue000",
-    "\udcff", "\udc80.nc", "\U0001f600", "\u00e9", "e\u0301", "\u6469\u64e6", LONG, LONG + ".nc",
-    LONG + ".py", "y" * 100_000, "a/" * 3000, "../" * 40, "%s%n", "{}", "{0.__class__}", "[bold]",
-    "[/]", "$HOME", "`id`", "*", "?", "~", "~root", "\\", "'", '"', "None", "nan", "__class__",
-    "os.system", "a.b", "1;2", "<b>", "(" * 2000, "[" * 2000,
-)  # fmt: skip
+    "",
+    " ",
+    "\n",
+    "\t",
+    "-",
+    "--",
+    "-x",
+    "--x",
+    "---",
+    "=",
+    "==",
+    ",",
+    ",,",
+    ":",
+    ".",
+    "..",
+    "/",
+    ESCAPE,
+    f"a{ESCAPE}=1",
+    "\x9b2J",
+    "\x7f",
+    "\r",
+    "a\nb",
+    "\u202e",
+    "\u200b",
+    "\ufeff",
+    "\ue000",
+    "\udcff",
+    "\udc80.nc",
+    "\U0001f600",
+    "\u00e9",
+    "e\u0301",
+    "\u6469\u64e6",
+    LONG_STRING,
+    LONG_STRING + ".nc",
+    LONG_STRING + ".py",
+    "y" * 100_000,
+    "a/" * 3000,
+    "../" * 40,
+    "%s%n",
+    "{}",
+    "{0.__class__}",
+    "[bold]",
+    "[/]",
+    "$HOME",
+    "`id`",
+    "*",
+    "?",
+    "~",
+    "~root",
+    "\\",
+    "'",
+    '"',
+    "None",
+    "nan",
+    "__class__",
+    "os.system",
+    "a.b",
+    "1;2",
+    "<b>",
+    "(" * 2000,
+    "[" * 2000,
+)
 READABLE = (
     "outputs/tiny.nc", "outputs/tiny.zarr", "other/tiny.nc", "motion.nc", "rig.nc", "fit.nc",
     "record.csv", "protocol.csv", "step.csv", "tiny.py", "own.toml", "mine.mplstyle",
@@ -105,13 +161,50 @@ UNREADABLE = (
     "picture.png",
     "outputs/tiny.cells.sqlite", "broken.zarr",
 )  # fmt: skip
-PLACES = (
-    "new", "new/deep", "outputs", "out.png", "new/out.pdf", "out.svg", "out.html", "out.nc", "out",
-    "folder", "folder.png", "picture.png", "tiny.py", "tiny.py/under", "motion.nc", "motion.png",
-    "pipe", "pipe.png", "pipe.html", "device.png", "device.html", "dangling.png", "loop.png",
-    "fit.nc", "fit.png", "outputs/tiny.nc", ".", "..", "", "-", "~", f"{LONG}.png", LONG, ".png",
-    "a.b.png", "x\n.png", f"{ESCAPE}.png", "\udcff.png", "out.PNG", "out.html/", "/", "/proc/x/y",
-)  # fmt: skip
+OUTPUT_PATHS = (
+    "new",
+    "new/deep",
+    "outputs",
+    "out.png",
+    "new/out.pdf",
+    "out.svg",
+    "out.html",
+    "out.nc",
+    "out",
+    "folder",
+    "folder.png",
+    "picture.png",
+    "tiny.py",
+    "tiny.py/under",
+    "motion.nc",
+    "motion.png",
+    "pipe",
+    "pipe.png",
+    "pipe.html",
+    "device.png",
+    "device.html",
+    "dangling.png",
+    "loop.png",
+    "fit.nc",
+    "fit.png",
+    "outputs/tiny.nc",
+    ".",
+    "..",
+    "",
+    "-",
+    "~",
+    f"{LONG_STRING}.png",
+    LONG_STRING,
+    ".png",
+    "a.b.png",
+    "x\n.png",
+    f"{ESCAPE}.png",
+    "\udcff.png",
+    "out.PNG",
+    "out.html/",
+    "/",
+    "/proc/x/y",
+)
 FIELD_VALUES = (
     "slip", "slowness", "ageing", "constant", "variable", "imposed", "true", "false", "2", "1.5",
     "0.01", "0.56", "60", "1,2", "constant,variable", "5 MPa", "10 s", "protocol.csv", "record.csv",
@@ -123,7 +216,7 @@ COLUMNS = (
     "x=y", ",", "time=t (s", "displacement=lp * 1e400", "displacement=lp * nan + " + "9" * 400,
 )  # fmt: skip
 #: Files that are damaged before each command that names them, with their originals.
-DAMAGED = {
+DAMAGED_FILES = {
     "damaged_results.nc": "outputs/tiny.nc", "damaged_motion.nc": "rig.nc",
     "damaged_fit.nc": "fit.nc",
     "damaged_record.csv": "short.csv", "damaged_protocol.csv": "protocol.csv",
@@ -132,9 +225,9 @@ DAMAGED = {
     "damaged_sheet.mplstyle": "mine.mplstyle",
 }  # fmt: skip
 #: A file that commands read although no argument names it.
-JOURNAL = "outputs/tiny.cells.sqlite"
+JOURNAL_FILE = "outputs/tiny.cells.sqlite"
 #: Values of options and arguments by name. Other values follow from the type.
-KNOWN: dict[str, tuple[str, ...]] = {
+VALUES_BY_PARAMETER: dict[str, tuple[str, ...]] = {
     "name": ("tiny.py", "tiny", "own.py", "linear_stability", "outputs/tiny.nc", "motion.nc"),
     "first": ("outputs/tiny.nc", "other/tiny.nc", "tiny"),
     "second": ("outputs/tiny.nc", "other/tiny.nc", "tiny.py"),
@@ -165,51 +258,53 @@ KNOWN: dict[str, tuple[str, ...]] = {
     "rtol": ("1e-4", "1e-5", "1e-12", "0.1", "nan"),
 }  # fmt: skip
 #: Work limits that are added to a command line that does not set them.
-CHEAP = {"budget": ("--budget", "2000"), "posterior": (), "serial": ("--serial",)}
+WORK_LIMITS = {"budget": ("--budget", "2000"), "posterior": (), "serial": ("--serial",)}
 #: Named studies whose cells are fast with a budget of a few hundred evaluations.
 CHEAP_STUDIES = (
     "rate_step_boundary", "linear_stability", "rigid_response", "dilatancy", "two_states",
     "laws_zeta", "slide_hold_slide", "velocity_steps", "effects", "injection", "rig_recurrence",
 )  # fmt: skip
 #: Excluded flags, because they compute all named studies.
-DEAR = {("run", "every")}
+EXCLUDED_FLAGS = {("run", "every")}
 
 
-def fields() -> tuple[str, ...]:
+def field_names() -> tuple[str, ...]:
     """Return names that ``--set`` accepts, and a few unknown names."""
     from rsfstudy.slider import registry
 
-    return (*registry.defaults(), "case", "sample", "stiffnes", "B_over_a", "rtol", "numbers")
+    return (*registry.field_defaults(), "case", "sample", "stiffnes", "B_over_a", "rtol", "numbers")
 
 
-def value_of(command: str, param: click.Parameter, chance: random.Random) -> str:
+def draw_value(command: str, param: click.Parameter, chance: random.Random) -> str:
     """Draw a value of an option or argument that is valid with a probability of at least 0.5."""
     kind, name, drawn = param.type, str(param.name), chance.random()
     if drawn < 0.06:
-        return mutated(chance.choice(HOSTILE), chance)
+        return mutate_string(chance.choice(HOSTILE), chance)
     if drawn < 0.12 and isinstance(param, click.Argument):
-        return chance.choice(tuple(DAMAGED))
+        return chance.choice(tuple(DAMAGED_FILES))
     if name == "settings":
-        return setting(chance)
+        return draw_setting(chance)
     if (command, name) == ("run", "name") and drawn < 0.4:
         return chance.choice(CHEAP_STUDIES)
-    if name in KNOWN and drawn < 0.8:
-        return chance.choice(KNOWN[name])
+    if name in VALUES_BY_PARAMETER and drawn < 0.8:
+        return chance.choice(VALUES_BY_PARAMETER[name])
     if isinstance(kind, click.Choice) and drawn < 0.8:
         return str(chance.choice(list(kind.choices)))
     if isinstance(kind, click.types.IntParamType | click.types.FloatParamType):
         return chance.choice(NUMBERS if drawn < 0.5 else ODD_NUMBERS)
     if name in ("output", "figure") and drawn < 0.9:
-        return chance.choice(PLACES)
-    if isinstance(kind, click.Path) or name in KNOWN:
-        return chance.choice(READABLE if drawn < 0.7 else (*UNREADABLE, *DAMAGED, *DAMAGED))
+        return chance.choice(OUTPUT_PATHS)
+    if isinstance(kind, click.Path) or name in VALUES_BY_PARAMETER:
+        return chance.choice(
+            READABLE if drawn < 0.7 else (*UNREADABLE, *DAMAGED_FILES, *DAMAGED_FILES)
+        )
     pools = (QUANTITIES, QUANTITIES, ODD_QUANTITIES, ODD_NUMBERS, NUMBERS, UNREADABLE)
     return chance.choice(chance.choice(pools))
 
 
-def setting(chance: random.Random) -> str:
+def draw_setting(chance: random.Random) -> str:
     """Draw a value of ``--set``."""
-    name = chance.choice((*fields(), *("load_velocity_ratio", "case", "law", "loading") * 6))
+    name = chance.choice((*field_names(), *("load_velocity_ratio", "case", "law", "loading") * 6))
     pools = (FIELD_VALUES, FIELD_VALUES, NUMBERS, ODD_NUMBERS, QUANTITIES, ODD_QUANTITIES, RANGES)
     values = [chance.choice(chance.choice(pools)) for _ in range(chance.choice((1, 1, 1, 2, 3)))]
     return chance.choice(("{}={}",) * 12 + ("{}", "{}={}=1", "{} = {}")).format(
@@ -217,7 +312,7 @@ def setting(chance: random.Random) -> str:
     )
 
 
-def mutated(text: str, chance: random.Random) -> str:
+def mutate_string(text: str, chance: random.Random) -> str:
     """Change one character of a string with a certain probability."""
     if chance.random() < 0.7 or not text or len(text) > 2000:
         return text
@@ -234,7 +329,7 @@ class Line(NamedTuple):
     terminal: bool
 
 
-def line_of(seed: int, index: int) -> Line:
+def draw_line(seed: int, index: int) -> Line:
     """Draw the command line that belongs to a seed and an index."""
     chance = random.Random(f"{seed}:{index}")
     names = sorted(cli.commands)
@@ -252,22 +347,22 @@ def _command_line(name: str, chance: random.Random) -> list[str]:
     chance.shuffle(params)
     few = chance.choice((0.1, 0.2, 0.4))
     for param in params:
-        if (name, param.name) in DEAR:
+        if (name, param.name) in EXCLUDED_FLAGS:
             continue
         if isinstance(param, click.Argument):
             words += _arguments(name, param, chance)
-        elif chance.random() < (few if param.name not in CHEAP else 0.15):
+        elif chance.random() < (few if param.name not in WORK_LIMITS else 0.15):
             given.add(str(param.name))
             words += _option(name, param, chance)
     limits = [
         word
         for param in params
         if param.name not in given and not {"scheduler", "workers"} & given
-        for word in CHEAP.get(str(param.name), ())
+        for word in WORK_LIMITS.get(str(param.name), ())
     ]
     if chance.random() < 0.06 and words:
         place = chance.randrange(len(words))
-        words[place] = mutated(chance.choice((words[place], *HOSTILE)), chance)
+        words[place] = mutate_string(chance.choice((words[place], *HOSTILE)), chance)
     if chance.random() < 0.03:
         words.append(chance.choice((*HOSTILE, "--help", "--no-such-option", "-h")))
     return [name, *limits, *words]
@@ -276,7 +371,7 @@ def _command_line(name: str, chance: random.Random) -> list[str]:
 def _arguments(name: str, param: click.Argument, chance: random.Random) -> list[str]:
     count = chance.choice((0, 1, 1, 1, 1, 1, 2, 3)) if param.nargs == -1 else param.nargs
     count = 0 if chance.random() < 0.04 else count
-    values = [value_of(name, param, chance) for _ in range(count)]
+    values = [draw_value(name, param, chance) for _ in range(count)]
     if name == "run" and {*values} & {*CHEAP_STUDIES}:
         values += ["--budget", "100", "--set", chance.choice(("law=slip", "mu_star=0.6", "a=0.01"))]
     return values
@@ -288,7 +383,7 @@ def _option(name: str, param: click.Parameter, chance: random.Random) -> list[st
         return [spelling]
     words = []
     for _ in range(chance.choice((1, 1, 2)) if param.multiple else 1):
-        values = [value_of(name, param, chance) for _ in range(max(1, param.nargs))]
+        values = [draw_value(name, param, chance) for _ in range(max(1, param.nargs))]
         if len(values) == 1 and chance.random() < 0.3:
             words.append(f"{spelling}={values[0]}")
         else:
@@ -298,7 +393,7 @@ def _option(name: str, param: click.Parameter, chance: random.Random) -> list[st
 
 # ---- files ---------------------------------------------------------------------------------------
 
-TINY = """
+TINY_STUDY_SOURCE = """
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.reduce import LinearFit
@@ -313,8 +408,8 @@ study = Study(
     reductions=[LinearFit(name="slope", of="critical_stiffness", on="log_load_velocity_ratio")],
 )
 """
-OWN = TINY.replace('"tiny"', '"own"')
-OWN_PROBLEM = """
+USER_STUDY_SOURCE = TINY_STUDY_SOURCE.replace('"tiny"', '"own"')
+USER_PROBLEM_SOURCE = """
 title = "Velocity step"
 law = "slowness"
 quantities = ["friction"]
@@ -329,8 +424,15 @@ V_star = "1 um/s"
 [[loading]]
 velocity = "10 um/s"
 """
-RIG = ["--normal-stress", "5 MPa", "--slip-distance", "10 um", "--reference-velocity", "1 um/s"]
-FITTING = [
+RIG_ARGUMENTS = [
+    "--normal-stress",
+    "5 MPa",
+    "--slip-distance",
+    "10 um",
+    "--reference-velocity",
+    "1 um/s",
+]
+FIT_COMMAND = [
     "fit",
     "step.csv",
     "--normal-stress",
@@ -341,32 +443,56 @@ FITTING = [
     "1",
 ]
 #: Commands that create results. The fit also compiles code before processes are forked.
-MAKING = (
+SETUP_COMMANDS = (
     ["run", "tiny.py", "--serial", "--quiet"],
     ["run", "tiny.py", "--serial", "--quiet", "--format", "zarr"],
-    ["run", "tiny.py", "--serial", "--quiet", "--output", "other", "--set",
-     "load_velocity_ratio=1,3"],
+    [
+        "run",
+        "tiny.py",
+        "--serial",
+        "--quiet",
+        "--output",
+        "other",
+        "--set",
+        "load_velocity_ratio=1,3",
+    ],
     ["simulate", "--set", "load_velocity_ratio=1.1", "--duration", "2"],
-    ["simulate", *RIG, "--set", "load_velocity_ratio=1.1", "--duration", "1 s", "--output",
-     "rig.png"],
-    FITTING,
+    [
+        "simulate",
+        *RIG_ARGUMENTS,
+        "--set",
+        "load_velocity_ratio=1.1",
+        "--duration",
+        "1 s",
+        "--output",
+        "rig.png",
+    ],
+    FIT_COMMAND,
     ["problems", "referee"],
-)  # fmt: skip
+)
 
 
-def fill(place: Path) -> None:
+def write_input_files(place: Path) -> None:
     """Write files of all kinds to `place`, which must be the working directory."""
     texts = {
-        "tiny.py": TINY, "own.py": OWN, "own.toml": OWN_PROBLEM, "none.py": "x = 1\n",
-        "raises.py": "raise RuntimeError('\\x1b[2J')\n", "syntax.py": "study = (\n",
+        "tiny.py": TINY_STUDY_SOURCE,
+        "own.py": USER_STUDY_SOURCE,
+        "own.toml": USER_PROBLEM_SOURCE,
+        "none.py": "x = 1\n",
+        "raises.py": "raise RuntimeError('\\x1b[2J')\n",
+        "syntax.py": "study = (\n",
         "mine.mplstyle": "font.size: 9\nfigure.dpi: 40\nsavefig.dpi: 40\n",
         "bad.mplstyle": "font.sise: 9\n",
-        "text.nc": "no NetCDF\n", "empty.nc": "", "empty.csv": "", "text.csv": "no,table\nhere\n",
+        "text.nc": "no NetCDF\n",
+        "empty.nc": "",
+        "empty.csv": "",
+        "text.csv": "no,table\nhere\n",
         "hostile.csv": f"time (s),\x1b[2J (um),friction{ESCAPE}\n0,0,0.6\n1,1,0.6\n",
         "wide.csv": ",".join(f"x{n} (s)" for n in range(5000)) + "\n",
-        "text.toml": "no toml\n", "deep.toml": "a = " + "[" * 5000 + "]" * 5000 + "\n",
+        "text.toml": "no toml\n",
+        "deep.toml": "a = " + "[" * 5000 + "]" * 5000 + "\n",
         "utf16.csv": "time (s),displacement (um)\n0,1\n",
-    }  # fmt: skip
+    }
     for name, text in texts.items():
         Path(name).write_text(text, encoding="utf-16" if name == "utf16.csv" else "utf-8")
     for name in ("record.csv", "protocol.csv", "step.csv"):
@@ -374,7 +500,7 @@ def fill(place: Path) -> None:
     rows = (STUDIES / "pages" / "step.csv").read_text().splitlines(keepends=True)
     Path("short.csv").write_text("".join(rows[:160]))
     Path("binary.csv").write_bytes(bytes(range(256)) * 8)
-    for words in MAKING:
+    for words in SETUP_COMMANDS:
         _in_process(words)
     data = Path("outputs/tiny.nc").read_bytes()
     Path("cut.nc").write_bytes(data[: len(data) // 2])
@@ -398,11 +524,11 @@ def fill(place: Path) -> None:
     assert place.samefile(".")
 
 
-def damage(words: Sequence[str], chance: random.Random) -> None:
+def damage_files(words: Sequence[str], chance: random.Random) -> None:
     """Damage the files that a command line names, and occasionally the journal."""
-    for target, source in (*DAMAGED.items(), (JOURNAL, JOURNAL)):
+    for target, source in (*DAMAGED_FILES.items(), (JOURNAL_FILE, JOURNAL_FILE)):
         named = any(target in word for word in words)
-        if named or (target == JOURNAL and chance.random() < 0.1):
+        if named or (target == JOURNAL_FILE and chance.random() < 0.1):
             data = bytearray(Path(source).read_bytes())
             for _ in range(chance.choice((1, 1, 2, 5, 50))):
                 _damage_once(data, chance)
@@ -476,7 +602,7 @@ class Server:
         self.limit, self._pending = limit, b""
         self._read, write = pty.openpty() if terminal else os.pipe()
         if terminal:
-            fcntl.ioctl(write, termios.TIOCSWINSZ, struct.pack("HHHH", 24, WIDTH, 0, 0))
+            fcntl.ioctl(write, termios.TIOCSWINSZ, struct.pack("HHHH", 24, TERMINAL_WIDTH, 0, 0))
         self._link, theirs = socket.socketpair()
         self._process = os.fork()
         if not self._process:
@@ -518,14 +644,14 @@ class Server:
     def run(self, words: Sequence[str], place: Path) -> Answer:
         """Run a command line in the directory `place`."""
         self._link.sendall(json.dumps([words, str(place)]).encode() + b"\n")
-        began, _output = self._receive(60.0)
+        began, _output = self._receive(60.0 * self.limit)
         assert began is not None
         message, output = self._receive(PATIENCE * self.limit)
         hangs = message is None
         with contextlib.suppress(ProcessLookupError):
             os.killpg(began["process"], signal.SIGKILL)
         if message is None:
-            message, more = self._receive(60.0)
+            message, more = self._receive(60.0 * self.limit)
             output += more
             assert message is not None
         hangs |= message["status"] == -signal.SIGXCPU
@@ -556,12 +682,12 @@ def _serve(link: socket.socket, output: int, home: Path, limit: float) -> None:
     if not files.exists():
         files.mkdir(parents=True)
         os.chdir(files)
-        fill(files)
+        write_input_files(files)
     else:
         os.chdir(tempfile.mkdtemp(dir=home))
         for name in ("tiny.py", "step.csv"):
             shutil.copyfile(files / name, name)
-        _in_process(FITTING)
+        _in_process(FIT_COMMAND)
     sys.stdout.flush()
     gc.collect()
     gc.freeze()  # so that forks share memory
@@ -588,8 +714,8 @@ def _run(words: Sequence[str], place: str, limit: float) -> None:
         os.chdir(place)
         for kind, most in (
             (resource.RLIMIT_CPU, int(limit)),
-            (resource.RLIMIT_AS, MEMORY),
-            (resource.RLIMIT_FSIZE, FILE_SIZE),
+            (resource.RLIMIT_AS, MEMORY_LIMIT),
+            (resource.RLIMIT_FSIZE, FILE_SIZE_LIMIT),
             (resource.RLIMIT_CORE, 0),
         ):
             resource.setrlimit(kind, (most, most))
@@ -612,9 +738,13 @@ def _run(words: Sequence[str], place: str, limit: float) -> None:
 # ---- reports -------------------------------------------------------------------------------------
 
 #: Escape sequences of Rich for colours, progress bars and the cursor.
-_OF_RICH = re.compile(r"\x1b\[(?:[0-9;]*m|\?25[lh]|2K|1A)")
+_RICH_ESCAPES = re.compile(r"\x1b\[(?:[0-9;]*m|\?25[lh]|2K|1A)")
 _EXCEPTION = re.compile(r"(?<!raises )\b(?:[A-Z]\w*(?:Error|Exception|Halt)|Exception)\b(?::|\))")
-_LAST_RESORT = ("cannot be answered (", "cannot be had of this dataset", "Look at what it names")
+_CATCH_ALL_MESSAGES = (
+    "cannot be answered (",
+    "cannot be had of this dataset",
+    "Look at what it names",
+)
 
 
 def faults(line: Line, answer: Answer) -> Iterator[str]:
@@ -622,18 +752,18 @@ def faults(line: Line, answer: Answer) -> Iterator[str]:
     text = answer.output
     if answer.hangs:
         yield "hang"
-    elif answer.status not in STATUSES:
+    elif answer.status not in EXIT_STATUSES:
         yield f"status {answer.status}"
     if "Traceback (most recent call last)" in text:
         yield "traceback"
     allowed = "\n"
     if line.terminal:
-        text, allowed = _OF_RICH.sub("", text), "\r\n"
+        text, allowed = _RICH_ESCAPES.sub("", text), "\r\n"
     odd = {c for c in text if not c.isprintable() and c not in allowed and c != "\ufffd"}
     if odd:
         yield "control " + " ".join(sorted(map(ascii, odd)))
     said = " ".join(text.split())
-    if any(words in said for words in _LAST_RESORT):
+    if any(words in said for words in _CATCH_ALL_MESSAGES):
         yield "catch-all"
     elif found := _EXCEPTION.search(said):
         yield f"raw {found[0]}"
@@ -646,10 +776,10 @@ def fuzz(seed: int, indices: Sequence[int], limit: float, show: bool) -> int:
     with tempfile.TemporaryDirectory(prefix="fuzz_commands_") as home:
         servers = {kind: Server(kind, Path(home), limit) for kind in (False, True)}
         for index in indices:
-            line, place = line_of(seed, index), Path(home, "here")
+            line, place = draw_line(seed, index), Path(home, "here")
             subprocess.run(["cp", "-a", str(Path(home, "files")), str(place)], check=True)
             with contextlib.chdir(place):
-                damage(line.words, random.Random(f"damage {seed}:{index}"))
+                damage_files(line.words, random.Random(f"damage {seed}:{index}"))
             answer = servers[line.terminal].run(line.words, place)
             shutil.rmtree(place)
             statuses[answer.status] += 1

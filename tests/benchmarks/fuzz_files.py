@@ -32,7 +32,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from file_mutations import damaged, hostile_dataset, hostile_text
+from file_mutations import damage_bytes, hostile_dataset, hostile_text
 from forked import call_in_child
 
 import rsfstudy
@@ -61,7 +61,7 @@ STUDY = rsfstudy.Study(
         for number in range(12)
     ],
 )  # fmt: skip
-RIG = rsfstudy.Laboratory(
+RIG = rsfstudy.Rig(
     normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s", stiffness="1 kPa/um"
 )
 
@@ -77,7 +77,7 @@ class Kind(NamedTuple):
 # ---- readers -------------------------------------------------------------------------------------
 
 
-def command(*words: str) -> Callable[[Path], Any]:
+def command_reader(*words: str) -> Callable[[Path], Any]:
     """Return a reader that runs a command.
 
     In `words`, ``{0}`` is replaced by the path of the file, and ``{1}`` by its directory.
@@ -97,35 +97,35 @@ def command(*words: str) -> Callable[[Path], Any]:
     return read
 
 
-def opened(path: Path) -> xr.Dataset:
+def open_results(path: Path) -> xr.Dataset:
     return rsfstudy.open(path).load()
 
 
-def opened_any(path: Path) -> xr.Dataset:
-    return store.read_any(path).load()
+def open_dataset(path: Path) -> xr.Dataset:
+    return store.read_dataset(path).load()
 
 
-def shown(path: Path) -> str:
-    return str(store.read_any(path).rsf._repr_html_())
+def show_html(path: Path) -> str:
+    return str(store.read_dataset(path).rsf._repr_html_())
 
 
-def drawn(path: Path) -> Any:
-    return store.read_any(path).rsf.plot()
+def draw_plot(path: Path) -> Any:
+    return store.read_dataset(path).rsf.plot()
 
 
-def resumed(path: Path) -> xr.Dataset:
+def resume_run(path: Path) -> xr.Dataset:
     return rsfstudy.run(STUDY, output=path.parent, workers=0, progress=False)
 
 
-def answered(path: Path) -> Any:
-    return theirs.read(path, problem.read(problem.shipped()[1]))
+def answer_record(path: Path) -> Any:
+    return theirs.read_answer(path, problem.read_problem(problem.shipped_problems()[1]))
 
 
-def cases(path: Path) -> Any:
+def read_cases(path: Path) -> Any:
     return rsfstudy.Axis.cases(rsfstudy.read_table(path))
 
 
-def styled(path: Path) -> Any:
+def apply_style(path: Path) -> Any:
     return rsfstudy.plot(path.parent / "whole.nc", style=path)
 
 
@@ -146,7 +146,7 @@ def damage(path: Path, chance: random.Random) -> bool:
     content = path.read_bytes()
     if path.suffix == ".nc" and chance.random() < 0.5:
         content = content[: content.rindex(b"\nrsfstudy sha256 ")]
-    path.write_bytes(damaged(content, chance))
+    path.write_bytes(damage_bytes(content, chance))
     return True
 
 
@@ -156,7 +156,7 @@ def rewrite(path: Path, chance: random.Random) -> bool:
         warnings.simplefilter("ignore")
         dataset = hostile_dataset(xr.load_dataset(path), chance)
         if chance.random() < 0.7:
-            store.write(dataset, path)
+            store.write_dataset(dataset, path)
         else:
             dataset.to_netcdf(path)
     return False
@@ -193,52 +193,88 @@ def rename(path: Path, chance: random.Random) -> bool:
     return False
 
 
-def named_within(path: Path) -> Any:
+def read_study_file(path: Path) -> Any:
     name = path.read_text("utf-8", "surrogateescape")
     return rsfstudy.run(name, workers=0, progress=False, output=None)
 
 
-_OF_TEXT = (retype, retype, damage)
-_COMMANDS = tuple(
-    command(*words)
+_TEXT_CHANGES = (retype, retype, damage)
+_COMMAND_READERS = tuple(
+    command_reader(*words)
     for words in (("show", "{0}"), ("check", "{0}"), ("plot", "{0}", "--output", "{1}/drawn"),
                   ("export", "{0}", "--csv", "--output", "{1}/out.csv"), ("report", "{1}"),
                   ("compare", "{0}", "{1}/whole.nc"))
 )  # fmt: skip
 KINDS = {
-    "small.nc": Kind("results", (opened, opened, shown, drawn, *_COMMANDS), (damage, rewrite)),
-    "small.zarr": Kind("store", (opened, opened, shown, *_COMMANDS[:2]), (damage,)),
-    "motion.nc": Kind("motion", (opened_any, shown, drawn, *_COMMANDS), (damage, rewrite)),
-    "small.cells.sqlite": Kind("journal", (resumed,), (damage, tamper)),
-    "record.csv": Kind("record", (
-        _reading(rsfstudy.read_record, normal_stress="5 MPa"), rsfstudy.events, rsfstudy.history,
-        rsfstudy.read_table, command("fit", "{0}", "--stiffness", "1e-3 /um", "--law", "slip",
-                                     "--output", "{1}/fit.png")), _OF_TEXT),
-    "record.dat": Kind("xlook", (
-        rsfstudy.read_record,
-        _reading(rsfstudy.read_record, columns={
-            "time": ("1", "s"), "displacement": ("2", "um"), "friction": "3"})), (damage, retype)),
-    "protocol.csv": Kind("protocol", (
-        rsfstudy.read_protocol, _reading(rsfstudy.read_protocol, laboratory=RIG),
-        _reading(rsfstudy.history, laboratory=RIG), rsfstudy.read_table,
-        command("simulate", "--set", "loading={0}", "--output", "{1}/it.png")), _OF_TEXT),
-    "problem.toml": Kind("problem", (
-        problem.read, command("verify", "{1}/01_answer.csv", "--problem", "{0}")), _OF_TEXT),
-    "01_answer.csv": Kind("answer", (answered, command("verify", "{0}")), _OF_TEXT),
-    "cases.csv": Kind("cases", (cases,), _OF_TEXT),
-    "mine.mplstyle": Kind("style", (styled,), _OF_TEXT),
-    "study.txt": Kind("name", (named_within,), (rename,)),
-}  # fmt: skip
+    "small.nc": Kind(
+        "results",
+        (open_results, open_results, show_html, draw_plot, *_COMMAND_READERS),
+        (damage, rewrite),
+    ),
+    "small.zarr": Kind(
+        "store", (open_results, open_results, show_html, *_COMMAND_READERS[:2]), (damage,)
+    ),
+    "motion.nc": Kind(
+        "motion", (open_dataset, show_html, draw_plot, *_COMMAND_READERS), (damage, rewrite)
+    ),
+    "small.cells.sqlite": Kind("journal", (resume_run,), (damage, tamper)),
+    "record.csv": Kind(
+        "record",
+        (
+            _reading(rsfstudy.read_record, normal_stress="5 MPa"),
+            rsfstudy.events,
+            rsfstudy.history,
+            rsfstudy.read_table,
+            command_reader(
+                "fit", "{0}", "--stiffness", "1e-3 /um", "--law", "slip", "--output", "{1}/fit.png"
+            ),
+        ),
+        _TEXT_CHANGES,
+    ),
+    "record.dat": Kind(
+        "xlook",
+        (
+            rsfstudy.read_record,
+            _reading(
+                rsfstudy.read_record,
+                columns={"time": ("1", "s"), "displacement": ("2", "um"), "friction": "3"},
+            ),
+        ),
+        (damage, retype),
+    ),
+    "protocol.csv": Kind(
+        "protocol",
+        (
+            rsfstudy.read_protocol,
+            _reading(rsfstudy.read_protocol, rig=RIG),
+            _reading(rsfstudy.history, rig=RIG),
+            rsfstudy.read_table,
+            command_reader("simulate", "--set", "loading={0}", "--output", "{1}/it.png"),
+        ),
+        _TEXT_CHANGES,
+    ),
+    "problem.toml": Kind(
+        "problem",
+        (problem.read_problem, command_reader("verify", "{1}/01_answer.csv", "--problem", "{0}")),
+        _TEXT_CHANGES,
+    ),
+    "01_answer.csv": Kind(
+        "answer", (answer_record, command_reader("verify", "{0}")), _TEXT_CHANGES
+    ),
+    "cases.csv": Kind("cases", (read_cases,), _TEXT_CHANGES),
+    "mine.mplstyle": Kind("style", (apply_style,), _TEXT_CHANGES),
+    "study.txt": Kind("name", (read_study_file,), (rename,)),
+}
 
 
-def fill(place: Path) -> dict[str, Any]:
+def write_valid_files(place: Path) -> dict[str, Any]:
     """Write a valid file of each kind, and return the true datasets by kind."""
     results = rsfstudy.run(STUDY, output=place, workers=0, progress=False)
     rsfstudy.run(STUDY, output=place / "zarr", workers=0, progress=False, format="zarr")
     (place / "zarr" / "small.zarr").rename(place / "small.zarr")
     shutil.copy(place / "small.nc", place / "whole.nc")
     motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=0.5, rtol=1e-4)
-    store.write(motion, place / "motion.nc")
+    store.write_dataset(motion, place / "motion.nc")
     time = np.arange(600) * 0.2
     moved = np.where(time < 60.0, time, 10.0 * time - 540.0)
     stress = 0.6 + 1e-4 * np.random.default_rng(1).standard_normal(600)
@@ -247,8 +283,8 @@ def fill(place: Path) -> dict[str, Any]:
     (place / "record.csv").write_text("\n".join([header, *rows]))
     (place / "record.dat").write_bytes(_xlook(np.full(600, 0.2), moved, stress))
     (place / "protocol.csv").write_text("velocity (um/s),duration (s)\n1,10\n10,20\n0,5\n")
-    shutil.copy(problem.shipped()[1], place / "problem.toml")
-    shutil.copy(problem.shipped()[1].with_suffix(".csv"), place / "01_answer.csv")
+    shutil.copy(problem.shipped_problems()[1], place / "problem.toml")
+    shutil.copy(problem.shipped_problems()[1].with_suffix(".csv"), place / "01_answer.csv")
     (place / "cases.csv").write_text("a (1),b_over_a (1)\n0.01,1.5\n0.012,1.6\n0.01,2\n")
     (place / "mine.mplstyle").write_text("font.size: 9\naxes.grid: True\nlines.linewidth: 1.5\n")
     (place / "study.txt").write_text("study.py")
@@ -271,7 +307,7 @@ def _xlook(*columns: np.ndarray) -> bytes:
 class Answer(NamedTuple):
     """Answer of a reader, with its kind, its text, the output and the first difference."""
 
-    how: str
+    kind: str
     text: str
     printed: str
     differs: str
@@ -347,23 +383,23 @@ def run_case(case: Case, whole: Path, truths: dict[str, Any]) -> Answer:
 
 # ---- faults --------------------------------------------------------------------------------------
 
-_LAST_RESORT = re.compile(
+_CATCH_ALL_MESSAGES = re.compile(
     "cannot be answered|cannot be had of this dataset|as rsfstudy made it|Look at what it names"
 )
 _CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
-_OF_RICH = re.compile(r"\x1b\[(?:[0-9;]*m|\?25[lh]|2K|1A)")
+_RICH_ESCAPES = re.compile(r"\x1b\[(?:[0-9;]*m|\?25[lh]|2K|1A)")
 
 
 def faults(answer: Answer) -> Iterator[str]:
     """Yield the problems in an answer."""
     everything = f"{answer.text} {answer.printed}"
-    if answer.how.startswith(("raised", "hangs", "dies")):
-        yield answer.how
+    if answer.kind.startswith(("raised", "hangs", "dies")):
+        yield answer.kind
     if "Traceback (most" in everything:
         yield "traceback"
-    if _LAST_RESORT.search(everything):
+    if _CATCH_ALL_MESSAGES.search(everything):
         yield "catch-all answer"
-    if _CONTROLS.search(_OF_RICH.sub("", everything)):
+    if _CONTROLS.search(_RICH_ESCAPES.sub("", everything)):
         yield "control character"
     if answer.differs:
         yield f"damage that passes: {answer.differs}"
@@ -380,7 +416,7 @@ def main() -> int:
     found: collections.Counter[str] = collections.Counter()
     ended: collections.Counter[str] = collections.Counter()
     with tempfile.TemporaryDirectory() as place, tempfile.TemporaryDirectory() as warm:
-        truths = fill(Path(place))
+        truths = write_valid_files(Path(place))
         shutil.copytree(place, warm, dirs_exist_ok=True)
         for file, kind in KINDS.items():  # import and compile the code that all cases need
             for reader in kind.readers:
@@ -390,7 +426,7 @@ def main() -> int:
             if not re.search(asked.only, str(case)):
                 continue
             answer = run_case(case, Path(place), truths)
-            ended[answer.how] += 1
+            ended[answer.kind] += 1
             wrong = list(faults(answer))
             found.update(wrong)
             if wrong or asked.case is not None:

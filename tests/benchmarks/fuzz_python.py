@@ -45,19 +45,19 @@ import xarray as xr
 from scipy.stats import norm
 
 import rsfstudy
-from rsfstudy import Axis, Laboratory, Scene, Study, reduce
+from rsfstudy import Axis, Rig, Scene, Study, reduce
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.measures.linear_stability import LinearStability
 
-LIMIT = 20.0
-START = 120.0
+CALL_TIME_LIMIT = 20.0
+START_TIME_LIMIT = 120.0
 CATCH_ALL = re.compile(r"cannot be answered|not as rsfstudy made it|cannot be had of this dataset")
 #: Parameters without junk, because a random value could start many processes.
-CLUSTERS = ("workers",)
+PARAMETERS_WITHOUT_JUNK = ("workers",)
 
 
-class Odd:
+class HostileObject:
     """Object whose ``repr`` and comparison raise an exception."""
 
     def __repr__(self) -> str:
@@ -69,7 +69,7 @@ class Odd:
     __hash__ = None  # type: ignore[assignment]
 
 
-def junk() -> list[Any]:
+def junk_values() -> list[Any]:
     """Create a list of unusual values of many types.
 
     The values are new objects in each call, because the tested functions may change them.
@@ -103,12 +103,39 @@ def junk() -> list[Any]:
         xr.Dataset(attrs={"scene": 5}), pd.Timestamp("2020"), pd.Timedelta("1s"),
     ]  # fmt: skip
     others = [
-        None, Ellipsis, NotImplemented, object(), int, dict, Scene, ValueError, ValueError("x"),
-        lambda: 1, lambda *a, **k: None, len, print, np, rsfstudy, Odd(), b"bytes", bytearray(2),
-        memoryview(b"a"), io.StringIO("a"), Path("."), Path("a" * 5000), Path("missing.nc"),
-        Path("/dev/null"), datetime.datetime(2020, 1, 1), datetime.timedelta(1), slice(1),
-        re.compile("a"), Scene(), Axis("b_over_a", [2.0]), random.Random(1), type("T", (), {}),
-    ]  # fmt: skip
+        None,
+        Ellipsis,
+        NotImplemented,
+        object(),
+        int,
+        dict,
+        Scene,
+        ValueError,
+        ValueError("x"),
+        lambda: 1,
+        lambda *a, **k: None,
+        len,
+        print,
+        np,
+        rsfstudy,
+        HostileObject(),
+        b"bytes",
+        bytearray(2),
+        memoryview(b"a"),
+        io.StringIO("a"),
+        Path("."),
+        Path("a" * 5000),
+        Path("missing.nc"),
+        Path("/dev/null"),
+        datetime.datetime(2020, 1, 1),
+        datetime.timedelta(1),
+        slice(1),
+        re.compile("a"),
+        Scene(),
+        Axis("b_over_a", [2.0]),
+        random.Random(1),
+        type("T", (), {}),
+    ]
     return [*numbers, *texts, *containers, *arrays, *tables, *others]
 
 
@@ -124,7 +151,7 @@ def record() -> Any:
     return rsfstudy.read_record({**columns, "normal_stress": np.full(60, 5.0)})
 
 
-def inputs(place: Path) -> dict[str, Any]:
+def valid_inputs(place: Path) -> dict[str, Any]:
     """Create the scenes, studies, datasets, records and files for valid calls."""
     quick = {"rtol": 1e-2, "engine": "scipy"}
     scene = Scene(stiffness_ratio=1.5, load_velocity_ratio=2.0, normal_stress="constant")
@@ -132,7 +159,7 @@ def inputs(place: Path) -> dict[str, Any]:
     axes = [Axis("law", ["slip", "slowness"]), Axis("b_over_a", [1.5, 2.0, 3.0])]
     base, measure = Scene(normal_stress="constant"), LinearStability()
     study = Study(name="fuzzed", title="Fuzzed", base=base, axes=axes, measure=measure)
-    rig = Laboratory(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s",
+    rig = Rig(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s",
                      stiffness="1 MPa/um")  # fmt: skip
     dataset = rsfstudy.run(study, workers=0, progress=False, output=place)
     motion = rsfstudy.simulate(scene, duration=0.1, **quick)
@@ -153,14 +180,14 @@ def inputs(place: Path) -> dict[str, Any]:
 
 
 #: Arguments of valid reductions. Each reduction uses those in its signature.
-REDUCED = {
+REDUCTION_ARGUMENTS = {
     "name": "made", "of": "critical_stiffness", "on": "b_over_a", "over": "b_over_a",
     "along": "b_over_a", "reference": 2.0, "q": 0.5, "form": "velocity_step_at_critical_stiffness",
 }  # fmt: skip
-RIG = {"normal_stress": "5 MPa", "slip_distance": "10 um", "reference_velocity": "1 um/s"}
+RIG_ARGUMENTS = {"normal_stress": "5 MPa", "slip_distance": "10 um", "reference_velocity": "1 um/s"}
 
 
-def targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
+def call_targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
     """Return all public functions, constructors and methods, with the arguments of a valid call.
 
     If there are no arguments for a required parameter, the fuzzer passes junk.
@@ -172,7 +199,7 @@ def targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[s
     fit = {"laws": ["slip"], "free": ["a", "mu_star"], "noise": "white", "slip_distance": 10.0,
            "stiffness": 3e-3, "budget": 20_000}  # fmt: skip
     valid: dict[str, dict[str, Any]] = {
-        "cell": {"file": known["file"], "place": {"law": "slip", "b_over_a": 2.0}},
+        "recompute_cell": {"file": known["file"], "place": {"law": "slip", "b_over_a": 2.0}},
         "check": {"dataset": dataset},
         "compare": {"first": dataset, "second": dataset},
         "critical_step": {"scene": scene, **quick},
@@ -190,7 +217,7 @@ def targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[s
         "rerun": {"file": known["file"], **still},
         "run": {"study": known["study"], "output": None, **still},
         "simulate": {"scene": scene, "duration": 0.1, **quick},
-        "picture": {"motion": known["motion"]},
+        "plot_motion": {"motion": known["motion"]},
         "to_si": {"dataset": dataset, "normal_stress": 5e6, "slip_distance": 1e-5},
         "Axis": {"dimension": "b_over_a", "values": [1.5, 2.0]},
         "Axis.samples": {"distribution": {"a": norm(0.01, 0.001)}, "n": 4},
@@ -198,10 +225,10 @@ def targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[s
         "Study": {"name": "s", "title": "S", "base": scene, "axes": known["axes"],
                   "measure": known["measure"]},
         "Study.caption": {"docstring": "One.\n\nTwo."},
-        "Laboratory": dict(RIG),
+        "Rig": dict(RIG_ARGUMENTS),
         "Claim": {"id": "C", "statement": "", "source": "", "variable": "v", "where": {},
                   "published": 1.0, "tolerance": 1.0, "reason": ""},
-        "Panel": {"x": "b_over_a", "y": "critical_stiffness", "by": ["law"]},
+        "Panel": {"x": "b_over_a", "y": "critical_stiffness", "hue": ["law"]},
         "Figure": {"panels": [rsfstudy.Panel(x="b_over_a", y="critical_stiffness")]},
         "Scene": {"normal_stress": "constant", "b_over_a": 2.0},
         "Segment": {"load_velocity": 2.0, "duration": 1.0},
@@ -210,19 +237,19 @@ def targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[s
     methods: dict[str, dict[str, Any]] = {
         "Record.window": {"begins": 5.0, "ends": 50.0},
         "Record.with_steps": {"steps": [(30.0, 30.0, 1.0, 10.0)]},
-        "Laboratory.axis": {"dimension": "slip_distance", "values": ["1 um", "2 um"]},
-        "Laboratory.dimensionless": {"value": "10 s"},
-        "Laboratory.scene": {"b_over_a": 2.0},
-        "Laboratory.protocol": {"segments": [{"velocity": "2 um/s"}]},
-        "Laboratory.in_units": {"dataset": known["motion"]},
+        "Rig.axis": {"dimension": "slip_distance", "values": ["1 um", "2 um"]},
+        "Rig.dimensionless": {"value": "10 s"},
+        "Rig.scene": {"b_over_a": 2.0},
+        "Rig.protocol": {"segments": [{"velocity": "2 um/s"}]},
+        "Rig.in_units": {"dataset": known["motion"]},
         "Scene.with_": {"b_over_a": 3.0},
-        "Scene.under": {"segment": rsfstudy.Segment(1.0)},
-        "Scene.acting": {"number": 0},
+        "Scene.with_segment": {"segment": rsfstudy.Segment(1.0)},
+        "Scene.segment_scene": {"number": 0},
         "Study.with_": {"b_over_a": [2.0]},
         "Axis.with_rows": {"rows": [{"b_over_a": 2.0}], "units": {}},
         "Accessor.to_si": {"normal_stress": 5e6, "slip_distance": 1e-5},
         "Accessor.slip_mode": {"stick_slip_from": "1 mm/s"},
-        "Accessor.draw": {"n": 3},
+        "Accessor.sample_parameters": {"n": 3},
     }
     found: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {}
     for name in rsfstudy.__all__:
@@ -235,8 +262,14 @@ def targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[s
     for name in reduce.__all__:
         member = getattr(reduce, name)
         taken = inspect.signature(member).parameters
-        found[f"reduce.{name}"] = member, {n: v for n, v in REDUCED.items() if n in taken}
-    found["reduce.reduced"] = reduce.reduced, {"dataset": dataset, "reductions": ()}
+        found[f"reduce.{name}"] = (
+            member,
+            {n: v for n, v in REDUCTION_ARGUMENTS.items() if n in taken},
+        )
+    found["reduce.apply_reductions"] = (
+        reduce.apply_reductions,
+        {"dataset": dataset, "reductions": ()},
+    )
     for module in ("critical_step", "elasticities", "healing", "limit_cycle", "linear_stability",
                    "rigid_response", "velocity_step"):  # fmt: skip
         for name, member in vars(importlib.import_module(f"rsfstudy.measures.{module}")).items():
@@ -244,7 +277,7 @@ def targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[s
             if inspect.isclass(member) and is_own and not name.startswith("_"):
                 found[f"measures.{name}"] = member, {}
     objects = {
-        "Record": known["record"], "Laboratory": rig, "Scene": scene, "Study": known["study"],
+        "Record": known["record"], "Rig": rig, "Scene": scene, "Study": known["study"],
         "Axis": known["axes"][0], "Accessor": dataset.rsf,
         "Accessor of a motion": known["motion"].rsf,
         "Accessor of a fit": known["fitted"].rsf, "Accessor of a cycle": known["cycle"].rsf,
@@ -263,10 +296,12 @@ def targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[s
             method, entry = getattr(thing, name), f"{title.split()[0]}.{name}"
             if inspect.isroutine(method) and _is_ours(method):
                 found[f"{title}.{name}"] = method, methods.get(entry, {})
-    return found | composed(known) | properties(known)
+    return found | composed_functions(known) | accessor_properties(known)
 
 
-def composed(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
+def composed_functions(
+    known: dict[str, Any],
+) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
     """Return functions that create an object and then use it.
 
     Examples are a study that is run, a figure that is drawn, and a dataset that is altered, written
@@ -279,7 +314,12 @@ def composed(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[
 
     def reduction_on_results(kind: str, **options: Any) -> Any:
         made = getattr(reduce, kind)(**options)
-        return reduce.reduced(dataset, (made,)), made(dataset), made.quantities, made.describe()
+        return (
+            reduce.apply_reductions(dataset, (made,)),
+            made(dataset),
+            made.quantities,
+            made.describe(),
+        )
 
     def study_with(**options: Any) -> Any:
         return rsfstudy.run(Study(**{**declared, **options}), **still)
@@ -309,9 +349,9 @@ def composed(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[
         return use(path)
 
     def rig_study(**options: Any) -> Any:
-        rig = Laboratory(**{**RIG, **options})
+        rig = Rig(**{**RIG_ARGUMENTS, **options})
         axis = rig.axis("slip_distance", ["10 um", "20 um"])
-        made = {**declared, "base": rig.scene(), "axes": [axis], "laboratory": rig}
+        made = {**declared, "base": rig.scene(), "axes": [axis], "rig": rig}
         return rsfstudy.run(Study(**made), **still).rsf.in_units()
 
     def moved(**options: Any) -> Any:
@@ -329,17 +369,19 @@ def composed(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[
     found: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         "study_with": (study_with, {**declared, "reductions": [], "claims": [], "plot": "lines",
                                     "references": [], "accuracy": rsfstudy.Accuracy(1e-2),
-                                    "laboratory": None, "summary": ""}),
-        "drawn": (drawn, {"x": "b_over_a", "y": "critical_stiffness", "by": ["law"], "each": [],
-                          "at": {}, "style": {}, "error": "", "says": "", "marks": [],
-                          "title": "t", "x_label": "x", "y_label": "y", "log": "", "through": None,
-                          "x_limits": (None, None), "y_limits": (0.0, 1.0), "alike": "",
-                          "name": None, "columns": 2, "legend_title": None, "when": None}),
+                                    "rig": None, "summary": ""}),
+        "drawn": (drawn, {"x": "b_over_a", "y": "critical_stiffness", "hue": ["law"], "facet": [],
+                          "isel": {}, "style": {}, "error_bars": "", "annotation": "",
+                          "overlays": [],
+                          "title": "t", "x_label": "x", "y_label": "y", "log": "", "fit_line": None,
+                          "x_limits": (None, None), "y_limits": (0.0, 1.0), "y_scale_group": "",
+                          "curve_label": None, "legend_columns": 2, "legend_title": None,
+                          "condition": None}),
         "measured": (measured, {**quick, "options": {"of": "load_velocity_ratio"}}),
         "asked": (asked, {"of": dataset}),
         "asked of a motion": (asked, {"of": known["motion"]}),
         "asked of a fit": (asked, {"of": known["fitted"]}),
-        "rig_study": (rig_study, {**RIG}),
+        "rig_study": (rig_study, {**RIG_ARGUMENTS}),
         "moved": (moved, {"law": "slip", "normal_stress": "constant", "load_velocity_ratio": 2.0,
                           "b_over_a": 2.0, "stiffness_ratio": 1.5, "inertia": False}),
         "loaded": (loaded, {"segments": [{"velocity": 2.0, "duration": 1.0}, {"velocity": 1.0}]}),
@@ -357,18 +399,20 @@ def composed(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[
     for name, use in uses.items():
         found[f"{name} a file"] = (lambda of, use=use: through_a_file(of, use)), {"of": dataset}
     for kind in reduce.__all__:
-        if kind not in ("Reduction", "reduced"):
+        if kind not in ("Reduction", "apply_reductions"):
             taken = inspect.signature(getattr(reduce, kind)).parameters
-            options = {n: v for n, v in REDUCED.items() if n in taken}
+            options = {n: v for n, v in REDUCTION_ARGUMENTS.items() if n in taken}
             found[f"reduced by {kind}"] = reduction_on_results, {"kind": kind, **options}
     return found
 
 
-def properties(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
+def accessor_properties(
+    known: dict[str, Any],
+) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
     """Return functions that read the properties of the dataset accessor."""
     found: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {}
     for of in ("dataset", "motion", "fitted", "cycle"):
-        for name in ("scene", "laboratory", "study"):
+        for name in ("scene", "rig", "study"):
             found[f"{of}.rsf.{name}"] = (
                 lambda of, name=name: isinstance(of, xr.Dataset) and getattr(of.rsf, name),
                 {"of": known[of]},
@@ -383,28 +427,28 @@ def _is_ours(method: Any) -> bool:
 # ---- mutations -----------------------------------------------------------------------------------
 
 
-def mutated(value: Any, draw: random.Random) -> Any:
+def mutate_value(value: Any, draw: random.Random) -> Any:
     """Return junk, or a copy of a value with junk in one place."""
     if draw.random() < 0.35:
         if isinstance(value, dict) and value:
             key = draw.choice(list(value))
-            return {**value, key: mutated(value[key], draw)}
+            return {**value, key: mutate_value(value[key], draw)}
         if isinstance(value, list | tuple) and value:
             at = draw.randrange(len(value))
-            made = [mutated(v, draw) if n == at else v for n, v in enumerate(value)]
+            made = [mutate_value(v, draw) if n == at else v for n, v in enumerate(value)]
             return type(value)(made) if type(value) in (list, tuple) else tuple(made)
         if isinstance(value, np.ndarray) and value.ndim == 1 and len(value):
             made = value.astype(object)
             made[draw.randrange(len(value))] = draw.choice([None, "a", np.nan, np.inf, 10**400])
             return made
         if isinstance(value, xr.Dataset):
-            return altered(value, draw)
+            return alter_dataset(value, draw)
         if isinstance(value, str | Path) and draw.random() < 0.5:
             return str(value) + draw.choice(["\0", "x", " ", "\x1b[31m", "/..", "\udcff"])
-    return draw.choice(junk())
+    return draw.choice(junk_values())
 
 
-def altered(dataset: xr.Dataset, draw: random.Random) -> xr.Dataset:
+def alter_dataset(dataset: xr.Dataset, draw: random.Random) -> xr.Dataset:
     """Change a dataset as a user may change it in a notebook."""
     names = [str(name) for name in dataset.variables]
     dims = [str(name) for name in dataset.dims]
@@ -417,13 +461,13 @@ def altered(dataset: xr.Dataset, draw: random.Random) -> xr.Dataset:
         return dataset.isel({draw.choice(dims): draw.choice([0, slice(0)])})
     if way == 2:
         key = draw.choice(list(dataset.attrs))
-        return dataset.assign_attrs({key: draw.choice(junk())})
+        return dataset.assign_attrs({key: draw.choice(junk_values())})
     if way == 3:
         return dataset.drop_attrs()
     if way == 4:
         made, name = dataset.copy(), draw.choice(names)
         attribute = draw.choice(["units", "long_name", "flag_values", "flag_meanings", "scale"])
-        made[name].attrs[attribute] = draw.choice(junk())
+        made[name].attrs[attribute] = draw.choice(junk_values())
         return made
     if way == 5:
         # xarray itself rejects another shape for a coordinate of a dimension
@@ -443,23 +487,23 @@ def call_of(
     """Return the arguments of a valid call with one or two invalid changes."""
     parameters = inspect.signature(function).parameters
     plain = [n for n, p in parameters.items() if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
-    plain = [n for n in plain if n not in CLUSTERS and n != "self"]
+    plain = [n for n in plain if n not in PARAMETERS_WITHOUT_JUNK and n != "self"]
     options = dict(valid)
     for name in plain:
         if parameters[name].default is inspect.Parameter.empty and name not in options:
-            options[name] = draw.choice(junk())
-    plain += [n for n in options if n not in plain and n not in CLUSTERS]
+            options[name] = draw.choice(junk_values())
+    plain += [n for n in options if n not in plain and n not in PARAMETERS_WITHOUT_JUNK]
     for _ in range(1 if draw.random() < 0.85 else 2):
         way = draw.random()
         if way < 0.8 and plain:
             name = draw.choice(plain)
-            options[name] = mutated(options.get(name), draw)
+            options[name] = mutate_value(options.get(name), draw)
         elif way < 0.9:
             name = draw.choice([*plain, "x", "b_over_a", "units"])
             options[draw.choice([name[:-1] or "y", f"{name}s", "\x1b[31m", "self"])] = 1
         elif way < 0.95:
-            return (*options.values(), *(draw.choice(junk()),) * draw.randrange(2)), {}
-        elif left := [name for name in options if name not in CLUSTERS]:
+            return (*options.values(), *(draw.choice(junk_values()),) * draw.randrange(2)), {}
+        elif left := [name for name in options if name not in PARAMETERS_WITHOUT_JUNK]:
             del options[draw.choice(left)]
     return (), options
 
@@ -517,7 +561,7 @@ def text_of(value: Any) -> str:
         return f"<{type(value).__name__}>"
 
 
-def work(seed: int, first: int, count: int, step: int) -> None:
+def make_calls(seed: int, first: int, count: int, step: int) -> None:
     """Make the selected calls, and print a line of JSON before and after each call."""
     lines = os.fdopen(os.dup(1), "w")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
@@ -527,8 +571,8 @@ def work(seed: int, first: int, count: int, step: int) -> None:
     os.chdir(place)
     (place / "kept").mkdir()
     warnings.simplefilter("ignore")
-    known = inputs(place / "kept")
-    every = targets(known)
+    known = valid_inputs(place / "kept")
+    every = call_targets(known)
     names = sorted(every)
     for number in range(first, count, step):
         draw = random.Random(f"{seed} {number}")
@@ -537,13 +581,13 @@ def work(seed: int, first: int, count: int, step: int) -> None:
         args, options = call_of(function, copy.copy(valid), draw)
         given = ", ".join([*map(text_of, args), *(f"{n}={text_of(v)}" for n, v in options.items())])
         print(json.dumps({"number": number, "call": f"{name}({given})"}), file=lines, flush=True)
-        faulthandler.dump_traceback_later(LIMIT - 2.0)
+        faulthandler.dump_traceback_later(CALL_TIME_LIMIT - 2.0)
         kind, told = outcome(function, args, options)
         faulthandler.cancel_dump_traceback_later()
         print(json.dumps({"number": number, "kind": kind, "text": told}), file=lines, flush=True)
 
 
-def watch(seed: int, first: int, count: int, step: int, found: queue.Queue[Any]) -> None:
+def supervise_calls(seed: int, first: int, count: int, step: int, found: queue.Queue[Any]) -> None:
     """Run the calls in a subprocess, and start a new subprocess after a hang or a crash."""
     number = first
     while number < count:
@@ -556,7 +600,7 @@ def watch(seed: int, first: int, count: int, step: int, found: queue.Queue[Any])
                 target=lambda p=process, q=lines: [*map(q.put, p.stdout), q.put("")]
             )
             reading.start()
-            pending, limit = "", START
+            pending, limit = "", START_TIME_LIMIT
             while True:
                 try:
                     line = lines.get(timeout=limit)
@@ -574,10 +618,10 @@ def watch(seed: int, first: int, count: int, step: int, found: queue.Queue[Any])
                 told = json.loads(line)
                 number = told["number"]
                 if "call" in told:
-                    pending, limit = told["call"], LIMIT
+                    pending, limit = told["call"], CALL_TIME_LIMIT
                     continue
                 found.put((number, told["kind"], pending, told["text"]))
-                pending, limit, number = "", LIMIT, number + step
+                pending, limit, number = "", CALL_TIME_LIMIT, number + step
             if pending:
                 number += step
     found.put(None)
@@ -594,13 +638,13 @@ def main() -> int:
     given = parser.parse_args()
     count = given.count if given.work else given.first + given.count
     if given.work:
-        work(given.seed, given.first, count, given.work)
+        make_calls(given.seed, given.first, count, given.work)
         return 0
     found: queue.Queue[Any] = queue.Queue()
     each = min(given.processes, given.count)
     for n in range(each):
         args = (given.seed, given.first + n, count, each, found)
-        threading.Thread(target=watch, args=args).start()
+        threading.Thread(target=supervise_calls, args=args).start()
     kinds: collections.Counter[str] = collections.Counter()
     while each:
         one = found.get()

@@ -38,12 +38,12 @@ def cases() -> dict[str, tuple[Measure, Scene]]:
     return found
 
 
-def calls_of(measure: Measure, scene: Scene) -> list[tuple[Any, ...]]:
+def record_calls(measure: Measure, scene: Scene) -> list[tuple[Any, ...]]:
     """Copies of the arguments of all calls of the loop in a measurement."""
     run, kept = machine.compiled_loop(), list[tuple[Any, ...]]()
 
     def noting(*arguments: Any) -> Any:
-        kept.append(copied(arguments))
+        kept.append(copy_arguments(arguments))
         return run(*arguments)
 
     with mock.patch.object(machine, "compiled_loop", return_value=noting):
@@ -51,14 +51,14 @@ def calls_of(measure: Measure, scene: Scene) -> list[tuple[Any, ...]]:
     return kept
 
 
-def copied(value: Any) -> Any:
+def copy_arguments(value: Any) -> Any:
     """Arguments that a call of the loop may change without a trace."""
     if isinstance(value, tuple):
-        return tuple(map(copied, value))
+        return tuple(map(copy_arguments, value))
     return value.copy() if isinstance(value, np.ndarray) else value
 
 
-def whole(measure: Measure, scene: Scene) -> float:
+def measurement_time(measure: Measure, scene: Scene) -> float:
     """How long a measurement takes, of a scene that is made anew."""
     fresh = Scene(**scene.as_dict())
     began = time.perf_counter()
@@ -66,10 +66,10 @@ def whole(measure: Measure, scene: Scene) -> float:
     return time.perf_counter() - began
 
 
-def again(calls: list[tuple[Any, ...]]) -> float:
+def repeated_call_time(calls: list[tuple[Any, ...]]) -> float:
     """How long the calls of the loop take, without the copies."""
     run = machine.compiled_loop()
-    arguments = [copied(each) for each in calls]
+    arguments = [copy_arguments(each) for each in calls]
     began = time.perf_counter()
     for each in arguments:
         run(*each)
@@ -80,13 +80,13 @@ def main(rounds: int) -> None:
     """Print a table."""
     print(f"{'':44}{'measure':>10}{'motions':>10}{'ratio':>7}{'calls':>7}{'sides':>7}")
     for name, (measure, scene) in cases().items():
-        calls = calls_of(measure, scene)
+        calls = record_calls(measure, scene)
         sides = measure(scene, ACCURACY).rhs_evaluations
-        took = min(whole(measure, scene) for _ in range(3))
-        motions = again(calls)
+        took = min(measurement_time(measure, scene) for _ in range(3))
+        motions = repeated_call_time(calls)
         for _ in range(rounds):
-            took = min(took, whole(measure, scene))
-            motions = min(motions, again(calls))
+            took = min(took, measurement_time(measure, scene))
+            motions = min(motions, repeated_call_time(calls))
         times = f"{1e6 * took:10.0f}{1e6 * motions:10.0f}{took / motions:7.2f}"
         print(f"{name:44}{times}{len(calls):7}{sides:7}")
 

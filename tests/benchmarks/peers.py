@@ -33,27 +33,30 @@ import numpy as np
 from contest import calls
 from contest.hand import HandNumba, HandScipy
 from contest.libraries import Cyrk, Diffrax, Heyoka, Numbalsoda, Sundae
-from contest.ours import Ours
-from contest.problem import Problem, marked, problem
+from contest.ours import RsfstudyEngine
+from contest.problem import Problem, cycle_problem, with_marks
 from rich.console import Console
 from rich.table import Table
 
 #: Rungs of the ladder of tolerances, in half decades.
-_LAST, _TIGHTEST_OF_OURS = 26, 22
+_LAST_RUNG, _TIGHTEST_RSFSTUDY_RUNG = 26, 22
 #: Rungs by which a search begins at a tolerance looser than the error asked for.
-_LOOSER = 3
+_START_RUNGS_LOOSER = 3
 #: Rungs beyond the first that meets it, among which the cheapest is sought.
-_TIGHTER = 2
+_EXTRA_RUNGS = 2
 #: Accuracies for which the package would set the marks, the loosest first.
-_MARKS = (1e-4, 1e-7, 1e-8, 1e-9, 1e-10)
+_MARK_RTOLS = (1e-4, 1e-7, 1e-8, 1e-9, 1e-10)
 #: Range of b/a of many scenes: where mass acts in a rupture, whatever the accuracy.
 _B_OVER_A = 1.5, 3.0
 #: Shortest time to measure, in seconds.
-_LONG_ENOUGH = 0.01
+_MIN_MEASURED_TIME = 0.01
 #: Whose tolerance a slow contestant's search begins with: that of the same steps.
-_LIKE = {"rsfstudy, scipy": "rsfstudy, compiled", "SciPy loop by hand": "Numba loop by hand"}
+_TOLERANCE_SOURCE = {
+    "rsfstudy, scipy": "rsfstudy, compiled",
+    "SciPy loop by hand": "Numba loop by hand",
+}
 #: Seconds after which a failing contestant is given up, and beyond which a run is slow.
-_PATIENCE, _SLOW = 60.0, 2.0
+_FAILURE_TIMEOUT, _SLOW_RUN_TIME = 60.0, 2.0
 console = Console(width=120)
 
 
@@ -67,26 +70,28 @@ class Entry:
     error: float = math.inf
     ms: float = math.inf
     failed: str = ""
-    began: float = field(default_factory=time.perf_counter)
+    started_at: float = field(default_factory=time.perf_counter)
 
     @property
     def tolerance(self) -> float:
         """The tolerance of the rung."""
         return float(10.0 ** (-self.rung / 2.0))
 
-    def choose(self, first: int, target: float, more: int) -> None:
+    def choose_tolerance(self, first: int, target: float, more: int) -> None:
         """Find the cheapest tolerance that meets the target: of the loosest that does, and some
         more, because too loose a tolerance may cost more steps.
         """
-        last = _TIGHTEST_OF_OURS if isinstance(self.contestant, Ours) else _LAST
+        last = (
+            _TIGHTEST_RSFSTUDY_RUNG if isinstance(self.contestant, RsfstudyEngine) else _LAST_RUNG
+        )
         meeting: list[tuple[float, int, float]] = []
         for rung in range(first, last + 1):
-            if self.failed and time.perf_counter() - self.began > _PATIENCE:
+            if self.failed and time.perf_counter() - self.started_at > _FAILURE_TIMEOUT:
                 break
-            error, seconds = self.tried(rung)
+            error, seconds = self.try_rung(rung)
             if error <= target:
                 meeting.append((seconds, rung, error))
-            if meeting and (rung >= meeting[0][1] + more or seconds > _SLOW):
+            if meeting and (rung >= meeting[0][1] + more or seconds > _SLOW_RUN_TIME):
                 break
         if meeting:
             self.failed = ""
@@ -94,7 +99,7 @@ class Entry:
         else:
             self.failed = self.failed or f"no tolerance meets {target:g}"
 
-    def tried(self, rung: int) -> tuple[float, float]:
+    def try_rung(self, rung: int) -> tuple[float, float]:
         """Error at a rung, and the seconds of a second run."""
         tolerance = 10.0 ** (-rung / 2.0)
         try:
@@ -107,10 +112,10 @@ class Entry:
             return math.inf, math.inf
         return error, time.perf_counter() - began
 
-    def measure(self) -> None:
+    def time_again(self) -> None:
         """Time it once more."""
         times, began = 0, time.perf_counter()
-        while times == 0 or time.perf_counter() - began < _LONG_ENOUGH:
+        while times == 0 or time.perf_counter() - began < _MIN_MEASURED_TIME:
             self.contestant.run(self.problems, self.tolerance)
             times += 1
         passed = time.perf_counter() - began
@@ -118,7 +123,7 @@ class Entry:
 
 
 @contextlib.contextmanager
-def silence() -> Iterator[None]:
+def silence_c_output() -> Iterator[None]:
     """Nothing of what libraries in C print, which warn of tolerances that are too loose."""
     flush = ctypes.CDLL(None).fflush
     kept, nowhere = [os.dup(1), os.dup(2)], os.open(os.devnull, os.O_WRONLY)
@@ -135,7 +140,7 @@ def silence() -> Iterator[None]:
         os.close(nowhere)
 
 
-def prepared(contestants: list[Any], law: str, variable: bool) -> dict[str, str]:
+def prepare_contestants(contestants: list[Any], law: str, variable: bool) -> dict[str, str]:
     """Have contestants prepare; why those that cannot, cannot."""
     failed = {}
     for contestant in contestants:
@@ -146,15 +151,15 @@ def prepared(contestants: list[Any], law: str, variable: bool) -> dict[str, str]
     return failed
 
 
-def with_marks(problems: list[Problem], judge: Any, target: float) -> list[Problem]:
+def with_best_marks(problems: list[Problem], judge: Any, target: float) -> list[Problem]:
     """Problems, each with the loosest marks that leave an error well below the target, or with the
     best of all.
     """
 
     def ready(it: Problem) -> Problem:
         errors: dict[float, Problem] = {}
-        for rtol in _MARKS:
-            known = marked(it, rtol)
+        for rtol in _MARK_RTOLS:
+            known = with_marks(it, rtol)
             error = it.error(judge.run([known], 1e-12)[0])
             if error <= 0.3 * target:
                 return known
@@ -164,7 +169,7 @@ def with_marks(problems: list[Problem], judge: Any, target: float) -> list[Probl
     return [ready(it) for it in problems]
 
 
-def raced(
+def race(
     contestants: list[Any],
     failed: dict[str, str],
     problems: list[Problem],
@@ -176,20 +181,22 @@ def raced(
     for contestant in contestants:
         entry = Entry(contestant, problems, failed=failed.get(contestant.name, ""))
         if not entry.failed:
-            like = entries.get(_LIKE.get(contestant.name, ""))
-            with silence():
+            like = entries.get(_TOLERANCE_SOURCE.get(contestant.name, ""))
+            with silence_c_output():
                 # the same steps are cheapest for both
-                first = like.rung if like else round(-2.0 * math.log10(target)) - _LOOSER
-                entry.choose(first, target, 0 if like else _TIGHTER)
+                first = (
+                    like.rung if like else round(-2.0 * math.log10(target)) - _START_RUNGS_LOOSER
+                )
+                entry.choose_tolerance(first, target, 0 if like else _EXTRA_RUNGS)
         entries[contestant.name] = entry
     for _ in range(rounds):
         for entry in entries.values():
             if not entry.failed:
-                entry.measure()
+                entry.time_again()
     return list(entries.values())
 
 
-def show(case: str, one: list[Entry], many: list[Entry]) -> None:
+def print_case(case: str, one: list[Entry], many: list[Entry]) -> None:
     """Print the table of a case, and why contestants fail."""
     head = ("tolerance", "error", "ms", "ratio")
     scenes = len(many[0].problems)
@@ -226,7 +233,7 @@ def main() -> None:
     warnings.simplefilter("ignore")
     judge = HandNumba()
     contestants = [
-        Ours("compiled"),
+        RsfstudyEngine("compiled"),
         judge,
         Cyrk(),
         Numbalsoda(),
@@ -234,32 +241,37 @@ def main() -> None:
         Heyoka(),
         Diffrax(),
         HandScipy(),
-        Ours("scipy"),
+        RsfstudyEngine("scipy"),
     ]
     laws = ("slip",) if chosen.quick else chosen.laws.split(",")
     stresses = ("constant",) if chosen.quick else chosen.stresses.split(",")
     targets = (1e-6,) if chosen.quick else (1e-6, 1e-9)
     count = 8 if chosen.quick else chosen.scenes
     for law, stress in itertools.product(laws, stresses):
-        failed = prepared(contestants, law, stress == "variable")
-        alone = [problem(calls.cycling(law, stress))]
-        together = [problem(calls.cycling(law, stress, x)) for x in np.linspace(*_B_OVER_A, count)]
+        failed = prepare_contestants(contestants, law, stress == "variable")
+        alone = [cycle_problem(calls.cycling_scene(law, stress))]
+        together = [
+            cycle_problem(calls.cycling_scene(law, stress, x))
+            for x in np.linspace(*_B_OVER_A, count)
+        ]
         head = "call", "error", "compiled, ms", "scipy, ms", "ratio"
         of_calls = Table(*head, title=f"{law}, {stress}")
         for target in targets:
             results = [
-                raced(contestants, failed, with_marks(of, judge, target), target, rounds)
+                race(contestants, failed, with_best_marks(of, judge, target), target, rounds)
                 for of, rounds in ((alone, chosen.rounds), (together, max(1, chosen.rounds // 2)))
             ]
-            show(f"{law}, {stress}, {target:g}", *results)
+            print_case(f"{law}, {stress}, {target:g}", *results)
             for call in calls.CALLS:
-                found = calls.compared(calls.called(call, law, stress), target, chosen.rounds)
+                found = calls.compare_at_equal_error(
+                    calls.make_call(call, law, stress), target, chosen.rounds
+                )
                 ours, theirs = (found[engine][2] for engine in calls.ENGINES)
                 ratio = f"{theirs / ours:.1f}"
                 of_calls.add_row(call, f"{target:g}", f"{ours:.1f}", f"{theirs:.1f}", ratio)
         console.print(of_calls)
     uses = Table("seconds until the first cell", "s")
-    for name, seconds in calls.first_uses(1 if chosen.quick else 3).items():
+    for name, seconds in calls.first_use_times(1 if chosen.quick else 3).items():
         uses.add_row(name, f"{seconds:.2f}")
     console.print(uses)
 

@@ -16,11 +16,11 @@ from typing import Any
 from unittest import mock
 
 from contest import hand, ours
-from contest.calls import cycling
+from contest.calls import cycling_scene
 from contest.hand import HandNumba, HandScipy
-from contest.ours import Ours
-from contest.problem import Problem, meter, problem
-from peers import with_marks
+from contest.ours import RsfstudyEngine
+from contest.problem import Problem, cycle_problem, meter
+from peers import with_best_marks
 
 from rsfstudy.motion.accuracy import Accuracy
 
@@ -28,36 +28,36 @@ RTOL = 1e-5
 ENGINES = "scipy", "python"
 
 
-class Counting(hand.DOP853):  # type: ignore[misc]
+class CountingIntegrator(hand.DOP853):  # type: ignore[misc]
     """SciPy's integrator, which counts all right-hand sides there are."""
 
     count = 0
 
     def __init__(self, rate: Callable[..., Any], *arguments: Any, **named: Any) -> None:
         def counted(t: float, y: Any) -> Any:
-            Counting.count += 1
+            CountingIntegrator.count += 1
             return rate(t, y)
 
         super().__init__(counted, *arguments, **named)
 
 
-def sides_by_hand(run: Callable[[], Any]) -> int:
+def evaluations_by_hand(run: Callable[[], Any]) -> int:
     """Right-hand sides of the loop by hand."""
-    Counting.count = 0
-    with mock.patch.object(hand, "DOP853", Counting):
+    CountingIntegrator.count = 0
+    with mock.patch.object(hand, "DOP853", CountingIntegrator):
         run()
-    return Counting.count
+    return CountingIntegrator.count
 
 
-def sides_of_ours(problems: list[Problem]) -> int:
+def evaluations_of_engines(problems: list[Problem]) -> int:
     """Right-hand sides of the engines, which are the same for both."""
     counted = meter("scipy")
     with mock.patch.object(ours, "meter", return_value=counted):
-        Ours("scipy").run(problems, RTOL)
-    return counted.spent
+        RsfstudyEngine("scipy").run(problems, RTOL)
+    return counted.evaluations
 
 
-def shortest(runs: dict[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
+def shortest_times(runs: dict[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
     """Times of some runs."""
     took = dict.fromkeys(runs, float("inf"))
     for _ in range(rounds):
@@ -71,19 +71,19 @@ def shortest(runs: dict[str, Callable[[], Any]], rounds: int) -> dict[str, float
 def main(rounds: int) -> None:
     """Print a table."""
     judge, by_hand = HandNumba(), HandScipy()
-    tolerance = Accuracy(RTOL).solver
+    tolerance = Accuracy(RTOL).local_tolerance
     print(f"{'':20}{'by hand':>10}{'sides':>7}{'scipy':>8}{'python':>8}{'sides':>7}")
     for law in ("slip", "slowness"):
         for stress in ("constant", "variable"):
             for contestant in (judge, by_hand):
                 contestant.prepare(law, stress == "variable")
-            problems = with_marks([problem(cycling(law, stress))], judge, 1e-6)
+            problems = with_best_marks([cycle_problem(cycling_scene(law, stress))], judge, 1e-6)
             runs: dict[str, Callable[[], Any]] = {
-                engine: partial(Ours(engine).run, problems, RTOL) for engine in ENGINES
+                engine: partial(RsfstudyEngine(engine).run, problems, RTOL) for engine in ENGINES
             }
             runs["by hand"] = partial(by_hand.run, problems, tolerance)
-            sides = sides_by_hand(runs["by hand"]), sides_of_ours(problems)
-            took = shortest(runs, rounds)
+            sides = evaluations_by_hand(runs["by hand"]), evaluations_of_engines(problems)
+            took = shortest_times(runs, rounds)
             ratios = "".join(f"{took[engine] / took['by hand']:8.2f}" for engine in ENGINES)
             print(f"{law + ', ' + stress:20}{1e3 * took['by hand']:7.2f} ms{sides[0]:7}", end="")
             print(f"{ratios}{sides[1]:7}")

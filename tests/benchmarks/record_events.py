@@ -56,12 +56,12 @@ class Score(NamedTuple):
     sizes: int = 0
     times: int = 0
 
-    def plus(self, other: Score) -> Score:
+    def add(self, other: Score) -> Score:
         """Add the counts of two scores."""
         return Score(*(one + two for one, two in zip(self, other, strict=True)))
 
 
-def draw(
+def draw_record(
     rng: np.random.Generator,
     time: np.ndarray,
     *,
@@ -109,35 +109,35 @@ def draw(
     return Catalogue(time, stress, begins, durations, sizes)
 
 
-def whole(rng: np.random.Generator, **options: float) -> Catalogue:
+def sudden_drops(rng: np.random.Generator, **options: float) -> Catalogue:
     """Generate sudden drops, sampled at 50 Hz."""
-    return draw(rng, 0.02 * np.arange(10_000), **options)  # type: ignore[arg-type]
+    return draw_record(rng, 0.02 * np.arange(10_000), **options)  # type: ignore[arg-type]
 
 
-def triggered(rng: np.random.Generator) -> Catalogue:
+def triggered_bursts(rng: np.random.Generator) -> Catalogue:
     """Generate drops of 10 to 50 ms, sampled at 10 Hz with bursts at 1 kHz."""
     state = rng.bit_generator.state
     slow = 0.1 * np.arange(2_000)
-    begins = draw(rng, slow, lasts=(0.01, 0.05)).begins
+    begins = draw_record(rng, slow, lasts=(0.01, 0.05)).begins
     bursts = [np.arange(begin - 0.05, begin + 0.15, 0.001) for begin in begins]
     time = np.unique(np.concatenate([slow, *bursts]).round(6))
     rng.bit_generator.state = state
-    return draw(rng, time, lasts=(0.01, 0.05))
+    return draw_record(rng, time, lasts=(0.01, 0.05))
 
 
-def slow(rng: np.random.Generator) -> Catalogue:
+def slow_drops(rng: np.random.Generator) -> Catalogue:
     """Generate slow drops that last 2 to 4 s, at intervals of 10 s."""
-    return draw(rng, 0.02 * np.arange(10_000), lasts=(2.0, 4.0))
+    return draw_record(rng, 0.02 * np.arange(10_000), lasts=(2.0, 4.0))
 
 
-def short(rng: np.random.Generator) -> Catalogue:
+def short_drops(rng: np.random.Generator) -> Catalogue:
     """Generate short drops that last 2 to 6 sampling intervals."""
-    return draw(rng, 0.02 * np.arange(10_000), lasts=(0.04, 0.12))
+    return draw_record(rng, 0.02 * np.arange(10_000), lasts=(0.04, 0.12))
 
 
-def cut(rng: np.random.Generator) -> Catalogue:
+def cut_record(rng: np.random.Generator) -> Catalogue:
     """Generate a record that ends during a drop."""
-    made = draw(rng, 0.02 * np.arange(10_000), lasts=(0.2, 1.0))
+    made = draw_record(rng, 0.02 * np.arange(10_000), lasts=(0.2, 1.0))
     stop = made.begins[-1] + rng.uniform(0.4, 0.8) * made.durations[-1]
     rows = made.time <= stop
     sizes = made.sizes.copy()
@@ -145,35 +145,42 @@ def cut(rng: np.random.Generator) -> Catalogue:
     return made._replace(time=made.time[rows], stress=made.stress[rows], sizes=sizes)
 
 
-def negative(rng: np.random.Generator) -> Catalogue:
+def negative_stress(rng: np.random.Generator) -> Catalogue:
     """Generate sudden drops of a negative shear stress."""
-    made = whole(rng)
+    made = sudden_drops(rng)
     return made._replace(stress=-made.stress)
 
 
-def small(rng: np.random.Generator) -> Catalogue:
+def small_drops(rng: np.random.Generator) -> Catalogue:
     """Generate sudden drops of 1.5 to 10 standard deviations of the noise."""
-    return whole(rng, size=(0.03, 0.2), noise=0.02)  # type: ignore[arg-type]
+    return sudden_drops(rng, size=(0.03, 0.2), noise=0.02)  # type: ignore[arg-type]
 
 
-def correlated(rng: np.random.Generator) -> Catalogue:
+def correlated_noise(rng: np.random.Generator) -> Catalogue:
     """Generate short drops in noise with a correlation of 0.5 between successive samples."""
-    return draw(rng, 0.02 * np.arange(10_000), lasts=(0.04, 0.12), correlation=0.5)
+    return draw_record(rng, 0.02 * np.arange(10_000), lasts=(0.04, 0.12), correlation=0.5)
 
 
-def uneven(rng: np.random.Generator) -> Catalogue:
+def uneven_sampling(rng: np.random.Generator) -> Catalogue:
     """Generate drops of up to 0.3 s with sampling times that vary by 30 % of the interval."""
     time = 0.02 * (np.arange(10_000) + rng.uniform(-0.3, 0.3, 10_000))
-    return draw(rng, time, lasts=(0.0, 0.3))
+    return draw_record(rng, time, lasts=(0.0, 0.3))
 
 
 KINDS: dict[str, Callable[[np.random.Generator], Catalogue]] = {
-    made.__name__: made
-    for made in (whole, triggered, slow, short, cut, negative, small, correlated, uneven)
+    "whole": sudden_drops,
+    "triggered": triggered_bursts,
+    "slow": slow_drops,
+    "short": short_drops,
+    "cut": cut_record,
+    "negative": negative_stress,
+    "small": small_drops,
+    "correlated": correlated_noise,
+    "uneven": uneven_sampling,
 }
 
 
-def score(catalogue: Catalogue) -> Score:
+def score_record(catalogue: Catalogue) -> Score:
     """Compare the events that `rsfstudy.events` finds with the drops of a record."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -190,12 +197,12 @@ def score(catalogue: Catalogue) -> Score:
         over = np.flatnonzero((begins <= stop + reach) & (ends >= start - reach))
         fresh = [int(place) for place in over if int(place) not in taken]
         if not fresh:
-            result = result.plus(Score(false=1))
+            result = result.add(Score(false=1))
             continue
         place = fresh[0]
         taken.add(place)
         drop, of = (float(one[f"static_stress_drop{end}"]) for end in ("", "_error"))
-        result = result.plus(
+        result = result.add(
             Score(
                 found=int(large[place]),
                 matched=1,
@@ -212,7 +219,7 @@ def main(count: int = 30) -> None:
     for kind, make in KINDS.items():
         total = Score()
         for seed in range(count):
-            total = total.plus(score(make(np.random.default_rng([seed, *kind.encode()]))))
+            total = total.add(score_record(make(np.random.default_rng([seed, *kind.encode()]))))
         shares = (
             100.0 * part / max(whole_of, 1)
             for part, whole_of in (

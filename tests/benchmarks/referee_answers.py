@@ -18,24 +18,32 @@ import mpmath
 from referee_numbers import (
     UNITS,
     Numbers,
-    by_second,
     columns,
     damped_cycle,
     displacement_by_quadrature,
-    excess_of_peak,
-    of_velocity,
+    peak_excess,
+    second_way_rows,
+    velocity_excess,
 )
-from referee_ways import PROBLEMS, Slider, State, Steps, agrees, by, stated
+from referee_ways import (
+    PROBLEMS,
+    ExtrapolatedSteps,
+    ProblemSlider,
+    State,
+    read_stated_problem,
+    rounds_to,
+    rows_by_way,
+)
 
 
-class AsStated:
+class StatedEquations:
     """Unknowns tau, thetas, slip, phi and p, and slip rate where there is mass, in SI units."""
 
     def __init__(self, problem: dict[str, Any]) -> None:
-        self.s = s = Slider(problem, mpmath.mp, lambda x: mpmath.mpf(str(x)))
+        self.s = s = ProblemSlider(problem, mpmath.mp, lambda x: mpmath.mpf(str(x)))
         self.load, self.imposed = s.star, s.sigma
         states = [abs(star) for star in s.theta_star]
-        self.steps = Steps(
+        self.steps = ExtrapolatedSteps(
             20, mpmath.mpf("1e-19"), [s.sigma / 100, *states, *s.lengths[:1], 1, 1, s.star]
         )
         self.last = mpmath.mpf(0)
@@ -138,9 +146,9 @@ class AsStated:
         return [y[0], *thetas, *y[1 + count :]]
 
 
-def two_states_in_closed_form(problem: dict[str, Any]) -> Numbers:
+def two_state_closed_form(problem: dict[str, Any]) -> Numbers:
     """The root of a quadratic equation: Gu et al. (1984), for the slip law with two states."""
-    s = AsStated(problem).s
+    s = StatedEquations(problem).s
     (b_1, b_2), rho = (b / s.a for b in s.b), s.lengths[0] / s.lengths[1]
     half = b_1 - 1 + rho * (2 * b_1 + (b_2 - 1) * (2 + rho))
     under = half**2 + 4 * rho * (1 + rho) * (b_1 + b_2 - 1) * (1 + rho - b_1 - b_2 * rho)
@@ -148,9 +156,9 @@ def two_states_in_closed_form(problem: dict[str, Any]) -> Numbers:
     return {"critical_stiffness": ratio * s.a * s.sigma / s.lengths[0]}
 
 
-def growth_in_closed_form(problem: dict[str, Any]) -> Numbers:
+def growth_closed_form(problem: dict[str, Any]) -> Numbers:
     """Of a quadratic equation, with stress over sigma, time in D_c/V_*."""
-    s = AsStated(problem).s
+    s = StatedEquations(problem).s
     b, scale = s.b[0], s.sigma / s.lengths[0]
     eta, k = s.eta * s.star / s.sigma, s.k / scale
     half = ((b - k) / (s.a + eta) - 1) / 2
@@ -160,18 +168,18 @@ def growth_in_closed_form(problem: dict[str, Any]) -> Numbers:
     return numbers | {"critical_stiffness": (b - s.a - eta) * scale}
 
 
-def of_displacement(problem: dict[str, Any]) -> Callable[[Any], Any]:
+def displacement_excess(problem: dict[str, Any]) -> Callable[[Any], Any]:
     """``displacement -> excess``, as stated."""
 
     def excess(displacement: Any) -> Any:
-        way = AsStated(problem)
+        way = StatedEquations(problem)
         tau, *others = way.enter(way.begin(), mpmath.mpf(0), way.s.sigma)
-        return excess_of_peak(way, [tau + way.s.k * displacement, *others])
+        return peak_excess(way, [tau + way.s.k * displacement, *others])
 
     return excess
 
 
-def by_secant(excess: Callable[[Any], Any], near: Any) -> Any:
+def solve_by_secant(excess: Callable[[Any], Any], near: Any) -> Any:
     """Where an excess vanishes, from close by."""
     first, second = near, near * (1 + mpmath.mpf("1e-9"))
     at_first, at_second = excess(first), excess(second)
@@ -183,26 +191,32 @@ def by_secant(excess: Callable[[Any], Any], near: Any) -> Any:
     return third
 
 
-def first_way(problem: dict[str, Any]) -> Numbers:
+def first_way_numbers(problem: dict[str, Any]) -> Numbers:
     """Numbers by closed forms, and by the equations as stated."""
     (name, *_others) = problem["quantities"]
     if name == "critical_stiffness":
         two = problem["law"] == "two_slip_states"
-        return (two_states_in_closed_form if two else growth_in_closed_form)(problem)
+        return (two_state_closed_form if two else growth_closed_form)(problem)
     if name == "critical_velocity":
-        return {name: by_secant(of_velocity(AsStated, problem), mpmath.mpf("2.967e-6"))}
+        return {
+            name: solve_by_secant(velocity_excess(StatedEquations, problem), mpmath.mpf("2.967e-6"))
+        }
     if name == "critical_displacement":
         near = mpmath.mpf(repr(displacement_by_quadrature(problem)))
-        return {name: by_secant(of_displacement(problem), near)}
-    return damped_cycle(AsStated, problem, 1e-15)
+        return {name: solve_by_secant(displacement_excess(problem), near)}
+    return damped_cycle(StatedEquations, problem, 1e-15)
 
 
-def by_first(problem: dict[str, Any]) -> list[dict[str, Any]]:
+def first_way_rows(problem: dict[str, Any]) -> list[dict[str, Any]]:
     """Rows of an answer, with 30 digits."""
-    return [first_way(problem)] if problem["report"] == "numbers" else by(AsStated, problem)
+    return (
+        [first_way_numbers(problem)]
+        if problem["report"] == "numbers"
+        else rows_by_way(StatedEquations, problem)
+    )
 
 
-def text(name: str, value: Any, problem: dict[str, Any]) -> str:
+def format_number(name: str, value: Any, problem: dict[str, Any]) -> str:
     """A number with as many digits as the problem has; what says which row it is, as it is."""
     if name == columns(problem)[0] and problem["report"] != "numbers":
         return f"{float(value):.12g}"
@@ -212,14 +226,14 @@ def text(name: str, value: Any, problem: dict[str, Any]) -> str:
     return mpmath.nstr(mpmath.mpf(value), digits, strip_zeros=False, min_fixed=0, max_fixed=0)
 
 
-def write(path: Path) -> None:
-    problem = stated(path)
+def write_answers(path: Path) -> None:
+    problem = read_stated_problem(path)
     names = columns(problem)
-    first, second = by_first(problem), by_second(problem)
-    rows = [[text(name, row[name], problem) for name in names] for row in first]
+    first, second = first_way_rows(problem), second_way_rows(problem)
+    rows = [[format_number(name, row[name], problem) for name in names] for row in first]
     for row, other in zip(rows, second, strict=True):
         for name, told in zip(names, row, strict=True):
-            if not agrees(told, other[name]) and name not in ("event",):
+            if not rounds_to(told, other[name]) and name not in ("event",):
                 print("  differ:", path.stem, name, told, other[name])
     with path.with_suffix(".csv").open("w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
@@ -232,4 +246,4 @@ if __name__ == "__main__":
     mpmath.mp.dps = 30
     for each in sorted(PROBLEMS.glob("*.toml")):
         if len(sys.argv) == 1 or each.name[:2] in sys.argv[1:]:
-            write(each)
+            write_answers(each)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from referee_ways import InLogarithms, by, located
+from referee_ways import LogarithmicEquations, locate_extremum, rows_by_way
 from scipy.optimize import brentq
 
 Numbers = dict[str, Any]
@@ -28,7 +28,7 @@ def two_states_by_oscillation(problem: dict[str, Any]) -> Numbers:
     """The stiffness at which an oscillation neither grows nor decays: p = i q in the linearised
     equations ``k/(sigma p) V + a + sum_i of b_i times -(V/L_i)/(p + V/L_i) = 0``.
     """
-    s = InLogarithms(problem).s
+    s = LogarithmicEquations(problem).s
 
     def stiffness(q: float) -> complex:
         sums = sum(b / (1j * q / (s.star / x) + 1.0) for b, x in zip(s.b, s.lengths, strict=True))
@@ -41,7 +41,7 @@ def two_states_by_oscillation(problem: dict[str, Any]) -> Numbers:
 
 def growth_by_eigenvalues(problem: dict[str, Any]) -> Numbers:
     """Of the equations as stated, in tau and theta, linearised by hand."""
-    s = InLogarithms(problem).s
+    s = LogarithmicEquations(problem).s
     theta, length, b = s.theta_star[0], s.lengths[0], s.b[0]
 
     def eigenvalues(k: float) -> np.ndarray:
@@ -65,7 +65,7 @@ def growth_by_eigenvalues(problem: dict[str, Any]) -> Numbers:
 # ---- critical steps ------------------------------------------------------------------------------
 
 
-def excess_of_peak(way: Any, begin: list[Any]) -> Any:
+def peak_excess(way: Any, begin: list[Any]) -> Any:
     """ln of the first maximum of slip rate over the one that counts as unstable."""
     s, zero = way.s, way.s.number(0)
     unit, unstable = getattr(way, "unit", 1), s.number(s.given["V_unstable"])
@@ -75,19 +75,19 @@ def excess_of_peak(way: Any, begin: list[Any]) -> Any:
         if way.now(after_t, after)["slip_rate"] > 100 * unstable:
             return s.m.log(100)
         if way.growth(t, before) > 0 >= way.growth(after_t, after):
-            peak = way.now(t, located(way, t, before, h)[1])
+            peak = way.now(t, locate_extremum(way, t, before, h)[1])
             return s.m.log(peak["slip_rate"] / unstable)
         t, before, h = after_t, after, length
     raise AssertionError
 
 
-def of_velocity(kind: type, problem: dict[str, Any]) -> Callable[[Any], Any]:
+def velocity_excess(kind: type, problem: dict[str, Any]) -> Callable[[Any], Any]:
     """``V_0 -> excess`` by one of the two ways."""
 
     def excess(velocity: Any) -> Any:
         way = kind(problem)
         begin = way.begin()
-        return excess_of_peak(way, way.enter(begin, velocity, way.s.sigma))
+        return peak_excess(way, way.enter(begin, velocity, way.s.sigma))
 
     return excess
 
@@ -97,7 +97,7 @@ def displacement_by_quadrature(problem: dict[str, Any]) -> float:
     ln(theta V/2 D_c) alone, h = -sinh(u), and ``d ln V/d(slip) = -K/a - (b/a) h``: slip rate is
     highest where h = -K/b.
     """
-    way = InLogarithms(problem)
+    way = LogarithmicEquations(problem)
     s, k = way.s, way.k
     b, a = s.b[0], s.a
     end, limit = math.asinh(k / b), math.log(float(s.given["V_unstable"]) / s.star)
@@ -136,7 +136,7 @@ def damped_cycle(kind: type, problem: dict[str, Any], closes: float) -> Numbers:
     for after_t, after, length in walk:
         for sign, told in found.items():
             if sign * way.growth(t, before) > 0 >= sign * way.growth(after_t, after):
-                late, there = located(way, t, before, h, sign)
+                late, there = locate_extremum(way, t, before, h, sign)
                 told.append(((t + late) * unit, way.now(t + late, there)["slip_rate"]))
         peaks = found[1]
         if len(peaks) > 3 and abs(peaks[-1][1] / peaks[-2][1] - 1) < closes and found[-1]:
@@ -152,7 +152,7 @@ def damped_cycle(kind: type, problem: dict[str, Any], closes: float) -> Numbers:
 # ---- all of them ---------------------------------------------------------------------------------
 
 
-def second_way(problem: dict[str, Any]) -> Numbers:
+def second_way_numbers(problem: dict[str, Any]) -> Numbers:
     """The same by other formulations, in double precision."""
     (name, *_others) = problem["quantities"]
     if name == "critical_stiffness":
@@ -161,17 +161,25 @@ def second_way(problem: dict[str, Any]) -> Numbers:
     if name == "critical_velocity":
         return {
             name: brentq(
-                of_velocity(InLogarithms, problem), 2.966e-6, 2.968e-6, xtol=1e-300, rtol=1e-15
+                velocity_excess(LogarithmicEquations, problem),
+                2.966e-6,
+                2.968e-6,
+                xtol=1e-300,
+                rtol=1e-15,
             )
         }
     if name == "critical_displacement":
         return {name: displacement_by_quadrature(problem)}
-    return damped_cycle(InLogarithms, problem, 1e-13)
+    return damped_cycle(LogarithmicEquations, problem, 1e-13)
 
 
-def by_second(problem: dict[str, Any]) -> list[dict[str, Any]]:
+def second_way_rows(problem: dict[str, Any]) -> list[dict[str, Any]]:
     """Rows of an answer, in double precision."""
-    return [second_way(problem)] if problem["report"] == "numbers" else by(InLogarithms, problem)
+    return (
+        [second_way_numbers(problem)]
+        if problem["report"] == "numbers"
+        else rows_by_way(LogarithmicEquations, problem)
+    )
 
 
 def columns(problem: dict[str, Any]) -> list[str]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from referee_ways import PROBLEMS, stated
+from referee_ways import PROBLEMS, read_stated_problem
 
 PAGE = Path(__file__).parents[2] / "studies" / "pages" / "referee.md"
-MARK = "<!-- problems: written by tests/benchmarks/referee_page.py -->\n"
+PROBLEMS_MARKER = "<!-- problems: written by tests/benchmarks/referee_page.py -->\n"
 
 
-def part(number: int, problem: dict[str, Any]) -> str:
+def problem_section(number: int, problem: dict[str, Any]) -> str:
     """What a problem is, as a part of the page."""
     initial = problem.get("initial")
     begins = [f"{n}(0) = {_plain(value)}" for n, value in (initial or {}).items()]
@@ -59,12 +59,14 @@ def _report(problem: dict[str, Any]) -> str:
     return names
 
 
-def parts() -> str:
+def all_sections() -> str:
     """All of them."""
     files = sorted(PROBLEMS.glob("*.toml"))
-    return "\n".join(part(int(file.name[:2]), stated(file)) for file in files)
+    return "\n".join(
+        problem_section(int(file.name[:2]), read_stated_problem(file)) for file in files
+    )
 
 
 if __name__ == "__main__":
-    before = PAGE.read_text().partition(MARK)[0]
-    PAGE.write_text(before + MARK + "\n" + parts())
+    before = PAGE.read_text().partition(PROBLEMS_MARKER)[0]
+    PAGE.write_text(before + PROBLEMS_MARKER + "\n" + all_sections())

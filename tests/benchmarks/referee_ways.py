@@ -23,11 +23,11 @@ State = list[Any]
 Rates = Callable[[Any, State], State]
 
 
-def stated(path: Path) -> dict[str, Any]:
+def read_stated_problem(path: Path) -> dict[str, Any]:
     return tomllib.loads(path.read_text())
 
 
-def plain(value: Any) -> Any:
+def strip_units(value: Any) -> Any:
     """A number, without the units that are SI in every problem."""
     return value.split()[0] if isinstance(value, str) else value
 
@@ -35,7 +35,7 @@ def plain(value: Any) -> Any:
 # ---- integration ---------------------------------------------------------------------------------
 
 
-class Steps:
+class ExtrapolatedSteps:
     """Extrapolated midpoint steps of adaptive length, in any arithmetic."""
 
     def __init__(self, order: int, tolerance: Any, scales: Sequence[Any]) -> None:
@@ -90,7 +90,7 @@ class Steps:
             h = taken * min(3.0, 0.8 * max(size, 1e-30) ** -grows)
         yield t, y, None
 
-    def to(self, rates: Rates, t: Any, y: State, until: Any) -> State:
+    def advance_to(self, rates: Rates, t: Any, y: State, until: Any) -> State:
         *_others, (_t, y, _h) = self.path(rates, t, y, until, until - t)
         return y
 
@@ -98,13 +98,14 @@ class Steps:
 # ---- what a problem states -----------------------------------------------------------------------
 
 
-class Slider:
+class ProblemSlider:
     """The numbers of a problem in an arithmetic: `number` makes them, `m` has exp and log."""
 
     def __init__(self, problem: dict[str, Any], m: Any, number: Callable[[Any], Any]) -> None:
         self.m, self.problem, self.law = m, problem, problem["law"]
         given = {
-            n: v if isinstance(v, bool) else plain(v) for n, v in problem["parameters"].items()
+            n: v if isinstance(v, bool) else strip_units(v)
+            for n, v in problem["parameters"].items()
         }
 
         def of(name: str, other: Any = 0) -> Any:
@@ -123,7 +124,7 @@ class Slider:
         self.b, self.lengths = zip(*((of(b), of(d)) for b, d in pairs), strict=True)
         factor = 2 if self.law == "perrin_rice_zheng" else 1
         if self.law == "composite":
-            factor = m.exp(rest_of_composite(m.exp(-self.star / self.cutoff), m))
+            factor = m.exp(composite_rest_state(m.exp(-self.star / self.cutoff), m))
         self.theta_star = [factor * length / self.star for length in self.lengths]
         size = sum(abs(b) for b in self.b)
         self.shares = [abs(b) / size for b in self.b]
@@ -146,9 +147,9 @@ class Slider:
         """Beginning, load point velocity and normal stress of each segment of loading."""
         found, begins, sigma = [], self.number(0), self.sigma
         for segment in self.problem.get("loading") or [{"velocity": self.star}]:
-            sigma = self.number(plain(segment.get("normal_stress", sigma)))
-            found.append((begins, self.number(plain(segment["velocity"])), sigma))
-            begins = begins + self.number(plain(segment.get("duration", 0)))
+            sigma = self.number(strip_units(segment.get("normal_stress", sigma)))
+            found.append((begins, self.number(strip_units(segment["velocity"])), sigma))
+            begins = begins + self.number(strip_units(segment.get("duration", 0)))
         return found
 
     def initial(self) -> tuple[Any, list[Any]]:
@@ -157,10 +158,12 @@ class Slider:
         if not stated:
             return self.star, list(self.theta_star)
         thetas = stated["theta"] if isinstance(stated["theta"], list) else [stated["theta"]]
-        return self.number(plain(stated["slip_rate"])), [self.number(plain(x)) for x in thetas]
+        return self.number(strip_units(stated["slip_rate"])), [
+            self.number(strip_units(x)) for x in thetas
+        ]
 
 
-def rest_of_composite(healing: Any, m: Any) -> Any:
+def composite_rest_state(healing: Any, m: Any) -> Any:
     """u with u exp(u) = healing, by Newton's method."""
     u = healing / 2
     for _ in range(60):
@@ -171,19 +174,19 @@ def rest_of_composite(healing: Any, m: Any) -> Any:
 # ---- logarithms, in double precision -------------------------------------------------------------
 
 
-class InLogarithms:
+class LogarithmicEquations:
     """Unknowns ln(V/V_*), Theta of each state, spring stress deviation over sigma_*, slip in D_c,
     and phi and p over sigma_*; time in D_c/V_*.
     """
 
     def __init__(self, problem: dict[str, Any]) -> None:
-        self.s = s = Slider(problem, math, float)
+        self.s = s = ProblemSlider(problem, math, float)
         self.load, self.imposed = 1.0, 1.0
         self.k, self.eta = s.k * s.lengths[0] / s.sigma, s.eta * s.star / s.sigma
         self.unit = s.lengths[0] / s.star
         self.mass = s.mass * s.star / (s.sigma * self.unit)
         scales = [1.0, *[s.a] * len(s.b), s.a, 1.0, s.a, s.a]
-        self.steps = Steps(14, 1e-14, scales)
+        self.steps = ExtrapolatedSteps(14, 1e-14, scales)
         self.rest = math.log(s.theta_star[0] * s.star / s.lengths[0])
 
     def begin(self) -> State:
@@ -274,7 +277,7 @@ class InLogarithms:
 # ---- answers -------------------------------------------------------------------------------------
 
 
-def series(way: Any, unit: Any) -> list[dict[str, Any]]:
+def time_series(way: Any, unit: Any) -> list[dict[str, Any]]:
     """What a way tells at the times of a problem; `unit` is its unit of time in s."""
     s, t, y, rows = way.s, way.s.number(0), way.begin(), []
     segments = s.segments()
@@ -284,11 +287,11 @@ def series(way: Any, unit: Any) -> list[dict[str, Any]]:
         y = way.enter(y, velocity, sigma)
         end = ends.pop(0) if ends else max(asked) + 1
         for time in [x for x in asked if begins <= x <= end and (x < end or x == max(asked))]:
-            y = way.steps.to(way.rates, t / unit, y, time / unit) if time > t else y
+            y = way.steps.advance_to(way.rates, t / unit, y, time / unit) if time > t else y
             t = time
             rows.append({"time": time, **way.now(t / unit, y)})
         if end <= max(asked):
-            y = way.steps.to(way.rates, t / unit, y, end / unit) if end > t else y
+            y = way.steps.advance_to(way.rates, t / unit, y, end / unit) if end > t else y
             t = end
     return rows
 
@@ -302,7 +305,7 @@ def peaks(way: Any, unit: Any) -> list[dict[str, Any]]:
     t, before, h = next(walk)
     for after_t, after, length in walk:
         if way.growth(t, before) > 0 >= way.growth(after_t, after):
-            late, there = located(way, t, before, h)
+            late, there = locate_extremum(way, t, before, h)
             told = way.now(t + late, there)
             rows.append({"event": len(rows) + 1, "time": (t + late) * unit} | told)
             if len(rows) == s.problem["count"]:
@@ -311,7 +314,7 @@ def peaks(way: Any, unit: Any) -> list[dict[str, Any]]:
     raise AssertionError
 
 
-def located(way: Any, t: Any, y: State, h: Any, sign: int = 1) -> tuple[Any, State]:
+def locate_extremum(way: Any, t: Any, y: State, h: Any, sign: int = 1) -> tuple[Any, State]:
     """Where in a step slip rate is highest, or lowest: part of the step, and the state."""
     first = way.rates(t, y)
     low, high, side = h * 0, h, 0
@@ -332,14 +335,14 @@ def located(way: Any, t: Any, y: State, h: Any, sign: int = 1) -> tuple[Any, Sta
     return middle, there
 
 
-def by(way: type, problem: dict[str, Any]) -> list[dict[str, Any]]:
+def rows_by_way(way: type, problem: dict[str, Any]) -> list[dict[str, Any]]:
     """Rows of an answer by one of the two ways."""
     made = way(problem)
     unit = getattr(made, "unit", 1)
-    return (series if problem["report"] == "series" else peaks)(made, unit)
+    return (time_series if problem["report"] == "series" else peaks)(made, unit)
 
 
-def agrees(text: str, value: Any) -> bool:
+def rounds_to(text: str, value: Any) -> bool:
     """True if a number rounds to a text, or would if it were off by a tenth of the last digit."""
     mantissa, _, exponent = text.partition("e")
     place = mpmath.mpf(10) ** (int(exponent or 0) - len(mantissa.partition(".")[2]))

@@ -29,20 +29,20 @@ from rsfstudy import Axis, Scene, Study
 from rsfstudy.compute import runner
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import Meter
+from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.status import Status
 
 
 @dataclass(frozen=True)
-class Free(Measure):
+class TrivialMeasure(Measure):
     """Gives b/a, at once: what cells cost beyond their physics is all they cost."""
 
     name: ClassVar[str] = "free"
-    headline: ClassVar[str] = "total"
+    primary_output: ClassVar[str] = "total"
     variables: ClassVar = {"total": ()}
     typical_work: ClassVar[int] = 1
 
-    def find(self, scene: Scene, accuracy: Accuracy, meter: Meter) -> Outcome:
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """One right-hand side."""
         meter.charge("any", 1)
         return Outcome(Status.OK, {"total": scene.b_over_a})
@@ -58,21 +58,25 @@ def lattice(cells: int) -> Study:
             Axis("a", np.linspace(0.01, 0.02, 10)),
             Axis("b_over_a", np.linspace(1.5, 3.0, cells // 10)),
         ],
-        measure=Free(),
+        measure=TrivialMeasure(),
     )
 
 
-def peak() -> int:
+def peak_memory() -> int:
     """Largest memory of this process so far, in bytes."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 #: Steps of a run, by the methods that take them.
-PHASES = {"__init__": "planning", "_compute_missing": "computing", "_finished": "writing"}
+PHASE_OF_METHOD = {
+    "__init__": "planning",
+    "_compute_missing": "computing",
+    "_write_results": "writing",
+}
 
 
 @contextlib.contextmanager
-def timed(seconds: dict[str, float]) -> Iterator[None]:
+def time_phases(seconds: dict[str, float]) -> Iterator[None]:
     """Note how long each phase of a run takes."""
 
     def noting(method: Callable[..., Any], phase: str) -> Callable[..., Any]:
@@ -86,19 +90,19 @@ def timed(seconds: dict[str, float]) -> Iterator[None]:
         return noted
 
     with contextlib.ExitStack() as stack:
-        for name, phase in PHASES.items():
-            noted = noting(getattr(runner.Run, name), phase)
-            stack.enter_context(mock.patch.object(runner.Run, name, noted))
+        for name, phase in PHASE_OF_METHOD.items():
+            noted = noting(getattr(runner.StudyRun, name), phase)
+            stack.enter_context(mock.patch.object(runner.StudyRun, name, noted))
         yield
 
 
-def processor() -> float:
+def cpu_time() -> float:
     """CPU time in s of this process and of those it has started and seen end."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
-def measured(
+def measure_run(
     cells: int, workers: int, format: str = "netcdf", engine: str = "scipy"
 ) -> dict[str, float]:
     """One run, in this process; times in us a cell, without what the measure took itself."""
@@ -106,32 +110,32 @@ def measured(
     with tempfile.TemporaryDirectory() as output:
         rsfstudy.run(lattice(100), output=output, **options)
     seconds: dict[str, float] = {}
-    with tempfile.TemporaryDirectory() as output, timed(seconds):
-        before, used, began = peak(), processor(), time.perf_counter()
+    with tempfile.TemporaryDirectory() as output, time_phases(seconds):
+        before, used, began = peak_memory(), cpu_time(), time.perf_counter()
         results = rsfstudy.run(lattice(cells), output=output, **options)
         seconds["all"] = time.perf_counter() - began
-        spent = processor() - used
+        spent = cpu_time() - used
         sizes = {p.suffix: p.stat().st_size for p in Path(output).iterdir() if p.is_file()}
     physics = float(results["wall_time"].sum()) / max(1, workers)
     return {
         **{phase: 1e6 * took / cells for phase, took in seconds.items()},
         "beyond": 1e6 * (seconds["all"] - physics) / cells,
         "cpu": 1e6 * spent / cells,
-        "bytes": (peak() - before) / cells,
+        "bytes": (peak_memory() - before) / cells,
         "file": sizes.get(".nc", 0) / cells,
         "journal": sizes[".sqlite"] / cells,
     }
 
 
-def apart(*words: int | str) -> dict[str, float]:
-    """What `measured` gives for these arguments, in a process of its own."""
+def measure_in_subprocess(*words: int | str) -> dict[str, float]:
+    """What `measure_run` gives for these arguments, in a process of its own."""
     command = [sys.executable, __file__, *map(str, words)]
     said = subprocess.run(command, capture_output=True, text=True, check=True)
     found: dict[str, float] = json.loads(said.stdout)
     return found
 
 
-def speed_up(repeats: int = 3) -> list[float]:
+def parallel_speedup(repeats: int = 3) -> list[float]:
     """Time on one worker over time on two, for a lattice of 4,500 rate steps."""
     ratios = []
     for _ in range(repeats):
@@ -154,7 +158,7 @@ def speed_up(repeats: int = 3) -> list[float]:
 
 COLUMNS = {
     "beyond": "us a cell beyond physics",
-    **{phase: phase for phase in PHASES.values()},
+    **{phase: phase for phase in PHASE_OF_METHOD.values()},
     "cpu": "CPU",
     "bytes": "driver, bytes a cell",
     "file": "file",
@@ -169,18 +173,18 @@ def main(largest: int) -> None:
     sizes = [size for size in (10**3, 10**4, 10**5, 10**6) if size <= largest]
     cases = itertools.product(sizes, ("scipy", "compiled"), (0, 2), ("netcdf",))
     for cells, engine, workers, format in (*cases, (10**5, "scipy", 2, "zarr")):
-        found = apart(cells, workers, format, engine)
+        found = measure_in_subprocess(cells, workers, format, engine)
         name = engine if format == "netcdf" else f"{engine} ({format})"
         numbers = " | ".join(f"{found[column]:.0f}" for column in COLUMNS)
         print(f"| {cells:,} | {name} | {workers} | {numbers} |", flush=True)
     print("\n4,500 rate steps:")
-    ratios = speed_up()
+    ratios = parallel_speedup()
     print(f"  median {statistics.median(ratios):.2f}")
 
 
 if __name__ == "__main__":
     asked = sys.argv[1:]
     if asked and asked[0] != "--million":
-        print(json.dumps(measured(int(asked[0]), int(asked[1]), *asked[2:])))
+        print(json.dumps(measure_run(int(asked[0]), int(asked[1]), *asked[2:])))
     else:
         main(10**6 if asked else 10**5)

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion.accuracy import error_between
-from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Kind, maximum
+from rsfstudy.motion.accuracy import estimate_error
+from rsfstudy.motion.course import integrate_events
+from rsfstudy.motion.events import EventKind, maximum
 from rsfstudy.quantity import Output
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parts import number
@@ -29,25 +29,25 @@ class HoldAndReload(Loading):
 @dataclass(frozen=True)
 class PeakAfterRest(Measure):
     name = "peak_after_rest"
-    headline = "peak_stress"
+    primary_output = "peak_stress"
     outputs = (
         Output("peak_stress", "", "1", "rise of stress to its peak", "sigma_*", error=True),
         Output("relaxation", "", "1", "change of stress during the hold", "sigma_*"),
     )
     typical_work = 4_000
 
-    def find(self, scene, accuracy, meter):
+    def compute(self, scene, accuracy, meter):
         (left, peak), (_left, again) = (
             self.read(scene, asked, meter) for asked in (accuracy, accuracy.refined())
         )
-        error = error_between(peak, again, 0.01 * accuracy.rtol)
+        error = estimate_error(peak, again, 0.01 * accuracy.rtol)
         values = {"peak_stress": peak, "peak_stress_error": error, "relaxation": left}
         return Outcome(Status.OK, values)
 
     def read(self, scene, accuracy, meter):
-        motion = follow(scene, accuracy, meter, [maximum("spring_stress")])
-        reload = next(event for event in motion if event.kind is Kind.SEGMENT)
-        peak = next(event for event in motion if event.kind is Kind.MAXIMUM)
+        motion = integrate_events(scene, accuracy, meter, [maximum("spring_stress")])
+        reload = next(event for event in motion if event.kind is EventKind.SEGMENT)
+        peak = next(event for event in motion if event.kind is EventKind.MAXIMUM)
         return reload.point.spring_stress, peak.point.spring_stress
 
 

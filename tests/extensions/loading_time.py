@@ -12,11 +12,11 @@ from rsfstudy.status import Status
 @dataclass(frozen=True)
 class LoadingTime(Measure):
     name: ClassVar[str] = "loading_time"
-    headline = "loading_time"
+    primary_output = "loading_time"
     outputs = (Output("loading_time", "$t_a$", "s", "time in which loading speeds slip up"),)
     typical_work = 1
 
-    def find(self, scene, accuracy, meter):
+    def compute(self, scene, accuracy, meter):
         stressing = scene.stiffness * scene.load_velocity * scene.reference_rate
         return Outcome(Status.OK, {"loading_time": scene.a / stressing})
 

@@ -10,7 +10,7 @@ from rsfstudy import Axis, Scene, Study
 from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper
-from rsfstudy.motion.workspace import spend
+from rsfstudy.motion.workspace import count_evaluations
 
 
 class OrderFour(Stepper):
@@ -18,7 +18,7 @@ class OrderFour(Stepper):
 
     def begin(self, motion, space):
         system = self.systems[motion.regime]
-        self._rate, self._p, self._motion = system.rate, system.p, motion
+        self._rate, self._p, self._motion = system.rate_function, system.parameters, motion
         self._allowed = motion.tolerance * np.array(system.scales)
         self._length = 1e-3
         space.rates[: space.unknowns] = self.rates(np.array(space.y[: space.unknowns]))
@@ -31,7 +31,7 @@ class OrderFour(Stepper):
             if motion.clock + 0.1 * towards == motion.clock:
                 self.failure = "a step would be shorter than the spacing of numbers"
                 return NO_STEP
-            if motion.spent_slow + motion.spent_fast > motion.budget:
+            if motion.evaluations_slow + motion.evaluations_fast > motion.budget:
                 return BUDGET_SPENT
             new, error = self.halves(y, first, towards)
             error = np.max(np.abs(error) / (self._allowed + motion.tolerance * np.abs(new)))
@@ -40,28 +40,28 @@ class OrderFour(Stepper):
             if error <= 1.0:
                 break
             length = self._length
-        motion.taken, motion.end = towards, motion.clock + towards
-        space.new[: space.unknowns] = new
+        motion.step_length, motion.end = towards, motion.clock + towards
+        space.y_end[: space.unknowns] = new
         space.rates_at_end[: space.unknowns] = self.rates(new)
         return length
 
     def unknowns_at(self, motion, space, clock):
         """By the cubic with the values and rates of both ends."""
-        n, part = space.unknowns, (clock - motion.clock) / motion.taken
+        n, part = space.unknowns, (clock - motion.clock) / motion.step_length
         y, new, first, last = (
-            np.array(x[:n]) for x in (space.y, space.new, space.rates, space.rates_at_end)
+            np.array(x[:n]) for x in (space.y, space.y_end, space.rates, space.rates_at_end)
         )
         line = (1.0 - part) * y + part * new
-        bend = (1.0 - part) * (motion.taken * first - new + y)
-        bend += part * (new - y - motion.taken * last)
-        space.within[:n] = line + part * (1.0 - part) * bend
+        bend = (1.0 - part) * (motion.step_length * first - new + y)
+        bend += part * (new - y - motion.step_length * last)
+        space.y_within[:n] = line + part * (1.0 - part) * bend
 
     def retake(self, motion, space, clock):
         n = space.unknowns
-        motion.taken, motion.end = clock - motion.clock, clock
+        motion.step_length, motion.end = clock - motion.clock, clock
         y, first = np.array(space.y[:n]), np.array(space.rates[:n])
-        new = self.halves(y, first, motion.taken)[0]
-        space.new[:n], space.rates_at_end[:n] = new, self.rates(new)
+        new = self.halves(y, first, motion.step_length)[0]
+        space.y_end[:n], space.rates_at_end[:n] = new, self.rates(new)
 
     def halves(self, y, first, length):
         """The end of two halves of a step, of order five, and the error of order four."""
@@ -77,7 +77,7 @@ class OrderFour(Stepper):
         return y + length / 6.0 * (first + 2.0 * (second + third) + fourth)
 
     def rates(self, y):
-        spend(self._motion, 1)
+        count_evaluations(self._motion, 1)
         return np.array(self._rate(tuple(y.tolist()), self._p))
 
 

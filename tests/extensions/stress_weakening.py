@@ -13,7 +13,7 @@ from rsfstudy.slider.parts import number
 from rsfstudy.slider.places import LAW, MU_STAR
 
 
-def worn(friction, ratio, change, p):
+def stress_state_effect(friction, ratio, change, p):
     stress, c = p[MU_STAR] + friction, p[LAW + 1]
     return c * (stress / ratio - p[MU_STAR]), c * (1.0 - stress * change / ratio) / ratio
 
@@ -25,7 +25,7 @@ class StressWeakening(SlownessLaw):
     )
 
     name = "stress_weakening"
-    state_effect = staticmethod(worn)
+    state_effect = staticmethod(stress_state_effect)
 
     def numbers(self, scene):
         return (*super().numbers(scene), self.c)

@@ -7,10 +7,10 @@ from scipy.linalg import cholesky_banded, solve_banded
 
 #: Variance of unaveraged noise relative to averaged noise, which prevents an infinite weight of the
 #: notches of the spectrum; and the largest number of rows within an averaging time.
-_FLOOR, _WIDEST = 0.002, 200
+_EXTRA_VARIANCE, _MAX_LAG = 0.002, 200
 
 
-class Overlap:
+class AveragingCorrelation:
     """Correlation matrix of rows with overlapping averaging times.
 
     If white noise is averaged over a time T, the correlation of two rows is ``max(1 - |t_i -
@@ -20,24 +20,24 @@ class Overlap:
     ----------
     time : ndarray, shape (rows,)
         Times in s. If the clock restarts, the rows that follow belong to another window.
-    averaging : float
+    averaging_time : float
         Averaging time in s.
     """
 
-    def __init__(self, time: np.ndarray, averaging: float) -> None:
+    def __init__(self, time: np.ndarray, averaging_time: float) -> None:
         clock = np.concatenate([[0], np.cumsum(np.diff(time) <= 0.0)])
-        band = [np.full(len(time), 1.0 + _FLOOR)]
-        for lag in range(1, min(_WIDEST, len(time) - 1)):
-            apart = np.abs(time[lag:] - time[:-lag]) / averaging
+        band = [np.full(len(time), 1.0 + _EXTRA_VARIANCE)]
+        for lag in range(1, min(_MAX_LAG, len(time) - 1)):
+            apart = np.abs(time[lag:] - time[:-lag]) / averaging_time
             overlap = np.where(clock[lag:] == clock[:-lag], np.maximum(1.0 - apart, 0.0), 0.0)
             if not overlap.any():
                 break
             band.append(np.append(overlap, np.zeros(lag)))
-        self.factor = cholesky_banded(np.array(band), lower=True)
+        self.cholesky_factor = cholesky_banded(np.array(band), lower=True)
         #: Number of correlated rows per independent row.
-        self.rows = float(1.0 + 2.0 * np.sum(band[1:]) / len(time))
+        self.rows_per_independent_row = float(1.0 + 2.0 * np.sum(band[1:]) / len(time))
 
-    def whitened(self, columns: np.ndarray) -> np.ndarray:
+    def whiten(self, columns: np.ndarray) -> np.ndarray:
         """Remove the correlation from columns.
 
         Parameters
@@ -50,15 +50,17 @@ class Overlap:
         """
         if not columns.size:
             return columns
-        return np.asarray(solve_banded((len(self.factor) - 1, 0), self.factor, columns))
+        return np.asarray(
+            solve_banded((len(self.cholesky_factor) - 1, 0), self.cholesky_factor, columns)
+        )
 
     @property
     def log_determinant(self) -> float:
         """Logarithm of the determinant of the correlation matrix."""
-        return float(2.0 * np.sum(np.log(self.factor[0])))
+        return float(2.0 * np.sum(np.log(self.cholesky_factor[0])))
 
 
-def average(time: np.ndarray, columns: np.ndarray, averaging: float) -> np.ndarray:
+def apply_running_mean(time: np.ndarray, columns: np.ndarray, averaging_time: float) -> np.ndarray:
     """Average columns over a time interval centred at each row.
 
     The columns are interpolated linearly between the rows. Before the first row and after the last
@@ -69,19 +71,19 @@ def average(time: np.ndarray, columns: np.ndarray, averaging: float) -> np.ndarr
     time : ndarray, shape (rows,)
         Times in s, in increasing order.
     columns : ndarray, shape (rows, columns)
-    averaging : float
+    averaging_time : float
         Averaging time in s.
 
     Returns
     -------
     ndarray, shape (rows, columns)
     """
-    at = np.concatenate([[time[0] - averaging], time, [time[-1] + averaging]])
+    at = np.concatenate([[time[0] - averaging_time], time, [time[-1] + averaging_time]])
     padded = np.concatenate([columns[:1], columns, columns[-1:]])
     pieces = 0.5 * np.diff(at)[:, None] * (padded[1:] + padded[:-1])
     sums = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(pieces, axis=0)])
     ends = [
         np.column_stack([np.interp(time + side, at, column) for column in sums.T])
-        for side in (0.5 * averaging, -0.5 * averaging)
+        for side in (0.5 * averaging_time, -0.5 * averaging_time)
     ]
-    return np.asarray((ends[0] - ends[1]) / averaging)
+    return np.asarray((ends[0] - ends[1]) / averaging_time)

@@ -16,11 +16,11 @@ from rsfstudy.errors import InvalidValue
 
 MEAN, TRAILING_MEAN = "mean", "trailing_mean"
 #: Low-pass filters, with their orders: all are Butterworth filters.
-LOW_PASS = {"first_order": 1, "butterworth_2": 2, "butterworth_4": 4}
-KINDS = (MEAN, TRAILING_MEAN, *LOW_PASS)
+LOW_PASS_ORDERS = {"first_order": 1, "butterworth_2": 2, "butterworth_4": 4}
+FILTER_KINDS = (MEAN, TRAILING_MEAN, *LOW_PASS_ORDERS)
 #: Fewest points of a running mean, points per period of the corner frequency, periods after which a
 #: low-pass filter has settled, and largest number of points on its grid.
-_FEWEST, _POINTS, _SETTLED, _MOST = 8, 60, 3.0, 400_000
+_MIN_MEAN_POINTS, _POINTS_PER_PERIOD, _SETTLING_PERIODS, _MAX_GRID_POINTS = 8, 60, 3.0, 400_000
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ class Filter:
     size: float
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise InvalidValue("filter", self.kind, "is unknown", choices=KINDS)
+        if self.kind not in FILTER_KINDS:
+            raise InvalidValue("filter", self.kind, "is unknown", choices=FILTER_KINDS)
         if not 0.0 < self.size < math.inf:
             rule = "must be positive: an averaging time in s, or a corner frequency in Hz"
             raise InvalidValue("filter", self.size, rule)
@@ -62,13 +62,13 @@ class Filter:
             number = float(size)
         except ValueError:
             rule = "must be a kind of filter and its size, such as 'mean 1.0' (in s or Hz)"
-            raise InvalidValue("filter", text, rule, choices=KINDS) from None
+            raise InvalidValue("filter", text, rule, choices=FILTER_KINDS) from None
         return cls(kind, number)
 
     def sample_times(self, time: np.ndarray) -> np.ndarray:
         """Return the times, in s, at which unfiltered friction is required."""
-        if self.kind in LOW_PASS:
-            return self._grid(time)
+        if self.kind in LOW_PASS_ORDERS:
+            return self._time_grid(time)
         return np.unique(time[:, None] + self._offsets(time))
 
     def apply(self, time: np.ndarray, samples: np.ndarray) -> np.ndarray:
@@ -86,11 +86,11 @@ class Filter:
         ndarray, shape (rows,)
         """
         at = self.sample_times(time)
-        if self.kind not in LOW_PASS:
+        if self.kind not in LOW_PASS_ORDERS:
             places = np.searchsorted(at, time[:, None] + self._offsets(time))
             return np.asarray(samples[places].mean(axis=1))
         rate = 1.0 / float(at[1] - at[0])
-        sections = butter(LOW_PASS[self.kind], self.size, fs=rate, output="sos")
+        sections = butter(LOW_PASS_ORDERS[self.kind], self.size, fs=rate, output="sos")
         begin = sosfilt_zi(sections) * samples[0]  # steady before the first row
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
 
@@ -101,11 +101,11 @@ class Filter:
         interval apart.
         """
         count = max(round(self.size / float(np.median(np.diff(time)))), 1)
-        count *= max(math.ceil(_FEWEST / count), 1) if count < _FEWEST // 2 else 1
+        count *= max(math.ceil(_MIN_MEAN_POINTS / count), 1) if count < _MIN_MEAN_POINTS // 2 else 1
         middle = 0.5 if self.kind == MEAN else 1.0
         return np.asarray(self.size * ((np.arange(count) + 0.5) / count - middle))
 
-    def _grid(self, time: np.ndarray) -> np.ndarray:
-        first = float(time[0]) - _SETTLED / self.size
-        finest = max(1.0 / (_POINTS * self.size), (time[-1] - first) / _MOST)
+    def _time_grid(self, time: np.ndarray) -> np.ndarray:
+        first = float(time[0]) - _SETTLING_PERIODS / self.size
+        finest = max(1.0 / (_POINTS_PER_PERIOD * self.size), (time[-1] - first) / _MAX_GRID_POINTS)
         return np.arange(first, float(time[-1]) + 2.0 * finest, finest)

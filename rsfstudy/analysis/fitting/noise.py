@@ -34,70 +34,70 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.signal import lfilter
 
-from rsfstudy.analysis.fitting.averaging import Overlap
+from rsfstudy.analysis.fitting.averaging import AveragingCorrelation
 from rsfstudy.analysis.fitting.noise_runs import (
-    Run,
+    SamplingRun,
     count_processes,
     find_level_changes,
     find_runs,
     index_rows,
     split_runs,
 )
-from rsfstudy.analysis.fitting.whiteness import LAGS as LAGS
-from rsfstudy.analysis.fitting.whiteness import whiteness as whiteness
+from rsfstudy.analysis.fitting.whiteness import LAG_COUNT as LAG_COUNT
+from rsfstudy.analysis.fitting.whiteness import ljung_box_p_value as ljung_box_p_value
 from rsfstudy.errors import InvalidValue
 
 WHITE, AUTOREGRESSIVE = "white", "ar"
 #: Highest order that is looked for, and samples that each coefficient takes at least.
-HIGHEST, _SAMPLES = 12, 10
+MAX_ORDER, _SAMPLES_PER_COEFFICIENT = 12, 10
 #: Largest partial correlation, and slope of what REML minimises at which the search ends.
-_LARGEST, _ENOUGH = 0.999, 0.02
+_MAX_PARTIAL_AUTOCORRELATION, _GRADIENT_TOLERANCE = 0.999, 0.02
 #: Passes in which the noise levels and the autoregressive process are estimated in turn.
 _LEVEL_PASSES = 2
 #: Smallest standard deviation of a level, relative to that of all residuals.
-_QUIETEST = 1e-3
+_MIN_RELATIVE_SD = 1e-3
 #: Largest logarithm of a level relative to the first one.
-_WIDEST = 30.0
+_MAX_LOG_LEVEL_RATIO = 30.0
 
 
-def check_noise(name: str) -> None:
+def check_noise_name(name: str) -> None:
     """Raise ``InvalidValue`` if the name of a noise model is unknown."""
-    if name not in (WHITE, AUTOREGRESSIVE, *(f"ar{order}" for order in range(1, HIGHEST + 1))):
-        choices = (WHITE, AUTOREGRESSIVE, f"ar1 to ar{HIGHEST}")
+    if name not in (WHITE, AUTOREGRESSIVE, *(f"ar{order}" for order in range(1, MAX_ORDER + 1))):
+        choices = (WHITE, AUTOREGRESSIVE, f"ar1 to ar{MAX_ORDER}")
         raise InvalidValue("noise", name, "is unknown", choices=choices)
 
 
 @dataclass(frozen=True)
-class Noise:
+class NoiseModel:
     """Noise of a record, with an autoregressive process for each sampling interval.
 
     The standard deviation of the noise (its level) may also change along the record.
 
     Attributes
     ----------
-    runs : tuple of Run
-    partial : ndarray, shape (processes, order)
+    runs : tuple of SamplingRun
+    partial_autocorrelations : ndarray, shape (processes, order)
         Partial autocorrelations of each process.
-    sizes : ndarray, shape (levels,)
+    level_sds : ndarray, shape (levels,)
         Standard deviation of each level, relative to the first level.
-    kept : ndarray of bool, shape (rows,), optional
+    kept_mask : ndarray of bool, shape (rows,), optional
         False for outliers, which are excluded. By default, all rows are kept.
-    overlap : Overlap, optional
+    averaging_correlation : AveragingCorrelation, optional
         Correlation due to averaging, which is removed before the correlation of the process.
     """
 
-    runs: tuple[Run, ...]
-    partial: np.ndarray
-    sizes: np.ndarray
-    kept: np.ndarray | None = None
-    overlap: Overlap | None = None
+    runs: tuple[SamplingRun, ...]
+    partial_autocorrelations: np.ndarray
+    level_sds: np.ndarray
+    kept_mask: np.ndarray | None = None
+    averaging_correlation: AveragingCorrelation | None = None
 
     @property
     def order(self) -> int:
         """Order of the autoregressive processes."""
-        return int(self.partial.shape[1])
+        return int(self.partial_autocorrelations.shape[1])
 
-    def whitened(self, columns: np.ndarray) -> np.ndarray:
+    def whiten(self, columns: np.ndarray) -> np.ndarray:
         """Remove the correlation of the noise from columns.
 
         Each row is replaced by its prediction error, divided by the standard error of the
@@ -111,39 +111,49 @@ class Noise:
         -------
         ndarray, shape (kept rows, columns)
         """
-        columns = self.kept_rows(columns)
-        columns = columns if self.overlap is None else self.overlap.whitened(columns)
-        scaled = columns / self.sizes[index_rows(self.runs, "level")][:, None]
+        columns = self.drop_outliers(columns)
+        columns = (
+            columns
+            if self.averaging_correlation is None
+            else self.averaging_correlation.whiten(columns)
+        )
+        scaled = columns / self.level_sds[index_rows(self.runs, "level")][:, None]
         found = np.empty_like(columns)
         for run in self.runs:
-            known = min(run.before, self.order)
-            part = scaled[run.first - known : run.last]
-            found[run.first : run.last] = _innovations(part, *self.predictors[run.number])[known:]
+            known = min(run.preceding_rows, self.order)
+            part = scaled[run.start - known : run.stop]
+            found[run.start : run.stop] = _prediction_errors(part, *self.predictors[run.process])[
+                known:
+            ]
         return found
 
-    def kept_rows(self, columns: np.ndarray) -> np.ndarray:
+    def drop_outliers(self, columns: np.ndarray) -> np.ndarray:
         """Remove the rows of outliers from columns."""
-        return columns if self.kept is None else columns[self.kept]
+        return columns if self.kept_mask is None else columns[self.kept_mask]
 
     @cached_property
     def predictors(self) -> list[tuple[list[list[float]], list[float]]]:
-        """Coefficients and variances of each process (see ``_predictors``)."""
-        return [*map(_predictors, self.partial)]
+        """Coefficients and variances of each process (see ``_levinson_durbin``)."""
+        return [*map(_levinson_durbin, self.partial_autocorrelations)]
 
     @property
     def log_determinant(self) -> float:
         """Logarithm of the determinant of the correlation matrix R."""
-        total = 0.0 if self.overlap is None else self.overlap.log_determinant
+        total = (
+            0.0
+            if self.averaging_correlation is None
+            else self.averaging_correlation.log_determinant
+        )
         for first, last, number, before, level in self.runs:
             variances = self.predictors[number][1]
             early = variances[min(before, self.order) : min(before + last - first, self.order)]
             total += math.fsum(map(math.log, early))
             total += (last - first - len(early)) * math.log(variances[-1])
-            total += 2.0 * (last - first) * math.log(self.sizes[level])
+            total += 2.0 * (last - first) * math.log(self.level_sds[level])
         return total
 
     @property
-    def effective_samples(self) -> float:
+    def effective_sample_size(self) -> float:
         """Effective sample size for a mean.
 
         The effective sample size is n divided by the power at zero frequency, ``(1 - k_1^2)(1 -
@@ -151,8 +161,12 @@ class Noise:
         process, the effective sample size is ``n (1 - rho)/(1 + rho)``.
         """
         power = self._power_at_zero
-        lasts = ((run.last - run.first, run.number) for run in self.runs)
-        each = 1.0 if self.overlap is None else self.overlap.rows
+        lasts = ((run.stop - run.start, run.process) for run in self.runs)
+        each = (
+            1.0
+            if self.averaging_correlation is None
+            else self.averaging_correlation.rows_per_independent_row
+        )
         return sum(max(1.0, rows / max(power[n], 1.0) / each) for rows, n in lasts)
 
     @property
@@ -162,7 +176,7 @@ class Noise:
         return [left / (1.0 - math.fsum(last)) ** 2 for last, left in told]
 
     @property
-    def degrees(self) -> float:
+    def degrees_of_freedom(self) -> float:
         """Degrees of freedom of the power at zero frequency.
 
         This power determines the errors of slow trends. The degrees of freedom are 2 divided by the
@@ -170,29 +184,29 @@ class Noise:
         estimated coefficients.
         """
         total = 0.0
-        rows = np.bincount(index_rows(self.runs, "number")).tolist()
+        rows = np.bincount(index_rows(self.runs, "process")).tolist()
         for count, told, power in zip(rows, self.predictors, self._power_at_zero, strict=True):
             # coefficients have the covariance (variance left) R^-1/rows
-            ones = _innovations(np.ones((self.order, 1)), *told)
+            ones = _prediction_errors(np.ones((self.order, 1)), *told)
             total += count / (1.0 + 2.0 * power * float(np.square(ones).sum()))
         return total
 
 
-def white(time: np.ndarray) -> Noise:
+def white_noise(time: np.ndarray) -> NoiseModel:
     """Return white noise with one level for each sampling interval."""
     runs = find_runs(time)
-    return Noise(runs, np.zeros((count_processes(runs), 0)), np.ones(count_processes(runs)))
+    return NoiseModel(runs, np.zeros((count_processes(runs), 0)), np.ones(count_processes(runs)))
 
 
-def fitted(
+def fit_noise(
     name: str,
     time: np.ndarray,
     residuals: np.ndarray,
     jacobian: np.ndarray,
-    kept: np.ndarray | None = None,
-    least: float = 0.0,
-    averaging: float = 0.0,
-) -> Noise:
+    kept_mask: np.ndarray | None = None,
+    min_sd: float = 0.0,
+    averaging_time: float = 0.0,
+) -> NoiseModel:
     """Estimate the noise from the residuals of a fit by REML.
 
     Parameters
@@ -203,41 +217,54 @@ def fitted(
     residuals : ndarray, shape (rows,)
     jacobian : ndarray, shape (rows, parameters)
         Derivatives of the model.
-    kept : ndarray of bool, shape (rows,), optional
+    kept_mask : ndarray of bool, shape (rows,), optional
         False for outliers. By default, all rows are kept.
-    least : float
+    min_sd : float
         Lower bound of the standard deviation of a level, such as the rounding error.
-    averaging : float
+    averaging_time : float
         Averaging time of friction in s, or 0 if friction was not averaged.
 
     Returns
     -------
-    Noise
+    NoiseModel
         Noise with one process for each sampling interval, and one level for each segment.
     """
-    begin, least = guess_noise(name, time, residuals, kept, least, averaging)
-    shape, order = begin.partial.shape, begin.order
-    if not order and len(begin.sizes) == 1:
+    begin, min_sd = guess_noise(name, time, residuals, kept_mask, min_sd, averaging_time)
+    shape, order = begin.partial_autocorrelations.shape, begin.order
+    if not order and len(begin.level_sds) == 1:
         return begin
 
-    def noise(x: np.ndarray) -> Noise:
-        partial = _LARGEST * np.tanh(x[: begin.partial.size]).reshape(shape)
-        logs = np.clip(x[begin.partial.size :], -_WIDEST, _WIDEST)
+    def noise(x: np.ndarray) -> NoiseModel:
+        partial = _MAX_PARTIAL_AUTOCORRELATION * np.tanh(
+            x[: begin.partial_autocorrelations.size]
+        ).reshape(shape)
+        logs = np.clip(
+            x[begin.partial_autocorrelations.size :], -_MAX_LOG_LEVEL_RATIO, _MAX_LOG_LEVEL_RATIO
+        )
         sizes = np.exp(np.append(0.0, logs))
-        return Noise(begin.runs, partial, np.maximum(sizes, least), kept, begin.overlap)
+        return NoiseModel(
+            begin.runs, partial, np.maximum(sizes, min_sd), kept_mask, begin.averaging_correlation
+        )
 
-    columns = begin.kept_rows(np.column_stack([jacobian, residuals]))
-    columns = columns if begin.overlap is None else begin.overlap.whitened(columns)
-    products = _Products(begin.runs, columns, order)
+    columns = begin.drop_outliers(np.column_stack([jacobian, residuals]))
+    columns = (
+        columns
+        if begin.averaging_correlation is None
+        else begin.averaging_correlation.whiten(columns)
+    )
+    products = _LaggedProducts(begin.runs, columns, order)
 
     def misfit(x: np.ndarray) -> float:
-        return products.misfit(noise(x))
+        return products.reml_objective(noise(x))
 
-    x = np.append(np.arctanh(begin.partial.ravel() / _LARGEST), np.log(begin.sizes[1:]))
+    x = np.append(
+        np.arctanh(begin.partial_autocorrelations.ravel() / _MAX_PARTIAL_AUTOCORRELATION),
+        np.log(begin.level_sds[1:]),
+    )
     if not math.isfinite(misfit(x)):  # the residuals vanish
         return noise(x)
     with np.errstate(invalid="ignore", over="ignore"):  # the misfit may be infinite near by
-        found = minimize(misfit, x, method="BFGS", options={"gtol": _ENOUGH})
+        found = minimize(misfit, x, method="BFGS", options={"gtol": _GRADIENT_TOLERANCE})
     return noise(found.x if found.fun <= misfit(x) else x)
 
 
@@ -245,64 +272,69 @@ def guess_noise(
     name: str,
     time: np.ndarray,
     residuals: np.ndarray,
-    kept: np.ndarray | None = None,
-    least: float = 0.0,
-    averaging: float = 0.0,
-) -> tuple[Noise, float]:
+    kept_mask: np.ndarray | None = None,
+    min_sd: float = 0.0,
+    averaging_time: float = 0.0,
+) -> tuple[NoiseModel, float]:
     """Estimate the noise by the method of moments.
 
     See ``fitted`` for the parameters.
 
     Returns
     -------
-    noise : Noise
-    least : float
+    noise : NoiseModel
+    min_sd : float
         Lower bound of the standard deviation of a level, relative to the first level.
     """
-    if kept is not None:
-        time, residuals = time[kept], residuals[kept]
-    overlap = Overlap(time, averaging) if averaging else None
+    if kept_mask is not None:
+        time, residuals = time[kept_mask], residuals[kept_mask]
+    overlap = AveragingCorrelation(time, averaging_time) if averaging_time else None
     if overlap is not None:
-        residuals = overlap.whitened(residuals)
-    least = max(least, _QUIETEST * math.sqrt(float(np.mean(np.square(residuals)))), 1e-300)
-    found, first = _first_guess(name, find_runs(time), residuals, least)
-    return replace(found, kept=kept, overlap=overlap), least / first
+        residuals = overlap.whiten(residuals)
+    min_sd = max(min_sd, _MIN_RELATIVE_SD * math.sqrt(float(np.mean(np.square(residuals)))), 1e-300)
+    found, first = _estimate_by_moments(name, find_runs(time), residuals, min_sd)
+    return replace(found, kept_mask=kept_mask, averaging_correlation=overlap), min_sd / first
 
 
-def _first_guess(
-    name: str, whole: tuple[Run, ...], residuals: np.ndarray, least: float
-) -> tuple[Noise, float]:
+def _estimate_by_moments(
+    name: str, sampling_runs: tuple[SamplingRun, ...], residuals: np.ndarray, min_sd: float
+) -> tuple[NoiseModel, float]:
     """Compute the initial guess of the noise by the method of moments.
 
     Returns
     -------
-    noise : Noise
+    noise : NoiseModel
     first : float
         Standard deviation of the first level.
     """
-    stated, count = name.removeprefix(AUTOREGRESSIVE), count_processes(whole)
-    runs, knots, innovations = whole, list[int](), residuals
+    stated, count = name.removeprefix(AUTOREGRESSIVE), count_processes(sampling_runs)
+    runs, knots, innovations = sampling_runs, list[int](), residuals
     scale = np.ones(len(residuals))
     for _ in range(1 + _LEVEL_PASSES):
         levels = index_rows(runs, "level")
         squares = np.bincount(levels, np.square(innovations)) / np.bincount(levels)
-        scale = np.maximum(scale * np.sqrt(squares)[levels], least)
+        scale = np.maximum(scale * np.sqrt(squares)[levels], min_sd)
         scaled = residuals / scale
-        parts = [[scaled[r.first : r.last] for r in whole if r.number == n] for n in range(count)]
-        order = 0 if name == WHITE else int(stated) if stated else _order(parts)
-        partial = np.array([_partial(part, order) for part in parts]).reshape(count, order)
+        parts = [
+            [scaled[r.start : r.stop] for r in sampling_runs if r.process == n]
+            for n in range(count)
+        ]
+        order = 0 if name == WHITE else int(stated) if stated else _select_order(parts)
+        partial = np.array([_burg_coefficients(part, order) for part in parts]).reshape(
+            count, order
+        )
         sizes = scale[np.unique(levels, return_index=True)[1]]
-        found = Noise(runs, partial, sizes)
-        innovations = found.whitened(residuals[:, None])[:, 0]
-        before, knots = knots, find_level_changes(innovations * scale, least)
+        found = NoiseModel(runs, partial, sizes)
+        innovations = found.whiten(residuals[:, None])[:, 0]
+        before, knots = knots, find_level_changes(innovations * scale, min_sd)
         if knots == before:
             break
-        runs = split_runs(whole, knots)
-    first = float(found.sizes[0])
-    return Noise(found.runs, found.partial, found.sizes / first), first
+        runs = split_runs(sampling_runs, knots)
+    first = float(found.level_sds[0])
+    return NoiseModel(found.runs, found.partial_autocorrelations, found.level_sds / first), first
 
 
-class _Products:
+class _LaggedProducts:
     """Sums of products of lagged columns.
 
     The sum of squares of whitened columns follows from these sums for any coefficients. The cost of
@@ -310,34 +342,34 @@ class _Products:
 
     Parameters
     ----------
-    runs : tuple of Run
+    runs : tuple of SamplingRun
     columns : ndarray, shape (rows, columns)
         Derivatives of the model, followed by the residuals.
     order : int
         Order of the autoregressive processes.
     """
 
-    def __init__(self, runs: Sequence[Run], columns: np.ndarray, order: int) -> None:
-        self.rows, self.parameters = len(columns), columns.shape[1] - 1
+    def __init__(self, runs: Sequence[SamplingRun], columns: np.ndarray, order: int) -> None:
+        self.row_count, self.parameter_count = len(columns), columns.shape[1] - 1
         # derivatives may be next to dependent: those of the same span are as good, up to a constant
         base, left = np.linalg.qr(columns[:, :-1])[0], columns[:, -1]
         left = left - base @ (base.T @ left)
         columns = np.column_stack([base, left / (np.linalg.norm(left) or 1.0)])
         width = columns.shape[1]
-        self.levels = sorted({(run.number, run.level) for run in runs})
-        self.sums = np.zeros((len(self.levels), order + 1, order + 1, width, width))
+        self.process_levels = sorted({(run.process, run.level) for run in runs})
+        self.sums = np.zeros((len(self.process_levels), order + 1, order + 1, width, width))
         #: For each run: the first rows and the rows before them that predict them, the number of
         #: rows before them, the process of the run, and the levels of these rows.
-        self.early: list[tuple[np.ndarray, int, int, np.ndarray]] = []
+        self.initial_blocks: list[tuple[np.ndarray, int, int, np.ndarray]] = []
         levels = index_rows(runs, "level")
         for run in runs:
-            known = min(run.before, order)
-            rows = slice(run.first - known, min(run.first + order, run.last))
+            known = min(run.preceding_rows, order)
+            rows = slice(run.start - known, min(run.start + order, run.stop))
             if order:
-                self.early.append((columns[rows], known, run.number, levels[rows]))
-            part = columns[run.first : run.last]
+                self.initial_blocks.append((columns[rows], known, run.process, levels[rows]))
+            part = columns[run.start : run.stop]
             later = [part[order - lag : len(part) - lag] for lag in range(order + 1)]
-            sums = self.sums[self.levels.index((run.number, run.level))]
+            sums = self.sums[self.process_levels.index((run.process, run.level))]
             for i in range(order + 1 if len(part) > order else 0):
                 for j in range(i + 1):
                     found = later[i].T @ later[j]
@@ -345,7 +377,7 @@ class _Products:
                     if i > j:
                         sums[j, i] += found.T
 
-    def misfit(self, noise: Noise) -> float:
+    def reml_objective(self, noise: NoiseModel) -> float:
         """Compute the objective function of REML, up to a constant.
 
         Returns
@@ -354,37 +386,37 @@ class _Products:
             Infinity if the residuals vanish.
         """
         total = np.zeros(self.sums.shape[-2:])
-        for (number, level), sums in zip(self.levels, self.sums, strict=True):
+        for (number, level), sums in zip(self.process_levels, self.sums, strict=True):
             coefficients, variances = noise.predictors[number]
             full = np.append(1.0, -np.array(coefficients[-1]))
-            scale = variances[-1] * noise.sizes[level] ** 2
+            scale = variances[-1] * noise.level_sds[level] ** 2
             total += np.einsum("i,j,ijab->ab", full, full, sums) / scale
-        for early, known, number, levels in self.early:
-            scaled = early / noise.sizes[levels][:, None]
-            begun = _innovations(scaled, *noise.predictors[number])[known:]
+        for early, known, number, levels in self.initial_blocks:
+            scaled = early / noise.level_sds[levels][:, None]
+            begun = _prediction_errors(scaled, *noise.predictors[number])[known:]
             total += begun.T @ begun
         try:
             triangle = np.diag(np.linalg.cholesky(total))
         except np.linalg.LinAlgError:
             return math.inf
-        free = self.rows - self.parameters
+        free = self.row_count - self.parameter_count
         told = 2.0 * math.fsum(map(math.log, triangle[:-1]))
         return float(2.0 * free * math.log(triangle[-1]) + noise.log_determinant + told)
 
 
-def _order(parts: Sequence[Sequence[np.ndarray]]) -> int:
+def _select_order(parts: Sequence[Sequence[np.ndarray]]) -> int:
     """Return the autoregressive order that minimises Akaike's criterion."""
     shortest = min(max(map(len, part)) for part in parts)
-    highest = min(HIGHEST, shortest // _SAMPLES)
+    highest = min(MAX_ORDER, shortest // _SAMPLES_PER_COEFFICIENT)
     criterion = np.zeros(highest + 1)
     for part in parts:
         samples = sum(map(len, part))
-        left = np.cumsum(np.log1p(-(np.array(_partial(part, highest)) ** 2)))
+        left = np.cumsum(np.log1p(-(np.array(_burg_coefficients(part, highest)) ** 2)))
         criterion[1:] += samples * left + 2.0 * np.arange(1, highest + 1)
     return int(np.argmin(criterion))
 
 
-def _partial(part: Sequence[np.ndarray], order: int) -> list[float]:
+def _burg_coefficients(part: Sequence[np.ndarray], order: int) -> list[float]:
     """Estimate partial autocorrelations by Burg's recursion."""
     forward, backward = [[p - p.mean() for p in part] for _ in range(2)]
     found = []
@@ -394,13 +426,17 @@ def _partial(part: Sequence[np.ndarray], order: int) -> list[float]:
         above = sum(float(f @ b) for f, b in zip(ahead, behind, strict=True))
         below = sum(float(f @ f + b @ b) for f, b in zip(ahead, behind, strict=True))
         k = 2.0 * above / below if below > 0.0 else 0.0
-        found.append(min(max(k, -0.99 * _LARGEST), 0.99 * _LARGEST))
+        found.append(
+            min(max(k, -0.99 * _MAX_PARTIAL_AUTOCORRELATION), 0.99 * _MAX_PARTIAL_AUTOCORRELATION)
+        )
         forward = [f - found[-1] * b for f, b in zip(ahead, behind, strict=True)]
         backward = [b - found[-1] * f for f, b in zip(ahead, behind, strict=True)]
     return found
 
 
-def _predictors(partial: Sequence[float] | np.ndarray) -> tuple[list[list[float]], list[float]]:
+def _levinson_durbin(
+    partial: Sequence[float] | np.ndarray,
+) -> tuple[list[list[float]], list[float]]:
     """Compute prediction coefficients by the Levinson-Durbin recursion.
 
     Returns
@@ -421,7 +457,7 @@ def _predictors(partial: Sequence[float] | np.ndarray) -> tuple[list[list[float]
     return coefficients, variances
 
 
-def _innovations(
+def _prediction_errors(
     columns: np.ndarray, coefficients: list[list[float]], variances: list[float]
 ) -> np.ndarray:
     """Compute prediction errors divided by their standard errors."""

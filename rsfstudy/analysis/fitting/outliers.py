@@ -7,14 +7,14 @@ from scipy.ndimage import maximum_filter, rank_filter
 
 #: Neighbours on each side whose median is compared with a row, and rows of a block with a scale of
 #: its own.
-_REACH, _BLOCK = 3, 100
+_NEIGHBOUR_COUNT, _BLOCK_ROWS = 3, 100
 #: Standard deviations beyond which a row is an outlier, and the same in deviations of the model
 #: from its own median of neighbours: a misfit at a peak of the model is no outlier.
-_FAR, _PEAKED = 6.0, 2.0
+_OUTLIER_SIGMAS, _MAX_MODEL_DEPARTURE_RATIO = 6.0, 2.0
 #: Standard deviation of Gaussian noise over its median absolute deviation.
-_NORMAL = 1.4826
+_SD_PER_MAD = 1.4826
 #: Largest misfit of a grid of values, relative to its quantum.
-_GRID = 0.02
+_QUANTUM_TOLERANCE = 0.02
 
 
 def find_quantum(values: np.ndarray) -> float:
@@ -35,10 +35,12 @@ def find_quantum(values: np.ndarray) -> float:
     multiples = (distinct - distinct[0]) / gaps.min()
     quantum = float(gaps.min() * multiples[-1] / max(np.rint(multiples[-1]), 1.0))
     multiples = (distinct - distinct[0]) / quantum
-    return quantum if np.abs(multiples - np.rint(multiples)).max() < _GRID else 0.0
+    return quantum if np.abs(multiples - np.rint(multiples)).max() < _QUANTUM_TOLERANCE else 0.0
 
 
-def find_kept_rows(residuals: np.ndarray, curve: np.ndarray, quantum: float) -> np.ndarray | None:
+def find_kept_mask(
+    residuals: np.ndarray, model_friction: np.ndarray, quantum: float
+) -> np.ndarray | None:
     """Find the rows that are not outliers.
 
     Each residual is compared with the median of its neighbours. A row is an outlier if the
@@ -49,7 +51,7 @@ def find_kept_rows(residuals: np.ndarray, curve: np.ndarray, quantum: float) -> 
     ----------
     residuals : ndarray, shape (rows,)
         Residuals of a fit.
-    curve : ndarray, shape (rows,)
+    model_friction : ndarray, shape (rows,)
         Friction of the fit.
     quantum : float
         Quantum to which friction is rounded.
@@ -60,21 +62,24 @@ def find_kept_rows(residuals: np.ndarray, curve: np.ndarray, quantum: float) -> 
         None if there are no outliers.
     """
     off = residuals - _median_of_neighbours(residuals)
-    blocks = np.array_split(np.abs(off), max(len(off) // _BLOCK, 1))
-    least = max(0.5 * quantum, 0.1 * _NORMAL * float(np.median(np.abs(off))))
-    scales = [max(_NORMAL * float(np.median(block)), least) for block in blocks]
+    blocks = np.array_split(np.abs(off), max(len(off) // _BLOCK_ROWS, 1))
+    least = max(0.5 * quantum, 0.1 * _SD_PER_MAD * float(np.median(np.abs(off))))
+    scales = [max(_SD_PER_MAD * float(np.median(block)), least) for block in blocks]
     # the noise level may change within a block, and then one of the neighbours has that level
     scale = np.repeat(maximum_filter(scales, 3), [len(block) for block in blocks])
-    peaked = maximum_filter(np.abs(curve - _median_of_neighbours(curve)), 2 * _REACH + 1)
-    found = np.abs(off) > np.maximum(_FAR * scale, _PEAKED * peaked)
+    peaked = maximum_filter(
+        np.abs(model_friction - _median_of_neighbours(model_friction)), 2 * _NEIGHBOUR_COUNT + 1
+    )
+    found = np.abs(off) > np.maximum(_OUTLIER_SIGMAS * scale, _MAX_MODEL_DEPARTURE_RATIO * peaked)
     return ~found if found.any() and scale.min() > 0.0 else None
 
 
 def _median_of_neighbours(values: np.ndarray) -> np.ndarray:
     """Compute the median of the neighbours of each row, excluding the row."""
-    around = np.ones(2 * _REACH + 1, dtype=bool)
-    around[_REACH] = False
+    around = np.ones(2 * _NEIGHBOUR_COUNT + 1, dtype=bool)
+    around[_NEIGHBOUR_COUNT] = False
     lower, upper = (
-        rank_filter(values, rank, footprint=around, mode="mirror") for rank in (_REACH - 1, _REACH)
+        rank_filter(values, rank, footprint=around, mode="mirror")
+        for rank in (_NEIGHBOUR_COUNT - 1, _NEIGHBOUR_COUNT)
     )
     return np.asarray(0.5 * (lower + upper))

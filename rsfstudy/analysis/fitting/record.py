@@ -12,19 +12,20 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import isotonic_regression
 
-from rsfstudy.analysis.fitting.steps import Step, steps_of
+from rsfstudy._deprecation import renamed_keywords, renamed_members
+from rsfstudy.analysis.fitting.steps import LoadingStep, detect_velocity_steps
 from rsfstudy.analysis.fitting.stress_steps import (
     find_stress_steps,
-    with_levels,
-    with_stress_steps,
+    merge_stress_steps,
+    set_stress_levels,
 )
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.netcdf import with_cf_encoding
-from rsfstudy.quantity import Quantity, is_name
+from rsfstudy.quantity import Quantity, is_variable_name
 
 #: Its columns.
-COLUMNS = (
+RECORD_COLUMNS = (
     Quantity("time", "$t$", "s", "time"),
     Quantity("displacement", r"$\delta_0$", "um", "load point displacement"),
     Quantity("friction", r"$\mu$", "1", "friction coefficient"),
@@ -42,9 +43,11 @@ _STEP_COLUMNS = (
 )
 
 #: Pieces of steady velocity that stand for a ramp: at their ends displacement is exact.
-_RAMP = 16
+_RAMP_SEGMENTS = 16
 
 
+@renamed_keywords
+@renamed_members
 @guard_methods
 @dataclass(frozen=True, eq=False)
 class Record:
@@ -57,7 +60,7 @@ class Record:
         it was recorded. All columns have the same length.
     name : str
         Name of the record in results.
-    stated : tuple of Step or None
+    specified_steps : tuple of LoadingStep or None
         Steps that the user specified. If None, steps are detected.
 
     Raises
@@ -69,12 +72,12 @@ class Record:
 
     columns: dict[str, np.ndarray]
     name: str = "record"
-    stated: tuple[Step, ...] | None = None
+    specified_steps: tuple[LoadingStep, ...] | None = None
 
     def __post_init__(self) -> None:
-        if not is_name(self.name):
+        if not is_variable_name(self.name):
             raise InvalidValue("name", self.name, "must be a Python identifier")
-        for about in COLUMNS[:3]:
+        for about in RECORD_COLUMNS[:3]:
             if about.name not in self.columns:
                 rule = f"has no {about.name}"
                 raise InvalidValue("record", [*self.columns], rule, remedy=f"Give {about.name}.")
@@ -101,7 +104,7 @@ class Record:
     @cached_property
     def digest(self) -> str:
         """Hash of the columns and the specified steps. Equal records have equal hashes."""
-        told = hashlib.sha256(repr((sorted(self.columns), self.stated)).encode())
+        told = hashlib.sha256(repr((sorted(self.columns), self.specified_steps)).encode())
         for name in sorted(self.columns):
             told.update(np.ascontiguousarray(self.columns[name]).tobytes())
         return told.hexdigest()[:16]
@@ -115,14 +118,14 @@ class Record:
     def __len__(self) -> int:
         return len(self.time)
 
-    def window(self, begins: float, ends: float) -> Record:
+    def window(self, start: float, end: float) -> Record:
         """Return the part of the record between two times in s."""
-        if not begins < ends:
-            raise InvalidValue("window", (begins, ends), "must end after it begins")
-        rows = (self.time >= begins) & (self.time <= ends)
+        if not start < end:
+            raise InvalidValue("window", (start, end), "must end after it begins")
+        rows = (self.time >= start) & (self.time <= end)
         if not rows.any():
             rule = f"lies outside the record, {self.time[0]:g} to {self.time[-1]:g} s"
-            raise InvalidValue("window", (begins, ends), rule)
+            raise InvalidValue("window", (start, end), rule)
         return replace(self, columns={n: v[rows] for n, v in self.columns.items()})
 
     def with_steps(self, steps: Sequence[Sequence[float]]) -> Record:
@@ -142,20 +145,24 @@ class Record:
         -------
         Record
         """
-        return replace(self, stated=tuple(map(_stated_step, steps)))
+        return replace(self, specified_steps=tuple(map(_parse_step, steps)))
 
     @cached_property
-    def found(self) -> tuple[Step, ...]:
+    def loading_steps(self) -> tuple[LoadingStep, ...]:
         """The steps that the user specified, or else the detected steps."""
         stress, moved = self.columns.get("normal_stress"), self.columns["displacement"]
-        steps = self.stated if self.stated is not None else steps_of(self.time, moved)
+        steps = (
+            self.specified_steps
+            if self.specified_steps is not None
+            else detect_velocity_steps(self.time, moved)
+        )
         if stress is None:
             return steps
         changes = find_stress_steps(self.time, stress)
-        if self.stated is None:
+        if self.specified_steps is None:
             velocity = float(np.polyfit(self.time - self.time[0], moved, 1)[0])
-            steps = with_stress_steps(steps, changes, velocity)
-        return with_levels(steps, changes, self.time, stress)
+            steps = merge_stress_steps(steps, changes, velocity)
+        return set_stress_levels(steps, changes, self.time, stress)
 
     def steps(self) -> xr.Dataset:
         """Return a table of the steps of load point velocity and normal stress.
@@ -167,7 +174,7 @@ class Record:
             ``velocity_after`` (um/s), and, if normal stress was recorded, ``normal_stress_before``
             and ``normal_stress_after`` (Pa).
         """
-        numbers = [step[: len(_STEP_COLUMNS)] for step in self.found]
+        numbers = [step[: len(_STEP_COLUMNS)] for step in self.loading_steps]
         rows = np.array(numbers, dtype=float).reshape(-1, len(_STEP_COLUMNS))
         shown = _STEP_COLUMNS if "normal_stress" in self.columns else _STEP_COLUMNS[:4]
         data = {about.name: ("step", rows[:, n], about.attributes) for n, about in enumerate(shown)}
@@ -177,7 +184,7 @@ class Record:
 
     def to_dataset(self) -> xr.Dataset:
         """Convert the record to a dataset with the dimension ``time``."""
-        about = {column.name: column for column in COLUMNS}
+        about = {column.name: column for column in RECORD_COLUMNS}
         data = {
             name: ("time", values, {"long_name": about[name].long_name, "units": about[name].units})
             for name, values in self.columns.items()
@@ -189,36 +196,36 @@ class Record:
         return {"title": f"{title}: {self.name}", "Conventions": "CF-1.11"}
 
 
-def _stated_step(stated: Sequence[float]) -> Step:
+def _parse_step(fields: Sequence[float]) -> LoadingStep:
     """Validate the numbers of a step, and convert them to a ``Step``."""
-    if isinstance(stated, Step):  # from another record
-        return stated
+    if isinstance(fields, LoadingStep):  # from another record
+        return fields
     rule = "is no step: begins, ends, velocity before and after, and, if it changes, "
     rule += "normal stress before and after"
     try:
-        numbers = [float(number) for number in stated]
+        numbers = [float(number) for number in fields]
     except (TypeError, ValueError) as error:
-        raise InvalidValue("step", stated, rule) from error
+        raise InvalidValue("step", fields, rule) from error
     if len(numbers) not in (4, 6) or not np.isfinite(numbers).all():
-        raise InvalidValue("step", stated, rule)
+        raise InvalidValue("step", fields, rule)
     begins, ends, before, after, *stresses = numbers
     first, second = stresses or (math.nan, math.nan)
-    step = Step(begins, ends, before, after, first, second)
+    step = LoadingStep(begins, ends, before, after, first, second)
     if not begins <= ends or min(before, after) < 0.0 or min([1.0, *stresses]) <= 0.0:
         raise InvalidValue("step", tuple(numbers), rule)
     return step
 
 
-def loading_of(record: Record, begins: float, ends: float, *, recorded: bool) -> np.ndarray:
+def loading_history(record: Record, start: float, end: float, *, from_rows: bool) -> np.ndarray:
     """Return the loading history between two times.
 
     Parameters
     ----------
     record : Record
-    begins, ends : float
+    start, end : float
         Times in s. Before the first segment, the slider slides steadily at the load point velocity
         before the first step.
-    recorded : bool
+    from_rows : bool
         If True, each row begins a segment, and the recorded displacement is replaced by the closest
         displacement that never decreases. If False, the loading consists of steps, and load point
         velocity and normal stress change at a constant rate during a step.
@@ -229,48 +236,50 @@ def loading_of(record: Record, begins: float, ends: float, *, recorded: bool) ->
         For each segment, its start in s, the load point velocity in um/s, the ratio of normal
         stress to its initial value, and the rate of this ratio in 1/s.
     """
-    steps = steps_between(record, begins, ends)
-    if recorded:
-        part, first = record.window(begins, ends), steps[0] if steps else None
+    steps = steps_between(record, start, end)
+    if from_rows:
+        part, first = record.window(start, end), steps[0] if steps else None
         if first is None:
-            return _by_rows(part, 0.0, math.nan)
-        sliding = part.time < first.begins
+            return _rowwise_loading(part, 0.0, math.nan)
+        sliding = part.time < first.start
         stress = part.columns.get("normal_stress", np.array([]))[: int(sliding.sum())]
-        return _by_rows(part, first.before, float(stress.mean()) if stress.size else math.nan)
-    return by_steps(begins, steps)
+        return _rowwise_loading(
+            part, first.velocity_before, float(stress.mean()) if stress.size else math.nan
+        )
+    return stepwise_loading(start, steps)
 
 
-def steps_between(record: Record, begins: float, ends: float) -> list[Step]:
+def steps_between(record: Record, start: float, end: float) -> list[LoadingStep]:
     """Return the steps of a record between two times."""
-    return [step for step in record.found if begins < step.begins and step.ends < ends]
+    return [step for step in record.loading_steps if start < step.start and step.end < end]
 
 
-def by_steps(begins: float, steps: Sequence[Step]) -> np.ndarray:
+def stepwise_loading(start: float, steps: Sequence[LoadingStep]) -> np.ndarray:
     """Return the loading history that consists of steps.
 
     Parameters
     ----------
-    begins : float
+    start : float
         Start of the first segment in s.
-    steps : sequence of Step
+    steps : sequence of LoadingStep
 
     Returns
     -------
     ndarray, shape (segments, 4)
-        Segments as returned by ``loading_of``.
+        Segments as returned by ``loading_history``.
     """
-    pieces, level = [(begins, steps[0].before if steps else 0.0, 1.0, 0.0)], 1.0
+    pieces, level = [(start, steps[0].velocity_before if steps else 0.0, 1.0, 0.0)], 1.0
     for step in steps:
-        lasts, rises = step.ends - step.begins, level * (step.stress_ratio - 1.0)
-        for part, speed in _velocities(step):
-            at = step.begins + part * lasts
+        lasts, rises = step.end - step.start, level * (step.stress_ratio - 1.0)
+        for part, speed in _velocity_profile(step):
+            at = step.start + part * lasts
             pieces.append((float(at), float(speed), level + part * rises, rises / lasts))
         level += rises
-        pieces.append((step.ends, step.after, level, 0.0))
+        pieces.append((step.end, step.velocity_after, level, 0.0))
     return np.array(pieces)
 
 
-def _velocities(step: Step) -> list[tuple[float, float]]:
+def _velocity_profile(step: LoadingStep) -> list[tuple[float, float]]:
     """Return the velocities within a step.
 
     Returns
@@ -279,25 +288,32 @@ def _velocities(step: Step) -> list[tuple[float, float]]:
         The start of each velocity, as a fraction of the duration of the step, and the velocity in
         um/s.
     """
-    lasts = step.ends - step.begins
+    lasts = step.end - step.start
     if not lasts > 0.0:
         return []
-    if step.through:
-        return [(begins / lasts, speed) for begins, speed in step.through]
-    count = _RAMP if step.changes_velocity else 1
+    if step.velocity_profile:
+        return [(begins / lasts, speed) for begins, speed in step.velocity_profile]
+    count = _RAMP_SEGMENTS if step.changes_velocity else 1
     parts = (np.arange(count) / count).tolist()
-    return [(p, step.before + (p + 0.5 / _RAMP) * (step.after - step.before)) for p in parts]
+    return [
+        (
+            p,
+            step.velocity_before
+            + (p + 0.5 / _RAMP_SEGMENTS) * (step.velocity_after - step.velocity_before),
+        )
+        for p in parts
+    ]
 
 
-def _by_rows(record: Record, first: float, before: float) -> np.ndarray:
+def _rowwise_loading(record: Record, first_velocity: float, stress_before: float) -> np.ndarray:
     """Return the loading history with one segment per row.
 
     Parameters
     ----------
     record : Record
-    first : float
+    first_velocity : float
         Load point velocity of the first segment in um/s.
-    before : float
+    stress_before : float
         Normal stress in Pa before the first step, by which normal stress is divided. If NaN, the
         normal stress of the first row is used.
     """
@@ -306,10 +322,10 @@ def _by_rows(record: Record, first: float, before: float) -> np.ndarray:
     table = np.zeros((len(record), 4))
     table[:, 0], table[:, 2] = record.time, 1.0
     table[:-1, 1] = np.diff(moved) / lasts
-    table[-1, 1], table[0, 1] = table[-2, 1], first
+    table[-1, 1], table[0, 1] = table[-2, 1], first_velocity
     if "normal_stress" in record.columns:
         stress = record.columns["normal_stress"]
-        table[:, 2] = stress / (before if before > 0.0 else stress[0])
+        table[:, 2] = stress / (stress_before if stress_before > 0.0 else stress[0])
         table[0, 2] = 1.0  # the motion begins in steady sliding
         table[:-1, 3] = np.diff(table[:, 2]) / lasts
     return table

@@ -11,10 +11,10 @@ import numpy as np
 from scipy.stats import chi2
 
 #: Number of lags in the test of whitened residuals.
-LAGS = 20
+LAG_COUNT = 20
 
 
-def whiteness(innovations: np.ndarray, order: int) -> float:
+def ljung_box_p_value(whitened_residuals: np.ndarray, order: int) -> float:
     """Compute the p-value of the Ljung-Box test for autocorrelation.
 
     The test statistic is ``n (n + 2) sum r_k^2/(n - k)``, where r_k is the autocorrelation of the
@@ -23,7 +23,7 @@ def whiteness(innovations: np.ndarray, order: int) -> float:
 
     Parameters
     ----------
-    innovations : ndarray, shape (rows,)
+    whitened_residuals : ndarray, shape (rows,)
         Whitened residuals.
     order : int
         Number of estimated coefficients, which is subtracted from the degrees of freedom.
@@ -32,8 +32,8 @@ def whiteness(innovations: np.ndarray, order: int) -> float:
     -------
     float
     """
-    count, seen = len(innovations), innovations - innovations.mean()
-    lags = np.arange(1, min(LAGS + order, count // 4) + 1)
+    count, seen = len(whitened_residuals), whitened_residuals - whitened_residuals.mean()
+    lags = np.arange(1, min(LAG_COUNT + order, count // 4) + 1)
     correlations = np.array([seen[lag:] @ seen[:-lag] for lag in lags]) / (seen @ seen)
     size = count * (count + 2.0) * float(np.sum(correlations**2 / (count - lags)))
     return float(chi2.sf(size, max(len(lags) - order, 1)))

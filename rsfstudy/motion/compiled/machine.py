@@ -14,64 +14,71 @@ from numba import types
 from numba.core.errors import NumbaError
 
 from rsfstudy.motion import layout
-from rsfstudy.motion.columns import filling
-from rsfstudy.motion.compiled.building import called_by_address, called_from_python
-from rsfstudy.motion.compiled.refusal import check_raises_nothing, refused
-from rsfstudy.motion.handover import Limits
+from rsfstudy.motion.columns import in_place_functions
+from rsfstudy.motion.compiled.building import compile_cfuncs, compile_function
+from rsfstudy.motion.compiled.refusal import check_no_raise, compilation_error
+from rsfstudy.motion.handover import SwitchThresholds
 from rsfstudy.motion.loop import advance
-from rsfstudy.slider.equations import Equations, between_ruptures, in_rupture, without_mass
+from rsfstudy.slider.equations import (
+    Equations,
+    equations_between_ruptures,
+    equations_in_rupture,
+    equations_without_mass,
+)
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.scene import Scene
 
-_ARRAY, _TABLE = types.float64[::1], types.float64[:, ::1]
-_LIMITS = types.UniTuple(types.float64, len(Limits._fields))
-_PLAN = types.Tuple((_ARRAY, types.int64[:, ::1], _LIMITS, _ARRAY, _ARRAY))
+_ARRAY_TYPE, _TABLE_TYPE = types.float64[::1], types.float64[:, ::1]
+_THRESHOLDS_TYPE = types.UniTuple(types.float64, len(SwitchThresholds._fields))
+_PLAN_TYPE = types.Tuple(
+    (_ARRAY_TYPE, types.int64[:, ::1], _THRESHOLDS_TYPE, _ARRAY_TYPE, _ARRAY_TYPE)
+)
 
 
 #: The many objects of a compiler take a third of a second to be looked through as a process ends.
 atexit.register(gc.freeze)
 
 
-class Compiled:
-    """The loop, compiled, and its arguments (see `running.Plain`)."""
+class NumbaBackend:
+    """The loop, compiled, and its arguments (see `running.PythonBackend`)."""
 
-    def initial(self, fields: tuple[tuple[str, float], ...]) -> bytes:
-        return _initial(fields)
+    def initial_values(self, fields: tuple[tuple[str, float], ...]) -> bytes:
+        return _pack_initial_values(fields)
 
-    def state(self, initial: bytes, called_with: tuple[float, ...]) -> CompiledState:
-        return CompiledState(initial, called_with)
+    def create_state(self, initial: bytes, called_with: tuple[float, ...]) -> NumbaMotionState:
+        return NumbaMotionState(initial, called_with)
 
-    def table(self, systems: tuple[Equations, ...]) -> np.ndarray:
-        return _table(*map(addresses, systems))
+    def function_table(self, systems: tuple[Equations, ...]) -> np.ndarray:
+        return _build_function_table(*map(function_addresses, systems))
 
-    def passed(self, *arrays: np.ndarray) -> Sequence[np.ndarray]:
+    def as_arguments(self, *arrays: np.ndarray) -> Sequence[np.ndarray]:
         return arrays
 
-    def numbers(self, p: Sequence[float]) -> Any:
+    def as_parameters(self, p: Sequence[float]) -> Any:
         return np.array(p)
 
-    def advance(self) -> Any:
+    def loop_function(self) -> Any:
         return compiled_loop()
 
 
-class CompiledState:
+class NumbaMotionState:
     """The state of a motion as a record."""
 
     def __init__(self, initial: bytes, called_with: tuple[float, ...]) -> None:
         self._bytes = bytearray(initial)
-        layout.CALLED_WITH.pack_into(self._bytes, 0, *called_with)
+        layout.CALL_FORMAT.pack_into(self._bytes, 0, *called_with)
         self.memory = np.frombuffer(self._bytes, layout.MOTION)
 
-    def says(self) -> tuple[int, ...]:
+    def counters(self) -> tuple[int, ...]:
         """Right-hand sides by regime, steps, events, rows, and Jacobians."""
-        return layout.SAYS.unpack_from(self._bytes, layout.CALLED_WITH.size)
+        return layout.COUNTER_FORMAT.unpack_from(self._bytes, layout.CALL_FORMAT.size)
 
-    def field(self, name: str) -> float:
+    def get_field(self, name: str) -> float:
         """One of its fields."""
         return float(self.memory[name][0])
 
 
-def prepare(scene: Scene, *, clock: bool) -> None:
+def compile_scene(scene: Scene, *, with_time: bool) -> None:
     """Compile what motions of such a scene need, with time or without it, or find it in the cache.
     What carries no time may also be a path that leaves mass out.
 
@@ -81,15 +88,15 @@ def prepare(scene: Scene, *, clock: bool) -> None:
         Where a part of the scene cannot be compiled.
     """
     compiled_loop()
-    addresses(between_ruptures(scene, clock=clock))
+    function_addresses(equations_between_ruptures(scene, clock=with_time))
     if scene.has_mass:
-        addresses(in_rupture(scene, clock=clock))
-    if scene.has_mass and not clock:
-        addresses(without_mass(scene, clock=False))
+        function_addresses(equations_in_rupture(scene, clock=with_time))
+    if scene.has_mass and not with_time:
+        function_addresses(equations_without_mass(scene, clock=False))
 
 
 @lru_cache(maxsize=256)
-def _initial(fields: tuple[tuple[str, float], ...]) -> bytes:
+def _pack_initial_values(fields: tuple[tuple[str, float], ...]) -> bytes:
     """The state that motions begin with, as bytes: records are copied one field after the other."""
     memory = np.zeros(1, layout.MOTION)
     for name, value in fields:
@@ -98,11 +105,11 @@ def _initial(fields: tuple[tuple[str, float], ...]) -> bytes:
 
 
 @cache
-def _table(slow: tuple[int, ...], fast: tuple[int, ...] = ()) -> np.ndarray:
+def _build_function_table(slow: tuple[int, ...], fast: tuple[int, ...] = ()) -> np.ndarray:
     """The table of addresses; both regimes know of the balance between ruptures."""
-    rows = np.zeros((2, layout.FUNCTIONS), dtype=np.int64)
-    rows[layout.SLOW, : len(slow)], rows[layout.FAST, : len(fast)] = slow, fast
-    rows[layout.FAST, -1] = rows[layout.SLOW, -1]
+    rows = np.zeros((2, layout.FUNCTIONS_PER_REGIME), dtype=np.int64)
+    rows[layout.SLOW_REGIME, : len(slow)], rows[layout.FAST_REGIME, : len(fast)] = slow, fast
+    rows[layout.FAST_REGIME, -1] = rows[layout.SLOW_REGIME, -1]
     return rows
 
 
@@ -110,12 +117,12 @@ def _table(slow: tuple[int, ...], fast: tuple[int, ...] = ()) -> np.ndarray:
 def compiled_loop() -> Any:
     """The compiled loop of motions."""
     memory = types.Array(numba.from_dtype(layout.MOTION), 1, "C")
-    tables = _ARRAY, _TABLE, _ARRAY, _TABLE, _TABLE, types.int64
-    signature = types.int64(memory, _ARRAY, _ARRAY, _ARRAY, _PLAN, *tables)
-    return called_from_python(advance, signature)
+    tables = _ARRAY_TYPE, _TABLE_TYPE, _ARRAY_TYPE, _TABLE_TYPE, _TABLE_TYPE, types.int64
+    signature = types.int64(memory, _ARRAY_TYPE, _ARRAY_TYPE, _ARRAY_TYPE, _PLAN_TYPE, *tables)
+    return compile_function(advance, signature)
 
 
-def of_floats(function: Function, *arguments: float | Numbers) -> Any:
+def compile_scalar_function(function: Function, *arguments: float | Numbers) -> Any:
     """A function of floats and of tuples of floats, compiled for arguments of this form.
 
     Raises
@@ -123,46 +130,49 @@ def of_floats(function: Function, *arguments: float | Numbers) -> Any:
     InvalidValue
         Where a function of a part cannot be compiled, or raises.
     """
-    return _of_floats(function, *[len(x) if isinstance(x, tuple) else 0 for x in arguments])
+    return _compile_scalar_function(
+        function, *[len(x) if isinstance(x, tuple) else 0 for x in arguments]
+    )
 
 
 @cache
-def _of_floats(function: Function, *lengths: int) -> Any:
-    check_raises_nothing(function)
+def _compile_scalar_function(function: Function, *lengths: int) -> Any:
+    check_no_raise(function)
     floats = (types.UniTuple(types.float64, n) if n else types.float64 for n in lengths)
     try:
-        return called_from_python(function, tuple(floats))
+        return compile_function(function, tuple(floats))
     except NumbaError as error:
-        raise refused(error) from error
+        raise compilation_error(error) from error
 
 
 @cache
-def of_arrays(function: Function, *dimensions: int) -> Any:
+def compile_array_function(function: Function, *dimensions: int) -> Any:
     """A function of arrays of so many dimensions, compiled."""
     kinds = (types.Array(types.float64, count, "C") for count in dimensions)
-    return called_from_python(function, tuple(kinds))
+    return compile_function(function, tuple(kinds))
 
 
-def addresses(equations: Equations) -> tuple[int, ...]:
-    """Addresses of the compiled functions of a system of equations, in the order of `Filling`.
+def function_addresses(equations: Equations) -> tuple[int, ...]:
+    """Addresses of the compiled functions of a system of equations, in the order of
+    `InPlaceFunctions`.
 
     Raises
     ------
     InvalidValue
         Where a function of a part cannot be compiled, or raises.
     """
-    return _addresses(tuple(filter(None, filling(equations))), equations)
+    return _compile_addresses(tuple(filter(None, in_place_functions(equations))), equations)
 
 
-_ADDRESSES: dict[tuple[Any, ...], tuple[int, ...]] = {}
+_ADDRESS_CACHE: dict[tuple[Any, ...], tuple[int, ...]] = {}
 
 
-def _addresses(functions: tuple[Any, ...], equations: Equations) -> tuple[int, ...]:
-    if functions not in _ADDRESSES:
-        for function in (equations.rate, equations.point):
-            check_raises_nothing(function)
+def _compile_addresses(functions: tuple[Any, ...], equations: Equations) -> tuple[int, ...]:
+    if functions not in _ADDRESS_CACHE:
+        for function in (equations.rate_function, equations.point_function):
+            check_no_raise(function)
         try:
-            _ADDRESSES[functions] = called_by_address(functions)
+            _ADDRESS_CACHE[functions] = compile_cfuncs(functions)
         except NumbaError as error:
-            raise refused(error) from error
-    return _ADDRESSES[functions]
+            raise compilation_error(error) from error
+    return _ADDRESS_CACHE[functions]

@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+from rsfstudy._deprecation import adopt_former_members, renamed_members
 from rsfstudy.slider.equations import Equations
 
 #: What `Stepper.attempt` returns where it takes no step: none is long enough, or the budget is
@@ -17,6 +18,7 @@ from rsfstudy.slider.equations import Equations
 NO_STEP, BUDGET_SPENT = 0.0, -1.0
 
 
+@renamed_members
 class Stepper(ABC):
     """Integrates the equations of a motion, one step at a time.
 
@@ -39,23 +41,27 @@ class Stepper(ABC):
     #: What it is called in files and on the command line.
     name: ClassVar[str]
 
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        adopt_former_members(cls)
+
     def __init__(self, systems: tuple[Equations, ...], methods: Mapping[str, str]) -> None:
         self.systems, self.failure = systems, "no step is long enough"
 
     @abstractmethod
     def begin(self, motion: Any, space: Any) -> None:
         """Begin with the unknowns ``space.y`` of the regime ``motion.regime``, at clock zero; fill
-        in their rates, ``space.rates``. Where the loading has a kink, ``motion.length`` is that of
-        the step it has cut short; elsewhere it is 0.
+        in their rates, ``space.rates``. Where the loading has a kink, ``motion.next_step_length``
+        is that of the step it has cut short; elsewhere it is 0.
         """
 
     @abstractmethod
     def attempt(self, motion: Any, space: Any, longest: float) -> float:
         """Take a step whose local error is allowed, in the direction of ``motion.direction``.
 
-        Fills in ``space.new`` and ``space.rates_at_end``, the unknowns at its end and their rates,
-        and ``motion.end`` and ``motion.taken``, the clock there and the length. Each right-hand
-        side is charged by ``workspace.spend``.
+        Fills in ``space.y_end`` and ``space.rates_at_end``, the unknowns at its end and their
+        rates, and ``motion.end`` and ``motion.step_length``, the clock there and the length. Each
+        right-hand side is charged by ``workspace.count_evaluations``.
 
         Returns
         -------
@@ -63,7 +69,7 @@ class Stepper(ABC):
             Its length, or `NO_STEP`, or `BUDGET_SPENT`.
         """
 
-    def reach(self, motion: Any, space: Any, length: float) -> float:
+    def step_to_segment_end(self, motion: Any, space: Any, length: float) -> float:
         """Take a step that ends when the segment of loading does, as `attempt` does; of about that
         length. A stepper that cannot returns 0.
         """
@@ -71,7 +77,7 @@ class Stepper(ABC):
 
     @abstractmethod
     def unknowns_at(self, motion: Any, space: Any, clock: float) -> None:
-        """Fill in ``space.within``, the unknowns at a clock within the step, by dense output."""
+        """Fill in ``space.y_within``, the unknowns at a clock within the step, by dense output."""
 
     @abstractmethod
     def retake(self, motion: Any, space: Any, clock: float) -> None:
@@ -89,9 +95,9 @@ def attempt(motion, space, longest):
     return space.stepper.attempt(motion, space, longest)
 
 
-def reach(motion, space, length):
+def step_to_segment_end(motion, space, length):
     """Length of a step that ends when the segment does; 0 where none could be taken."""
-    return space.stepper.reach(motion, space, length)
+    return space.stepper.step_to_segment_end(motion, space, length)
 
 
 def unknowns_at(motion, space, clock):

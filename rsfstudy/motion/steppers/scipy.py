@@ -18,8 +18,8 @@ from scipy.integrate import (
     Radau,
 )
 
-from rsfstudy.motion.layout import SLOW
-from rsfstudy.motion.meter import Halt
+from rsfstudy.motion.layout import SLOW_REGIME
+from rsfstudy.motion.meter import MotionStopped
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper, order_eight
 from rsfstudy.slider.equations import LONGEST_STEP, Equations
 from rsfstudy.slider.parts import Numbers
@@ -32,19 +32,19 @@ METHODS: Mapping[str, type[OdeSolver]] = {
 DEFAULT_METHOD = "DOP853"
 
 
-class _Spent(Exception):
+class _BudgetExceeded(Exception):
     """The budget is, within a step."""
 
 
-def _by_floats(dense: Any) -> Callable[[float], Iterable[float]]:
+def _float_interpolant(dense_output: Any) -> Callable[[float], Iterable[float]]:
     """The unknowns at a clock by dense output; that of order eight as it says, operation by
     operation, but on floats: arrays of so few numbers take four times as long.
     """
-    if type(dense).__name__ != "Dop853DenseOutput":
-        values: Callable[[float], Iterable[float]] = dense
+    if type(dense_output).__name__ != "Dop853DenseOutput":
+        values: Callable[[float], Iterable[float]] = dense_output
         return values
-    began, length, ends = dense.t_old, dense.h, dense.y_old.tolist()
-    columns = list(zip(*reversed(dense.F.tolist()), ends, strict=True))
+    began, length, ends = dense_output.t_old, dense_output.h, dense_output.y_old.tolist()
+    columns = list(zip(*reversed(dense_output.F.tolist()), ends, strict=True))
 
     def unknowns(clock: float) -> list[float]:
         x = (clock - began) / length
@@ -67,85 +67,91 @@ class SciPyStepper(Stepper):
         names = (methods.get(system.regime, DEFAULT_METHOD) for system in systems)
         self._methods = [METHODS[name] for name in names]
         self._solver: Any = None
-        self._dense: Any = None
-        self._most = math.inf
+        self._interpolant: Any = None
+        self._max_evaluations = math.inf
 
     def begin(self, motion: Any, space: Any) -> None:
         ends = 0.0, motion.direction * np.inf
         # the longest first step is asked of a trial step, which may leave the domain
-        begin, known = np.array(space.y[: space.unknowns]), motion.length
+        begin, known = np.array(space.y[: space.unknowns]), motion.next_step_length
         first = {"first_step": known} if known else {}
-        self._solver = self._solves(motion, space, ends, begin, **first)
-        space.rates[: space.unknowns] = self._rates()
+        self._solver = self._create_solver(motion, space, ends, begin, **first)
+        space.rates[: space.unknowns] = self._current_rates()
 
     def attempt(self, motion: Any, space: Any, longest: float) -> float:
-        motion.pace = 0.0
+        motion.time_per_step = 0.0
         if self._solver.status == "finished":  # a step that was taken anew
             ends = motion.clock, motion.direction * np.inf
-            begin, length = np.array(space.y[: space.unknowns]), abs(motion.length)
-            self._solver = self._solves(motion, space, ends, begin, first_step=length)
+            begin, length = np.array(space.y[: space.unknowns]), abs(motion.next_step_length)
+            self._solver = self._create_solver(motion, space, ends, begin, first_step=length)
         solver = self._solver
         solver.max_step = longest
-        if motion.length and isinstance(solver, DOP853):  # it may have been too long for a kink
-            solver.h_abs = motion.length
-        if not self._step(motion, solver):
+        if motion.next_step_length and isinstance(
+            solver, DOP853
+        ):  # it may have been too long for a kink
+            solver.h_abs = motion.next_step_length
+        if not self._take_step(motion, solver):
             return BUDGET_SPENT
         if solver.status == "failed":
             return NO_STEP
-        if motion.spent_slow + motion.spent_fast > motion.budget:
+        if motion.evaluations_slow + motion.evaluations_fast > motion.budget:
             return BUDGET_SPENT
-        motion.end, self._dense = float(solver.t), None
-        motion.taken = motion.end - motion.clock
-        motion.length = float(getattr(solver, "h_abs", abs(motion.taken)))
-        self._fill(space)
-        return abs(float(motion.taken))
+        motion.end, self._interpolant = float(solver.t), None
+        motion.step_length = motion.end - motion.clock
+        motion.next_step_length = float(getattr(solver, "h_abs", abs(motion.step_length)))
+        self._store_step_end(space)
+        return abs(float(motion.step_length))
 
-    def reach(self, motion: Any, space: Any, length: float) -> float:
+    def step_to_segment_end(self, motion: Any, space: Any, length: float) -> float:
         if not isinstance(self._solver, DOP853):
             return 0.0
-        self._dense = None
-        taken: float = order_eight.reach(motion, space, length)  # type: ignore[no-untyped-call]
+        self._interpolant = None
+        taken: float = order_eight.step_to_segment_end(motion, space, length)  # type: ignore[no-untyped-call]
         return taken
 
     def unknowns_at(self, motion: Any, space: Any, clock: float) -> None:
-        if motion.pace > 0.0:
+        if motion.time_per_step > 0.0:
             order_eight.unknowns_at(motion, space, clock)  # type: ignore[no-untyped-call]
             return
-        if self._dense is None:
-            self._dense = _by_floats(self._solver.dense_output())
-        for i, unknown in enumerate(self._dense(clock)):
-            space.within[i] = unknown
+        if self._interpolant is None:
+            self._interpolant = _float_interpolant(self._solver.dense_output())
+        for i, unknown in enumerate(self._interpolant(clock)):
+            space.y_within[i] = unknown
 
     def retake(self, motion: Any, space: Any, clock: float) -> None:
-        begin, motion.pace = np.array(space.y[: space.unknowns]), 0.0
+        begin, motion.time_per_step = np.array(space.y[: space.unknowns]), 0.0
         # the clock may round to where the step begins; an integrator wants a way to go
         end = clock if clock != motion.clock else np.nextafter(clock, motion.direction * np.inf)
         length, ends = abs(end - motion.clock), (motion.clock, end)
-        self._solver = solver = self._solves(motion, space, ends, begin, first_step=length)
+        self._solver = solver = self._create_solver(motion, space, ends, begin, first_step=length)
         clocks, within = [motion.clock], []
         while solver.status == "running":
-            if not self._step(motion, solver) or solver.status == "failed":
-                raise Halt(Status.INTEGRATION_FAILED, f"a step cannot be ended: {self.failure}")
+            if not self._take_step(motion, solver) or solver.status == "failed":
+                raise MotionStopped(
+                    Status.INTEGRATION_FAILED, f"a step cannot be ended: {self.failure}"
+                )
             clocks.append(solver.t)
             within.append(solver.dense_output())
-        motion.end, motion.taken = clock, clock - motion.clock
-        self._dense = OdeSolution(clocks, within) if len(within) > 1 else _by_floats(within[0])
-        self._fill(space)
+        motion.end, motion.step_length = clock, clock - motion.clock
+        self._interpolant = (
+            OdeSolution(clocks, within) if len(within) > 1 else _float_interpolant(within[0])
+        )
+        self._store_step_end(space)
 
-    def _solves(
+    def _create_solver(
         self, motion: Any, space: Any, ends: tuple[float, float], begin: np.ndarray, **first: float
     ) -> OdeSolver:
         """An integrator of the regime from one clock to another, whose work is charged."""
         system = self.systems[motion.regime]
-        rate_of, p, is_slow = system.rate, system.p, motion.regime == SLOW
+        rate_of, p, is_slow = system.rate_function, system.parameters, motion.regime == SLOW_REGIME
 
         def rate(_clock: float, unknowns: np.ndarray) -> Numbers:
-            if is_slow:  # as `spend` does, in half the time
-                motion.spent_slow += 1
+            if is_slow:  # as `count_evaluations` does, in half the time
+                motion.evaluations_slow += 1
             else:
-                motion.spent_fast += 1
-            if motion.spent_slow + motion.spent_fast > self._most:
-                raise _Spent
+                motion.evaluations_fast += 1
+            if motion.evaluations_slow + motion.evaluations_fast > self._max_evaluations:
+                raise _BudgetExceeded
             changes: Numbers = rate_of(tuple(unknowns.tolist()), p)
             return changes
 
@@ -164,31 +170,35 @@ class SciPyStepper(Stepper):
         motion.jacobians += int(solver.njev)
         return solver
 
-    def _step(self, motion: Any, solver: OdeSolver) -> bool:
+    def _take_step(self, motion: Any, solver: OdeSolver) -> bool:
         """Take one step; whether the budget is enough for it.
 
         Trial steps may leave the domain, and the solver then rejects them; what it accepts is
         checked.
         """
-        known, self._most, self.failure = solver.njev, motion.budget, "the budget is spent"
+        known, self._max_evaluations, self.failure = (
+            solver.njev,
+            motion.budget,
+            "the budget is spent",
+        )
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 self.failure = str(solver.step())
-        except _Spent:
+        except _BudgetExceeded:
             return False
         finally:
-            self._most = math.inf
+            self._max_evaluations = math.inf
             motion.jacobians += int(solver.njev - known)
         return True
 
-    def _rates(self) -> np.ndarray:
+    def _current_rates(self) -> np.ndarray:
         """Rates where the solver stands; most have just computed them."""
         known = getattr(self._solver, "f", None)
         if known is None:
             known = self._solver.fun(self._solver.t, self._solver.y)
         return np.asarray(known, dtype=float)
 
-    def _fill(self, space: Any) -> None:
+    def _store_step_end(self, space: Any) -> None:
         """Fill in the end of a step."""
-        space.new[: space.unknowns] = self._solver.y
-        space.rates_at_end[: space.unknowns] = self._rates()
+        space.y_end[: space.unknowns] = self._solver.y
+        space.rates_at_end[: space.unknowns] = self._current_rates()

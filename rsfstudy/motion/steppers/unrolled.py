@@ -21,90 +21,97 @@ import numpy as np
 from scipy.integrate import DOP853
 
 #: Stages of a step, of its dense output beyond the step's end, and rows of that.
-STAGES, EXTRA, ROWS = 12, 3, 7
-ALL_STAGES = STAGES + 1 + EXTRA
+STAGE_COUNT, EXTRA_STAGE_COUNT, DENSE_ROW_COUNT = 12, 3, 7
+TOTAL_STAGE_COUNT = STAGE_COUNT + 1 + EXTRA_STAGE_COUNT
 #: Weights of the stages before each stage, of which the last is the end of the step, and of all of
 #: them in its errors of fifth and third order.
-_WEIGHTS: Mapping[str, np.ndarray] = {
-    **{f"stage_{s}": DOP853.A[s, :s] for s in range(1, STAGES)},
-    f"stage_{STAGES}": DOP853.B,
+_STAGE_WEIGHTS: Mapping[str, np.ndarray] = {
+    **{f"stage_{s}": DOP853.A[s, :s] for s in range(1, STAGE_COUNT)},
+    f"stage_{STAGE_COUNT}": DOP853.B,
     "error_of_fifth": DOP853.E5,
     "error_of_third": DOP853.E3,
 }
 #: Places of the sizes of a step, in front of its block, and how many they are: its length, the
 #: tolerance, and its local error over what is allowed.
-LENGTH, TOLERANCE, ERROR, SIZES = 0, 1, 2, 3
+LENGTH_INDEX, TOLERANCE_INDEX, ERROR_INDEX, HEADER_SIZE = 0, 1, 2, 3
 
 Function = Callable[..., Any]
 
 
-def attempt(rate: Function, unknowns: int, numbers: Function) -> Function:
+def build_attempt_function(rate: Function, unknowns: int, unpack_parameters: Function) -> Function:
     """One step by rates of so many unknowns: ``attempt(y, stages, p, step)``.
 
     From `y`, whose rates are the first stage, it fills in the other stages, the unknowns at its
-    end, and its local error over what is allowed. `numbers` makes the tuple of numbers that `rate`
-    reads of `p`.
+    end, and its local error over what is allowed. `unpack_parameters` makes the tuple of numbers
+    that `rate` reads of `p`.
     """
-    made: Function = _source(unknowns)(rate, numbers)
+    made: Function = _build_step_factory(unknowns)(rate, unpack_parameters)
     return made
 
 
 @cache
-def _source(unknowns: int) -> Function:
+def _build_step_factory(unknowns: int) -> Function:
     """Source of such steps of ``rate_of`` and ``numbers``."""
-    n, scales = range(unknowns), SIZES + unknowns
+    n, scales = range(unknowns), HEADER_SIZE + unknowns
     lines = [
-        f"step[{ERROR}] = math.nan",
+        f"step[{ERROR_INDEX}] = math.nan",
         "of_scene = numbers(p)",
-        f"length, tolerance = step[{LENGTH}], step[{TOLERANCE}]",
+        f"length, tolerance = step[{LENGTH_INDEX}], step[{TOLERANCE_INDEX}]",
         *(f"y{i}, k0_{i} = y[{i}], stages[{i}]" for i in n),
     ]
-    for s in range(1, STAGES + 1):
+    for s in range(1, STAGE_COUNT + 1):
         unknown, rates = (", ".join(f"{x}{i}" for i in n) for x in ("z", f"k{s}_"))
         lines += [
-            *(f"z{i} = y{i} + length * {_call(f'stage_{s}', i)}" for i in n),
+            *(f"z{i} = y{i} + length * {_format_sum_call(f'stage_{s}', i)}" for i in n),
             f"{rates}, = rate_of(({unknown},), of_scene)",
             *(f"stages[{s * unknowns + i}] = k{s}_{i}" for i in n),
         ]
     for i in n:
         lines += [
-            f"step[{SIZES + i}] = z{i}",
+            f"step[{HEADER_SIZE + i}] = z{i}",
             f"allowed = tolerance * (step[{scales + i}] + max(abs(y{i}), abs(z{i})))",
-            f"fifth{i} = {_call('error_of_fifth', i)} / allowed",
-            f"third{i} = {_call('error_of_third', i)} / allowed",
+            f"fifth{i} = {_format_sum_call('error_of_fifth', i)} / allowed",
+            f"third{i} = {_format_sum_call('error_of_third', i)} / allowed",
         ]
     lines += [
         f"fifth = {' + '.join(f'fifth{i} * fifth{i}' for i in n)}",
         f"both = fifth + 0.01 * ({' + '.join(f'third{i} * third{i}' for i in n)})",
         f"error = abs(length) * fifth / math.sqrt(both * {unknowns}.0) if both != 0.0 else 0.0",
-        f"step[{ERROR}] = error",
+        f"step[{ERROR_INDEX}] = error",
     ]
     inner = "\n        ".join(["def attempt(y, stages, p, step):", *lines])
-    return _made("attempts", "rate_of, numbers", [inner, "return attempt"], _sums())
+    return _compile_source(
+        "attempts", "rate_of, numbers", [inner, "return attempt"], _build_weighted_sums()
+    )
 
 
 @cache
-def _sums() -> dict[str, Any]:
+def _build_weighted_sums() -> dict[str, Any]:
     """Weighted sums of the rates in all stages, as functions: compiled once for all equations."""
-    return {name: _made(name, _rates(name), [f"return {_terms(name)}"], {}) for name in _WEIGHTS}
+    return {
+        name: _compile_source(name, _sum_arguments(name), [f"return {_format_sum(name)}"], {})
+        for name in _STAGE_WEIGHTS
+    }
 
 
-def _call(name: str, unknown: int) -> str:
+def _format_sum_call(name: str, unknown: int) -> str:
     """A weighted sum of the rates of an unknown."""
-    rates = _rates(name).split(", ")
+    rates = _sum_arguments(name).split(", ")
     return f"{name}({', '.join(f'{rate}_{unknown}' for rate in rates)})"
 
 
-def _rates(name: str) -> str:
+def _sum_arguments(name: str) -> str:
     """Terms of a sum."""
-    return ", ".join(f"k{s}" for s in np.flatnonzero(_WEIGHTS[name]))
+    return ", ".join(f"k{s}" for s in np.flatnonzero(_STAGE_WEIGHTS[name]))
 
 
-def _terms(name: str) -> str:
-    return " + ".join(f"{float(x)!r} * k{s}" for s, x in enumerate(_WEIGHTS[name]) if x)
+def _format_sum(name: str) -> str:
+    return " + ".join(f"{float(x)!r} * k{s}" for s, x in enumerate(_STAGE_WEIGHTS[name]) if x)
 
 
-def _made(name: str, arguments: str, lines: Sequence[str], known: Mapping[str, Any]) -> Function:
+def _compile_source(
+    name: str, arguments: str, lines: Sequence[str], known: Mapping[str, Any]
+) -> Function:
     """The function that some lines define, which a debugger shows."""
     made: dict[str, Any] = {**known, "__name__": __name__, "math": math}
     text = "\n    ".join([f"def {name}({arguments}):", *lines])

@@ -1,7 +1,7 @@
 """Dynamics: the forces that balance the spring besides friction, one file a case.
 
 A case states how slip rate follows from spring stress and state, by functions that take the
-friction of a scene (see `friction.Friction`) and return functions of floats:
+friction of a scene (see `friction.FrictionFunctions`) and return functions of floats:
 
 - ``slip_rate(friction) -> (balance, growth)``, where ``balance(spring, psis, p)`` gives ln(V/V_*),
   frictional stress g and the state lost to stress, and ``growth(state, rates, x, g, p)`` the
@@ -16,37 +16,39 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.slider.parts import Function, Part, Scene, found_in
-from rsfstudy.slider.requirements import QUANTITIES
+from rsfstudy._deprecation import renamed_members
+from rsfstudy.slider.parts import Function, Part, Scene, discover_parts
+from rsfstudy.slider.requirements import PART_QUANTITIES
 
 
+@renamed_members
 @dataclass(frozen=True, kw_only=True)
 class Dynamics(Part):
     """Base of the cases of dynamics."""
 
     #: Name of the form between ruptures, as it appears in results.
     regime: ClassVar[str]
-    receives = frozenset(QUANTITIES)
+    received_quantities = frozenset(PART_QUANTITIES)
     slip_rate: ClassVar[Function]
     rupture_rate: ClassVar[Function | None] = None
     #: Whether slip may reverse, in the regularised form of friction.
-    reverses: ClassVar[bool] = False
+    allows_reversed_slip: ClassVar[bool] = False
 
     @classmethod
-    def functions(cls) -> tuple[str, ...]:
+    def required_functions(cls) -> tuple[str, ...]:
         return ("slip_rate",)
 
-    def radiated(self, log_slip_rate: float) -> float:
+    def radiated_stress(self, log_slip_rate: float) -> float:
         """Part of the spring stress that waves carry away at ln(V/V_*), over sigma_*."""
         return 0.0
 
-    def damping(self, log_slip_rate: float) -> float:
+    def radiated_stress_slope(self, log_slip_rate: float) -> float:
         """Derivative of the radiated stress with respect to ln V."""
         return 0.0
 
-    def norm(self, scene: Scene, log_slip_rate: float) -> float:
+    def slip_rate_norm(self, scene: Scene, log_slip_rate: float) -> float:
         """w = V T/(2 pi D_c) where mass acts, and 0 where there is none."""
         return 0.0
 
 
-PARTS = found_in(__name__, __path__)
+BUILT_IN_PARTS = discover_parts(__name__, __path__)

@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.slider.dynamics import Dynamics
-from rsfstudy.slider.friction import Friction
+from rsfstudy.slider.friction import FrictionFunctions
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.places import A
 
 
-def slip_rate(friction: Friction) -> tuple[Function, Function]:
+def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
     """``a ln(V/V_*) = strength(f) - Psi`` with f the deviation of spring stress, and its
     derivative, ``a d ln V = strength'(f) df - dPsi``.
     """
     strength, state_sum = friction.strength, friction.state_sum
-    contribution = friction.contribution
+    contribution = friction.state_contribution
 
     def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
         value, _slope, shift, _shift_slope = strength(spring_stress, psis, p)
@@ -35,5 +35,5 @@ class QuasiStatic(Dynamics):
 
     name = "quasi_static"
     regime = "quasi_static"
-    reverses = True
+    allows_reversed_slip = True
     slip_rate = staticmethod(slip_rate)

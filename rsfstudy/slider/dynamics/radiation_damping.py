@@ -6,20 +6,20 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.dynamics import Dynamics
-from rsfstudy.slider.friction import Friction
-from rsfstudy.slider.parts import NOT_NEGATIVE, Function, Numbers, Scene, number
+from rsfstudy.slider.friction import FrictionFunctions
+from rsfstudy.slider.parts import NON_NEGATIVE, Function, Numbers, Scene, number
 from rsfstudy.slider.places import DYNAMICS, LARGEST_LOG_SLIP_RATE, A
 
-_MOST_ITERATIONS = 200
-_SETTLED = 1e-15
+_MAX_ITERATIONS = 200
+_STEP_TOLERANCE = 1e-15
 #: How far strength may be off where Newton's steps have become small, over its size: on the floor
 #: of normal stress, which only trial steps meet, slopes are so steep that they are small anywhere.
-_BALANCED = 1e-6
+_BALANCE_TOLERANCE = 1e-6
 #: ln V beyond which only trial steps look for a balance: radiation would be 10^300 eta.
-_FASTEST = 690.0
+_MAX_LOG_SLIP_RATE = 690.0
 
 
-def radiated(log_slip_rate: float, damping: float) -> float:
+def compute_radiated_stress(log_slip_rate: float, damping: float) -> float:
     """Stress that waves carry away, over sigma_*: ``eta (V - V_*)``, so that it vanishes at V_*.
 
     Parameters
@@ -36,7 +36,7 @@ def radiated(log_slip_rate: float, damping: float) -> float:
     return damping * math.expm1(log_slip_rate)
 
 
-def slip_rate(friction: Friction) -> tuple[Function, Function]:
+def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
     """ln(V/V_*) at which friction and radiation together balance the spring, the frictional stress
     there, and the state lost to stress; and its derivative, ``[a + strength'(g) eta V] d ln V =
     strength'(g) df - dPsi``.
@@ -46,19 +46,19 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
     Newton's steps would leave it or shrink too slowly.
     """
     strength, state_sum = friction.strength, friction.state_sum
-    contribution = friction.contribution
+    contribution = friction.state_contribution
 
     def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
         a, damping, psi = p[A], p[DYNAMICS], state_sum(psis)
         # slip backwards is no part of it: radiation is at least -eta, which bounds ln V from above
         low, high = (
             -math.inf,
-            min((strength(spring_stress + damping, psis, p)[0] - psi) / a, _FASTEST),
+            min((strength(spring_stress + damping, psis, p)[0] - psi) / a, _MAX_LOG_SLIP_RATE),
         )
         # a good guess where radiation takes most of the stress
         x = min(high, math.log(max(a * high / damping, 1.0))) if high > 0.0 else high
         before = math.inf
-        for _ in range(_MOST_ITERATIONS):
+        for _ in range(_MAX_ITERATIONS):
             g = spring_stress - damping * math.expm1(x)
             value, slope, shift, _shift_slope = strength(g, psis, p)
             missing = value - psi - a * x
@@ -67,11 +67,13 @@ def slip_rate(friction: Friction) -> tuple[Function, Function]:
             else:
                 high = x
             change = missing / (a + slope * damping * math.exp(x))
-            balanced = abs(missing) <= _BALANCED * (1.0 + abs(psi) + a * abs(x))
-            if balanced and abs(change) <= _SETTLED * (1.0 + abs(x)):
+            balanced = abs(missing) <= _BALANCE_TOLERANCE * (1.0 + abs(psi) + a * abs(x))
+            if balanced and abs(change) <= _STEP_TOLERANCE * (1.0 + abs(x)):
                 return x, g, shift
             # where normal stress is nearly lost, slopes are so steep that such steps lead nowhere
-            slow = abs(change) > 0.5 * abs(before) or abs(change) <= _SETTLED * (1.0 + abs(x))
+            slow = abs(change) > 0.5 * abs(before) or abs(change) <= _STEP_TOLERANCE * (
+                1.0 + abs(x)
+            )
             before = change
             if slow or not low < x + change <= high:
                 before = math.inf
@@ -100,11 +102,11 @@ class RadiationDamping(Dynamics):
         "1",
         "stress that waves carry away at V_star",
         "sigma_*",
-        rule=NOT_NEGATIVE,
+        rule=NON_NEGATIVE,
     )
 
     name = "radiation_damping"
-    called_by = "radiation_damping"
+    selected_by = "radiation_damping"
     regime = "quasi_dynamic"
     slip_rate = staticmethod(slip_rate)
 
@@ -116,8 +118,8 @@ class RadiationDamping(Dynamics):
         """eta V_*/sigma_*."""
         return (self.radiation_damping,)
 
-    def radiated(self, log_slip_rate: float) -> float:
-        return radiated(log_slip_rate, self.radiation_damping)
+    def radiated_stress(self, log_slip_rate: float) -> float:
+        return compute_radiated_stress(log_slip_rate, self.radiation_damping)
 
-    def damping(self, log_slip_rate: float) -> float:
+    def radiated_stress_slope(self, log_slip_rate: float) -> float:
         return self.radiation_damping * math.exp(log_slip_rate)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.parts import Numbers, Part, found_in
+from rsfstudy.slider.parts import Numbers, Part, discover_parts
 from rsfstudy.slider.requirements import PORE_PRESSURE, SLIP_RATE
 
 
@@ -31,9 +31,9 @@ class Fluid(Part):
     is extremely large.
     """
 
-    conclusions = ("highest_pressure",)
-    equations = frozenset({"auxiliary_rates", "numbers"})
-    receives = frozenset({SLIP_RATE, PORE_PRESSURE})
+    derived_properties = ("highest_pressure",)
+    defining_methods = frozenset({"auxiliary_rates", "numbers"})
+    received_quantities = frozenset({SLIP_RATE, PORE_PRESSURE})
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
         """Bound of pore pressure from now on, while ln(V/V_*) is at most `log_slip_rate`; infinite
@@ -49,4 +49,4 @@ class Fluid(Part):
         return math.inf
 
 
-PARTS = found_in(__name__, __path__)
+BUILT_IN_PARTS = discover_parts(__name__, __path__)

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.fluid import Fluid
-from rsfstudy.slider.parts import Function, Numbers, Scene, numbers_of
-from rsfstudy.slider.places import DYNAMICS, FLUID, LARGEST_SLOWNESS, RECHARGE
+from rsfstudy.slider.parts import Function, Numbers, Scene, collect_numbers
+from rsfstudy.slider.places import BOUNDARY_PRESSURE_RATE, DYNAMICS, FLUID, LARGEST_LOG_SLOWNESS
 
 if TYPE_CHECKING:
     from rsfstudy.slider.loading import Loading
 
 
 @cache
-def with_surroundings(rates: Function) -> Function:
+def rates_with_boundary_pressure(rates: Function) -> Function:
     """Changes of the pressure R of the surroundings, and of the unknowns of a fluid behind it.
 
     The fluid knows of pressure as far as it exceeds that of the surroundings, P - R, as in
@@ -27,15 +27,15 @@ def with_surroundings(rates: Function) -> Function:
     def auxiliary_rates(
         log_slip_rate: float, states: Numbers, fraction: float, p: Numbers
     ) -> Numbers:
-        time = fraction * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS))
+        time = fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
         own = (*states[1:-1], states[-1] - states[0])
-        return (-p[RECHARGE] * time, *rates(log_slip_rate, own, fraction, p))
+        return (-p[BOUNDARY_PRESSURE_RATE] * time, *rates(log_slip_rate, own, fraction, p))
 
     return auxiliary_rates
 
 
 @cache
-def with_surroundings_at_rest(steady_states: Function) -> Function:
+def steady_states_with_boundary_pressure(steady_states: Function) -> Function:
     """The same in steady sliding before the loading: pressures are counted from there."""
 
     def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
@@ -45,7 +45,7 @@ def with_surroundings_at_rest(steady_states: Function) -> Function:
 
 
 @dataclass(frozen=True)
-class Recharged:
+class FluidWithBoundaryPressure:
     """A fluid together with a loading that imposes the pressure around it.
 
     Attributes
@@ -79,16 +79,16 @@ class Recharged:
     def auxiliary_rates(self) -> Function:
         """Theirs."""
         assert self.fluid.auxiliary_rates is not None
-        return with_surroundings(self.fluid.auxiliary_rates)
+        return rates_with_boundary_pressure(self.fluid.auxiliary_rates)
 
     @property
     def auxiliary_steady_states(self) -> Function:
         """Theirs."""
         assert self.fluid.auxiliary_steady_states is not None
-        return with_surroundings_at_rest(self.fluid.auxiliary_steady_states)
+        return steady_states_with_boundary_pressure(self.fluid.auxiliary_steady_states)
 
     def numbers(self, scene: Scene) -> Numbers:
         """Those of the fluid, and the rate of the loading in the last place."""
-        own = numbers_of(self.fluid, scene)
+        own = collect_numbers(self.fluid, scene)
         between = (math.nan,) * (DYNAMICS - FLUID - 1 - len(own))
-        return (*own, *between, *numbers_of(self.loading, scene))
+        return (*own, *between, *collect_numbers(self.loading, scene))

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.fluid import Fluid
-from rsfstudy.slider.laws import lacks_threshold
-from rsfstudy.slider.parts import NOT_NEGATIVE, POSITIVE, Numbers, Scene, number
-from rsfstudy.slider.places import FLUID, LARGEST_SLOWNESS
+from rsfstudy.slider.laws import lacks_critical_stiffness
+from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, Numbers, Scene, number
+from rsfstudy.slider.places import FLUID, LARGEST_LOG_SLOWNESS
 
 
 def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
@@ -37,7 +37,7 @@ def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: N
     """
     porosity, pressure = states
     opening = fraction * (p[FLUID] * log_slip_rate - porosity)
-    time = fraction * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS))
+    time = fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
     return opening, -p[FLUID + 1] * time * pressure - opening
 
 
@@ -47,7 +47,7 @@ def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Dilatant(Fluid):
+class DilatantFluid(Fluid):
     """Pores that open with slip rate, in a fault that exchanges fluid with what surrounds it.
 
     Pore pressure begins at that of the surroundings, as in steady sliding, where porosity is
@@ -64,7 +64,7 @@ class Dilatant(Fluid):
         "1",
         "pore pressure that undrained dilatancy takes for each unit of ln V",
         "sigma_*",
-        rule=NOT_NEGATIVE,
+        rule=NON_NEGATIVE,
     )
     drainage: float = number(
         1.0,
@@ -98,9 +98,9 @@ class Dilatant(Fluid):
 
     def check(self, scene: Scene) -> None:
         """Some critical stiffness, where the spring is given by its ratio to that."""
-        if lacks_threshold(scene):
+        if lacks_critical_stiffness(scene):
             rule = f"leaves no critical stiffness with dilatancy = {self.dilatancy:g}"
-            raise self.invalid("drainage", rule, "Give stiffness itself, or raise drainage.")
+            raise self.field_error("drainage", rule, "Give stiffness itself, or raise drainage.")
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
         """Pores close by ``V (phi - phi_0 - eps ln(V/V_*))`` at most, which drainage holds at a

@@ -8,8 +8,8 @@ from rsfstudy.slider.fluid import Fluid
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drained(Fluid):
+class DrainedFluid(Fluid):
     """Constant pore pressure, ``dp/dt = 0``: nothing to add to the friction relation."""
 
     name = "drained"
-    no_meaning = "while the fault is drained", "set fluid='dilatant'"
+    rejection_hint = "while the fault is drained", "set fluid='dilatant'"

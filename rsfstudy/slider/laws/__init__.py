@@ -12,32 +12,33 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from rsfstudy._deprecation import renamed_members, renamed_names
 from rsfstudy.slider.parts import (
-    NOT_NEGATIVE,
+    NON_NEGATIVE,
     POSITIVE,
     Function,
     Numbers,
     Part,
     Scene,
+    discover_parts,
     flag,
-    found_in,
     number,
 )
-from rsfstudy.slider.requirements import LAW_RECEIVES
+from rsfstudy.slider.requirements import LAW_QUANTITIES
 
 #: Exponents of evolution laws beyond this occur in trial steps only, which the integrator rejects:
 #: the equations of motion stop at slip rates of 10^-290 V_*.
 LARGEST_EXPONENT = 700.0
 
 
-def exp_less_one(exponent: float) -> float:
+def fast_expm1(exponent: float) -> float:
     """exp(x) - 1 to all digits, in a third of the time of `expm1` where x is far from 0."""
     return math.expm1(exponent) if abs(exponent) < 0.5 else math.exp(exponent) - 1.0
 
 
-def cutoff_velocity() -> Any:
+def cutoff_velocity_field() -> Any:
     """The field that laws with a slip rate of their own have in common."""
     return number(
         100.0,
@@ -49,8 +50,9 @@ def cutoff_velocity() -> Any:
     )
 
 
+@renamed_members
 @dataclass(frozen=True, kw_only=True)
-class LawOfStates(Part):
+class LawBase(Part):
     """Base class of all state evolution laws.
 
     Laws with a single b are derived from ``Law``, which is a subclass of this class.
@@ -86,21 +88,21 @@ class LawOfStates(Part):
         "$c$",
         "1",
         "effect of shear stress on the state variable",
-        rule=NOT_NEGATIVE,
+        rule=NON_NEGATIVE,
         remedy="Zero leaves the effect out.",
     )
     regularised: bool = flag(False, "whether slip may reverse, with the sign of shear stress")
 
-    conclusions = ("orbits_close", "scale_free", "relaxation")
-    equations = frozenset({"evolution", "evolutions"})
-    receives = LAW_RECEIVES
+    derived_properties = ("has_closed_orbits", "scale_free", "relaxation")
+    defining_methods = frozenset({"evolution", "evolutions"})
+    received_quantities = LAW_QUANTITIES
     #: How many states the law has.
-    states: ClassVar[int] = 1
+    state_count: ClassVar[int] = 1
     #: Whether every orbit closes at critical stiffness, where friction alone acts and stress has no
     #: effect on it: where evolution changes with its own state in proportion to itself.
-    orbits_close: ClassVar[bool] = False
+    has_closed_orbits: ClassVar[bool] = False
     #: Whether the state is ``Theta = b ln(theta/theta_*)``, so that there is a theta to tell of.
-    logarithmic: ClassVar[bool] = True
+    has_logarithmic_state: ClassVar[bool] = True
     #: Whether the law has no slip rate of its own, so that V_* could be any other.
     scale_free: ClassVar[bool] = False
     #: ``relaxation(rate, slip)``: the stress in units of b that is left above its steady value
@@ -115,8 +117,8 @@ class LawOfStates(Part):
     state_effect: ClassVar[Function | None] = None
 
     @classmethod
-    def functions(cls) -> tuple[str, ...]:
-        return ("evolution",) if cls.states == 1 else ("evolutions", "steady_states")
+    def required_functions(cls) -> tuple[str, ...]:
+        return ("evolution",) if cls.state_count == 1 else ("evolutions", "steady_states")
 
     @property
     def b_over_a(self) -> float:
@@ -131,12 +133,12 @@ class LawOfStates(Part):
         return ()
 
     @property
-    def size_over_a(self) -> float:
+    def state_change_over_a(self) -> float:
         """Change of the states by a unit of ln V, over the direct effect; positive."""
-        return abs(self.b_over_a) or VANISHING
+        return abs(self.b_over_a) or VANISHING_B_OVER_A
 
     @property
-    def feels_stress(self) -> bool:
+    def depends_on_stress(self) -> bool:
         """True if stress itself changes the state variable."""
         return self.state_effect is not None or self.stress_dependence > 0.0
 
@@ -153,21 +155,24 @@ class LawOfStates(Part):
         loading, source = scene.parts.loading, scene.pressure_source
         bends = stress.normal_stress is not None and not stress.coupling
         unknown = fluid.name if fluid.unknowns else stress.name if bends else ""
-        if not unknown and loading.imposes:
+        if not unknown and loading.changes_normal_stress:
             unknown = "normal stress that the loading changes"
         if self.stress_dependence and unknown:
             rule = f"is known for normal stress in proportion to shear stress, not for {unknown}"
             remedy = "Leave it out, or state `coupling` where the proportion is constant."
-            raise self.invalid("stress_dependence", rule, remedy)
-        pressed = source.unknowns and not loading.displaces
-        one_way = source if pressed else None if scene.dynamics.reverses else scene.dynamics
+            raise self.field_error("stress_dependence", rule, remedy)
+        pressed = source.unknowns and not loading.has_load_point_unknown
+        one_way = (
+            source if pressed else None if scene.dynamics.allows_reversed_slip else scene.dynamics
+        )
         if self.regularised and one_way:
             rule = f"has no meaning for {one_way.name}, whose equations hold ln V"
-            raise self.invalid("regularised", rule, "Leave one of them out.")
+            raise self.field_error("regularised", rule, "Leave one of them out.")
 
 
+@renamed_members
 @dataclass(frozen=True, kw_only=True)
-class Law(LawOfStates):
+class Law(LawBase):
     """Base class of the laws with a single b.
 
     A law is defined by a plain function of floats, which is stored in the class as
@@ -189,17 +194,17 @@ class Law(LawOfStates):
     raise ``InvalidValue`` if field values contradict each other. The class attribute ``name`` is
     the name of the law. The attributes ``relaxation``, ``steady_states`` and ``state_effect`` are
     optional as well. A law with one b can have several states. Such a law defines ``evolutions``
-    and ``steady_states``, as described for ``LawOfStates``.
+    and ``steady_states``, as described for ``LawBase``.
     """
 
     b_over_a: float = number(2.0, "$b/a$", "1", "ratio of evolution effect to direct effect")
 
     def numbers(self, scene: Scene) -> Numbers:
         """b; of no effect at all, one that nothing feels, because equations divide by it."""
-        return (scene.a * (self.b_over_a or VANISHING),)
+        return (scene.a * (self.b_over_a or VANISHING_B_OVER_A),)
 
     @property
-    def least_weakening(self) -> float:
+    def min_weakening_b_over_a(self) -> float:
         """Smallest b/a for steady friction to fall with slip rate at V_*."""
         return 1.0
 
@@ -208,32 +213,32 @@ class Law(LawOfStates):
         enough.
         """
         super().check(scene)
-        if not self.b_over_a and (self.feels_stress or scene.parts.normal_stress.state_effect):
+        if not self.b_over_a and (self.depends_on_stress or scene.parts.normal_stress.state_effect):
             rule = "has no meaning where stress acts on the state variable: by alpha/b or c/b"
             remedy = "Leave alpha and stress_dependence out, or give another b_over_a."
-            raise self.invalid("b_over_a", rule, remedy)
+            raise self.field_error("b_over_a", rule, remedy)
         if not self.b_over_a and scene.parts.slider.initial_state:
             rule = "is of a state variable that has no effect where b_over_a is 0"
-            raise scene.parts.slider.invalid("initial_state", rule, "Leave initial_state out.")
-        if 0.0 < abs(self.b_over_a) < SMALLEST:
-            raise self.invalid(
-                "b_over_a", f"must be 0, or at least {SMALLEST:g} in size", "Give 0."
+            raise scene.parts.slider.field_error("initial_state", rule, "Leave initial_state out.")
+        if 0.0 < abs(self.b_over_a) < MIN_B_OVER_A:
+            raise self.field_error(
+                "b_over_a", f"must be 0, or at least {MIN_B_OVER_A:g} in size", "Give 0."
             )
-        least = self.least_weakening
-        if self.b_over_a <= least and lacks_threshold(scene):
+        least = self.min_weakening_b_over_a
+        if self.b_over_a <= least and lacks_critical_stiffness(scene):
             rule = f"must exceed {least:.6g}: without rate weakening there is no critical stiffness"
-            raise self.invalid("b_over_a", rule, GIVE_STIFFNESS)
+            raise self.field_error("b_over_a", rule, STIFFNESS_REMEDY)
 
 
 #: b/a in equations that divide by b, of a state variable without effect: by far less than rounding.
-VANISHING = 1e-60
+VANISHING_B_OVER_A = 1e-60
 #: The smallest b/a but 0: below it, powers and quotients of it are lost to the range of numbers.
-SMALLEST = 1e-30
+MIN_B_OVER_A = 1e-30
 #: What to do where there is no critical stiffness.
-GIVE_STIFFNESS = "Sliding is then stable at every stiffness, or at none: give stiffness itself."
+STIFFNESS_REMEDY = "Sliding is then stable at every stiffness, or at none: give stiffness itself."
 
 
-def lacks_threshold(scene: Scene) -> bool:
+def lacks_critical_stiffness(scene: Scene) -> bool:
     """True if the spring is given by its ratio to a critical stiffness that there is not: stable or
     unstable is then every spring.
     """
@@ -241,4 +246,7 @@ def lacks_threshold(scene: Scene) -> bool:
     return not stated and not 0.0 < scene.critical_stiffness < math.inf
 
 
-PARTS = found_in(__name__, __path__)
+BUILT_IN_PARTS = discover_parts(__name__, __path__)
+
+if not TYPE_CHECKING:
+    __getattr__ = renamed_names(__name__)

@@ -5,25 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.laws import GIVE_STIFFNESS, LawOfStates, lacks_threshold
+from rsfstudy.slider.laws import STIFFNESS_REMEDY, LawBase, lacks_critical_stiffness
 from rsfstudy.slider.parts import POSITIVE, Numbers, Scene, number
 from rsfstudy.slider.places import LAW
 
 #: Places of the numbers of the law: b of each state, the part each has in what stress takes from
 #: the state variable, and L_1/L_2.
-FIRST, SECOND, OF_FIRST, OF_SECOND, OVER = range(LAW, LAW + 5)
+FIRST_B, SECOND_B, FIRST_SHARE, SECOND_SHARE, LENGTH_QUOTIENT = range(LAW, LAW + 5)
 
 
 def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
     """The states of steady sliding, ``Psi_i = c_i shift - b_i ln(V/V_*)``, c_i being the shares."""
     return (
-        p[OF_FIRST] * shift - p[FIRST] * log_slip_rate,
-        p[OF_SECOND] * shift - p[SECOND] * log_slip_rate,
+        p[FIRST_SHARE] * shift - p[FIRST_B] * log_slip_rate,
+        p[SECOND_SHARE] * shift - p[SECOND_B] * log_slip_rate,
     )
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoStates(LawOfStates):
+class TwoStateLaw(LawBase):
     """Base of the laws of two states, tau = sigma (mu_* + a ln(V/V_*) + Theta_1 + Theta_2), each
     with a b of its own; the first evolves over D_c, the second over L_2.
 
@@ -52,7 +52,7 @@ class TwoStates(LawOfStates):
         rule=POSITIVE,
     )
 
-    states = 2
+    state_count = 2
     steady_states = staticmethod(steady_states)
 
     @property
@@ -60,34 +60,34 @@ class TwoStates(LawOfStates):
         return self.b1_over_a + self.b2_over_a
 
     @property
-    def size_over_a(self) -> float:
+    def state_change_over_a(self) -> float:
         return abs(self.b1_over_a) + abs(self.b2_over_a)
 
     def numbers(self, scene: Scene) -> Numbers:
         """b_1, b_2, their shares in what stress takes, and L_1/L_2."""
-        both, size = (self.b1_over_a, self.b2_over_a), self.size_over_a
+        both, size = (self.b1_over_a, self.b2_over_a), self.state_change_over_a
         # of two states without effect there are no shares: see `check`
         shares = (abs(b) / size if size else 0.5 for b in both)
         return (*(scene.a * b for b in both), *shares, 1.0 / self.length_ratio)
 
     @classmethod
-    def refuse(cls, name: str, value: object) -> InvalidValue:
+    def rejection_error(cls, name: str, value: object) -> InvalidValue:
         if name == "b_over_a":
             rule = f"is b1_over_a + b2_over_a for {cls.name}, and follows from them"
             return InvalidValue(name, value, rule, remedy="Give those.")
-        return super().refuse(name, value)
+        return super().rejection_error(name, value)
 
     def check(self, scene: Scene) -> None:
         """States that do something, and a critical stiffness where the spring is given by its ratio
         to it.
         """
         super().check(scene)
-        if not self.size_over_a:
+        if not self.state_change_over_a:
             rule = "must not be 0 where b1_over_a is: no state has an effect"
-            raise self.invalid("b2_over_a", rule, "Give one of them.")
-        if lacks_threshold(scene):
+            raise self.field_error("b2_over_a", rule, "Give one of them.")
+        if lacks_critical_stiffness(scene):
             rule = (
                 f"with b1_over_a = {self.b1_over_a:g} and length_ratio = {self.length_ratio:g} "
                 "gives no critical stiffness"
             )
-            raise self.invalid("b2_over_a", rule, GIVE_STIFFNESS)
+            raise self.field_error("b2_over_a", rule, STIFFNESS_REMEDY)

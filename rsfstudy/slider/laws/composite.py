@@ -7,12 +7,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity
+from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity_field
 from rsfstudy.slider.parts import Numbers, Scene
 from rsfstudy.slider.places import LAW
 
 #: Steps of third order that take Lambert's W to rounding from the guess below.
-STEPS = 4
+HALLEY_STEPS = 4
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
@@ -42,21 +42,23 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     """
     b = p[LAW]
     ahead = state / b + log_slip_rate + p[LAW + 2]
-    return b * (share_of_healing(log_slip_rate, p[LAW + 1]) * math.exp(bounded(-ahead)) - ahead)
+    return b * (
+        healing_factor(log_slip_rate, p[LAW + 1]) * math.exp(clamp_exponent(-ahead)) - ahead
+    )
 
 
 def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
     """Steady sliding, where ``u exp(u) = exp(-V/V_c)``."""
-    ahead = lambert_w(share_of_healing(log_slip_rate, p[LAW + 1]))
+    ahead = lambert_w(healing_factor(log_slip_rate, p[LAW + 1]))
     return (shift + p[LAW] * (ahead - p[LAW + 2] - log_slip_rate),)
 
 
-def share_of_healing(log_slip_rate: float, log_cutoff: float) -> float:
+def healing_factor(log_slip_rate: float, log_cutoff: float) -> float:
     """``exp(-V/V_c)``."""
-    return math.exp(-math.exp(bounded(log_slip_rate - log_cutoff)))
+    return math.exp(-math.exp(clamp_exponent(log_slip_rate - log_cutoff)))
 
 
-def bounded(exponent: float) -> float:
+def clamp_exponent(exponent: float) -> float:
     """An exponent that a motion meets, or the largest."""
     return min(exponent, LARGEST_EXPONENT)
 
@@ -64,7 +66,7 @@ def bounded(exponent: float) -> float:
 def lambert_w(value: float) -> float:
     """The solution w of ``w exp(w) = value`` between 0 and 1, by Halley's method."""
     w = value / (1.0 + value)
-    for _ in range(STEPS):
+    for _ in range(HALLEY_STEPS):
         grown = math.exp(w)
         off = w * grown - value
         w -= off / (grown * (w + 1.0) - 0.5 * (w + 2.0) * off / (w + 1.0))
@@ -72,25 +74,25 @@ def lambert_w(value: float) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Composite(Law):
+class CompositeLaw(Law):
     """The composite law."""
 
-    cutoff_velocity_ratio: float = cutoff_velocity()
+    cutoff_velocity_ratio: float = cutoff_velocity_field()
 
     name = "composite"
     evolution = staticmethod(evolution)
     steady_states = staticmethod(steady_states)
 
     @property
-    def least_weakening(self) -> float:
+    def min_weakening_b_over_a(self) -> float:
         """Steady friction falls as ``b - a + b u_*/(1 + u_*) V_*/V_c`` with ln V, at V_*."""
-        ahead = self._steady_at_reference()
+        ahead = self._reference_steady_offset()
         return 1.0 / (1.0 + ahead / ((1.0 + ahead) * self.cutoff_velocity_ratio))
 
     def numbers(self, scene: Scene) -> Numbers:
         """b, ln(V_c/V_*), and u_* of steady sliding at V_*."""
         logarithm = math.log(self.cutoff_velocity_ratio)
-        return (*super().numbers(scene), logarithm, self._steady_at_reference())
+        return (*super().numbers(scene), logarithm, self._reference_steady_offset())
 
-    def _steady_at_reference(self) -> float:
-        return lambert_w(share_of_healing(0.0, math.log(self.cutoff_velocity_ratio)))
+    def _reference_steady_offset(self) -> float:
+        return lambert_w(healing_factor(0.0, math.log(self.cutoff_velocity_ratio)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity, exp_less_one
+from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity_field, fast_expm1
 from rsfstudy.slider.parts import Numbers, Scene
 from rsfstudy.slider.places import LAW
 
@@ -37,52 +37,54 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     Okubo (1989), J. Geophys. Res. 94, 12321-12335.
     """
     b = p[LAW]
-    behind = steady_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]) - state / b
-    return b * exp_less_one(min(behind, LARGEST_EXPONENT))
+    behind = steady_state_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]) - state / b
+    return b * fast_expm1(min(behind, LARGEST_EXPONENT))
 
 
 def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
     """Steady sliding, ``Theta_ss = b ln[(1 + V_c/V)/(1 + V_c/V_*)]``."""
-    return (shift + p[LAW] * steady_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]),)
+    return (shift + p[LAW] * steady_state_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]),)
 
 
-def steady_over_b(log_slip_rate: float, healing: float, cut: float) -> float:
-    """``ln(healing V_*/V + cut)``, which adds up to 0 at V_*: in each direction the form of which
-    no digits are lost, and exponents that overflow are left out of it.
+def steady_state_over_b(
+    log_slip_rate: float, cutoff_fraction: float, reference_fraction: float
+) -> float:
+    """``ln(healing V_*/V + reference_fraction)``, which adds up to 0 at V_*: in each direction the
+    form of which no digits are lost, and exponents that overflow are left out of it.
     """
     if log_slip_rate < 0.0:
         exponent = min(-log_slip_rate, LARGEST_EXPONENT)
-        return math.log1p(healing * math.expm1(exponent)) - log_slip_rate - exponent
+        return math.log1p(cutoff_fraction * math.expm1(exponent)) - log_slip_rate - exponent
     exponent = min(log_slip_rate, LARGEST_EXPONENT)
-    return math.log1p(cut * math.expm1(exponent)) - exponent
+    return math.log1p(reference_fraction * math.expm1(exponent)) - exponent
 
 
 @dataclass(frozen=True, kw_only=True)
-class CutOff(Law):
+class CutOffLaw(Law):
     """The slowness law with a cut-off."""
 
-    cutoff_velocity_ratio: float = cutoff_velocity()
+    cutoff_velocity_ratio: float = cutoff_velocity_field()
 
     name = "cut_off"
     evolution = staticmethod(evolution)
     steady_states = staticmethod(steady_states)
-    logarithmic = False  # in 1 + theta V_c/D_c
+    has_logarithmic_state = False  # in 1 + theta V_c/D_c
 
     @property
-    def least_weakening(self) -> float:
+    def min_weakening_b_over_a(self) -> float:
         """Steady friction falls as ``b/(1 + V_*/V_c) - a`` with ln V, at V_*."""
         return 1.0 + 1.0 / self.cutoff_velocity_ratio
 
     def numbers(self, scene: Scene) -> Numbers:
         """b, V_c/(V_c + V_*) and V_*/(V_c + V_*)."""
-        return (*super().numbers(scene), *self._parts())
+        return (*super().numbers(scene), *self._velocity_fractions())
 
     def relaxation(self, rate: float, slip: float) -> float:
         """``ln{1 + [(1 + V_c/V_*)/(1 + V_c/V) - 1] exp(-slip/D_c)}``."""
-        ahead = -steady_over_b(rate, *self._parts())
+        ahead = -steady_state_over_b(rate, *self._velocity_fractions())
         return math.log(-math.expm1(-slip) + math.exp(ahead - slip))
 
-    def _parts(self) -> Numbers:
+    def _velocity_fractions(self) -> Numbers:
         return 1.0 / (1.0 + 1.0 / self.cutoff_velocity_ratio), 1.0 / (
             1.0 + self.cutoff_velocity_ratio
         )

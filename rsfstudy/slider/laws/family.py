@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, exp_less_one
+from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, fast_expm1
 from rsfstudy.slider.parts import Numbers, Scene, number
 from rsfstudy.slider.places import LAW
 
@@ -37,13 +37,11 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     b, exponent = p[LAW], p[LAW + 1]
     if exponent == 0.0:
         return -(state + b * log_slip_rate)
-    return (
-        b * exp_less_one(min(-exponent * (state / b + log_slip_rate), LARGEST_EXPONENT)) / exponent
-    )
+    return b * fast_expm1(min(-exponent * (state / b + log_slip_rate), LARGEST_EXPONENT)) / exponent
 
 
 @dataclass(frozen=True, kw_only=True)
-class Family(Law):
+class LawFamily(Law):
     """The family between the slip law and the slowness law."""
 
     law_exponent: float = number(
@@ -57,7 +55,7 @@ class Family(Law):
     name = "family"
     evolution = staticmethod(evolution)
     scale_free = True
-    orbits_close = True  # dh/du = -(1 + eps h), as at both ends
+    has_closed_orbits = True  # dh/du = -(1 + eps h), as at both ends
 
     def relaxation(self, rate: float, slip: float) -> float:
         """``ln[1 + ((V/V_*)**eps - 1) exp(-slip/D_c)]/eps``."""

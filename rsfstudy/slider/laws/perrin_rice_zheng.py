@@ -11,7 +11,7 @@ from rsfstudy.slider.places import LAW
 
 #: Distance above steady sliding that only trial steps exceed: a motion ends at ln(V/V_*) = 276, and
 #: the square of what is larger overflows in an estimate of the first step.
-FARTHEST_ABOVE = 300.0
+LARGEST_STEADY_STATE_OFFSET = 300.0
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
@@ -40,7 +40,9 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     Perrin, Rice and Zheng (1995), J. Mech. Phys. Solids 43, 1461-1495.
     """
     b = p[LAW]
-    return -b * math.sinh(max(-LARGEST_EXPONENT, min(state / b + log_slip_rate, FARTHEST_ABOVE)))
+    return -b * math.sinh(
+        max(-LARGEST_EXPONENT, min(state / b + log_slip_rate, LARGEST_STEADY_STATE_OFFSET))
+    )
 
 
 def relaxation(rate: float, slip: float) -> float:
@@ -53,7 +55,7 @@ def relaxation(rate: float, slip: float) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PerrinRiceZheng(Law):
+class PerrinRiceZhengLaw(Law):
     """The law of Perrin, Rice and Zheng."""
 
     name = "perrin_rice_zheng"

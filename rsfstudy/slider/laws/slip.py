@@ -50,4 +50,4 @@ class SlipLaw(Law):
     evolution = staticmethod(evolution)
     relaxation = staticmethod(relaxation)
     scale_free = True
-    orbits_close = True  # Gu et al. (1984)
+    has_closed_orbits = True  # Gu et al. (1984)

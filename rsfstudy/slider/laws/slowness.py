@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, exp_less_one
+from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, fast_expm1
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.places import LAW
 
@@ -37,7 +37,7 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     """
     b = p[LAW]
     exponent = -(state / b + log_slip_rate)
-    return b * exp_less_one(LARGEST_EXPONENT if exponent > LARGEST_EXPONENT else exponent)
+    return b * fast_expm1(LARGEST_EXPONENT if exponent > LARGEST_EXPONENT else exponent)
 
 
 def relaxation(rate: float, slip: float) -> float:
@@ -53,4 +53,4 @@ class SlownessLaw(Law):
     evolution = staticmethod(evolution)
     relaxation = staticmethod(relaxation)
     scale_free = True
-    orbits_close = True  # Ranjith and Rice (1999)
+    has_closed_orbits = True  # Ranjith and Rice (1999)

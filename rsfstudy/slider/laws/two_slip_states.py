@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws._two_states import FIRST, OF_FIRST, OF_SECOND, OVER, SECOND, TwoStates
+from rsfstudy.slider.laws._two_states import (
+    FIRST_B,
+    FIRST_SHARE,
+    LENGTH_QUOTIENT,
+    SECOND_B,
+    SECOND_SHARE,
+    TwoStateLaw,
+)
 from rsfstudy.slider.parts import Numbers
 
 
@@ -33,13 +40,13 @@ def evolutions(
     tuple of float
         dTheta_1 and dTheta_2 over slip in D_c = L_1, times the fraction.
     """
-    first = psis[0] - p[OF_FIRST] * shift + p[FIRST] * log_slip_rate
-    second = psis[1] - p[OF_SECOND] * shift + p[SECOND] * log_slip_rate
-    return -fraction * first, -fraction * p[OVER] * second
+    first = psis[0] - p[FIRST_SHARE] * shift + p[FIRST_B] * log_slip_rate
+    second = psis[1] - p[SECOND_SHARE] * shift + p[SECOND_B] * log_slip_rate
+    return -fraction * first, -fraction * p[LENGTH_QUOTIENT] * second
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoSlipStates(TwoStates):
+class TwoStateSlipLaw(TwoStateLaw):
     """The slip law with two states."""
 
     name = "two_slip_states"

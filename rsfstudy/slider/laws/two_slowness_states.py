@@ -5,8 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.laws import LARGEST_EXPONENT, exp_less_one
-from rsfstudy.slider.laws._two_states import FIRST, OF_FIRST, OF_SECOND, OVER, SECOND, TwoStates
+from rsfstudy.slider.laws import LARGEST_EXPONENT, fast_expm1
+from rsfstudy.slider.laws._two_states import (
+    FIRST_B,
+    FIRST_SHARE,
+    LENGTH_QUOTIENT,
+    SECOND_B,
+    SECOND_SHARE,
+    TwoStateLaw,
+)
 from rsfstudy.slider.parts import Numbers, Scene
 
 
@@ -36,16 +43,16 @@ def evolutions(
     tuple of float
         dTheta_1 and dTheta_2 over slip in D_c = L_1, times the fraction.
     """
-    first = (psis[0] - p[OF_FIRST] * shift) / p[FIRST] + log_slip_rate
-    second = (psis[1] - p[OF_SECOND] * shift) / p[SECOND] + log_slip_rate
+    first = (psis[0] - p[FIRST_SHARE] * shift) / p[FIRST_B] + log_slip_rate
+    second = (psis[1] - p[SECOND_SHARE] * shift) / p[SECOND_B] + log_slip_rate
     return (
-        fraction * p[FIRST] * exp_less_one(min(-first, LARGEST_EXPONENT)),
-        fraction * p[OVER] * p[SECOND] * exp_less_one(min(-second, LARGEST_EXPONENT)),
+        fraction * p[FIRST_B] * fast_expm1(min(-first, LARGEST_EXPONENT)),
+        fraction * p[LENGTH_QUOTIENT] * p[SECOND_B] * fast_expm1(min(-second, LARGEST_EXPONENT)),
     )
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoSlownessStates(TwoStates):
+class TwoStateSlownessLaw(TwoStateLaw):
     """The slowness law with two states."""
 
     name = "two_slowness_states"

@@ -9,14 +9,15 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+from rsfstudy._deprecation import renamed_members
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import NOT_NEGATIVE, Numbers, Part, Scene, found_in, number
+from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, Part, Scene, discover_parts, number
 from rsfstudy.slider.requirements import SLIP_RATE
 
 #: Duration of a segment in D_c/V_* below which no step of an integrator is taken; from a time of 1
 #: on rounding is longer.
-SHORTEST = 1e-16
+MIN_SEGMENT_DURATION = 1e-16
 
 
 @guard_methods
@@ -54,6 +55,7 @@ class Segment(NamedTuple):
         return stated
 
 
+@renamed_members
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Loading(Part):
@@ -76,13 +78,13 @@ class Loading(Part):
 
     #: Whether the last of them is, instead, shear stress by a load point that is ahead of its mean
     #: motion, less what stands as third of its numbers.
-    displaces: ClassVar[bool] = False
-    receives = frozenset({SLIP_RATE})
+    has_load_point_unknown: ClassVar[bool] = False
+    received_quantities = frozenset({SLIP_RATE})
     #: Whether the fall of normal stress is pore pressure: beside a fluid that has unknowns, that of
     #: its surroundings.
     of_pressure: ClassVar[bool] = True
 
-    def begins(self, scene: Scene) -> Numbers:
+    def initial_unknowns(self, scene: Scene) -> Numbers:
         """Initial values of its unknowns."""
         return ()
 
@@ -92,7 +94,7 @@ class Loading(Part):
         """
         if len(self.segments) > 1:
             self._check_durations()
-        fluid, name = scene.parts.fluid, self.called_by
+        fluid, name = scene.parts.fluid, self.selected_by
         if self.unknowns and fluid.unknowns and not self.of_pressure:
             rule = f"has no meaning for fluid={fluid.name!r}"
             rule += ", whose pore pressure changes normal stress"
@@ -101,17 +103,18 @@ class Loading(Part):
             raise InvalidValue(name or "loading", value, rule, remedy=remedy)
 
     def _check_durations(self) -> None:
-        for n, (begins, ends, *_others) in enumerate(self.table):
-            if ends - begins < SHORTEST and ends > 0.0:
-                rule = f"must be {SHORTEST:g} D_c/V_* at least, and more than the rounding of time"
+        for n, (begins, ends, *_others) in enumerate(self.segment_table):
+            if ends - begins < MIN_SEGMENT_DURATION and ends > 0.0:
+                least = f"{MIN_SEGMENT_DURATION:g} D_c/V_*"
+                rule = f"must be {least} at least, and more than the rounding of time"
                 remedy = "Leave out what lasts no time."
                 wrong = InvalidValue("duration", self.segments[n].duration, rule, remedy=remedy)
-                raise wrong.at(f"segment {n + 1}")
+                raise wrong.with_location(f"segment {n + 1}")
 
     @property
-    def presses(self) -> bool:
+    def has_stress_unknowns(self) -> bool:
         """True if it has unknowns that change normal stress."""
-        return bool(self.unknowns) and not self.displaces
+        return bool(self.unknowns) and not self.has_load_point_unknown
 
     @property
     def segments(self) -> tuple[Segment, ...]:
@@ -122,22 +125,22 @@ class Loading(Part):
         """The history as plain data: its segments, as `protocol` takes them."""
         return {"segments": [segment.as_dict() for segment in self.segments]}
 
-    def alone(self, number: int) -> Loading | Segment:
+    def isolate_segment(self, index: int) -> Loading | Segment:
         """One of its segments without the others; the history itself, if it has one only, or
         unknowns in the first.
         """
         history = self.segments
-        if len(history) == 1 or (self.unknowns and number == 0):
+        if len(history) == 1 or (self.unknowns and index == 0):
             return self
-        return history[number]
+        return history[index]
 
     @property
-    def told(self) -> int:
+    def reported_segment_count(self) -> int:
         """How many segments a motion tells the beginning of; these are the last ones."""
         return len(self.segments) - 1
 
     @property
-    def table(self) -> Any:
+    def segment_table(self) -> Any:
         """The segments as motions read them, a row each (see `places`)."""
         rows, begins = [], 0.0
         for velocity, _step, lasts, _stress in self.segments:
@@ -147,7 +150,7 @@ class Loading(Part):
         return rows
 
     @property
-    def jumps(self) -> Any:
+    def jump_mask(self) -> Any:
         """Whether each segment begins with a jump, of the load point or of normal stress."""
         before, found = 0.0, []
         for place, segment in enumerate(self.segments):
@@ -157,27 +160,27 @@ class Loading(Part):
         return found
 
     @property
-    def is_a_step(self) -> bool:
+    def perturbs_steady_sliding(self) -> bool:
         """True if it changes anything about steady sliding at V_*."""
         return bool(self.unknowns) or any(
             s.load_velocity != 1.0 or s.displacement or s.normal_stress for s in self.segments
         )
 
     @property
-    def imposes(self) -> bool:
+    def changes_normal_stress(self) -> bool:
         """True if it changes normal stress."""
-        return self.presses or any(segment.normal_stress for segment in self.segments)
+        return self.has_stress_unknowns or any(segment.normal_stress for segment in self.segments)
 
     @classmethod
-    def refuse(cls, name: str, value: Any) -> InvalidValue:
-        owners = (p for p in PARTS.values() if str(name) in p.__dataclass_fields__)
-        wanted = " or ".join(p.called_by for p in owners if p.called_by not in ("", name))
+    def rejection_error(cls, name: str, value: Any) -> InvalidValue:
+        owners = (p for p in BUILT_IN_PARTS.values() if str(name) in p.__dataclass_fields__)
+        wanted = " or ".join(p.selected_by for p in owners if p.selected_by not in ("", name))
         remedy = f"Leave it out, or state {wanted} too." if wanted else "Leave it out."
         of = getattr(cls, "name", cls.__name__)  # each protocol has a name of its own
         return InvalidValue(name, value, f"has no meaning for {of}", remedy=remedy)
 
 
-def velocity_ratio() -> Any:
+def load_velocity_field() -> Any:
     """The field of the load point velocity that a history ends with, or is of."""
     return number(
         None,
@@ -185,13 +188,13 @@ def velocity_ratio() -> Any:
         "1",
         "load point velocity after the step",
         "V_*",
-        rule=NOT_NEGATIVE,
+        rule=NON_NEGATIVE,
         remedy="0 holds the load point.",
     )
 
 
 @dataclass(frozen=True, kw_only=True)
-class AtVelocity(Loading):
+class LoadingAtVelocity(Loading):
     """Base of the histories that end with a load point velocity, or are of one: V_* unless
     stated.
     """
@@ -205,4 +208,4 @@ class AtVelocity(Loading):
         return 1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio
 
 
-PARTS = found_in(__name__, __path__)
+BUILT_IN_PARTS = discover_parts(__name__, __path__)

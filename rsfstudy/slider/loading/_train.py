@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from rsfstudy.slider.loading import AtVelocity, Loading, Segment, velocity_ratio
-from rsfstudy.slider.parts import NOT_NEGATIVE, POSITIVE, Numbers, Scene, number
-from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
+from rsfstudy.slider.loading import Loading, LoadingAtVelocity, Segment, load_velocity_field
+from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, Numbers, Scene, number
+from rsfstudy.slider.places import LARGEST_LOG_SLOWNESS, LOADING
 
 
 def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
@@ -32,7 +32,7 @@ def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: N
         omega D_c/V_* at LOADING, and A behind it.
     """
     ahead, relief = states
-    turn = p[LOADING] * fraction * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS))
+    turn = p[LOADING] * fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
     over, relative = ahead / p[LOADING + 1], relief / p[LOADING + 1]
     missing = 0.5 * (1.0 - over * over - relative * relative)
     return turn * (relief + missing * ahead), turn * (missing * relief - ahead)
@@ -44,7 +44,7 @@ def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Train(AtVelocity):
+class OscillationBase(LoadingAtVelocity):
     """Base of the oscillations, under a load point at `load_velocity_ratio`, V_* unless stated: a
     harmonic pair of unknowns.
     """
@@ -57,22 +57,22 @@ class Train(AtVelocity):
         "D_c/V_*",
         rule=POSITIVE,
     )
-    load_velocity_ratio: float | None = velocity_ratio()
+    load_velocity_ratio: float | None = load_velocity_field()
     oscillation_begin: float | None = number(
         None,
         r"$t_b V_*/D_c$",
         "1",
         "time at which the oscillation begins",
         "D_c/V_*",
-        rule=NOT_NEGATIVE,
-        if_stated=True,
+        rule=NON_NEGATIVE,
+        omit_if_none=True,
     )
     oscillation_phase: float | None = number(
         None,
         r"$\phi_o$",
         "degree",
         "angle by which the oscillation is ahead of a sine where it begins",
-        if_stated=True,
+        omit_if_none=True,
     )
     oscillation_cycles: float | None = number(
         None,
@@ -81,7 +81,7 @@ class Train(AtVelocity):
         "number of cycles after which the oscillation ends",
         rule=POSITIVE,
         remedy="Leave it out for one that goes on for ever.",
-        if_stated=True,
+        omit_if_none=True,
     )
 
     of_pressure = False
@@ -95,20 +95,20 @@ class Train(AtVelocity):
         if self.oscillation_period < free and not scene.has_mass:
             rule = f"is below the period of free oscillation, T V_*/D_c = {free:.3g}: mass matters"
             remedy = "Set inertia=True, or give a longer one."
-            raise self.invalid("oscillation_period", rule, remedy)
+            raise self.field_error("oscillation_period", rule, remedy)
 
     @property
-    def angle(self) -> float:
+    def initial_phase(self) -> float:
         """Phase where it begins."""
         return math.radians(self.oscillation_phase or 0.0)
 
     @property
-    def frequency(self) -> float:
+    def angular_frequency(self) -> float:
         """omega D_c/V_*."""
         return 2.0 * math.pi / self.oscillation_period
 
     @property
-    def lasts(self) -> float:
+    def oscillation_duration(self) -> float:
         """How long it oscillates."""
         cycles = self.oscillation_cycles
         return math.inf if cycles is None else cycles * self.oscillation_period
@@ -118,18 +118,18 @@ class Train(AtVelocity):
         """What is before it, itself, and what follows."""
         steady, begin = Segment(self.load_velocity), self.oscillation_begin
         before = [steady._replace(duration=begin)] if begin else []
-        after = [steady] if self.lasts < math.inf else []
-        return (*before, steady._replace(duration=self.lasts), *after)
+        after = [steady] if self.oscillation_duration < math.inf else []
+        return (*before, steady._replace(duration=self.oscillation_duration), *after)
 
     @property
-    def jumps(self) -> list[bool]:
+    def jump_mask(self) -> list[bool]:
         """Its unknowns are those of itself alone, and its phase is one at once."""
         return [True] * len(self.segments)
 
-    def alone(self, number: int) -> Loading | Segment:
+    def isolate_segment(self, index: int) -> Loading | Segment:
         segments = self.segments
-        if number % len(segments) != bool(self.oscillation_begin):
-            return segments[number]
+        if index % len(segments) != bool(self.oscillation_begin):
+            return segments[index]
         if len(segments) == 1:
             return self
         return replace(self, oscillation_begin=None, oscillation_cycles=None)

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.loading import _train
-from rsfstudy.slider.parts import NOT_NEGATIVE, Numbers, Scene, number
+from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, Scene, number
 
 
 @dataclass(frozen=True, kw_only=True)
-class Oscillation(_train.Train):
+class NormalStressOscillation(_train.OscillationBase):
     """Oscillation of imposed normal stress under a steady load point velocity V_0.
 
     ``sigma/sigma_* = 1 + A sin(2 pi (t - t_b)/T_o + phi_o)`` for t from t_b to t_b + N_o T_o, with
@@ -32,11 +32,11 @@ class Oscillation(_train.Train):
         "1",
         "amplitude of an oscillation of imposed normal stress",
         "sigma_*",
-        rule=NOT_NEGATIVE,
+        rule=NON_NEGATIVE,
     )
 
     name = "oscillation"
-    called_by = "oscillation_amplitude"
+    selected_by = "oscillation_amplitude"
     unknowns = (
         Quantity("oscillation_ahead", "$y$", "1", "oscillation a quarter ahead", "sigma_*"),
         Quantity("oscillation_relief", "$P$", "1", "imposed fall of normal stress", "sigma_*"),
@@ -46,14 +46,14 @@ class Oscillation(_train.Train):
         """Normal stress that stays positive; see `Train`."""
         if self.oscillation_amplitude >= 1.0:
             remedy = "Normal stress stays positive: it oscillates by less than all of it."
-            raise self.invalid("oscillation_amplitude", "must be less than 1", remedy)
+            raise self.field_error("oscillation_amplitude", "must be less than 1", remedy)
         super().check(scene)
 
-    def begins(self, scene: Scene) -> Numbers:
+    def initial_unknowns(self, scene: Scene) -> Numbers:
         """y and P of its phase."""
-        amplitude, angle = self.oscillation_amplitude, self.angle
+        amplitude, angle = self.oscillation_amplitude, self.initial_phase
         return amplitude * math.cos(angle), -amplitude * math.sin(angle)
 
     def numbers(self, scene: Scene) -> Numbers:
         """omega D_c/V_*, and A."""
-        return self.frequency, self.oscillation_amplitude
+        return self.angular_frequency, self.oscillation_amplitude

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.quantity import Quantity
-from rsfstudy.slider.loading import AtVelocity, Segment, velocity_ratio
+from rsfstudy.slider.loading import LoadingAtVelocity, Segment, load_velocity_field
 from rsfstudy.slider.parts import POSITIVE, Numbers, Scene, number
-from rsfstudy.slider.places import LARGEST_SLOWNESS, LOADING
+from rsfstudy.slider.places import LARGEST_LOG_SLOWNESS, LOADING
 
 
 def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
@@ -26,7 +26,7 @@ def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: N
     p : tuple of float
         Rate of imposed normal stress in sigma_* V_*/D_c, at LOADING.
     """
-    return (-p[LOADING] * fraction * math.exp(min(-log_slip_rate, LARGEST_SLOWNESS)),)
+    return (-p[LOADING] * fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS)),)
 
 
 def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
@@ -35,7 +35,7 @@ def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ramp(AtVelocity):
+class NormalStressRamp(LoadingAtVelocity):
     """Ramp of imposed normal stress under a steady load point velocity V_0, V_* unless stated.
 
     ``sigma(t) = sigma_* + Delta_sigma min(t/t_r, 1)`` from steady sliding at t = 0 on, with the
@@ -61,10 +61,10 @@ class Ramp(AtVelocity):
         rule=POSITIVE,
         remedy="A sudden change is normal_stress_step.",
     )
-    load_velocity_ratio: float | None = velocity_ratio()
+    load_velocity_ratio: float | None = load_velocity_field()
 
     name = "ramp"
-    called_by = "normal_stress_ramp"
+    selected_by = "normal_stress_ramp"
     unknowns = (
         Quantity("ramp_left", "$P$", "1", "imposed normal stress that is yet to come", "sigma_*"),
     )
@@ -78,7 +78,7 @@ class Ramp(AtVelocity):
         last = Segment(self.load_velocity, normal_stress=self.normal_stress_ramp)
         return last._replace(duration=self.ramp_duration), last
 
-    def begins(self, scene: Scene) -> Numbers:
+    def initial_unknowns(self, scene: Scene) -> Numbers:
         """All of the change is yet to come."""
         return (self.normal_stress_ramp,)
 

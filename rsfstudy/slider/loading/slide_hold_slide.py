@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsfstudy.slider.loading import AtVelocity, Segment, velocity_ratio
-from rsfstudy.slider.parts import NOT_NEGATIVE, number
+from rsfstudy.slider.loading import LoadingAtVelocity, Segment, load_velocity_field
+from rsfstudy.slider.parts import NON_NEGATIVE, number
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlideHoldSlide(AtVelocity):
+class SlideHoldSlide(LoadingAtVelocity):
     """Hold of the load point for a time, then reloading.
 
     ``V_load(t) = 0`` for t from 0 to t_h, and ``V_load(t) = V_0`` for t > t_h; t_h is in D_c/V_*,
@@ -26,12 +26,12 @@ class SlideHoldSlide(AtVelocity):
         "1",
         "time for which the load point is held",
         "D_c/V_*",
-        rule=NOT_NEGATIVE,
+        rule=NON_NEGATIVE,
     )
-    load_velocity_ratio: float | None = velocity_ratio()
+    load_velocity_ratio: float | None = load_velocity_field()
 
     name = "slide_hold_slide"
-    called_by = "hold_time"
+    selected_by = "hold_time"
 
     @property
     def segments(self) -> tuple[Segment, ...]:

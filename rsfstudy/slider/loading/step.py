@@ -6,13 +6,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsfstudy.slider.derived import derived
-from rsfstudy.slider.loading import AtVelocity, Segment, velocity_ratio
+from rsfstudy.slider.derived import cached_attribute
+from rsfstudy.slider.loading import LoadingAtVelocity, Segment, load_velocity_field
 from rsfstudy.slider.parts import number
 
 
 @dataclass(frozen=True, kw_only=True)
-class Step(AtVelocity):
+class StepLoading(LoadingAtVelocity):
     """Step of load point velocity, load point displacement or normal stress at t = 0.
 
     ``V_load(t) = V_0`` and ``sigma(t) = sigma_* + Delta_sigma`` for t > 0, and the load point moves
@@ -20,7 +20,7 @@ class Step(AtVelocity):
     over V_*, displacements over D_c and stresses over sigma_*.
     """
 
-    load_velocity_ratio: float | None = velocity_ratio()
+    load_velocity_ratio: float | None = load_velocity_field()
     displacement_step: float = number(
         0.0, r"$\Delta\delta_0/D_c$", "1", "load point displacement step", "D_c"
     )
@@ -48,10 +48,10 @@ class Step(AtVelocity):
         return super().load_velocity
 
     @property
-    def imposes(self) -> bool:
+    def changes_normal_stress(self) -> bool:
         return self.normal_stress_step != 0.0
 
-    @derived
+    @cached_attribute
     def segments(self) -> tuple[Segment, ...]:
         """The step, and what follows it."""
         moved, pressed = self.displacement_step, self.normal_stress_step

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from rsfstudy.quantity import Quantity
 from rsfstudy.slider.loading import _train
-from rsfstudy.slider.parts import NOT_NEGATIVE, Numbers, Scene, number
+from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, Scene, number
 
 
 @dataclass(frozen=True, kw_only=True)
-class VelocityOscillation(_train.Train):
+class VelocityOscillation(_train.OscillationBase):
     """Oscillation of load point velocity about its mean V_0.
 
     ``V_load(t) = V_0 [1 + A_V sin(2 pi (t - t_b)/T_o + phi_o)]`` for t from t_b to t_b + N_o T_o,
@@ -27,13 +27,13 @@ class VelocityOscillation(_train.Train):
         "$A_V$",
         "1",
         "amplitude of an oscillation of load point velocity, over its mean",
-        rule=NOT_NEGATIVE,
-        if_stated=True,
+        rule=NON_NEGATIVE,
+        omit_if_none=True,
     )
 
     name = "velocity_oscillation"
-    called_by = "velocity_oscillation"
-    displaces = True
+    selected_by = "velocity_oscillation"
+    has_load_point_unknown = True
     unknowns = (
         Quantity("load_point_behind", "$y$", "1", "load point a quarter behind", "sigma_*"),
         Quantity("load_point_ahead", "$P$", "1", "stress by the load point", "sigma_*"),
@@ -44,22 +44,22 @@ class VelocityOscillation(_train.Train):
         if (self.velocity_oscillation or 0.0) > 1.0 and not scene.parts.law.regularised:
             rule = "must be 1 or less: the load point moves back, and friction is of forward slip"
             remedy = "Set regularised=True, by which slip reverses with shear stress."
-            raise self.invalid("velocity_oscillation", rule, remedy)
+            raise self.field_error("velocity_oscillation", rule, remedy)
         if self.load_velocity == 0.0:
             rule = "must be greater than 0: velocity_oscillation is over it"
-            raise self.invalid("load_velocity_ratio", rule)
+            raise self.field_error("load_velocity_ratio", rule)
         super().check(scene)
 
-    def begins(self, scene: Scene) -> Numbers:
+    def initial_unknowns(self, scene: Scene) -> Numbers:
         """The pair whose last is ``-K R cos(omega t + phase)``."""
-        stress = self.stress(scene)
-        return -stress * math.sin(self.angle), -stress * math.cos(self.angle)
+        stress = self.stress_amplitude(scene)
+        return -stress * math.sin(self.initial_phase), -stress * math.cos(self.initial_phase)
 
     def numbers(self, scene: Scene) -> Numbers:
         """omega D_c/V_*, K R, and what the last unknown begins with."""
-        return self.frequency, self.stress(scene), self.begins(scene)[1]
+        return self.angular_frequency, self.stress_amplitude(scene), self.initial_unknowns(scene)[1]
 
-    def stress(self, scene: Scene) -> float:
+    def stress_amplitude(self, scene: Scene) -> float:
         """K R."""
         amplitude = (self.velocity_oscillation or 0.0) * self.load_velocity
-        return scene.stiffness * amplitude / self.frequency
+        return scene.stiffness * amplitude / self.angular_frequency

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.slider.loading import Loading, Segment
-from rsfstudy.slider.parts import COUNT, POSITIVE, number
+from rsfstudy.slider.parts import POSITIVE, POSITIVE_INTEGER, number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,11 +40,11 @@ class VelocityRamp(Loading):
         "",
         "1",
         "number of stairs that stand for a ramp of load point velocity",
-        rule=COUNT,
+        rule=POSITIVE_INTEGER,
     )
 
     name = "velocity_ramp"
-    called_by = "velocity_ramp"
+    selected_by = "velocity_ramp"
 
     @property
     def segments(self) -> tuple[Segment, ...]:

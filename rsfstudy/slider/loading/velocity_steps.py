@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.loading import Loading, Segment
-from rsfstudy.slider.parts import ANY_COUNT, POSITIVE, number
+from rsfstudy.slider.parts import NON_NEGATIVE_INTEGER, POSITIVE, number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +23,7 @@ class VelocitySteps(Loading):
         "",
         "1",
         "number of steps of load point velocity, there and back in turn",
-        rule=ANY_COUNT,
+        rule=NON_NEGATIVE_INTEGER,
     )
     velocity_ratio: float = number(
         10.0,
@@ -43,7 +43,7 @@ class VelocitySteps(Loading):
     )
 
     name = "velocity_steps"
-    called_by = "velocity_steps"
+    selected_by = "velocity_steps"
 
     @property
     def segments(self) -> tuple[Segment, ...]:

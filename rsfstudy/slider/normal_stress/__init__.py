@@ -6,10 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.slider.parts import Function, Part, Scene, found_in
+from rsfstudy._deprecation import renamed_members
+from rsfstudy.slider.parts import Function, Part, Scene, discover_parts
 from rsfstudy.slider.requirements import SHEAR_STRESS
 
 
+@renamed_members
 @dataclass(frozen=True, kw_only=True)
 class NormalStress(Part):
     """Base of the cases of normal stress.
@@ -19,9 +21,9 @@ class NormalStress(Part):
     where normal stress is constant.
     """
 
-    conclusions = ("follows_friction", "coupling", "weakest")
-    equations = frozenset({"normal_stress", "state_effect", "numbers"})
-    receives = frozenset({SHEAR_STRESS})
+    derived_properties = ("depends_on_shear_stress", "coupling", "min_frictional_stress")
+    defining_methods = frozenset({"normal_stress", "state_effect", "numbers"})
+    received_quantities = frozenset({SHEAR_STRESS})
     normal_stress: ClassVar[Function | None] = None
 
     @property
@@ -32,7 +34,7 @@ class NormalStress(Part):
         return None
 
     @property
-    def follows_friction(self) -> bool:
+    def depends_on_shear_stress(self) -> bool:
         """True if normal stress changes while slip goes on, and not by the loading alone."""
         return bool(self.effects)
 
@@ -41,9 +43,9 @@ class NormalStress(Part):
         """d sigma/d tau, and the effect alpha of normal stress on the state, if that is all."""
         return None
 
-    def weakest(self, scene: Scene) -> float:
+    def min_frictional_stress(self, scene: Scene) -> float:
         """Deviation of frictional stress, over sigma_*, at which normal stress vanishes."""
         return -math.inf
 
 
-PARTS = found_in(__name__, __path__)
+BUILT_IN_PARTS = discover_parts(__name__, __path__)

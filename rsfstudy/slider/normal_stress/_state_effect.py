@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.normal_stress import NormalStress
-from rsfstudy.slider.parts import NOT_NEGATIVE, Function, Numbers, number
+from rsfstudy.slider.parts import NON_NEGATIVE, Function, Numbers, number
 from rsfstudy.slider.places import NORMAL_STRESS
 
 
-def linker_dieterich(
+def linker_dieterich_effect(
     friction: float, ratio: float, change: float, p: Numbers
 ) -> tuple[float, float]:
     """State variable lost to the present normal stress, and its derivative with respect to shear
@@ -38,16 +38,16 @@ def linker_dieterich(
 
 
 @dataclass(frozen=True, kw_only=True)
-class StateEffect(NormalStress):
+class NormalStressWithStateEffect(NormalStress):
     """Base of the cases in which normal stress changes: the strength `alpha` of the effect."""
 
     alpha: float = number(
-        0.56, r"$\alpha$", "1", "normal stress effect on the state variable", rule=NOT_NEGATIVE
+        0.56, r"$\alpha$", "1", "normal stress effect on the state variable", rule=NON_NEGATIVE
     )
 
     @property
     def state_effect(self) -> Function | None:
-        return linker_dieterich if self.alpha else None
+        return linker_dieterich_effect if self.alpha else None
 
     @property
     def effects(self) -> tuple[str, ...]:

@@ -10,16 +10,16 @@ from rsfstudy.slider.parts import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
-class Constant(NormalStress):
+class ConstantNormalStress(NormalStress):
     """Constant normal stress, ``sigma = sigma_*``: nothing to add to the friction relation."""
 
     name = "constant"
-    no_meaning = "while normal stress is constant", "set normal_stress='variable'"
+    rejection_hint = "while normal stress is constant", "set normal_stress='variable'"
     coupling = (0.0, 0.0)
 
     def check(self, scene: Scene) -> None:
         """Nothing that changes it."""
-        if scene.parts.loading.imposes:
+        if scene.parts.loading.changes_normal_stress:
             remedy = "Set normal_stress='imposed', or 'variable' where it follows shear stress too."
             rule = "is changed by the loading"
             raise InvalidValue("normal_stress", self.name, rule, remedy=remedy)

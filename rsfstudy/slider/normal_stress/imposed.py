@@ -6,20 +6,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsfstudy.slider.normal_stress._state_effect import StateEffect
+from rsfstudy.slider.normal_stress._state_effect import NormalStressWithStateEffect
 from rsfstudy.slider.parts import Numbers, Scene
-from rsfstudy.slider.places import IMPOSED
+from rsfstudy.slider.places import IMPOSED_NORMAL_STRESS
 
 
 def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
     """Normal stress over its reference value less 1: what the loading has made of it, whatever
     shear stress does.
     """
-    return p[IMPOSED], 0.0
+    return p[IMPOSED_NORMAL_STRESS], 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Imposed(StateEffect):
+class ImposedNormalStress(NormalStressWithStateEffect):
     """Normal stress that the loading imposes, with an effect `alpha` of it on the state.
 
     ``sigma = sigma_* + Delta_sigma(t)`` and ``dTheta = -alpha dsigma/sigma`` beside the evolution
@@ -31,9 +31,12 @@ class Imposed(StateEffect):
     """
 
     name = "imposed"
-    no_meaning = "while normal stress does not follow shear stress", "set normal_stress='variable'"
+    rejection_hint = (
+        "while normal stress does not follow shear stress",
+        "set normal_stress='variable'",
+    )
     normal_stress = staticmethod(normal_stress)
-    follows_friction = False
+    depends_on_shear_stress = False
 
     @property
     def coupling(self) -> tuple[float, float]:

@@ -7,9 +7,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.normal_stress._state_effect import StateEffect
+from rsfstudy.slider.normal_stress._state_effect import NormalStressWithStateEffect
 from rsfstudy.slider.parts import POSITIVE, Numbers, Scene, number
-from rsfstudy.slider.places import IMPOSED, LARGEST_EXCESS, NORMAL_STRESS, SMALLEST_EXCESS
+from rsfstudy.slider.places import (
+    IMPOSED_NORMAL_STRESS,
+    LARGEST_NORMAL_STRESS_EXCESS,
+    NORMAL_STRESS,
+    SMALLEST_NORMAL_STRESS_EXCESS,
+)
 
 
 def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
@@ -28,14 +33,14 @@ def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
         + 1.
     """
     cot_phi = p[NORMAL_STRESS + 1]
-    excess = cot_phi * friction + p[IMPOSED]
-    if not SMALLEST_EXCESS <= excess <= LARGEST_EXCESS:
-        excess = min(max(excess, SMALLEST_EXCESS), LARGEST_EXCESS)
+    excess = cot_phi * friction + p[IMPOSED_NORMAL_STRESS]
+    if not SMALLEST_NORMAL_STRESS_EXCESS <= excess <= LARGEST_NORMAL_STRESS_EXCESS:
+        excess = min(max(excess, SMALLEST_NORMAL_STRESS_EXCESS), LARGEST_NORMAL_STRESS_EXCESS)
     return excess, cot_phi
 
 
 @dataclass(frozen=True, kw_only=True)
-class Variable(StateEffect):
+class VariableNormalStress(NormalStressWithStateEffect):
     """A driving stress inclined at `phi`, with an effect `alpha` of normal stress on the state.
 
     ``sigma = sigma_3 + tau cot(phi)``, and ``dTheta = -alpha dsigma/sigma`` beside the evolution
@@ -75,15 +80,15 @@ class Variable(StateEffect):
         """alpha and cot(phi)."""
         return self.alpha, self.cot_phi
 
-    def weakest(self, scene: Scene) -> float:
+    def min_frictional_stress(self, scene: Scene) -> float:
         return -(1.0 + scene.imposed_normal_stress) / self.cot_phi
 
     def check(self, scene: Scene) -> None:
         """An angle at which normal stress varies, and sigma_3 is positive."""
         if self.phi >= 90.0:
             remedy = "At 90 degrees it no longer varies: set normal_stress='constant'."
-            raise self.invalid("phi", "must lie between 0 and 90 degrees", remedy)
+            raise self.field_error("phi", "must lie between 0 and 90 degrees", remedy)
         lowest = math.degrees(math.atan(scene.mu_star))
         if self.phi <= lowest:
             rule = f"must exceed atan(mu_star) = {lowest:.6g} degrees: sigma_3 is negative below"
-            raise self.invalid("phi", rule, "Raise phi or lower mu_star.")
+            raise self.field_error("phi", rule, "Raise phi or lower mu_star.")

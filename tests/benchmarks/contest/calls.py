@@ -28,7 +28,7 @@ print(time.perf_counter() - began)
 """
 
 
-def cycling(law: str, normal_stress: str, b_over_a: float = 2.0) -> Scene:
+def cycling_scene(law: str, normal_stress: str, b_over_a: float = 2.0) -> Scene:
     """The scene of the benchmark."""
     return Scene(
         law=law,
@@ -40,10 +40,10 @@ def cycling(law: str, normal_stress: str, b_over_a: float = 2.0) -> Scene:
     )
 
 
-def called(call: str, law: str, normal_stress: str) -> Callable[[float, str], list[float]]:
+def make_call(call: str, law: str, normal_stress: str) -> Callable[[float, str], list[float]]:
     """A call as a function of rtol and engine; it gives the numbers whose error counts."""
     if call == "limit_cycle":
-        scene = cycling(law, normal_stress)
+        scene = cycling_scene(law, normal_stress)
 
         def numbers(rtol: float, engine: str) -> list[float]:
             found = rsfstudy.limit_cycle(scene, rtol=rtol, engine=engine)
@@ -58,7 +58,9 @@ def called(call: str, law: str, normal_stress: str) -> Callable[[float, str], li
     return numbers
 
 
-def compared(numbers: Callable[[float, str], list[float]], target: float, rounds: int) -> Any:
+def compare_at_equal_error(
+    numbers: Callable[[float, str], list[float]], target: float, rounds: int
+) -> Any:
     """For each engine, the loosest rtol that meets the target, its measured error, and the shortest
     time of a call in milliseconds; the engines take turns.
     """
@@ -84,7 +86,7 @@ def compared(numbers: Callable[[float, str], list[float]], target: float, rounds
     return found
 
 
-def first_uses(rounds: int) -> dict[str, float]:
+def first_use_times(rounds: int) -> dict[str, float]:
     """Seconds until the first cell of a fresh process, import included: the shortest of rounds."""
     found: dict[str, list[float]] = {}
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import DOP853
 
-from contest.problem import Problem, arrays, equations, scales, through
+from contest.problem import Problem, cycle_function, equations, problem_arrays, unknown_scales
 
-Found = list[tuple[float, float]]
+CycleNumbers = list[tuple[float, float]]
 
 
 def _clamped(value: float, low: float, high: float) -> float:
@@ -60,18 +60,18 @@ class HandScipy:
                 now = y.tolist()
                 return made.slow(now[0], now[1], p)
 
-            return integrated(rate, (f, psi, t), span, tolerance, scales(p[0])[0])
+            return integrated(rate, (f, psi, t), span, tolerance, unknown_scales(p[0])[0])
 
         def fast(f: float, x: float, g: float, span: float, p: Any, tolerance: float) -> Any:
             def rate(_clock: float, y: np.ndarray) -> Any:
                 now = y.tolist()
                 return made.fast(now[0], now[1], now[2], p)
 
-            return integrated(rate, (f, x, g), span, tolerance, scales(p[0])[1])
+            return integrated(rate, (f, x, g), span, tolerance, unknown_scales(p[0])[1])
 
-        self._cycle = through(made.balance, made.strength, slow, fast)
+        self._cycle = cycle_function(made.balance, made.strength, slow, fast)
 
-    def run(self, problems: list[Problem], tolerance: float) -> Found:
+    def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
         """One cycle of each problem."""
         return [
             self._cycle(it.begin.spring_stress, it.begin.psis[0], it.p, it.marks, tolerance)
@@ -79,12 +79,12 @@ class HandScipy:
         ]
 
 
-def _sum(row: Any, names: str) -> str:
+def _linear_combination_source(row: Any, names: str) -> str:
     """Source of a linear combination of stages."""
     return " + ".join(f"{float(c)!r}*{names}{j}" for j, c in enumerate(row) if c) or "0.0"
 
 
-def unrolled(rate: str) -> str:
+def unrolled_source(rate: str) -> str:
     """Source of DOP853 for three unknowns, without any loop but that over steps."""
     lines = [
         "def integrate(u, v, w, span, p, tolerance, su, sv, sw):",
@@ -99,14 +99,17 @@ def unrolled(rate: str) -> str:
     ]
     for s in range(1, 13):
         row = DOP853.A[s, :s] if s < 12 else DOP853.B
-        lines += [f"        {n}s = {n} + length*({_sum(row, 'd' + n)})" for n in "uvw"]
+        lines += [
+            f"        {n}s = {n} + length*({_linear_combination_source(row, 'd' + n)})"
+            for n in "uvw"
+        ]
         made = rate.replace("u,", "us,").replace("v,", "vs,").replace("w,", "ws,")
         lines.append(f"        du{s}, dv{s}, dw{s} = {made}")
     for n in "uvw":
         lines += [
             f"        scale = tolerance*(s{n} + max(abs({n}), abs({n}s)))",
-            f"        e5{n} = ({_sum(DOP853.E5, 'd' + n)})/scale",
-            f"        e3{n} = ({_sum(DOP853.E3, 'd' + n)})/scale",
+            f"        e5{n} = ({_linear_combination_source(DOP853.E5, 'd' + n)})/scale",
+            f"        e3{n} = ({_linear_combination_source(DOP853.E3, 'd' + n)})/scale",
         ]
     lines += [
         "        fifth, third = e5u*e5u + e5v*e5v + e5w*e5w, e3u*e3u + e3v*e3v + e3w*e3w",
@@ -148,7 +151,7 @@ class HandNumba:
         def loop(rate: str) -> Any:
             names: dict[str, Any] = {"math": math, "first": first, "made": None}
             names["slow_rate"], names["fast_rate"] = made.slow, made.fast
-            exec(unrolled(rate), names)
+            exec(unrolled_source(rate), names)
             return ready(names["integrate"])
 
         on_manifold, in_rupture = loop("slow_rate(u, v, p)"), loop("fast_rate(u, v, w, p)")
@@ -161,15 +164,15 @@ class HandNumba:
         def fast(f, x, g, span, p, tolerance):
             return in_rupture(f, x, g, span, p, tolerance, p[0], 1.0, p[0])
 
-        cycle = through(made.balance, made.strength, slow, fast, ready)
-        self._all = over_problems(cycle, ready)
+        cycle = cycle_function(made.balance, made.strength, slow, fast, ready)
+        self._all = loop_over_problems(cycle, ready)
 
-    def run(self, problems: list[Problem], tolerance: float) -> Found:
+    def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
         """One cycle of each problem."""
-        return called(self._all, problems, tolerance)
+        return call_compiled(self._all, problems, tolerance)
 
 
-def over_problems(cycle: Any, ready: Any) -> Any:
+def loop_over_problems(cycle: Any, ready: Any) -> Any:
     """A compiled function that goes through the cycles of all problems."""
 
     @ready
@@ -181,8 +184,8 @@ def over_problems(cycle: Any, ready: Any) -> Any:
     return every
 
 
-def called(every: Any, problems: list[Problem], tolerance: float) -> Found:
+def call_compiled(every: Any, problems: list[Problem], tolerance: float) -> CycleNumbers:
     """Its result."""
     result = np.empty((len(problems), 2))
-    every(*arrays(problems), tolerance, result)
+    every(*problem_arrays(problems), tolerance, result)
     return [tuple(row) for row in result.tolist()]

@@ -1,4 +1,6 @@
-"""Peers from the package registry, each as its documentation says is best; see `problem.through`.
+"""Peers from the package registry, each as its documentation says is best.
+
+See `problem.cycle_function`.
 
 All use explicit methods of high order on equations without stiffness; none has to find events.
 Importing what is not installed fails in `prepare`, so that the table can say so.
@@ -11,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from contest.hand import COMPILED, Found, called, over_problems
-from contest.problem import Problem, arrays, equations, scales, through
+from contest.hand import COMPILED, CycleNumbers, call_compiled, loop_over_problems
+from contest.problem import Problem, cycle_function, equations, problem_arrays, unknown_scales
 
 
 class Cyrk:
@@ -67,12 +69,12 @@ class Cyrk:
             y = np.array([f, x, g])
             return solved(address_fast, y, span, p, tolerance, p[0], 1.0, p[0])
 
-        cycle = through(made.balance, made.strength, slow, fast, ready)
-        self._all = over_problems(cycle, ready)
+        cycle = cycle_function(made.balance, made.strength, slow, fast, ready)
+        self._all = loop_over_problems(cycle, ready)
 
-    def run(self, problems: list[Problem], tolerance: float) -> Found:
+    def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
         """One cycle of each problem."""
-        return called(self._all, problems, tolerance)
+        return call_compiled(self._all, problems, tolerance)
 
 
 class Numbalsoda:
@@ -113,12 +115,12 @@ class Numbalsoda:
         def fast(f, x, g, span, p, tolerance):
             return solved(address_fast, np.array([f, x, g]), span, p, tolerance)
 
-        cycle = through(made.balance, made.strength, slow, fast, ready)
-        self._all = over_problems(cycle, ready)
+        cycle = cycle_function(made.balance, made.strength, slow, fast, ready)
+        self._all = loop_over_problems(cycle, ready)
 
-    def run(self, problems: list[Problem], tolerance: float) -> Found:
+    def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
         """One cycle of each problem."""
-        return called(self._all, problems, tolerance)
+        return call_compiled(self._all, problems, tolerance)
 
 
 class Sundae:
@@ -161,14 +163,14 @@ class Sundae:
             return tuple(found.y.ravel().tolist())
 
         def slow(f: float, psi: float, t: float, span: float, p: Any, tolerance: float) -> Any:
-            return solved(slow_rate, (f, psi, t), span, p, tolerance, scales(p[0])[0])
+            return solved(slow_rate, (f, psi, t), span, p, tolerance, unknown_scales(p[0])[0])
 
         def fast(f: float, x: float, g: float, span: float, p: Any, tolerance: float) -> Any:
-            return solved(fast_rate, (f, x, g), span, p, tolerance, scales(p[0])[1])
+            return solved(fast_rate, (f, x, g), span, p, tolerance, unknown_scales(p[0])[1])
 
-        self._cycle = through(plain.balance, plain.strength, slow, fast)
+        self._cycle = cycle_function(plain.balance, plain.strength, slow, fast)
 
-    def run(self, problems: list[Problem], tolerance: float) -> Found:
+    def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
         """One cycle of each problem."""
         return [
             self._cycle(it.begin.spring_stress, it.begin.psis[0], it.p, it.marks, tolerance)
@@ -227,7 +229,7 @@ class Heyoka:
 
             return integrate
 
-        self._cycle = through(plain.balance, plain.strength, integrating(0), integrating(1))
+        self._cycle = cycle_function(plain.balance, plain.strength, integrating(0), integrating(1))
 
     def _integrator(self, system: int, tolerance: float, wide: int) -> Any:
         import heyoka as hy
@@ -239,9 +241,9 @@ class Heyoka:
             self._known[key] = kind(self._systems[system], start, tol=tolerance, fast_math=True)
         return self._known[key]
 
-    def run(self, problems: list[Problem], tolerance: float) -> Found:
+    def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
         """One cycle of each problem."""
-        every, found = arrays(problems), []
+        every, found = problem_arrays(problems), []
         for first in range(0, len(problems), self._wide):
             starts, psis, p, marks = (of[..., first : first + self._wide] for of in every)
             found += list(zip(*self._cycle(starts, psis, p, marks, tolerance), strict=True))
@@ -267,7 +269,7 @@ class Diffrax:
 
         def integrating(rate: Any, of: int) -> Any:
             def integrate(u: Any, v: Any, w: Any, span: Any, p: Any, tolerance: Any) -> Any:
-                scale = jnp.stack([jnp.asarray(it) for it in scales(p[0])[of]])
+                scale = jnp.stack([jnp.asarray(it) for it in unknown_scales(p[0])[of]])
 
                 def scaled(_clock: Any, y: Any, p: Any) -> Any:
                     u, v, w = y * scale
@@ -292,13 +294,13 @@ class Diffrax:
 
         slow = integrating(lambda u, v, _w, p: made.slow(u, v, p), 0)
         fast = integrating(made.fast, 1)
-        cycle = through(made.balance, made.strength, slow, fast)
+        cycle = cycle_function(made.balance, made.strength, slow, fast)
         self._all = jax.jit(jax.vmap(cycle, in_axes=(0, 0, 1, 1, None)))
         self._one = jax.jit(cycle)
 
-    def run(self, problems: list[Problem], tolerance: float) -> Found:
+    def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
         """One cycle of each problem."""
-        starts, psis, p, marks = arrays(problems)
+        starts, psis, p, marks = problem_arrays(problems)
         if len(problems) == 1:
             interval, drop = self._one(starts[0], psis[0], p[:, 0], marks[:, 0], tolerance)
             return [(float(interval), float(drop))]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from contest.hand import Found
+from contest.hand import CycleNumbers
 from contest.problem import BUDGET, Problem, meter
-from rsfstudy.analysis.cycles import cycles
+from rsfstudy.analysis.cycles import iterate_cycles
 from rsfstudy.motion.accuracy import Accuracy
 
 
-class Ours:
+class RsfstudyEngine:
     """One of the engines."""
 
     def __init__(self, engine: str) -> None:
@@ -17,12 +17,14 @@ class Ours:
     def prepare(self, law: str, variable: bool) -> None:
         """Nothing to do: the first call compiles."""
 
-    def run(self, problems: list[Problem], tolerance: float) -> Found:
+    def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
         """One cycle of each problem."""
-        found: Found = []
+        found: CycleNumbers = []
         accuracy = Accuracy(tolerance, budget=BUDGET, engine=self.engine)
         for it in problems:
-            cycle = next(cycles(it.scene, accuracy, meter(self.engine), it.begin))
+            cycle = next(iterate_cycles(it.scene, accuracy, meter(self.engine), it.begin))
             assert cycle is not None
-            found.append((cycle.interval, cycle.highest - cycle.lowest))
+            found.append(
+                (cycle.recurrence_interval, cycle.max_spring_stress - cycle.min_spring_stress)
+            )
         return found

@@ -18,16 +18,16 @@ from typing import Any
 import numpy as np
 
 from rsfstudy import Scene
-from rsfstudy.analysis.approach import Approach
-from rsfstudy.analysis.cycles import _asked, cycles
-from rsfstudy.motion.accuracy import TIGHTEST_RTOL, Accuracy
-from rsfstudy.motion.course import follow
-from rsfstudy.motion.events import Kind, rise, settling
-from rsfstudy.motion.meter import Meter
-from rsfstudy.slider.dynamics.inertia import AHEAD, LIGHT
-from rsfstudy.slider.equations import IN_RUPTURE, between_ruptures
+from rsfstudy.analysis.approach import CycleSearch
+from rsfstudy.analysis.cycles import _event_specifications, iterate_cycles
+from rsfstudy.motion.accuracy import MIN_RTOL, Accuracy
+from rsfstudy.motion.course import integrate_events
+from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
+from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.slider.dynamics.inertia import DIFFERENCE_STEP, NEGLIGIBLE_SECOND_ORDER_WEIGHT
+from rsfstudy.slider.equations import RUPTURE_REGIME, equations_between_ruptures
 from rsfstudy.slider.point import Point
-from rsfstudy.slider.system import UNITS
+from rsfstudy.slider.system import PATH_LOG_RATE_SCALE
 
 BUDGET = 10**9
 #: Places of the numbers of a scene.
@@ -60,21 +60,21 @@ class Problem:
     scene: Scene
     begin: Point
     p: tuple[float, ...]
-    rises: float
+    initial_spring_stress_rate: float
     interval: float
     drop: float
     leave: float = math.nan
     rupture: float = math.nan
     rest: float = math.nan
-    lasts: float = math.nan
+    duration: float = math.nan
     fall: float = math.nan
     creep: float = math.nan
 
     @property
     def marks(self) -> tuple[float, ...]:
-        """What `through` has to know."""
+        """What `cycle_function` has to know."""
         paths = self.leave, self.rupture, self.rest
-        return self.rises, *paths, self.lasts, self.fall, self.creep
+        return self.initial_spring_stress_rate, *paths, self.duration, self.fall, self.creep
 
     def error(self, found: tuple[float, float]) -> float:
         """Largest relative error of the recurrence interval and of the static stress drop."""
@@ -83,49 +83,56 @@ class Problem:
         return math.inf if any(map(math.isnan, errors)) else max(errors)
 
 
-def problem(scene: Scene) -> Problem:
+def cycle_problem(scene: Scene) -> Problem:
     """The cycle of a scene, without marks."""
-    tight = Accuracy(TIGHTEST_RTOL, budget=BUDGET, engine="compiled")
-    approach = Approach(scene, tight, meter("compiled"))
-    if not approach.follow(300):
+    tight = Accuracy(MIN_RTOL, budget=BUDGET, engine="compiled")
+    approach = CycleSearch(scene, tight, meter("compiled"))
+    if not approach.run(300):
         raise ValueError(f"no limit cycle: {scene}")
-    begin = approach.seen[-1].end
-    truth = next(cycles(scene, tight, meter("compiled"), begin))
+    begin = approach.cycles[-1].end_point
+    truth = next(iterate_cycles(scene, tight, meter("compiled"), begin))
     coupling = scene.parts.normal_stress.coupling
     assert truth is not None
     assert coupling is not None
-    mass, load, log_load = scene.inertial_time, scene.load_velocity, scene.log_load_rate
+    mass, load, log_load = scene.inertial_time, scene.load_velocity, scene.log_load_velocity
     common = scene.a, scene.b, scene.mu_star, scene.stiffness, load, log_load
-    slow = between_ruptures(scene, clock=True)
-    passing = slow.rates((begin.spring_stress, *begin.psis, 0.0))[-1]
+    slow = equations_between_ruptures(scene, clock=True)
+    passing = slow.evaluate_rates((begin.spring_stress, *begin.psis, 0.0))[-1]
     return Problem(
         scene=scene,
         begin=begin,
         p=(*common, mass, math.log(mass), *coupling),
-        rises=begin.growth / passing / (2.0 * scene.load_velocity),
-        interval=truth.interval,
-        drop=truth.highest - truth.lowest,
+        initial_spring_stress_rate=begin.log_slip_rate_derivative
+        / passing
+        / (2.0 * scene.load_velocity),
+        interval=truth.recurrence_interval,
+        drop=truth.max_spring_stress - truth.min_spring_stress,
     )
 
 
-def marked(it: Problem, rtol: float) -> Problem:
+def with_marks(it: Problem, rtol: float) -> Problem:
     """A problem with marks where the package sets them for an accuracy."""
     scene, passed = it.scene, dict[str, float]()
     allowed = Accuracy(rtol, budget=BUDGET, engine="compiled")
-    moving = follow(
-        scene, allowed, meter("compiled"), _asked(scene.log_load_rate), start=it.begin, clock=True
+    moving = integrate_events(
+        scene,
+        allowed,
+        meter("compiled"),
+        _event_specifications(scene.log_load_velocity),
+        start=it.begin,
+        with_time=True,
     )
     for event in moving:
-        if event.kind is Kind.REGIME:
-            entering = event.regime == IN_RUPTURE
+        if event.kind is EventKind.REGIME:
+            entering = event.regime == RUPTURE_REGIME
             passed["leave" if entering else "land"] = event.time
             passed["landed"] = event.point.spring_stress
-        elif event.kind is Kind.FALL and event.time > 0.0:
+        elif event.kind is EventKind.FALL and event.time > 0.0:
             passed["fall"], passed["lowest"] = event.time, event.point.spring_stress
-        elif event.kind is Kind.RISE and "fall" in passed:
+        elif event.kind is EventKind.RISE and "fall" in passed:
             break
     loaded = scene.stiffness * scene.load_velocity * (passed["land"] - passed["fall"])
-    leave, rupture, rest = paths(scene, Accuracy(rtol), it.begin)
+    leave, rupture, rest = stretch_lengths(scene, Accuracy(rtol), it.begin)
     return replace(
         it,
         leave=leave,
@@ -137,23 +144,25 @@ def marked(it: Problem, rtol: float) -> Problem:
     )
 
 
-def paths(scene: Scene, accuracy: Accuracy, begin: Point) -> list[float]:
+def stretch_lengths(scene: Scene, accuracy: Accuracy, begin: Point) -> list[float]:
     """How long the path is in each of the three stretches of a cycle."""
-    lengths, regime, load = list[float](), "", scene.log_load_rate
-    watches = rise("log_slip_rate", load), settling(2.0)
-    for event in follow(scene, accuracy, meter("scipy"), watches, start=begin, clock=True):
+    lengths, regime, load = list[float](), "", scene.log_load_velocity
+    watches = rise("log_slip_rate", load), approach_to_steady_state(2.0)
+    for event in integrate_events(
+        scene, accuracy, meter("scipy"), watches, start=begin, with_time=True
+    ):
         if event.regime != regime:
             regime = event.regime
             lengths.append(0.0)
         lengths[-1] = event.clock
-        if len(lengths) == 3 and event.kind is Kind.RISE:
+        if len(lengths) == 3 and event.kind is EventKind.RISE:
             break
     return lengths
 
 
-def meter(engine: str) -> Meter:
+def meter(engine: str) -> WorkMeter:
     """A meter without a limit."""
-    return Meter(BUDGET, engine=engine)
+    return WorkMeter(BUDGET, engine=engine)
 
 
 def _identity(function: Any) -> Any:
@@ -212,11 +221,11 @@ def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _i
     @ready
     def balance(f: Any, psi: Any, p: Any) -> Any:
         x, slope, resistance, trails = trailing(f, psi, p)
-        if not branches or weight(x, p) > LIGHT * p[A]:
+        if not branches or weight(x, p) > NEGLIGIBLE_SECOND_ORDER_WEIGHT * p[A]:
             _value, _slope, shift = strength(f - resistance, p)
             loading, evolving, growing = changes(x - trails, psi, shift, slope, p)
-            ahead = trailing(f + AHEAD * loading, psi + AHEAD * evolving, p)[3]
-            growing = growing - (ahead - trails) / AHEAD
+            ahead = trailing(f + DIFFERENCE_STEP * loading, psi + DIFFERENCE_STEP * evolving, p)[3]
+            growing = growing - (ahead - trails) / DIFFERENCE_STEP
             resistance = clamped(weight(x - trails, p) * growing, -p[A], p[A])
         g = f - resistance
         value, _slope, shift = strength(g, p)
@@ -229,7 +238,7 @@ def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _i
         share = 1.0 / (1.0 + slower)
         loading = p[STIFFNESS] * (slower - 1.0) * share
         evolving = evolution(x, psi - shift, p) * share
-        slant = (loading - evolving) / (UNITS * p[A])
+        slant = (loading - evolving) / (PATH_LOG_RATE_SCALE * p[A])
         part = 1.0 / sqrt(1.0 + slant * slant)
         return part * loading, part * evolving, part * slower * share / p[LOAD]
 
@@ -240,14 +249,14 @@ def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _i
         faster = clamped((f - g) / (p[STIFFNESS] * norm), -1e30, 1e30)
         changes = evolution(x, value - p[A] * x - shift, p) * norm
         loading = p[STIFFNESS] * (p[LOAD] * p[MASS] - norm)
-        slant = faster / UNITS
+        slant = faster / PATH_LOG_RATE_SCALE
         part = 1.0 / sqrt(1.0 + slant * slant)
         return part * loading, part * faster, part * (p[A] * faster + changes) / slope
 
     return SimpleNamespace(strength=strength, balance=balance, slow=slow, fast=fast)
 
 
-def through(
+def cycle_function(
     balance: Any, strength: Any, slow: Any, fast: Any, ready: Callable[[Any], Any] = _identity
 ) -> Any:
     """A function that goes through a cycle, as whoever integrates in floats or in arrays needs it.
@@ -273,7 +282,9 @@ def through(
     return cycle
 
 
-def arrays(problems: list[Problem]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def problem_arrays(
+    problems: list[Problem],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Spring stress and state at the beginning, numbers and marks: problems in the last place."""
     starts = np.array([(it.begin.spring_stress, it.begin.psis[0]) for it in problems]).T
     marks = [it.marks for it in problems]
@@ -281,6 +292,6 @@ def arrays(problems: list[Problem]) -> tuple[np.ndarray, np.ndarray, np.ndarray,
     return starts[0].copy(), starts[1].copy(), p, np.ascontiguousarray(np.array(marks).T)
 
 
-def scales(a: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+def unknown_scales(a: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Changes of the unknowns that weigh as much as 1 in ln V, between ruptures and in them."""
     return (a, a, 1.0), (a, 1.0, a)

@@ -1,0 +1,515 @@
+"""Former names of public functions, classes, members and keywords.
+
+A former name works for one release, with a ``DeprecationWarning`` that states the new name. This
+module and its uses are removed in version 1.0.0. Each entry of ``RENAMED`` maps former names to new
+names, in one of three places:
+
+``"package.module"``
+    Names of a module. The module sets ``__getattr__ = renamed_names(__name__)``.
+``"package.module:Class"``
+    Members of a class, which has the decorator ``renamed_members``. If users override the members,
+    ``__init_subclass__`` of the class calls ``adopt_former_members``.
+``"package.module:function()"``, ``"package.module:Class()"``
+    Keyword arguments of a function or of a constructor, which has the outermost decorator
+    ``renamed_keywords``.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import sys
+import warnings
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+F = TypeVar("F", bound=Callable[..., Any])
+C = TypeVar("C", bound=type)
+
+#: New names by former names, by place.
+RENAMED: Mapping[str, Mapping[str, str]] = {
+    "rsfstudy": {
+        "Laboratory": "Rig",
+        "picture": "plot_motion",
+        "cell": "recompute_cell",
+    },
+    "rsfstudy.errors": {
+        "NoAnswer": "NoResultWarning",
+        "Incomplete": "IncompleteWarning",
+        "Signalled": "SignalInterrupt",
+    },
+    "rsfstudy.errors:InvalidValue": {
+        "at": "with_location",
+    },
+    "rsfstudy.quantity": {
+        "ShownAsTable": "HtmlTableMixin",
+    },
+    "rsfstudy.quantity:Output": {
+        "names": "variable_names",
+    },
+    "rsfstudy.rig.laboratory": {
+        "Laboratory": "Rig",
+    },
+    "rsfstudy.rig.laboratory:Rig": {
+        "on_axis": "axis_fields",
+    },
+    "rsfstudy.rig.history:history()": {
+        "laboratory": "rig",
+    },
+    "rsfstudy.rig.history:read_protocol()": {
+        "laboratory": "rig",
+    },
+    "rsfstudy.rig.table": {
+        "Selected": "ColumnSpec",
+    },
+    "rsfstudy.rig.table:Column": {
+        "number": "column_number",
+        "lines": "line_numbers",
+        "place": "location",
+        "check": "check_values",
+    },
+    "rsfstudy.axes.axis:Axis()": {
+        "drawn": "sampling_info",
+    },
+    "rsfstudy.axes.axis:Axis": {
+        "drawn": "sampling_info",
+        "is_plain": "is_single_field",
+        "is_numbered": "has_numbered_points",
+        "points": "point_names",
+    },
+    "rsfstudy.declare.study:Study()": {
+        "laboratory": "rig",
+        "declared_in": "source_file",
+    },
+    "rsfstudy.declare.study:Study": {
+        "laboratory": "rig",
+        "declared_in": "source_file",
+        "own_parts": "user_parts",
+        "own_classes": "user_classes",
+        "of_scene": "scene_field_names",
+        "fields_of": "scene_fields_of_row",
+        "changes": "cell_changes",
+        "split": "split_rows",
+        "place": "describe_cell",
+    },
+    "rsfstudy.declare.claims:Claim": {
+        "check_place": "check_selection",
+    },
+    "rsfstudy.declare.figure": {
+        "level": "horizontal_line",
+    },
+    "rsfstudy.declare.figure:Panel()": {
+        "by": "hue",
+        "each": "facet",
+        "at": "isel",
+        "points": "markers_only",
+        "error": "error_bars",
+        "through": "fit_line",
+        "name": "curve_label",
+        "says": "annotation",
+        "marks": "overlays",
+        "alike": "y_scale_group",
+        "when": "condition",
+        "columns": "legend_columns",
+        "as_marked": "is_custom",
+    },
+    "rsfstudy.declare.figure:Figure()": {
+        "more_axes": "allow_extra_dims",
+    },
+    "rsfstudy.reduce": {
+        "reduced": "apply_reductions",
+        "OverClosedForm": "ClosedFormRatio",
+        "DecadeFit": "SemilogFit",
+    },
+    "rsfstudy.reduce.base:Reduction": {
+        "measured_in": "unit_fields",
+        "of_failures": "uses_failed_cells",
+        "draws_on": "support_status",
+    },
+    "rsfstudy.plots": {
+        "place": "describe_point",
+        "name_rows": "label_rows",
+        "look": "cycle_style",
+        "marker": "cycle_marker",
+        "in_grey": "add_grey_legend_entry",
+        "styled": "style_context",
+        "number": "format_number",
+        "slope_with_error": "format_slope",
+        "figure": "draw_figure",
+        "save": "save_figure",
+        "rendered": "render_figure",
+        "NAMES": "FIGURE_NAMES",
+        "Drawing": "NotebookFigure",
+    },
+    "rsfstudy.plots._motion:plot_motion()": {
+        "laboratory": "rig",
+    },
+    "rsfstudy.api.accessor:Accessor": {
+        "laboratory": "rig",
+        "table": "fit_table",
+        "draw": "sample_parameters",
+    },
+    "rsfstudy.slider.parts": {
+        "NOT_NEGATIVE": "NON_NEGATIVE",
+        "ANY_COUNT": "NON_NEGATIVE_INTEGER",
+        "COUNT": "POSITIVE_INTEGER",
+    },
+    "rsfstudy.slider.parts:number()": {
+        "if_stated": "omit_if_none",
+    },
+    "rsfstudy.slider.parts:Part": {
+        "called_by": "selected_by",
+        "conclusions": "derived_properties",
+        "equations": "defining_methods",
+        "no_meaning": "rejection_hint",
+        "receives": "received_quantities",
+        "functions": "required_functions",
+        "refuse": "rejection_error",
+        "invalid": "field_error",
+        "resting": "steady_states",
+        "stress_left": "relaxation",
+        "seepage": "auxiliary_rates",
+        "seeped": "auxiliary_steady_states",
+    },
+    "rsfstudy.slider.laws": {
+        "LawOfStates": "LawBase",
+    },
+    "rsfstudy.slider.laws:LawBase": {
+        "states": "state_count",
+        "orbits_close": "has_closed_orbits",
+        "logarithmic": "has_logarithmic_state",
+        "size_over_a": "state_change_over_a",
+        "feels_stress": "depends_on_stress",
+    },
+    "rsfstudy.slider.laws:Law": {
+        "least_weakening": "min_weakening_b_over_a",
+    },
+    "rsfstudy.slider.normal_stress:NormalStress": {
+        "follows_friction": "depends_on_shear_stress",
+        "weakest": "min_frictional_stress",
+    },
+    "rsfstudy.slider.dynamics:Dynamics": {
+        "reverses": "allows_reversed_slip",
+        "radiated": "radiated_stress",
+        "damping": "radiated_stress_slope",
+        "norm": "slip_rate_norm",
+    },
+    "rsfstudy.slider.loading:Loading": {
+        "begins": "initial_unknowns",
+        "alone": "isolate_segment",
+        "told": "reported_segment_count",
+        "table": "segment_table",
+        "jumps": "jump_mask",
+        "is_a_step": "perturbs_steady_sliding",
+        "imposes": "changes_normal_stress",
+        "displaces": "has_load_point_unknown",
+        "presses": "has_stress_unknowns",
+    },
+    "rsfstudy.slider.places": {
+        "LOG_LOAD_RATE": "LOG_LOAD_VELOCITY",
+        "IMPOSED": "IMPOSED_NORMAL_STRESS",
+        "RECHARGE": "BOUNDARY_PRESSURE_RATE",
+    },
+    "rsfstudy.slider.assembly:SceneBase": {
+        "under": "with_segment",
+        "acting": "segment_scene",
+        "chains": "continuous_segments",
+        "unforced": "under_steady_loading",
+        "made": "cache",
+        "layout": "field_index",
+        "own_parts": "user_parts",
+        "states": "state_count",
+        "log_load_rate": "log_load_velocity",
+        "log_norm_rate": "log_instability_rate",
+        "is_disturbed": "is_perturbed",
+        "begins_elsewhere": "starts_unsteady",
+        "numbers_of_friction": "friction_numbers",
+        "shown": "quantities_with_values",
+    },
+    "rsfstudy.slider.point:Point": {
+        "growth": "log_slip_rate_derivative",
+        "friction": "frictional_stress",
+        "imbalance": "steady_state_offset",
+        "coefficient": "friction_coefficient",
+        "reading": "apparent_friction",
+        "reading_growth": "apparent_friction_derivative",
+    },
+    "rsfstudy.slider.friction:FrictionFunctions": {
+        "effective_stress": "effective_normal_stress",
+        "outer_stress": "rig_normal_stress",
+        "outer_pressure": "boundary_pressure",
+        "contribution": "state_contribution",
+        "by_pressure": "pressure_derivatives",
+        "states_at": "states_from_strength",
+        "imposed": "load_point_stress",
+        "imposed_change": "load_point_stress_change",
+        "states": "state_count",
+        "counted": "distance_indices",
+    },
+    "rsfstudy.slider.equations:Equations": {
+        "rate": "rate_function",
+        "point": "point_function",
+        "p": "parameters",
+        "states": "state_count",
+        "balance": "balance_function",
+        "rates": "evaluate_rates",
+        "at": "evaluate_point",
+    },
+    "rsfstudy.motion.accuracy:Accuracy": {
+        "at": "with_rtol",
+        "solver": "local_tolerance",
+        "switch_weight": "max_inertia_weight",
+        "switch_correction": "max_inertia_correction",
+        "remaining_slip": "max_remaining_slip",
+    },
+    "rsfstudy.motion.meter": {
+        "Halt": "MotionStopped",
+        "Meter": "WorkMeter",
+    },
+    "rsfstudy.motion.meter:WorkMeter": {
+        "spent": "evaluations",
+        "check": "check_budget",
+        "settle": "charge_difference",
+        "by_regime": "evaluations_by_regime",
+    },
+    "rsfstudy.motion.events": {
+        "Kind": "EventKind",
+        "settling": "approach_to_steady_state",
+    },
+    "rsfstudy.motion.events:maximum()": {
+        "of": "quantity",
+        "ends": "terminal",
+        "waits": "may_defer",
+    },
+    "rsfstudy.motion.events:minimum()": {
+        "of": "quantity",
+        "ends": "terminal",
+        "waits": "may_defer",
+    },
+    "rsfstudy.motion.events:rise()": {
+        "of": "quantity",
+        "to": "level",
+        "ends": "terminal",
+        "waits": "may_defer",
+    },
+    "rsfstudy.motion.events:fall()": {
+        "of": "quantity",
+        "to": "level",
+        "ends": "terminal",
+        "waits": "may_defer",
+    },
+    "rsfstudy.motion.events:approach_to_steady_state()": {
+        "part": "fraction",
+        "ends": "terminal",
+    },
+    "rsfstudy.motion.events:EventSpecification": {
+        "of": "quantity",
+        "ends": "terminal",
+        "waits": "may_defer",
+    },
+    "rsfstudy.motion.events:Event": {
+        "watch": "specification",
+        "work": "evaluations",
+    },
+    "rsfstudy.motion.running:PythonMotionState": {
+        "lasts": "end_time",
+        "taken": "step_length",
+        "finer": "step_limit_factor",
+        "pace": "time_per_step",
+        "resolved": "dense_output_limit",
+        "begins": "pending_start",
+        "length": "next_step_length",
+        "records": "recording_mode",
+        "kinks": "kinks_ahead",
+        "reported": "reported_kinks",
+        "spent_slow": "evaluations_slow",
+        "spent_fast": "evaluations_fast",
+        "started": "regime_start_time",
+        "reverses": "may_reverse",
+        "terminates": "may_terminate",
+        "limits_steps": "clock_is_path_length",
+        "sampled": "samples_taken",
+        "target": "target_time",
+        "urgent": "must_report",
+        "at_point": "starts_at_point",
+        "stress": "final_normal_stress",
+        "behind": "unknowns_behind_fluid",
+        "recorded": "recorded_rows",
+        "events": "event_rows",
+    },
+    "rsfstudy.motion.workspace:Workspace": {
+        "new": "y_end",
+        "step": "step_block",
+        "dense": "dense_rows",
+        "within": "y_within",
+        "slopes": "dense_slopes",
+        "before": "point_at_begin",
+        "after": "point_at_end",
+        "between": "point_within",
+        "when": "event_clocks",
+        "specified": "spec_count",
+        "p": "parameters",
+        "p_before": "parameters_before",
+    },
+    "rsfstudy.motion.steppers:Stepper": {
+        "reach": "step_to_segment_end",
+    },
+    "rsfstudy.analysis.fitting.record:Record": {
+        "stated": "specified_steps",
+        "found": "loading_steps",
+    },
+    "rsfstudy.analysis.fitting.record:Record()": {
+        "stated": "specified_steps",
+    },
+    "rsfstudy.measures": {
+        "TAKEN": "RESERVED_NAMES",
+        "Plain": "PlainValue",
+        "Value": "OutputValue",
+    },
+    "rsfstudy.measures._records": {
+        "Recorded": "RecordingMeasure",
+        "recorded": "phase_outputs",
+    },
+    "rsfstudy.measures:Measure": {
+        "find": "compute",
+        "headline": "primary_output",
+        "sought": "solved_fields",
+        "clocks": "needs_time",
+        "scales": "error_scales",
+        "charged": "run_nested",
+        "metered": "run_metered",
+        "classes": "code_classes",
+        "restored_fields": "fields_from_description",
+        "optional": "optional_outputs",
+        "estimated": "outputs_with_error",
+    },
+}
+
+
+def user_stacklevel() -> int:
+    """Return the ``stacklevel`` with which a warning refers to the code of the user."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] == "rsfstudy":
+        level, frame = level + 1, frame.f_back
+    return level
+
+
+def warn_renamed(former: str, new: str, where: str) -> None:
+    """Emit the warning about the former name of a member, a keyword or a name of a module."""
+    text = f"{former!r} of {where} is now called {new!r}. The old name will be removed in 1.0.0."
+    warnings.warn(text, DeprecationWarning, stacklevel=user_stacklevel())
+
+
+def renamed_names(module: str) -> Callable[[str], Any]:
+    """Return a module ``__getattr__`` that looks up the former names of the module."""
+
+    def __getattr__(name: str) -> Any:  # noqa: N807
+        if (new := RENAMED[module].get(name)) is None:
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        warn_renamed(name, new, module)
+        return getattr(importlib.import_module(module), new)
+
+    return __getattr__
+
+
+def renamed_members(kind: C, *, writable: bool = False) -> C:
+    """Add the former names of members to a class."""
+    for former, new in RENAMED[_key(kind)].items():
+        setattr(kind, former, (_FormerField if writable else _FormerMember)(former, new))
+    return kind
+
+
+def renamed_attribute(instance: Any, kind: type, name: str) -> Any:
+    """Return an attribute by its former name, for the ``__getattr__`` of a class.
+
+    Raises
+    ------
+    AttributeError
+        If the name is not the former name of an attribute.
+    """
+    if (new := RENAMED[_key(kind)].get(name)) is None:
+        raise AttributeError(f"a {kind.__name__} has no field or attribute {name!r}")
+    warn_renamed(name, new, kind.__name__)
+    return getattr(instance, new)
+
+
+def renamed_value(kind: type, name: str) -> str:
+    """Return the new name of a member of a class that is given by its name in a string."""
+    new = RENAMED[_key(kind)].get(name, name)
+    if new != name:
+        warn_renamed(name, new, kind.__name__)
+    return new
+
+
+def adopt_former_members(kind: type) -> None:
+    """Copy members that a subclass defines under a former name to the new name.
+
+    If the subclass also defines the new name, the former name is ignored. Dataclass fields become
+    a property, if the new name is a property of the base class. Other dataclass fields keep their
+    name and their meaning.
+    """
+    for base in kind.__mro__[1:]:
+        for former, new in RENAMED.get(_key(base), {}).items():
+            own, annotation = vars(kind), vars(kind).get("__annotations__", {}).get(former, "")
+            is_field = annotation != "" and "ClassVar" not in str(annotation)
+            if new in own or not (former in own or is_field):
+                continue
+            if is_field and not isinstance(getattr(base, new, None), property):
+                continue
+            warn_renamed(former, new, kind.__name__)
+            setattr(kind, new, _field_property(former) if is_field else own[former])
+
+
+def renamed_keywords(target: F) -> F:
+    """Accept the former names of keyword arguments of a function or of a constructor."""
+    table = RENAMED[f"{_key(target)}()"]
+    owner: Any = target
+    wrapped = owner.__init__ if isinstance(target, type) else target
+
+    @functools.wraps(wrapped)
+    def wrapper(*args: Any, **keywords: Any) -> Any:
+        # dataclasses.replace also passes the present values, under the new names
+        for former in table.keys() & keywords.keys():
+            warn_renamed(former, table[former], f"{target.__name__}()")
+            keywords[table[former]] = keywords.pop(former)
+        return wrapped(*args, **keywords)
+
+    if not isinstance(target, type):
+        return wrapper  # type: ignore[return-value]
+    owner.__init__ = wrapper
+    return target
+
+
+class _FormerMember:
+    """Descriptor that looks up a member by its new name."""
+
+    def __init__(self, former: str, new: str) -> None:
+        self.former, self.new = former, new
+
+    def __get__(self, instance: Any, owner: type) -> Any:
+        annotated = any(self.former in vars(c).get("__annotations__", {}) for c in owner.__mro__)
+        if instance is None and annotated:  # dataclass looks for the default of a field
+            raise AttributeError(self.former)
+        warn_renamed(self.former, self.new, owner.__name__)
+        target = owner if instance is None else instance
+        # classes that define the former name can only get here through super()
+        defining = [c for c in owner.__mro__ if vars(c).get(self.former, self) is not self]
+        return getattr(super(defining[-1], target) if defining else target, self.new)
+
+
+class _FormerField(_FormerMember):
+    """Descriptor of a field that users also assign by its former name."""
+
+    def __set__(self, instance: Any, value: Any) -> None:
+        warn_renamed(self.former, self.new, type(instance).__name__)
+        setattr(instance, self.new, value)
+
+
+def _field_property(name: str) -> property:
+    """Return a property with the value of a field."""
+    return property(lambda self: getattr(self, name))
+
+
+def _key(target: Any) -> str:
+    """Return the key of a class or function in ``RENAMED``."""
+    return f"{target.__module__}:{target.__qualname__}"
