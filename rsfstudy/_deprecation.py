@@ -7,8 +7,8 @@ names, in one of three places:
 ``"package.module"``
     Names of a module. The module sets ``__getattr__ = renamed_names(__name__)``.
 ``"package.module:Class"``
-    Members of a class, which has the decorator ``renamed_members``. If users override the members,
-    ``__init_subclass__`` of the class calls ``adopt_former_members``.
+    Members of a class, which has the decorator ``renamed_members``. If users may override the
+    members in a subclass, ``__init_subclass__`` of the class calls ``adopt_former_members``.
 ``"package.module:function()"``, ``"package.module:Class()"``
     Keyword arguments of a function or of a constructor, which has the outermost decorator
     ``renamed_keywords``.
@@ -395,7 +395,7 @@ def user_stacklevel() -> int:
 
 
 def warn_renamed(former: str, new: str, where: str) -> None:
-    """Emit the warning about the former name of a member, a keyword or a name of a module."""
+    """Emit the deprecation warning for the former name of a member, keyword or module object."""
     text = f"{former!r} of {where} is now called {new!r}. The old name will be removed in 1.0.0."
     warnings.warn(text, DeprecationWarning, stacklevel=user_stacklevel())
 
@@ -434,7 +434,7 @@ def renamed_attribute(instance: Any, kind: type, name: str) -> Any:
 
 
 def renamed_value(kind: type, name: str) -> str:
-    """Return the new name of a member of a class that is given by its name in a string."""
+    """Return the new name of a class member. The class is specified by its name, as a string."""
     new = RENAMED[_key(kind)].get(name, name)
     if new != name:
         warn_renamed(name, new, kind.__name__)
@@ -442,10 +442,10 @@ def renamed_value(kind: type, name: str) -> str:
 
 
 def adopt_former_members(kind: type) -> None:
-    """Copy members that a subclass defines under a former name to the new name.
+    """Make members that a subclass defines under a former name available under the new name.
 
-    If the subclass also defines the new name, the former name is ignored. Dataclass fields become
-    a property, if the new name is a property of the base class. Other dataclass fields keep their
+    If the subclass also defines the new name, the former name is ignored. A dataclass field becomes
+    a property if its new name is a property of the base class. Other dataclass fields keep their
     name and their meaning.
     """
     for base in kind.__mro__[1:]:
@@ -498,7 +498,7 @@ class _FormerMember:
 
 
 class _FormerField(_FormerMember):
-    """Descriptor of a field that users also assign by its former name."""
+    """Descriptor of a field that can also be assigned under its former name."""
 
     def __set__(self, instance: Any, value: Any) -> None:
         warn_renamed(self.former, self.new, type(instance).__name__)

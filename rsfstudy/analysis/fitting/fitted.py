@@ -15,7 +15,8 @@ from rsfstudy.analysis.fitting.noise import NoiseModel
 class FitSolution:
     """Result of a fit.
 
-    A coordinate is a parameter, or its logarithm for the parameters in ``LOGARITHMIC``.
+    The coordinate of a parameter is the parameter itself, or its logarithm for slip distances and
+    the stiffness.
 
     Attributes
     ----------

@@ -1,7 +1,8 @@
 """Segmentation of a record into runs with uniform sampling and noise.
 
-Sampling intervals are classified by their running mean, so a clock with jitter belongs to one
-class. Changes of the noise level are detected by binary segmentation of the whitened residuals.
+Sampling intervals are classified by their running mean, so that all intervals of a clock with
+jitter fall into one class. Changes of the noise level are detected by binary segmentation of the
+whitened residuals.
 """
 
 from __future__ import annotations
@@ -91,7 +92,7 @@ def count_processes(runs: Sequence[SamplingRun]) -> int:
 
 
 def index_rows(runs: Sequence[SamplingRun], field: str) -> np.ndarray:
-    """Return the index of the noise process or of the noise level of each row.
+    """Return the index of the noise process, or of the noise level, for each row.
 
     Parameters
     ----------
@@ -105,9 +106,9 @@ def index_rows(runs: Sequence[SamplingRun], field: str) -> np.ndarray:
 def find_level_changes(whitened_residuals: np.ndarray, min_difference: float = 0.0) -> list[int]:
     """Find the rows at which the standard deviation of the noise changes.
 
-    The function segments the logarithms of the absolute differences between successive rows. A
-    misfit of the model near a step affects few of these differences, because it is smooth or short.
-    A change of the noise level affects all of them.
+    The function segments the logarithms of the absolute differences between successive rows. Misfit
+    of the model near a step is either smooth or short, so it affects few of these differences. A
+    change of the noise level affects all of them.
 
     Parameters
     ----------

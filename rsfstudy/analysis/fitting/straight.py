@@ -28,7 +28,7 @@ _MAX_CORRELATION = 0.98
 
 @lru_cache(maxsize=256)
 def find_linear_start(record: Record, start: float, end: float) -> float:
-    """Find the time from which friction is linear in time up to a step.
+    """Find the start of the interval before a step in which friction varies linearly with time.
 
     Two conditions are tested. First, two separate lines must describe friction far better than a
     single line, after allowing for the correlation of the residuals. Second, the earlier part must
@@ -64,7 +64,7 @@ def find_linear_start(record: Record, start: float, end: float) -> float:
 
 
 def _find_break(t: np.ndarray, friction: np.ndarray) -> int:
-    """Find the row at which two separate lines describe friction best.
+    """Find the row at which a split into two separate lines fits friction best.
 
     Returns
     -------

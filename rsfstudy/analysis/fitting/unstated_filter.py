@@ -1,9 +1,9 @@
 """Detection of filtered friction if the user did not specify a filter.
 
 A filter smooths the peak of a velocity step and correlates the noise. A running mean over m rows
-also causes notches in the spectrum of the noise. The function tests models with these effects,
-linearised in the parameters. If the criterion improves and a parameter changes noticeably, friction
-was probably filtered.
+also causes notches in the spectrum of the noise. The function compares linearised models with and
+without these effects. If the criterion improves and a parameter changes noticeably, friction was
+probably filtered.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def _candidates(found: FitSolution, interval: float) -> Iterator[tuple[str, floa
 
 
 def _filtered(kind: str, size: float, time: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Filter columns of a window, shape (rows, columns)."""
+    """Return the filtered columns of a window, as an array of shape (rows, columns)."""
     if not kind:
         return columns
     if kind == "mean":
