@@ -55,6 +55,8 @@ START_TIME_LIMIT = 120.0
 CATCH_ALL = re.compile(r"cannot be answered|not as rsfstudy made it|cannot be had of this dataset")
 #: Parameters without junk, because a random value could start many processes.
 PARAMETERS_WITHOUT_JUNK = ("workers",)
+#: Module of the descriptors of former names, which are the same members as those of the new names.
+FORMER_NAMES = "rsfstudy._deprecation"
 
 
 class HostileObject:
@@ -293,6 +295,8 @@ def call_targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], d
                 getattr(type(thing), name, None)
             ):
                 continue
+            if inspect.getattr_static(type(thing), name).__class__.__module__ == FORMER_NAMES:
+                continue
             method, entry = getattr(thing, name), f"{title.split()[0]}.{name}"
             if inspect.isroutine(method) and _is_ours(method):
                 found[f"{title}.{name}"] = method, methods.get(entry, {})
@@ -313,7 +317,7 @@ def composed_functions(
     declared = {name: getattr(study, name) for name in parts}
 
     def reduction_on_results(kind: str, **options: Any) -> Any:
-        made = getattr(reduce, kind)(**options)
+        made = {name: getattr(reduce, name) for name in reduce.__all__}[kind](**options)
         return (
             reduce.apply_reductions(dataset, (made,)),
             made(dataset),
