@@ -153,6 +153,16 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         (lambda r: study_of("s", LinearStability(), Axis("a", [0.1])).scene(-1), "number = -1: is"),
         (lambda r: rsfstudy.read_record({"time": np.datetime64("2020")}), "time = .*one dim"),
         (lambda r: rsfstudy.Accuracy().with_rtol(np.timedelta64(1)), "rtol = .*must be a number"),
+        (
+            lambda r: Rig(normal_stress=None, slip_distance=1e-5, reference_velocity=1e-6),
+            "normal_stress = None: is required",
+        ),
+        (
+            lambda r: rsfstudy.simulate(
+                Scene(stiffness_ratio=5e-324, load_velocity_ratio=2.0), duration=0.1
+            ),
+            "stiffness_ratio = 5e-324: is so small",
+        ),
         (lambda r: Scene(a=np.timedelta64(1, "s")), "a = .*must be a number"),
         (lambda r: Axis("a", [0.1]).with_rows(np, {}), "rows = <module 'numpy'.*must be a list"),
         (lambda r: Figure(panels=np.ndarray), "panels = <class.*must be a list"),

@@ -159,7 +159,7 @@ def simulate(
         meter = WorkMeter(budget, engine=accuracy.engine)
     if not (isinstance(accuracy, Accuracy) and isinstance(meter, WorkMeter)):
         rule = "must be an Accuracy and a WorkMeter"
-        remedy = "Pass accuracy=accuracy, meter=meter, as Measure.find receives them."
+        remedy = "Pass accuracy=accuracy, meter=meter, as Measure.compute receives them."
         raise InvalidValue("accuracy, meter", (accuracy, meter), rule, remedy=remedy)
     check_engine(accuracy.engine)
     if is_alone and not scene.is_perturbed:

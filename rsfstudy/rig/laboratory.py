@@ -90,6 +90,9 @@ class Rig(HtmlTableMixin):
     density: Any = None
 
     def __post_init__(self) -> None:
+        for name in ("normal_stress", "slip_distance", "reference_velocity"):
+            if getattr(self, name) is None:
+                raise InvalidValue(name, None, "is required", remedy="Give a value with units.")
         for name in RIG_QUANTITIES:
             if getattr(self, name) is not None:
                 object.__setattr__(

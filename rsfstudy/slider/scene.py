@@ -318,7 +318,11 @@ class Scene(SceneBase):
         if not 0.0 < self.critical_stiffness < math.inf:
             rule = f"is of a critical stiffness at V_* that is {self.critical_stiffness:g}"
             raise InvalidValue("stiffness_ratio", ratio, rule, remedy="Give stiffness itself.")
-        return float(ratio * self.critical_stiffness)
+        stiffness = float(ratio * self.critical_stiffness)
+        if not stiffness > 0.0:
+            rule = "is so small that the stiffness is rounded to 0"
+            raise InvalidValue("stiffness_ratio", ratio, rule, remedy="Choose a larger ratio.")
+        return stiffness
 
     @property
     def stiffness_ratio(self) -> float:
