@@ -41,28 +41,28 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
     "rsfstudy.errors:InvalidValue": {
         "at": "with_location",
     },
-    "rsfstudy.quantity": {
+    "rsfstudy.quantities": {
         "ShownAsTable": "HtmlTableMixin",
     },
-    "rsfstudy.quantity:Output": {
+    "rsfstudy.quantities:Output": {
         "names": "variable_names",
     },
-    "rsfstudy.rig.laboratory": {
+    "rsfstudy.rig.rig": {
         "Laboratory": "Rig",
     },
-    "rsfstudy.rig.laboratory:Rig": {
+    "rsfstudy.rig.rig:Rig": {
         "on_axis": "axis_fields",
     },
-    "rsfstudy.rig.history:history()": {
+    "rsfstudy.rig.protocol_files:history()": {
         "laboratory": "rig",
     },
-    "rsfstudy.rig.history:read_protocol()": {
+    "rsfstudy.rig.protocol_files:read_protocol()": {
         "laboratory": "rig",
     },
-    "rsfstudy.rig.table": {
+    "rsfstudy.rig.table_files": {
         "Selected": "ColumnSpec",
     },
-    "rsfstudy.rig.table:Column": {
+    "rsfstudy.rig.table_files:Column": {
         "number": "column_number",
         "lines": "line_numbers",
         "place": "location",
@@ -77,11 +77,11 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "is_numbered": "has_numbered_points",
         "points": "point_names",
     },
-    "rsfstudy.declare.study:Study()": {
+    "rsfstudy.study.study:Study()": {
         "laboratory": "rig",
         "declared_in": "source_file",
     },
-    "rsfstudy.declare.study:Study": {
+    "rsfstudy.study.study:Study": {
         "laboratory": "rig",
         "declared_in": "source_file",
         "own_parts": "user_parts",
@@ -92,13 +92,13 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "split": "split_rows",
         "place": "describe_cell",
     },
-    "rsfstudy.declare.claims:Claim": {
+    "rsfstudy.study.claims:Claim": {
         "check_place": "check_selection",
     },
-    "rsfstudy.declare.figure": {
+    "rsfstudy.study.figure_declarations": {
         "level": "horizontal_line",
     },
-    "rsfstudy.declare.figure:Panel()": {
+    "rsfstudy.study.figure_declarations:Panel()": {
         "by": "hue",
         "each": "facet",
         "at": "isel",
@@ -113,15 +113,15 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "columns": "legend_columns",
         "as_marked": "is_custom",
     },
-    "rsfstudy.declare.figure:Figure()": {
+    "rsfstudy.study.figure_declarations:Figure()": {
         "more_axes": "allow_extra_dims",
     },
-    "rsfstudy.reduce": {
+    "rsfstudy.reductions": {
         "reduced": "apply_reductions",
         "OverClosedForm": "ClosedFormRatio",
         "DecadeFit": "SemilogFit",
     },
-    "rsfstudy.reduce.base:Reduction": {
+    "rsfstudy.study.reductions.base:Reduction": {
         "measured_in": "unit_fields",
         "of_failures": "uses_failed_cells",
         "draws_on": "support_status",
@@ -205,7 +205,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "displaces": "has_load_point_unknown",
         "presses": "has_stress_unknowns",
     },
-    "rsfstudy.slider.places": {
+    "rsfstudy.slider.parameter_layout": {
         "LOG_LOAD_RATE": "LOG_LOAD_VELOCITY",
         "IMPOSED": "IMPOSED_NORMAL_STRESS",
         "RECHARGE": "BOUNDARY_PRESSURE_RATE",
@@ -311,7 +311,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "watch": "specification",
         "work": "evaluations",
     },
-    "rsfstudy.motion.running:PythonMotionState": {
+    "rsfstudy.motion.driver:PythonMotionState": {
         "lasts": "end_time",
         "taken": "step_length",
         "finer": "step_limit_factor",
@@ -354,11 +354,11 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
     "rsfstudy.motion.steppers:Stepper": {
         "reach": "step_to_segment_end",
     },
-    "rsfstudy.analysis.fitting.record:Record": {
+    "rsfstudy.fitting.record:Record": {
         "stated": "specified_steps",
         "found": "loading_steps",
     },
-    "rsfstudy.analysis.fitting.record:Record()": {
+    "rsfstudy.fitting.record:Record()": {
         "stated": "specified_steps",
     },
     "rsfstudy.measures": {
@@ -366,11 +366,11 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "Plain": "PlainValue",
         "Value": "OutputValue",
     },
-    "rsfstudy.measures._records": {
+    "rsfstudy.measure_base._recorded_motion": {
         "Recorded": "RecordingMeasure",
         "recorded": "phase_outputs",
     },
-    "rsfstudy.measures:Measure": {
+    "rsfstudy.measure_base.measure:Measure": {
         "find": "compute",
         "headline": "primary_output",
         "sought": "solved_fields",

@@ -13,8 +13,8 @@ from importlib import resources
 from types import MappingProxyType
 from typing import Any
 
-from rsfstudy.quantity import Quantity
-from rsfstudy.slider.registry import FIELD_QUANTITIES as SCENE
+from rsfstudy.quantities import Quantity
+from rsfstudy.slider import FIELD_QUANTITIES as SCENE
 
 
 def _read_vocabulary() -> Iterator[Quantity]:

@@ -7,14 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy import Scene, Segment
-from rsfstudy.analysis.approach import EventSequence, follow_to_orbit
-from rsfstudy.analysis.cycles import LN10, Cycle, more_events_remedy
-from rsfstudy.analysis.return_map import DIFFERENCE_STEP, Orbit, ReturnMap, section_at
+from rsfstudy import Accuracy, Scene, Segment
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures._single_step import check_steady_loading
-from rsfstudy.measures.limit_cycle import (
+from rsfstudy.limit_cycles.cycle_search import EventSequence, follow_to_orbit
+from rsfstudy.limit_cycles.cycles import LN10, Cycle, more_events_remedy
+from rsfstudy.limit_cycles.limit_cycle import (
     PEAK_INDEX,
     PERIOD_OUTPUT,
     PERTURBATION_DISPLACEMENT,
@@ -23,10 +20,10 @@ from rsfstudy.measures.limit_cycle import (
     check_errors,
     estimate_cycle_errors,
 )
-from rsfstudy.motion.accuracy import Accuracy, estimate_error
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.quantity import Output, Quantity
-from rsfstudy.status import Status
+from rsfstudy.limit_cycles.return_map import DIFFERENCE_STEP, Orbit, ReturnMap, section_at
+from rsfstudy.measure_base import check_steady_loading
+from rsfstudy.measures import Measure, Outcome, Output, Quantity, Status
+from rsfstudy.motion import WorkMeter, estimate_error
 
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
 _COINCIDENCE_FLOOR = 0.02

@@ -10,19 +10,21 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from rsfstudy import Scene, Segment
-from rsfstudy.analysis.approach import CycleSearch
-from rsfstudy.analysis.return_map import ReturnMap
+from rsfstudy import Accuracy, Scene, Segment
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion.accuracy import Accuracy, estimate_error
-from rsfstudy.motion.course import integrate_events
-from rsfstudy.motion.events import Event, EventSpecification, rise
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.quantity import Output
+from rsfstudy.limit_cycles.cycle_search import CycleSearch
+from rsfstudy.limit_cycles.return_map import ReturnMap
+from rsfstudy.measures import Measure, Outcome, Output, Status
+from rsfstudy.motion import (
+    Event,
+    EventSpecification,
+    WorkMeter,
+    estimate_error,
+    integrate_events,
+    rise,
+)
+from rsfstudy.slider import Point
 from rsfstudy.slider.loading.oscillation import NormalStressOscillation
-from rsfstudy.slider.point import Point
-from rsfstudy.status import Status
 
 #: Displacement step in D_c that sets free motion off, and most events until its cycle repeats.
 START_DISPLACEMENT_STEP, MAX_EVENTS = 0.1, 300

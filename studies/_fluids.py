@@ -1,6 +1,6 @@
 """Scene and source that the studies of pore fluids share."""
 
-from rsfstudy.slider.scene import Scene
+from rsfstudy import Scene
 
 SEGALL_RICE = "Segall and Rice (1995)"
 REFERENCE = f"{SEGALL_RICE}, J. Geophys. Res. 100, 22155-22171"

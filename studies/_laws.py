@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from rsfstudy.declare.figure import Panel
+from rsfstudy import Panel
 
 if TYPE_CHECKING:
     import xarray as xr

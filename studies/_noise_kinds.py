@@ -15,7 +15,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 if TYPE_CHECKING:
-    from rsfstudy.analysis.fitting.record import Record
+    from rsfstudy.fitting import Record
 
 
 class ExactResponse(NamedTuple):
@@ -110,7 +110,7 @@ class NoiseKind:
 
     def draw(self, truth: ExactResponse, rng: np.random.Generator) -> Record:
         """Draw a random record."""
-        from rsfstudy.analysis.fitting.record import Record  # imports xarray, which is slow
+        from rsfstudy.fitting import Record  # imports xarray, which is slow
 
         margin = self.mean_of // 2
         time = self._times(truth, rng, margin)

@@ -10,25 +10,15 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from rsfstudy import Accuracy, Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Outcome
-from rsfstudy.measures._records import (
-    PHASE_VARIABLES,
-    RecordingMeasure,
-    estimate_instant_errors,
-    phase_outputs,
-)
-from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
-from rsfstudy.motion.events import Event
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.quantity import Output
+from rsfstudy.measure_base import RecordingMeasure, estimate_instant_errors, phase_outputs
+from rsfstudy.measure_base._recorded_motion import PHASE_VARIABLES
+from rsfstudy.measures import Outcome, Output, Status
+from rsfstudy.motion import Event, WorkMeter, integrate_events
+from rsfstudy.slider import Point, growth_rates, steady_sliding
 from rsfstudy.slider.loading.oscillation import NormalStressOscillation
-from rsfstudy.slider.point import Point
-from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.stability import growth_rates, response_to_normal_stress
-from rsfstudy.slider.steady import steady_sliding
-from rsfstudy.status import Status
+from rsfstudy.slider.stability import response_to_normal_stress
 
 #: Part of the accuracy asked for that is left of the transient where the record begins, by the
 #: slowest decay of small changes.

@@ -12,25 +12,28 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from rsfstudy.analysis.settling import settled_flag
+from rsfstudy import Accuracy, Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Outcome
-from rsfstudy.measures._records import (
-    PHASE_VARIABLES,
+from rsfstudy.measure_base import (
     RecordingMeasure,
+    check_steady_loading,
     estimate_instant_errors,
     phase_outputs,
+    settled_flag,
 )
-from rsfstudy.measures._single_step import check_steady_loading
-from rsfstudy.motion.accuracy import ROUNDING_ERROR, Accuracy
-from rsfstudy.motion.course import integrate_events
-from rsfstudy.motion.events import Event
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.motion.readings import friction_coefficient, sample_along_path
-from rsfstudy.motion.recording import MOTION_VARIABLES, RECORDED_VARIABLES, Recording
-from rsfstudy.quantity import Output
-from rsfstudy.slider.scene import Scene
-from rsfstudy.status import Status
+from rsfstudy.measure_base._recorded_motion import PHASE_VARIABLES
+from rsfstudy.measures import Outcome, Output, Status
+from rsfstudy.motion import (
+    MOTION_VARIABLES,
+    RECORDED_VARIABLES,
+    ROUNDING_ERROR,
+    Event,
+    Recording,
+    WorkMeter,
+    friction_coefficient,
+    integrate_events,
+    sample_along_path,
+)
 
 #: Part of the record, at its end, over which friction must stay, and within which part of what it
 #: is at `fit_from`.

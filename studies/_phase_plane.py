@@ -9,11 +9,15 @@ import math
 import numpy as np
 import xarray as xr
 
-from rsfstudy.declare.figure import Axes
-from rsfstudy.slider.assembly import find_inapplicable_fields
-from rsfstudy.slider.registry import field_types, find_named_user_parts
-from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.steady import steady_friction_excess, stress_for_friction
+from rsfstudy import Scene
+from rsfstudy.slider import (
+    field_types,
+    find_inapplicable_fields,
+    find_named_user_parts,
+    steady_friction_excess,
+    stress_for_friction,
+)
+from rsfstudy.study.figure_declarations import Axes
 
 LN10 = math.log(10.0)
 

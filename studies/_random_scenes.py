@@ -8,13 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from rsfstudy import Scene
-from rsfstudy.measures import Measure
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.healing import Healing
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.rigid_response import RigidResponse
-from rsfstudy.measures.step_response import StepResponse
-from rsfstudy.measures.velocity_step import VelocityStep
+from rsfstudy.measures import (
+    CriticalStep,
+    Healing,
+    LimitCycle,
+    Measure,
+    RigidResponse,
+    StepResponse,
+    VelocityStep,
+)
 
 from ._normal_stress_response import NormalStressResponse
 from ._normal_stress_transient import NormalStressTransient

@@ -12,28 +12,23 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from scipy.linalg import solve_toeplitz, toeplitz
 
-from rsfstudy.analysis.fitting.fitted import FitSolution
-from rsfstudy.analysis.fitting.intervals import LikelihoodProfile, stderr_multiplier
-from rsfstudy.analysis.fitting.joint import JointModel, number_parameters, strip_window_number
-from rsfstudy.analysis.fitting.model import (
-    LOGARITHMIC_PARAMETERS,
-    Values,
-    WindowModel,
-    check_free_parameters,
-    check_positive,
-    scene_to_parameters,
-)
-from rsfstudy.analysis.fitting.noise import check_noise_name
-from rsfstudy.analysis.fitting.search import FitProblem
-from rsfstudy.analysis.fitting.validity import find_validity_problems
-from rsfstudy.axes.axis import Axis
+from rsfstudy import Accuracy, Axis, Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome, OutputValue
-from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.quantity import Output, Quantity
-from rsfstudy.slider.scene import Scene
-from rsfstudy.status import Status
+from rsfstudy.fitting import (
+    LOGARITHMIC_PARAMETERS,
+    check_free_parameters,
+    scene_to_parameters,
+    strip_window_number,
+)
+from rsfstudy.fitting.fit_problem import FitProblem
+from rsfstudy.fitting.fit_solution import FitSolution
+from rsfstudy.fitting.intervals import LikelihoodProfile, stderr_multiplier
+from rsfstudy.fitting.joint_model import JointModel, number_parameters
+from rsfstudy.fitting.noise import check_noise_name
+from rsfstudy.fitting.validity import find_validity_problems
+from rsfstudy.fitting.window_model import Values, WindowModel, check_positive
+from rsfstudy.measures import Measure, Outcome, Output, OutputValue, Quantity, Status
+from rsfstudy.motion import WorkMeter
 
 from ._noise_kinds import NOISE_KINDS, ExactResponse
 
@@ -199,7 +194,7 @@ class SyntheticFit(Measure):
 
     def _fit_noisy_record(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Draw a laboratory record and fit it in the same way as ``rsfstudy.fit``."""
-        from rsfstudy.measures.fit import Fit  # imports xarray, which is slow
+        from rsfstudy.measures import Fit  # imports xarray, which is slow
 
         kind, true = NOISE_KINDS[self.process], self._exact_parameters(scene)
         if "trend1" in true:

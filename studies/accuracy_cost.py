@@ -15,25 +15,26 @@ from typing import ClassVar
 
 import xarray as xr
 
-from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, horizontal_line, reference_line
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Outcome
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.rigid_response import RigidResponse
-from rsfstudy.measures.step_response import StepResponse
-from rsfstudy.motion.accuracy import MAX_RTOL, MIN_RTOL, Accuracy
-from rsfstudy.motion.engines import COMPILED, SCIPY, is_installed
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.measures import (
+    CriticalStep,
+    LimitCycle,
+    Outcome,
+    Output,
+    Quantity,
+    RigidResponse,
+    Status,
+    StepResponse,
+)
+from rsfstudy.motion import COMPILED, MAX_RTOL, MIN_RTOL, SCIPY, WorkMeter, is_installed
 from rsfstudy.motion.steppers.scipy import METHODS
-from rsfstudy.quantity import Output, Quantity
-from rsfstudy.reduce import LinearFit
-from rsfstudy.status import Status
+from rsfstudy.reductions import LinearFit
+from rsfstudy.study.figure_declarations import Axes, horizontal_line, reference_line
 
-from . import _references as known
-from ._cheapest import CheapestIntegrator
-from ._problem import ERROR_OUTPUTS, Fields, Problem, ProblemMeasure, register_problem
+from . import _reference_values as known
+from ._cheapest_integrator import CheapestIntegrator
+from ._known_problems import ERROR_OUTPUTS, Fields, Problem, ProblemMeasure, register_problem
 
 QUASI_STATIC_FIELDS: Fields = {"law": "slowness", "normal_stress": "constant"}
 CYCLE_FIELDS: Fields = {

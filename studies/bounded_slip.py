@@ -17,11 +17,10 @@ import xarray as xr
 from scipy.interpolate import CubicSpline
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes
-from rsfstudy.measures.step_response import StepResponse
-from rsfstudy.quantity import Quantity
-from rsfstudy.reduce import Difference
-from rsfstudy.reduce.base import Reduction, is_failed
+from rsfstudy.measures import Quantity, StepResponse
+from rsfstudy.reductions import Difference, Reduction
+from rsfstudy.study import is_failed
+from rsfstudy.study.figure_declarations import Axes
 
 from ._paper import PAPER, REFERENCE
 from ._phase_plane import hatch_reversed_stress, plot_steady_line

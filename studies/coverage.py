@@ -17,15 +17,12 @@ from typing import Any, ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion.accuracy import MIN_RTOL, Accuracy
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.quantity import Output, Quantity
-from rsfstudy.reduce.base import Reduction
-from rsfstudy.status import Status
+from rsfstudy.measures import Measure, Outcome, Output, Quantity, Status
+from rsfstudy.motion import MIN_RTOL, WorkMeter
+from rsfstudy.reductions import Reduction
+from rsfstudy.study.figure_declarations import Axes
 
 from ._random_scenes import ALL_QUESTIONS, MOTION_QUESTIONS, random_scene
 

@@ -10,8 +10,8 @@ records keep what is promised.
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Study
-from rsfstudy.analysis.fitting.model import LOGARITHMIC_PARAMETERS
-from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
+from rsfstudy.fitting import LOGARITHMIC_PARAMETERS
+from rsfstudy.fitting import PARAMETERS as MODEL
 
 from ._synthetic_fit import FIT_ACCURACY, STEP_BACK_PROTOCOL, STEP_UP_PROTOCOL
 from .law_identification import EXPONENT_FIT, FAMILY_SCENE, MAX_CHANCE_DEVIATION, ScatterRatio

@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Study
-from rsfstudy.declare.figure import Axes
-from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.measures import LinearStability
+from rsfstudy.study.figure_declarations import Axes
 
 from ._fluids import DILATANT_FAULT, REFERENCE, SEGALL_RICE
 

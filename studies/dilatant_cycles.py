@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
-from rsfstudy.declare.figure import Axes
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures import LimitCycle
+from rsfstudy.study.figure_declarations import Axes
 
 from ._fluids import DILATANT_FAULT, REFERENCE, SEGALL_RICE
 

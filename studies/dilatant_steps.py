@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
-from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.measures import CriticalStep
 
 from ._fluids import DILATANT_FAULT, REFERENCE, SEGALL_RICE
 

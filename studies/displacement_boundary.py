@@ -15,9 +15,9 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import horizontal_line, reference_line
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import ClosedFormRatio, ProportionalFit, RelativeDifference
+from rsfstudy.measures import CriticalStep
+from rsfstudy.reductions import ClosedFormRatio, ProportionalFit, RelativeDifference
+from rsfstudy.study.figure_declarations import horizontal_line, reference_line
 
 from ._paper import (
     CONSTANT_NORMAL_STRESS,

@@ -18,13 +18,12 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, DrawFunction
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.motion.meter import MotionStopped, WorkMeter
-from rsfstudy.quantity import Output
-from rsfstudy.reduce import RelativeDifference
-from rsfstudy.slider.equations import Equations, equations_between_ruptures, equations_in_rupture
+from rsfstudy.measures import LimitCycle, Measure, Outcome, Output
+from rsfstudy.motion import MotionStopped, WorkMeter
+from rsfstudy.reductions import RelativeDifference
+from rsfstudy.slider import Equations, equations_between_ruptures, equations_in_rupture
+from rsfstudy.study import DrawFunction
+from rsfstudy.study.figure_declarations import Axes
 
 #: Radiation damping with the impedance of spring and mass, K T V_*/(2 pi D_c), at constant normal
 #: stress.

@@ -19,9 +19,9 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Study
-from rsfstudy.analysis.fitting.model import PARAMETERS as MODEL
-from rsfstudy.declare.figure import Axes
-from rsfstudy.reduce.base import Reduction
+from rsfstudy.fitting import PARAMETERS as MODEL
+from rsfstudy.reductions import Reduction
+from rsfstudy.study.figure_declarations import Axes
 
 from ._noise_kinds import NOISE_KINDS
 from ._synthetic_fit import (

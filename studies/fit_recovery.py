@@ -17,21 +17,14 @@ from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.analysis.fitting.joint import JointModel
-from rsfstudy.analysis.fitting.model import (
-    LOGARITHMIC_PARAMETERS,
-    PARAMETERS,
-    Values,
-    WindowModel,
-    scene_to_parameters,
-)
-from rsfstudy.analysis.fitting.search import FitProblem
-from rsfstudy.declare.figure import Axes
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import Measure, Outcome, OutputValue
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.quantity import Output, Quantity
-from rsfstudy.status import Status
+from rsfstudy.fitting import LOGARITHMIC_PARAMETERS, PARAMETERS, scene_to_parameters
+from rsfstudy.fitting.fit_problem import FitProblem
+from rsfstudy.fitting.joint_model import JointModel
+from rsfstudy.fitting.window_model import Values, WindowModel
+from rsfstudy.measures import Measure, Outcome, Output, OutputValue, Quantity, Status
+from rsfstudy.motion import WorkMeter
+from rsfstudy.study.figure_declarations import Axes
 
 from ._synthetic_fit import FIT_ACCURACY
 

@@ -14,21 +14,24 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.measures.rigid_response import RigidResponse
-from rsfstudy.measures.step_response import StepResponse
-from rsfstudy.measures.triggered import Triggered
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.quantity import Output
-from rsfstudy.status import Status
+from rsfstudy.measures import (
+    CriticalStep,
+    LimitCycle,
+    LinearStability,
+    Measure,
+    Outcome,
+    Output,
+    RigidResponse,
+    Status,
+    StepResponse,
+    Triggered,
+)
+from rsfstudy.motion import WorkMeter
+from rsfstudy.study.figure_declarations import Axes
 
-from . import _references as known
-from ._problem import ERROR_OUTPUTS, Fields, Problem, ProblemMeasure, register_problem
-from ._references import KnownValue
+from . import _reference_values as known
+from ._known_problems import ERROR_OUTPUTS, Fields, Problem, ProblemMeasure, register_problem
+from ._reference_values import KnownValue
 
 
 @dataclass(frozen=True)

@@ -17,17 +17,12 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq
 
-from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, horizontal_line
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion.accuracy import Accuracy, estimate_error
-from rsfstudy.motion.course import integrate_events
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.motion.recording import MOTION_VARIABLES, Recording
-from rsfstudy.quantity import Output
-from rsfstudy.rig.history import history
-from rsfstudy.slider.history import TIME_COLUMN, SampledHistory
-from rsfstudy.status import Status
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study, history
+from rsfstudy.measures import Measure, Outcome, Output, Status
+from rsfstudy.motion import MOTION_VARIABLES, Recording, WorkMeter, estimate_error, integrate_events
+from rsfstudy.slider import SampledHistory
+from rsfstudy.slider.sampled_history import TIME_COLUMN
+from rsfstudy.study.figure_declarations import Axes, horizontal_line
 
 #: Initial departure of spring stress, over a; samples in D_c/V_*; and part of the record around an
 #: extreme of the size of departures that is looked at for it.

@@ -13,9 +13,9 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, horizontal_line
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import Inverse
+from rsfstudy.measures import CriticalStep
+from rsfstudy.reductions import Inverse
+from rsfstudy.study.figure_declarations import Axes, horizontal_line
 
 from ._paper import PAPER, REFERENCE
 

@@ -13,8 +13,8 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Study
-from rsfstudy.declare.figure import Axes
-from rsfstudy.reduce.base import Reduction
+from rsfstudy.reductions import Reduction
+from rsfstudy.study.figure_declarations import Axes
 
 from ._synthetic_fit import (
     BASE_SCENE,

@@ -17,9 +17,9 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Scene, Study
-from rsfstudy.declare.figure import Axes
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import ClosedFormRatio, RelativeDifference
+from rsfstudy.measures import CriticalStep
+from rsfstudy.reductions import ClosedFormRatio, RelativeDifference
+from rsfstudy.study.figure_declarations import Axes
 
 from ._laws import (
     COMPOSITE,

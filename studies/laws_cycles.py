@@ -10,8 +10,8 @@ V_* keeps slip below 10^5.4 V_*, and drops small.
 """
 
 from rsfstudy import Axis, Claim, Figure, Scene, Study
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.reduce import ClosedFormRatio, Difference, LinearFit
+from rsfstudy.measures import LimitCycle
+from rsfstudy.reductions import ClosedFormRatio, Difference, LinearFit
 
 from ._laws import (
     FAMILY_MIDDLE,

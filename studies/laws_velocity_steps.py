@@ -11,8 +11,8 @@ composite law has V_c = 100 V_*.
 import numpy as np
 
 from rsfstudy import Axis, Claim, Figure, Scene, Study
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import RelativeDifference
+from rsfstudy.measures import CriticalStep
+from rsfstudy.reductions import RelativeDifference
 
 from ._laws import (
     CUT_OFF,

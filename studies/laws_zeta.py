@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import ClosedFormRatio, ProportionalFit
+from rsfstudy.measures import CriticalStep
+from rsfstudy.reductions import ClosedFormRatio, ProportionalFit
 
 from ._laws import REFERENCES, family_colour
 from ._paper import PAPER, REFERENCE

@@ -13,8 +13,8 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.measures import LimitCycle
+from rsfstudy.study.figure_declarations import Axes
 
 from ._paper import PAPER, REFERENCE
 from ._phase_plane import (

@@ -15,11 +15,10 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.reduce import Inverse, LinearFit
-from rsfstudy.slider.stability import critical_stiffness
-from rsfstudy.slider.steady import min_steady_log_slip_rate
+from rsfstudy.measures import LinearStability
+from rsfstudy.reductions import Inverse, LinearFit
+from rsfstudy.slider import critical_stiffness, min_steady_log_slip_rate
+from rsfstudy.study.figure_declarations import Axes
 
 from ._paper import PAPER, REFERENCE
 from ._phase_plane import scene_from_coordinates

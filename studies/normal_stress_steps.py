@@ -16,7 +16,7 @@ import xarray as xr
 from scipy.integrate import quad
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, horizontal_line
+from rsfstudy.study.figure_declarations import Axes, horizontal_line
 
 from ._normal_stress_transient import NormalStressTransient
 from ._phase_plane import scene_from_coordinates

@@ -12,9 +12,9 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, reference_line
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import ProportionalFit, RelativeDifference
+from rsfstudy.measures import CriticalStep
+from rsfstudy.reductions import ProportionalFit, RelativeDifference
+from rsfstudy.study.figure_declarations import Axes, reference_line
 
 from ._paper import (
     CONSTANT_NORMAL_STRESS,

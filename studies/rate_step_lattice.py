@@ -11,9 +11,9 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes
-from rsfstudy.measures.triggered import Triggered
-from rsfstudy.reduce import Boundary
+from rsfstudy.measures import Triggered
+from rsfstudy.reductions import Boundary
+from rsfstudy.study.figure_declarations import Axes
 
 from ._paper import CONSTANT_NORMAL_STRESS, NORMAL_STRESS_CASES, PAPER, REFERENCE
 

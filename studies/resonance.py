@@ -16,9 +16,9 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, horizontal_line
-from rsfstudy.reduce import Inverse
+from rsfstudy.reductions import Inverse
 from rsfstudy.slider.stability import response_to_normal_stress
+from rsfstudy.study.figure_declarations import Axes, horizontal_line
 
 from ._normal_stress_response import NormalStressResponse
 from ._phase_plane import scene_from_coordinates

@@ -12,8 +12,8 @@ from dataclasses import replace
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Rig, Study
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.reduce import LinearFit
+from rsfstudy.measures import LimitCycle
+from rsfstudy.reductions import LinearFit
 
 #: Normal stresses in MPa.
 NORMAL_STRESSES = (5.0, 10.0, 20.0)

@@ -11,9 +11,9 @@ from typing import Any
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import horizontal_line
-from rsfstudy.measures.rigid_response import RigidResponse
-from rsfstudy.reduce import Range, RelativeDifference
+from rsfstudy.measures import RigidResponse
+from rsfstudy.reductions import Range, RelativeDifference
+from rsfstudy.study.figure_declarations import horizontal_line
 
 from ._paper import PAPER, REFERENCE
 

@@ -13,8 +13,8 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.measures.healing import Healing
-from rsfstudy.reduce import SemilogFit
+from rsfstudy.measures import Healing
+from rsfstudy.reductions import SemilogFit
 
 SLIP, SLOWNESS, STRENGTHENING = "slip law", "slowness law", "slowness law, b < a"
 CASES: dict[str, dict[str, str | float]] = {

@@ -21,14 +21,14 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.limit_cycle import SLIP_MODES, LimitCycle
-from rsfstudy.quantity import Quantity
-from rsfstudy.reduce import Boundary
-from rsfstudy.reduce.base import Reduction, dimension_of_coordinate, is_failed, is_refused
-from rsfstudy.slider.stability import critical_stiffness
-from rsfstudy.status import Status
+from rsfstudy.limit_cycles import SLIP_MODES
+from rsfstudy.measures import LimitCycle, Quantity, Status
+from rsfstudy.reductions import Boundary, Reduction
+from rsfstudy.slider import critical_stiffness
+from rsfstudy.study import is_failed
+from rsfstudy.study.figure_declarations import Axes
+from rsfstudy.study.reductions.base import dimension_of_coordinate, is_refused
 
 from ._paper import GU_ET_AL, PAPER, REFERENCE
 from ._phase_plane import scene_from_coordinates

@@ -17,9 +17,8 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.reduce import ClosedFormRatio, LinearFit, Reduction
-from rsfstudy.status import Status
+from rsfstudy.measures import LimitCycle, Status
+from rsfstudy.reductions import ClosedFormRatio, LinearFit, Reduction
 
 from ._paper import PAPER, REFERENCE
 

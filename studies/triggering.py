@@ -27,12 +27,14 @@ from typing import Any
 import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, DrawFunction, horizontal_line, reference_line
-from rsfstudy.reduce import LinearFit
-from rsfstudy.slider.closed_forms import critical_normal_stress_step, effective_friction
+from rsfstudy.reductions import LinearFit
+from rsfstudy.slider import effective_friction
+from rsfstudy.slider.closed_forms import critical_normal_stress_step
+from rsfstudy.study import DrawFunction
+from rsfstudy.study.figure_declarations import Axes, horizontal_line, reference_line
 
+from ._critical_triggers import Triggers
 from ._paper import GU_ET_AL, REFERENCE
-from ._triggers import Triggers
 
 base = Scene(b_over_a=2.0)
 

@@ -15,9 +15,10 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes, DrawFunction, horizontal_line
-from rsfstudy.reduce import Boundary, Inverse
-from rsfstudy.status import Status
+from rsfstudy.measures import Status
+from rsfstudy.reductions import Boundary, Inverse
+from rsfstudy.study import DrawFunction
+from rsfstudy.study.figure_declarations import Axes, horizontal_line
 
 from ._bifurcation import Bifurcation
 

@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from rsfstudy import Axis, Claim, Scene, Study
-from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.measures import LinearStability
 
 GU_ET_AL = "Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196"
 RUINA = "Ruina (1983), J. Geophys. Res. 88, 10359-10370"

@@ -13,10 +13,9 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Rig, Study
-from rsfstudy.declare.figure import Axes
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.reduce import Logarithm, Mean, Quantile, StandardDeviation, StatusShares
-from rsfstudy.rig.reductions import InUnits
+from rsfstudy.measures import LimitCycle
+from rsfstudy.reductions import InUnits, Logarithm, Mean, Quantile, StandardDeviation, StatusShares
+from rsfstudy.study.figure_declarations import Axes
 
 # ---- what a fit says ----------------------------------------------------------------------------
 

@@ -14,9 +14,9 @@ import xarray as xr
 from scipy.integrate import quad
 
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import horizontal_line
-from rsfstudy.measures.velocity_step import VelocityStep
-from rsfstudy.reduce import ClosedFormRatio
+from rsfstudy.measures import VelocityStep
+from rsfstudy.reductions import ClosedFormRatio
+from rsfstudy.study.figure_declarations import horizontal_line
 
 #: Stiffness over critical stiffness, compliant to stiff.
 STIFFNESS_RATIOS = [1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0, 300.0]

@@ -15,7 +15,7 @@ from typing import Any
 import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import horizontal_line
+from rsfstudy.study.figure_declarations import horizontal_line
 
 from ._clock_advance import LINEARISED_LAWS, ClockAdvance
 

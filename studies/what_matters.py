@@ -16,14 +16,18 @@ import xarray as xr
 from scipy.stats import norm
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
-from rsfstudy.declare.figure import Axes
-from rsfstudy.measures import Measure, Outcome, OutputValue
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.quantity import Output
-from rsfstudy.reduce import Logarithm, SobolIndices
-from rsfstudy.status import Status
+from rsfstudy.measures import (
+    CriticalStep,
+    LimitCycle,
+    Measure,
+    Outcome,
+    Output,
+    OutputValue,
+    Status,
+)
+from rsfstudy.motion import WorkMeter
+from rsfstudy.reductions import Logarithm, SobolIndices
+from rsfstudy.study.figure_declarations import Axes
 
 #: Independent quantities, each uncertain by a tenth; the stiffness is that of the cycles.
 INPUT_MEANS = {"ln_a": 0.01, "ln_net": 0.02, "ln_stiffness": 0.006}

@@ -16,8 +16,8 @@ from hypothesis import HealthCheck, settings
 from matplotlib.mathtext import MathTextParser
 
 from rsfstudy import Scene
-from rsfstudy.compute import clusters, provenance, workers
-from rsfstudy.motion import course
+from rsfstudy.execution import clusters, provenance, workers
+from rsfstudy.motion import integrate
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.events import (
@@ -48,7 +48,7 @@ sys.dont_write_bytecode = False
 #: end. What uses the results of studies comes later, when they are there: it would wait for each.
 SLOW_MODULES = (
     "test_studies", "test_resume", "test_public_functions", "test_faults", "test_clusters",
-    "test_strangers",
+    "test_altered_files",
     "test_report", "test_compiled", "test_scale", "test_figures", "test_fits_together",
     "test_notebook", "test_statuses", "test_cli", "test_readme", "test_extensions", "test_site",
     "test_two_states", "test_critical_step", "test_fit_command", "test_tables",
@@ -84,7 +84,7 @@ def follow_until(
     and the end of each step; and what else is watched for.
     """
     meter, watches = WorkMeter(budget), (*watches, STEP_END_EVENT)
-    for event in course.integrate_events(
+    for event in integrate.integrate_events(
         scene, Accuracy(rtol, budget), meter, watches, with_time=True
     ):
         if until(event):
@@ -104,7 +104,7 @@ def reaches_instability_norm(scene: Scene, rtol: float = 1e-8, peaks: float = ma
     )
     accuracy, meter = Accuracy(rtol, engine=COMPILED), WorkMeter(200_000, engine=COMPILED)
     with contextlib.suppress(MotionStopped):  # slip that dies out, or that decays for ever
-        for event in course.integrate_events(scene, accuracy, meter, watches):
+        for event in integrate.integrate_events(scene, accuracy, meter, watches):
             # a step may pass the norm and come back
             if event.kind is EventKind.RISE or event.point.log_slip_rate >= norm:
                 return True

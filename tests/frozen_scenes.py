@@ -2,7 +2,7 @@
 
 `test_frozen_events.py` holds all engines to `frozen_events.json`. None amplifies rounding: a last
 bit of any field moves no number by more than a tenth of what the tests allow (`python
-tests/telling.py sensitivity` measures it).
+tests/frozen_motion_comparison.py sensitivity` measures it).
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import numpy as np
 
 from rsfstudy import Scene, protocol
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import events_along, integrate_events
 from rsfstudy.motion.events import (
     EventKind,
     EventSpecification,
@@ -25,6 +24,7 @@ from rsfstudy.motion.events import (
     minimum,
     rise,
 )
+from rsfstudy.motion.integrate import events_along, integrate_events
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.recording import MOTION_VARIABLES, Recording
 from rsfstudy.slider.equations import equations_between_ruptures, equations_of_rigid_slider

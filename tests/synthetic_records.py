@@ -18,7 +18,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 import rsfstudy
-from rsfstudy.analysis.fitting.record import Record
+from rsfstudy.fitting.record import Record
 
 #: A velocity step up from 1 to 10 um/s after 40 um: parameters in um and s.
 EXACT_PARAMETERS = {

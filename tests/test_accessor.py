@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
-from running import example_claim
+from study_runs import example_claim
 
 import rsfstudy
 import rsfstudy.api.accessor  # datasets of others have it too, whichever test is the first
 from rsfstudy import Axis, Scene, Study
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
-from rsfstudy.measures.critical_step import CriticalStep
 
 STUDY = Study(
     name="soft_and_stiff",

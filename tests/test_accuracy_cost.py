@@ -10,23 +10,23 @@ import pytest
 import xarray as xr
 from conftest import STEP_END_EVENT
 from extended_precision import critical_velocity, make_slider
-from rsfstudy.named_studies._cheapest import CheapestIntegrator
-from rsfstudy.named_studies._problem import Problem
+from rsfstudy.named_studies._cheapest_integrator import CheapestIntegrator
+from rsfstudy.named_studies._known_problems import Problem
 from rsfstudy.named_studies.accuracy_cost import WorkPrecision
 
 from rsfstudy import Scene
-from rsfstudy.declare import catalogue
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Outcome
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import events_along
+from rsfstudy.motion.integrate import events_along
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.steppers.scipy import METHODS
-from rsfstudy.reduce import apply_reductions
+from rsfstudy.reductions import apply_reductions
+from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider.equations import equations_between_ruptures
 from rsfstudy.status import Status
+from rsfstudy.study import catalogue
 
 SCENE = Scene(law="slowness", normal_stress="constant", load_velocity_ratio=20.0)
 PEAK = 8.853655123157110332821499968933

@@ -10,13 +10,13 @@ import pytest
 import xarray as xr
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from running import SMALL_STUDY, run, run_command
+from study_runs import SMALL_STUDY, run, run_command
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.slider.registry import FIELD_NAMES
+from rsfstudy.study import catalogue
 
 #: Anything a user, a JSON file or a notebook may put where a value is asked for.
 ODD = st.one_of(
@@ -148,6 +148,6 @@ def test_any_study_file_is_taken_or_refused(tmp_path_factory, text):
 @pytest.mark.parametrize("output", ["/dev/null/results", "/proc/results"])
 def test_an_output_that_cannot_be_written(output, monkeypatch):
     """Told before any cell is computed."""
-    monkeypatch.setattr("rsfstudy.compute.cells.compute_cell", None)
+    monkeypatch.setattr("rsfstudy.execution.cells.compute_cell", None)
     with pytest.raises(DataError, match=f"cannot use {output}.*Choose another --output"):
         run(output=output)

@@ -11,8 +11,8 @@ import synthetic_records as synthetic
 import xarray as xr
 
 import rsfstudy
-from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.errors import InvalidValue
+from rsfstudy.fitting.record import Record
 from rsfstudy.status import Status
 
 ROWS = 400

@@ -7,10 +7,10 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from running import start_point
+from study_runs import start_point
 
 from rsfstudy import Scene
-from rsfstudy.motion.starting import initial_point
+from rsfstudy.motion.initial_points import initial_point
 
 DYNAMICS = ({}, {"radiation_damping": 1e-3}, {"inertia": True})
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from rsfstudy.reduce import (
+from rsfstudy.reductions import (
     Boundary,
     ClosedFormRatio,
     Difference,
@@ -21,8 +21,8 @@ from rsfstudy.reduce import (
     StandardDeviation,
     apply_reductions,
 )
-from rsfstudy.reduce.base import ERROR_COMMENT
 from rsfstudy.status import Status
+from rsfstudy.study.reductions.base import ERROR_COMMENT
 
 X = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
 OF, ON = "critical_velocity_ratio", "a_over_b_minus_a"

@@ -10,11 +10,11 @@ import numpy as np
 import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from running import run
+from study_runs import run
 
 import rsfstudy
 from rsfstudy import Rig, Study
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.rig.units import unit_factor
 
 NAMES = {

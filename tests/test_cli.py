@@ -6,15 +6,15 @@ import sys
 from dataclasses import replace
 
 import pytest
-from faulty import faulty_study
-from running import SMALL_STUDY as LATTICE
-from running import call_main, example_claim, named_results
+from faulty_study import faulty_study
+from study_runs import SMALL_STUDY as LATTICE
+from study_runs import call_main, example_claim, named_results
 
 import rsfstudy
 from rsfstudy.cli import assignments
-from rsfstudy.declare import catalogue, names
-from rsfstudy.files import store
 from rsfstudy.motion import engine_factory
+from rsfstudy.storage import store
+from rsfstudy.study import catalogue, study_index
 
 NAME = "rate_step_boundary"
 SMALL = ["--serial", "--set", "b_over_a=2,3,5"]
@@ -151,14 +151,23 @@ def test_a_label_may_hold_commas_and_colons(tmp_path):
 # ---- several studies, one after the other -------------------------------------------------------
 
 
+def replace_everywhere(monkeypatch, function, other):
+    """Replace a function in all modules of rsfstudy that have imported it."""
+    for module in [m for n, m in sys.modules.items() if n.startswith("rsfstudy.")]:
+        for name in [
+            n for n, value in getattr(module, "__dict__", {}).items() if value is function
+        ]:
+            monkeypatch.setattr(module, name, other)
+
+
 @pytest.fixture
 def catalogued(monkeypatch):
     """Puts studies in the place of the named ones."""
 
     def named(*studies):
         by_name, load = {study.name: study for study in studies}, catalogue.load_study
-        monkeypatch.setattr(names, "study_names", lambda: tuple(by_name))
-        monkeypatch.setattr(catalogue, "load_study", lambda name: by_name.get(name) or load(name))
+        replace_everywhere(monkeypatch, study_index.study_names, lambda: tuple(by_name))
+        replace_everywhere(monkeypatch, load, lambda name: by_name.get(name) or load(name))
 
     return named
 

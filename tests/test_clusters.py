@@ -19,8 +19,8 @@ import dask
 import psutil
 import pytest
 import yaml
-from faulty import faulty_study
-from running import (
+from faulty_study import faulty_study
+from study_runs import (
     FAULTY_STUDY_FILE,
     HANG_TIMEOUT,
     QUIET_CLUSTER_OPTIONS,
@@ -34,8 +34,8 @@ from running import (
 )
 
 import rsfstudy
-from rsfstudy.compute import clusters, provenance
 from rsfstudy.errors import RunError
+from rsfstudy.execution import clusters, provenance
 
 CLUSTERS = Path(__file__).parent.parent / "studies" / "clusters"
 #: What the page has for Kubernetes, by kind and name.

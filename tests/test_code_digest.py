@@ -13,15 +13,15 @@ from rsfstudy.named_studies import effects
 
 import rsfstudy
 from rsfstudy import measures
-from rsfstudy.compute import code_digest, provenance
-from rsfstudy.declare import catalogue, names
-from rsfstudy.declare.names import STUDIES_PACKAGE
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import DataError, RunError
+from rsfstudy.execution import code_digest, provenance
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Outcome
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.reduce import Reduction
+from rsfstudy.reductions import Reduction
 from rsfstudy.status import Status
+from rsfstudy.study import catalogue, study_index
+from rsfstudy.study.study_index import STUDIES_PACKAGE
 
 HELPER = """
 import functools
@@ -160,7 +160,7 @@ def test_what_it_does_not_draw_on_does_not(part, old, new, tmp_path):
 
 
 def test_the_code_of_a_measure_within_another_counts(tmp_path):
-    head = "from rsfstudy.measures.elasticities import Elasticities\n" + MEASURE
+    head = "from rsfstudy.measure_base.elasticities import Elasticities\n" + MEASURE
     text = head.replace("measure=Own()", 'measure=Elasticities(Own(), ("b_over_a",))')
     found = set()
     for number, helper in enumerate((HELPER, HELPER, HELPER.replace("2.0 * x", "3.0 * x"))):
@@ -173,7 +173,7 @@ def test_it_is_the_same_in_other_processes(tmp_path):
     """Whatever the seed of their hashes; in a script, and in code that has no file, too."""
     expected = digest(study_in(tmp_path))
     script = tmp_path / "script.py"
-    ask = "\nfrom rsfstudy.compute import code_digest\nprint(code_digest.digest_classes(Own))"
+    ask = "\nfrom rsfstudy.execution import code_digest\nprint(code_digest.digest_classes(Own))"
     script.write_text(MEASURE + ask)
     for seed, words in (("1", [str(script)]), ("2", ["-c", MEASURE + ask])):
         said = subprocess.run(
@@ -237,7 +237,7 @@ def physics_of(study):
 
 def with_measures_of_their_own():
     """Modules of named studies that hold the measure of their study."""
-    loaded = [catalogue.load_study(name) for name in names.study_names()]
+    loaded = [catalogue.load_study(name) for name in study_index.study_names()]
     homes = {study.name: type(study.measure).__module__ for study in loaded}
     return [
         sys.modules[home] for name, home in homes.items() if home == f"{STUDIES_PACKAGE}.{name}"
@@ -329,7 +329,7 @@ def test_of_the_physics_its_code_counts_and_no_remark(old, new, same, tmp_path):
 def test_the_digest_of_the_physics_is_that_of_its_files():
     package = Path(rsfstudy.__file__).parent
     files = provenance.read_sources(package)
-    assert {"slider/friction.py", "motion/loop.py", "measures/__init__.py"} <= set(files)
+    assert {"slider/friction.py", "motion/loop.py", "measure_base/measure.py"} <= set(files)
     moved = {**files, "slider/moved.py": files["slider/friction.py"]}
     digests = [code_digest.digest_sources(each) for each in (files, moved)]
     assert digests[0] == provenance.code_fingerprint()["physics"] != digests[1]

@@ -6,15 +6,15 @@ import json
 from dataclasses import replace
 
 import pytest
-from running import call_main, run, study_of
+from study_runs import call_main, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.files import store
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.reduce import LinearFit
+from rsfstudy.reductions import LinearFit
+from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
+from rsfstudy.storage import store
 
 NUMBER = "critical_stiffness"
 RATIOS = [1.5, 2.0, 2.5, 3.0]

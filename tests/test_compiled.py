@@ -13,21 +13,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numba.core.bytecode import FunctionIdentity
-from running import COMPILED_ONLY_STUDIES, SMALL_STUDY, reduced_study, run
+from study_runs import COMPILED_ONLY_STUDIES, SMALL_STUDY, reduced_study, run
 
 from rsfstudy import Scene, critical_step, limit_cycle, simulate
-from rsfstudy.compute.plan import Plan
-from rsfstudy.declare import catalogue
 from rsfstudy.errors import DataError, IncompleteWarning, InvalidValue
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.execution.plan import Plan
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.compiled import building, machine
+from rsfstudy.motion.compiled import compile_cache, machine
 from rsfstudy.motion.engines import COMPILED, ENGINES, compilation_log
 from rsfstudy.slider.equations import equations_between_ruptures
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.laws.slip import SlipLaw
-from rsfstudy.slider.places import LAW
+from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.status import Status
+from rsfstudy.study import catalogue
 
 CYCLE = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
 
@@ -40,7 +40,7 @@ def test_a_recording_is_the_same_however_few_rows_a_call_may_fill(rows, monkeypa
     """Regimes change in the middle of a table, and at its last rows."""
     scene, accuracy = Scene(**CYCLE), Accuracy(rtol=1e-3, engine=COMPILED)
     whole = LimitCycle(phases=50)(scene, accuracy)
-    monkeypatch.setattr("rsfstudy.motion.running._RECORDING_ROWS", rows)
+    monkeypatch.setattr("rsfstudy.motion.driver._RECORDING_ROWS", rows)
     pieces = LimitCycle(phases=50)(scene, accuracy)
     assert np.array_equal(whole.values["shear_stress"], pieces.values["shear_stress"])
     assert whole.values["recurrence_interval"] == pieces.values["recurrence_interval"]
@@ -179,13 +179,13 @@ def tripled(y, rates, p, result):
 @pytest.fixture
 def empty_cache(tmp_path, monkeypatch) -> Path:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    return building.cache_folder()
+    return compile_cache.cache_folder()
 
 
 def compiled_programs(function=doubled) -> int:
     """How many programs it takes to have a function called by its address."""
     before = compilation_log.programs
-    (address,) = building.compile_cfuncs([function])
+    (address,) = compile_cache.compile_cfuncs([function])
     assert address
     return compilation_log.programs - before
 
@@ -194,7 +194,7 @@ def test_other_processes_find_equations_again(tmp_path):
     """Closures too, by which Numba's own cache would find none: it would write them anew."""
     asks = (
         "from rsfstudy import Scene\n"
-        "from rsfstudy.analysis.critical_path import CriticalPath\n"
+        "from rsfstudy.critical_steps.critical_path import CriticalPath\n"
         "from rsfstudy.motion.compiled.machine import function_addresses\n"
         "from rsfstudy.motion.engines import compilation_log\n"
         "from rsfstudy.slider.equations import equations_between_ruptures\n"
@@ -278,7 +278,7 @@ def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeyp
     function, state = ctypes.CFUNCTYPE(None, *[ctypes.POINTER(ctypes.c_double)] * 4), (0.01, 0.02)
     for law in ("perrin_rice_zheng", "slip", "perrin_rice_zheng", "slip"):
         monkeypatch.setattr(FunctionIdentity, "_unique_ids", itertools.count(10**7))
-        building._jit_internal.cache_clear()
+        compile_cache._jit_internal.cache_clear()
         monkeypatch.setattr(machine, "_ADDRESS_CACHE", {})
         equations = equations_between_ruptures(
             Scene(law=law, normal_stress="constant"), clock=False
@@ -296,19 +296,21 @@ def test_a_cache_of_other_code_is_never_used(monkeypatch):
     """Any change of a function, or of a number it reads, makes another digest."""
     scene = Scene(law=SlipLaw)
     rate = equations_between_ruptures(scene, clock=False).rate_function
-    before = building.compute_digest(None, rate)
-    assert building.compute_digest(None, rate) == before
+    before = compile_cache.compute_digest(None, rate)
+    assert compile_cache.compute_digest(None, rate) == before
     cells = scene.functions.friction.strength.__closure__
     effect = next(
         c.cell_contents for c in cells if c.cell_contents.__name__ == "linker_dieterich_effect"
     )
     monkeypatch.setitem(effect.__globals__, "NORMAL_STRESS", 3)
-    assert building.compute_digest(None, rate) != before
-    assert building.compute_digest(None, doubled) != building.compute_digest(None, tripled)
-    before = building.compute_digest(None, doubled)
-    assert building.compute_digest(int, doubled) != before
-    monkeypatch.setitem(building._COMPILER_OPTIONS, "fastmath", {"nsz"})
-    assert building.compute_digest(None, doubled) != before
+    assert compile_cache.compute_digest(None, rate) != before
+    assert compile_cache.compute_digest(None, doubled) != compile_cache.compute_digest(
+        None, tripled
+    )
+    before = compile_cache.compute_digest(None, doubled)
+    assert compile_cache.compute_digest(int, doubled) != before
+    monkeypatch.setitem(compile_cache._COMPILER_OPTIONS, "fastmath", {"nsz"})
+    assert compile_cache.compute_digest(None, doubled) != before
 
 
 def by_module(y, rates, p, result):
@@ -317,6 +319,6 @@ def by_module(y, rates, p, result):
 
 def test_a_number_of_another_module_counts_too(monkeypatch):
     monkeypatch.setattr(known, "NUMBER", 2.0)
-    before = building.compute_digest(by_module)
+    before = compile_cache.compute_digest(by_module)
     monkeypatch.setattr(known, "NUMBER", 3.0)
-    assert building.compute_digest(by_module) != before
+    assert compile_cache.compute_digest(by_module) != before

@@ -12,19 +12,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import events_along
 from rsfstudy.motion.engines import PYTHON, SCIPY
+from rsfstudy.motion.integrate import events_along
 from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.slider.equations import (
     Equations,
     equations_between_ruptures,
     equations_by_displacement,
 )
-from rsfstudy.slider.places import LAW
+from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.point import Point
-from rsfstudy.slider.system import path_metric
+from rsfstudy.slider.scene_functions import path_metric
 from rsfstudy.status import Status
 
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from running import SMALL_STUDY, call_main, run
+from study_runs import SMALL_STUDY, call_main, run
 
 from rsfstudy.cli import cost
-from rsfstudy.compute.plan import Plan
+from rsfstudy.execution.plan import Plan
 from rsfstudy.motion.accuracy import Accuracy
 
 FILE = "small.cells.sqlite"

@@ -15,9 +15,9 @@ from rsfstudy.named_studies.coverage import Coverage, CoverageStatistics
 
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import limit_cycle
+from rsfstudy.limit_cycles import limit_cycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.reduce import apply_reductions
+from rsfstudy.reductions import apply_reductions
 from rsfstudy.status import Status
 
 

@@ -9,21 +9,20 @@ import pytest
 from conftest import cot_phi, reaches_instability_norm
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from in_time import TimeDomainMotion
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from time_domain_reference import TimeDomainMotion
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.analysis import after_step
-from rsfstudy.analysis.critical_path import CriticalPath
-from rsfstudy.measures import critical_step
-from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.critical_steps import critical_step, forward_motion
+from rsfstudy.critical_steps.critical_path import CriticalPath
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engine_factory import scalar_function
 from rsfstudy.motion.engines import COMPILED, SCIPY
-from rsfstudy.motion.handover import slow_manifold_error
 from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.regime_switching import slow_manifold_error
 from rsfstudy.motion.roots import build_root_finder
 from rsfstudy.slider.equations import equations_between_ruptures, log_slip_rate_at
 from rsfstudy.slider.point import Point
@@ -248,7 +247,7 @@ def test_paths_on_the_slow_manifold_agree_with_motions_of_the_full_equations(cas
     without = found(scene.with_(inertia=False), rtol=1e-8)[0]
     values = {}
     for heavy in (False, True):
-        for module in (critical_step, after_step):
+        for module in (critical_step, forward_motion):
             monkeypatch.setattr(module, "inertia_matters", lambda *_scene, heavy=heavy: heavy)
         values[heavy] = found(scene, rtol=1e-8)[:2]
     (path, error), (forward, its_error) = values[False], values[True]
@@ -324,14 +323,14 @@ def test_an_orbit_that_grows_slowly_is_known_to_reach_the_norm_in_a_few_leaps():
     """Leaps that had to be shortened each time would take ten times the work."""
     slowly = {"law": "slowness", "b_over_a": 2.46, "phi": 82.8, "alpha": 0.129}
     scene = Scene(**slowly, stiffness_ratio=0.998, load_velocity_ratio=0.16, instability_norm=3e-4)
-    assert after_step.reaches_norm(scene, Accuracy(1e-6), WorkMeter(15_000))
+    assert forward_motion.reaches_norm(scene, Accuracy(1e-6), WorkMeter(15_000))
 
 
 def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
     """k = k_cr, constant normal stress: without mass it peaks at 10^87 V_*."""
     scene = Scene(law="slowness", load_velocity_ratio=200.0, instability_norm=10.0, **CONSTANT)
     for inertia in (False, True):
-        reached = after_step.reaches_norm(
+        reached = forward_motion.reaches_norm(
             scene.with_(inertia=inertia), Accuracy(1e-6), WorkMeter(500_000)
         )
         assert reached is not inertia
@@ -344,9 +343,9 @@ def test_a_limit_cycle_below_the_norm_is_not_leapt_over():
     for load, peak in ((0.25, 9.57), (0.3, 8.49)):
         scene = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=load)
         assert peak < scene.log_instability_rate
-        assert not after_step.reaches_norm(scene, Accuracy(1e-6), WorkMeter(500_000))
+        assert not forward_motion.reaches_norm(scene, Accuracy(1e-6), WorkMeter(500_000))
     low = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=0.15)
-    assert after_step.reaches_norm(low, Accuracy(1e-6), WorkMeter(500_000))
+    assert forward_motion.reaches_norm(low, Accuracy(1e-6), WorkMeter(500_000))
 
 
 def test_a_spent_budget_is_a_failure_with_a_name():

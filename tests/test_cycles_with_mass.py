@@ -5,11 +5,11 @@ round, and against the same scene in other words.
 import math
 
 import pytest
-from in_time import TimeDomainMotion
 from rsfstudy.named_studies._bifurcation import Bifurcation
+from time_domain_reference import TimeDomainMotion
 
 from rsfstudy import Scene
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.status import Status

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from running import run
-from test_strangers import TINY
+from study_runs import run
+from test_altered_files import TINY
 
 import rsfstudy
 from rsfstudy.errors import DataError
-from rsfstudy.files import content_digest, contents, store
+from rsfstudy.storage import content_digest, schema, store
 
 #: With many claims the declaration is so long that HDF5 keeps no checksum of it.
 STUDY = replace(
@@ -135,4 +135,4 @@ def test_a_damaged_motion_is_refused(tmp_path):
         store.read_dataset(tmp_path / "motion.nc")
     shutil.copy(tmp_path / "whole.nc", tmp_path / "motion.nc")
     again = store.read_dataset(tmp_path / "motion.nc")
-    xr.testing.assert_identical(again, motion.assign_attrs(layout=contents.LAYOUT_VERSION))
+    xr.testing.assert_identical(again, motion.assign_attrs(layout=schema.LAYOUT_VERSION))

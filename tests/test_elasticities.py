@@ -7,14 +7,14 @@ from typing import ClassVar
 import pytest
 
 from rsfstudy import Scene
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import InvalidValue
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
+from rsfstudy.measure_base.elasticities import Elasticities
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.elasticities import Elasticities
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.quantity import Output
+from rsfstudy.quantities import Output
+from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.rig.quantities import derive_scene_fields
 from rsfstudy.status import Status
 

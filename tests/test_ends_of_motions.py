@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 
 import pytest
-from running import start_point
 from scipy.optimize import brentq
+from study_runs import start_point
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.analysis.after_step import reaches_norm
+from rsfstudy.critical_steps.forward_motion import reaches_norm
 from rsfstudy.errors import IncompleteWarning, NoResultWarning
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.events import EventKind, rise
-from rsfstudy.motion.handover import CONTINUES, find_termination, termination_margin
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import MotionStopped, WorkMeter
+from rsfstudy.motion.regime_switching import CONTINUES, find_termination, termination_margin
 from rsfstudy.status import Status
 
 ENGINES = (SCIPY, COMPILED)

@@ -4,27 +4,25 @@ The error names the argument, the rule and the remedy, whichever public function
 method is called.
 """
 
-import importlib
 import inspect
 import pickle
-import pkgutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
-from running import study_of
+from study_runs import study_of
 
 import rsfstudy
-from rsfstudy import Axis, Figure, Panel, Rig, Scene, Segment, measures, reduce
+from rsfstudy import Axis, Figure, Panel, Rig, Scene, Segment, measures, reductions
 from rsfstudy.argument_checks import MAX_ITEMS, describe_type, matches_annotation
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import CallError, DataError, IncompleteWarning, InvalidValue, RsfStudyError
 from rsfstudy.measures import Measure
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.measures.velocity_step import VelocityStep
-from rsfstudy.quantity import html_table
-from rsfstudy.reduce import ClosedFormRatio, LinearFit, PowerLaw, Range
+from rsfstudy.quantities import html_table
+from rsfstudy.reductions import ClosedFormRatio, LinearFit, PowerLaw, Range
+from rsfstudy.responses.linear_stability import LinearStability
+from rsfstudy.responses.velocity_step import VelocityStep
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -52,11 +50,9 @@ def dataset():
 def public_classes() -> list[type]:
     """The classes that users make instances of, and those that functions return."""
     found = {getattr(rsfstudy, name) for name in rsfstudy.__all__}
-    found |= {getattr(reduce, name) for name in reduce.__all__}
-    for module in pkgutil.iter_modules(measures.__path__):
-        if not module.name.startswith("_"):
-            members = vars(importlib.import_module(f"rsfstudy.measures.{module.name}")).values()
-            found |= {m for m in members if inspect.isclass(m) and issubclass(m, Measure)}
+    found |= {getattr(reductions, name) for name in reductions.__all__}
+    exported = (getattr(measures, name) for name in measures.__all__)
+    found |= {m for m in exported if inspect.isclass(m) and issubclass(m, Measure)}
     record = rsfstudy.read_record({"time": [0.0, 1.0], "displacement": [0, 1], "friction": [1, 1]})
     loadings = [rsfstudy.protocol([{"velocity": 2.0}])]
     loadings.append(rsfstudy.history({"time": [0.0, 1.0], "velocity": [1.0, 2.0]}))
@@ -147,7 +143,10 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         (lambda r: Segment("a"), "load_velocity = 'a': must be a number"),
         (lambda r: ClosedFormRatio("z", of="x", form=np.ones(3)), "form = array.*must be a text"),
         (lambda r: LinearFit("z", of=None, on="x"), "of = None: must be a text"),
-        (lambda r: reduce.apply_reductions(r, ()), "dataset = Record.*must be an xarray.Dataset"),
+        (
+            lambda r: reductions.apply_reductions(r, ()),
+            "dataset = Record.*must be an xarray.Dataset",
+        ),
         (lambda r: rsfstudy.run("a" * 300), "study = 'aaa.*at most 255 bytes"),
         (lambda r: rsfstudy.history({"time": [0, 1], "velocity": "="}), "velocity = '=': must"),
         (lambda r: study_of("s", LinearStability(), Axis("a", [0.1])).scene(-1), "number = -1: is"),
@@ -173,10 +172,13 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         ),
         (lambda r: rsfstudy.read_table(STEP, {"time": ("a", "s", "x")}), "must be a heading, or"),
         (lambda r: rsfstudy.read_table(STEP, xr.Dataset({"time": 1.0})), "column = <xarray.Data"),
-        (lambda r: reduce.Mean("z", of="x").compute(ARRAY), "of = .*has no dimension 'sample'. Ch"),
+        (
+            lambda r: reductions.Mean("z", of="x").compute(ARRAY),
+            "of = .*has no dimension 'sample'. Ch",
+        ),
         (lambda r: PowerLaw("z", of="x", on="y").centre_values(ARRAY, "y"), "has no dimension 'y'"),
         (
-            lambda r: reduce.Difference("z", of="x", along="y").support_status(ARRAY),
+            lambda r: reductions.Difference("z", of="x", along="y").support_status(ARRAY),
             "no dimension 'y'",
         ),
         (
@@ -279,8 +281,8 @@ def test_warnings_are_spelt_out():
 
 
 def test_headings_of_the_terminal_are_spelt_out(dataset, tmp_path, capsys):
-    from rsfstudy.api.tables import Table
-    from rsfstudy.cli.layout import print_piece
+    from rsfstudy.cli.table_layout import print_piece
+    from rsfstudy.reporting.tables import Table
 
     rows = [{f"zeta ({ESCAPE})": "1", "why": "x" * 60}]
     print_piece(Table(rows, caption=ESCAPE, wrappable={"why"}))

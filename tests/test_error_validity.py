@@ -11,8 +11,8 @@ import xarray as xr
 from synthetic_records import EXACT_PARAMETERS, FIT_OPTIONS, STEP_UP
 
 import rsfstudy
-from rsfstudy.api import fit_results, summaries
-from rsfstudy.reduce import Range, apply_reductions
+from rsfstudy.reductions import Range, apply_reductions
+from rsfstudy.reporting import fit_tables, summaries
 from rsfstudy.status import Status
 
 
@@ -46,8 +46,8 @@ def test_autocorrelated_whitened_residuals_change_the_status() -> None:
 
 
 def test_tables_mark_standard_errors_that_are_not_valid() -> None:
-    assert not fit_results.all_answered(naive())  # exit status 1
-    assert fit_results.format_with_stderr(naive().squeeze(), "a").endswith("*")
+    assert not fit_tables.all_answered(naive())  # exit status 1
+    assert fit_tables.format_with_stderr(naive().squeeze(), "a").endswith("*")
     texts = [piece for piece in summaries.summary_pieces(naive()) if isinstance(piece, str)]
     assert any("standard errors marked by * are not valid" in text for text in texts)
 

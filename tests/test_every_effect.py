@@ -15,12 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
-from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.events import EventKind, maximum
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.slider import laws, stability, steady
+from rsfstudy.responses.linear_stability import LinearStability
+from rsfstudy.slider import laws, stability, steady_state
 from rsfstudy.slider.equations import (
     Equations,
     equations_between_ruptures,
@@ -78,7 +78,7 @@ def eigenvalues(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
 def test_growth_rates_are_eigenvalues_of_the_assembled_equations(fields, ratio, log_slip_rate):
     """Their clock is slip and load point displacement: twice as fast as slip."""
     scene = scene_of(fields, ratio, log_slip_rate)
-    found = steady.steady_sliding(scene, log_slip_rate)
+    found = steady_state.steady_sliding(scene, log_slip_rate)
     equations, at = equations_by_displacement(scene), (found.spring_stress, *found.psis)
     assert np.abs(equations.evaluate_rates(at)).max() < 1e-13
     ours, theirs = 0.5 * stability.growth_rates(scene, log_slip_rate), eigenvalues(equations, at)
@@ -93,7 +93,7 @@ def test_growth_rates_are_eigenvalues_of_the_assembled_equations(fields, ratio, 
 def test_growth_rates_with_mass_are_eigenvalues_of_the_full_equations(fields):
     """In inertial time: w times as much."""
     scene = Scene(**{"stiffness_ratio": 0.9, **fields})
-    found = steady.steady_sliding(scene, 0.0)
+    found = steady_state.steady_sliding(scene, 0.0)
     at = (found.spring_stress, 0.0, found.frictional_stress, *found.psis[1:])
     ours = scene.inertial_time * stability.growth_rates(scene, 0.0)
     theirs = eigenvalues(equations_by_inertial_time(scene), at)

@@ -15,25 +15,25 @@ from types import SimpleNamespace
 import cloudpickle
 import numpy as np
 import pytest
+from frozen_motion_comparison import largest_differences, record_frozen_motion
 from frozen_scenes import Motion
-from running import call_main, have_same_numbers, run, study_of
-from telling import largest_differences, record_frozen_motion
+from study_runs import call_main, have_same_numbers, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, limit_cycle, plots
-from rsfstudy.declare import catalogue
-from rsfstudy.declare.figure import Figure, Panel
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.slider import laws, places, registry
+from rsfstudy.responses.linear_stability import LinearStability
+from rsfstudy.slider import laws, parameter_layout, registry
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.loading.step import StepLoading
 from rsfstudy.slider.normal_stress import NormalStress
+from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import flag, number
-from rsfstudy.slider.places import LAW
 from rsfstudy.status import Status
+from rsfstudy.study import catalogue
+from rsfstudy.study.figure_declarations import Figure, Panel
 
 #: Fields of every scene; others are among its values only if they are stated.
 PLAIN = tuple(name for name in registry.FIELD_NAMES if name not in registry.OMITTED_IF_NONE)
@@ -394,7 +394,7 @@ def test_members_may_bear_their_former_names():
 
 def test_a_part_has_as_many_numbers_as_there_are_places():
     def numbers(self, scene):
-        return tuple(range(places.FLUID - places.NORMAL_STRESS + 1))
+        return tuple(range(parameter_layout.FLUID - parameter_layout.NORMAL_STRESS + 1))
 
     scene = Scene(normal_stress=made(Unvaried, name="numerous", numbers=numbers), stiffness=0.01)
     with pytest.raises(InvalidValue, match="'numerous': states 3 numbers, .* places for 2"):

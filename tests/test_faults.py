@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from faulty import faulty_study
-from running import (
+from faulty_study import faulty_study
+from study_runs import (
     FAULTY_STUDY_FILE,
     HANG_TIMEOUT,
     QUIET_CLUSTER_OPTIONS,
@@ -23,13 +23,13 @@ from running import (
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.api import tables
-from rsfstudy.cli import assignments, terminal
-from rsfstudy.compute import clusters, runner, workers
-from rsfstudy.compute.plan import BatchIterator
+from rsfstudy.cli import assignments, printing
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RunError
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import LinearFit, apply_reductions
+from rsfstudy.execution import clusters, runner, workers
+from rsfstudy.execution.plan import BatchIterator
+from rsfstudy.reductions import LinearFit, apply_reductions
+from rsfstudy.reporting import tables
 from rsfstudy.status import Status
 
 LABELS = {s.label: s for s in Status}
@@ -86,7 +86,7 @@ def test_a_cell_that_goes_wrong(fault, gone_wrong, capsys):
         cells = dataset.sel(fault=fault)
         only_one_failed(cells, status)
         assert message in cells.message.values[1]
-        assert terminal.print_failures(cells) == 1
+        assert printing.print_failures(cells) == 1
         assert status in capsys.readouterr().out
 
 
@@ -142,7 +142,7 @@ def test_a_cell_that_computes_for_ever(sturdy, monkeypatch):
     only_one_failed(dataset, "time_limit_spent")
     assert "no answer within 0.5 s of CPU time" in dataset.message.values[1]
     assert "--time-limit" in dataset.message.values[1]
-    assert "faulty.py" in log.read_text()  # where it was
+    assert "faulty_study.py" in log.read_text()  # where it was
 
 
 def test_a_cell_that_waits_for_ever(sturdy):
@@ -155,7 +155,7 @@ def test_a_time_limit_is_one_of_cpu_time():
     """Whatever the clock says, before and after."""
     script = """
 import collections, itertools, time
-from rsfstudy.compute import cells
+from rsfstudy.execution import cells
 cells.WALL_TIME_FACTOR = 1e6
 with cells._cpu_time_limits.enforced(0.1):
     time.sleep(1.5)

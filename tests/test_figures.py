@@ -13,17 +13,17 @@ from matplotlib.image import imread
 from matplotlib.lines import Line2D
 from matplotlib.mathtext import MathTextParser
 from matplotlib.text import Text
-from running import call_main, named_results, run
+from study_runs import call_main, named_results, run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
-from rsfstudy.declare import names
 from rsfstudy.defaults import FIGURE_FORMATS
 from rsfstudy.errors import InvalidValue
-from rsfstudy.files import store
-from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.plots import _style, _text
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantities import Quantity
+from rsfstudy.responses.linear_stability import LinearStability
+from rsfstudy.storage import store
+from rsfstudy.study import study_index
 
 MM = 25.4
 #: Inches by which neighbours may seem to overlap. Extents are those of the highest letters, rounded
@@ -31,7 +31,7 @@ MM = 25.4
 SLACK = 0.015
 
 
-@pytest.fixture(scope="module", params=names.study_names())
+@pytest.fixture(scope="module", params=study_index.study_names())
 def figure(request, tmp_path_factory):
     """The figure of enough of each study."""
     dataset, _path = named_results(request.param, tmp_path_factory)

@@ -13,17 +13,17 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from running import call_main, cell_key, run
+from study_runs import call_main, cell_key, run
 
 import rsfstudy
 from rsfstudy import Scene, plots
-from rsfstudy.compute.provenance import git_state
-from rsfstudy.declare import catalogue, names
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.files import contents, restore, store
-from rsfstudy.files.journal import Journal, OutputPacking
+from rsfstudy.execution.provenance import git_state
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
+from rsfstudy.storage import rebuild, schema, store
+from rsfstudy.storage.journal import Journal, OutputPacking
+from rsfstudy.study import catalogue, study_index
 
 
 def dataset(value=1.0) -> xr.Dataset:
@@ -192,10 +192,10 @@ def test_what_another_program_saved_is_read_and_told(small, tmp_path):
 
 
 def test_a_file_of_a_later_version_is_told_for_what_it_is(small, tmp_path):
-    later = xr.load_dataset(small).assign_attrs(layout=contents.LAYOUT_VERSION + 1)
+    later = xr.load_dataset(small).assign_attrs(layout=schema.LAYOUT_VERSION + 1)
     store.write_dataset(later, tmp_path / "later.nc")
     with pytest.raises(
-        DataError, match=f"layout is 3, and this version .* reads 1 to {contents.LAYOUT_VERSION}"
+        DataError, match=f"layout is 3, and this version .* reads 1 to {schema.LAYOUT_VERSION}"
     ):
         rsfstudy.open(tmp_path / "later.nc")
 
@@ -255,13 +255,11 @@ def test_git_tells_the_commit_and_whether_it_was_clean(tmp_path):
 # ---- from the file alone ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", names.study_names())
+@pytest.mark.parametrize("name", study_index.study_names())
 def test_every_declaration_restores_its_study(name):
     study = catalogue.load_study(name)
     described = json.loads(json.dumps(study.describe()))
-    restored = restore.study_from_declaration(
-        contents.parse_declaration(described), study.user_parts
-    )
+    restored = rebuild.study_from_declaration(schema.parse_declaration(described), study.user_parts)
     assert json.loads(json.dumps(restored.describe())) == described
     assert restored.size == study.size
     # of thousands of cells some, which have all points of every axis
@@ -273,7 +271,7 @@ def test_measures_and_reductions_in_the_files_of_studies_are_found_by_their_name
     """In a process that has loaded no study."""
     described = [catalogue.load_study(name).describe() for name in ("effects", "coverage")]
     asked = (
-        "import json, sys; from rsfstudy.files import contents, restore\n"
+        "import json, sys; from rsfstudy.storage import schema as contents, rebuild as restore\n"
         "for plain in json.load(sys.stdin):\n"
         "    study = restore.study_from_declaration(contents.parse_declaration(plain), {})\n"
         "    print(*(type(p).__name__ for p in (study.measure, study.reductions[0])))"
@@ -287,7 +285,7 @@ def test_measures_and_reductions_in_the_files_of_studies_are_found_by_their_name
     )
     assert ran.stdout == "EffectCost RelativeDifference\nCoverage CoverageStatistics\n"
     with pytest.raises(InvalidValue, match="Did you mean 'effect_cost'"):
-        restore.rebuild_measure({"name": "effect_costs"}, "")
+        rebuild.rebuild_measure({"name": "effect_costs"}, "")
 
 
 def test_a_rerun_reproduces_every_number(small):

@@ -7,16 +7,16 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from running import call_main, study_of
 from scipy.io import loadmat
+from study_runs import call_main, study_of
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.api import exchange
-from rsfstudy.compute import provenance
+from rsfstudy.api import export
 from rsfstudy.errors import DataError
-from rsfstudy.files import store
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.execution import provenance
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
+from rsfstudy.storage import store
 
 SCENE = Scene(stiffness_ratio=0.5, load_velocity_ratio=10.0, inertia=True)
 RIG = ("--normal-stress", "5 MPa", "--slip-distance", "10 um", "--reference-velocity", "1 um/s")
@@ -125,7 +125,7 @@ def test_other_programs_read_what_is_exported(place, tmp_path):
 def test_codes_are_words_in_a_table(tmp_path):
     values = xr.DataArray([20, 0], dims="time", attrs={"flag_values": [0, 20]})
     values.attrs["flag_meanings"] = "ok work_budget_spent"
-    exchange.to_csv(xr.Dataset({"status": values}, {"time": [0.0, 1.0]}), tmp_path / "it.csv")
+    export.to_csv(xr.Dataset({"status": values}, {"time": [0.0, 1.0]}), tmp_path / "it.csv")
     assert pd.read_csv(tmp_path / "it.csv")["status"].tolist() == ["work_budget_spent", "ok"]
 
 

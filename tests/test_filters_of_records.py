@@ -10,9 +10,9 @@ import synthetic_records as synthetic
 from synthetic_records import EXACT_PARAMETERS, FIT_OPTIONS
 
 import rsfstudy
-from rsfstudy.analysis.fitting.averaging import AveragingCorrelation, apply_running_mean
-from rsfstudy.analysis.fitting.filters import FILTER_KINDS, LOW_PASS_ORDERS, Filter
 from rsfstudy.errors import InvalidValue
+from rsfstudy.fitting.averaging import AveragingCorrelation, apply_running_mean
+from rsfstudy.fitting.filters import FILTER_KINDS, LOW_PASS_ORDERS, Filter
 from rsfstudy.status import Status
 
 LOADING = ((0.0, 1.0), (40.07, 10.0))

@@ -20,9 +20,9 @@ from synthetic_records import (
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.analysis.fitting.load_point import shift_steps
-from rsfstudy.analysis.fitting.model import STEP_SHIFT_FRACTION, WindowModel
-from rsfstudy.analysis.fitting.record import loading_history
+from rsfstudy.fitting.load_point_errors import shift_steps
+from rsfstudy.fitting.record import loading_history
+from rsfstudy.fitting.window_model import STEP_SHIFT_FRACTION, WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import WorkMeter
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 import synthetic_records as synthetic
 import xarray as xr
-from running import call_main
+from study_runs import call_main
 
 import rsfstudy
-from rsfstudy.api import fit_results
-from rsfstudy.api.fit_results import format_with_stderr
+from rsfstudy.reporting import fit_tables
+from rsfstudy.reporting.fit_tables import format_with_stderr
 from rsfstudy.status import Status
 
 PAGES = Path(__file__).parent.parent / "studies" / "pages"
@@ -78,7 +78,7 @@ def test_what_it_finds_is_what_the_record_was_made_of(written):
     here, _said = written
     found = rsfstudy.open(here / "fit.nc")
     for name in ("a", "b", "slip_distance", "trend1"):
-        for one in fit_results.split_fits(found):
+        for one in fit_tables.split_fits(found):
             off = (one[name].item() - TRUE[name]) / one[f"{name}_stderr"].item()
             assert abs(off) < 4.0, (name, off)
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from rsfstudy.analysis.fitting import intervals
-from rsfstudy.analysis.fitting.model import QUICK_DIFFERENCES, DifferenceScheme, Values
-from rsfstudy.analysis.fitting.search import FitProblem, FitSolution
+from rsfstudy.fitting import intervals
+from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
+from rsfstudy.fitting.window_model import QUICK_DIFFERENCES, DifferenceScheme, Values
 
 ROWS, SIZE = 80, 1e-3
 FREE = ("b", "slip_distance", "mu_star")

@@ -19,7 +19,7 @@ from synthetic_records import (
 )
 
 from rsfstudy import Scene
-from rsfstudy.analysis.fitting.model import FINE_DIFFERENCES, QUICK_DIFFERENCES, WindowModel
+from rsfstudy.fitting.window_model import FINE_DIFFERENCES, QUICK_DIFFERENCES, WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import WorkMeter
 

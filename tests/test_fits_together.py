@@ -23,9 +23,9 @@ from synthetic_records import (
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.analysis.fitting.joint import JointModel
-from rsfstudy.analysis.fitting.model import WindowModel
 from rsfstudy.errors import IncompleteWarning, InvalidValue
+from rsfstudy.fitting.joint_model import JointModel
+from rsfstudy.fitting.window_model import WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.meter import WorkMeter

@@ -13,21 +13,21 @@ from scipy.interpolate import PchipInterpolator
 from test_steady import PLAIN
 
 from rsfstudy import Scene, simulate
-from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import events_along, integrate_events
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import EventKind, maximum
+from rsfstudy.motion.integrate import events_along, integrate_events
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLES, Recording
+from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import (
     equations_of_rigid_slider,
 )
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.fluid.dilatant import DilatantFluid
+from rsfstudy.slider.parameter_layout import FLUID
 from rsfstudy.slider.parts import number
-from rsfstudy.slider.places import FLUID
 
 LAWS = PLAIN
 CONSTANT = {"normal_stress": "constant"}

@@ -1,13 +1,18 @@
 """All engines tell what they told when `frozen_events.json` was written: a change of code that is
-not to change numbers changes none. `python tests/telling.py freeze` writes the file anew, after a
-change that is to.
+not to change numbers changes none. `python tests/frozen_motion_comparison.py freeze` writes the
+file anew, after a change that is to.
 """
 
 import json
 
 import pytest
+from frozen_motion_comparison import (
+    FROZEN_EVENTS_FILE,
+    EventColumns,
+    largest_differences,
+    record_frozen_motion,
+)
 from frozen_scenes import MOTIONS
-from telling import FROZEN_EVENTS_FILE, EventColumns, largest_differences, record_frozen_motion
 
 from rsfstudy import Scene
 from rsfstudy.motion.engines import ENGINES
@@ -16,8 +21,8 @@ from rsfstudy.slider.registry import SLOTS
 
 #: What numbers may differ by, relative to what `telling.largest_differences` says. Last bits are
 #: another CPU's own (its exponentials, the order of its sums, whether it fuses multiplication and
-#: addition): by `telling.py sensitivity` none of them moves an event by more than a tenth of this,
-#: a root that ends an iteration earlier included.
+#: addition): by `frozen_motion_comparison.py sensitivity` none of them moves an event by more than
+#: a tenth of this, a root that ends an iteration earlier included.
 WITHIN = 1e-12
 #: The same where steps end. A step is as long as its error estimate says, which is a difference of
 #: slopes: rounding is 1e-9 of it where it just meets a tolerance of 7e-9.

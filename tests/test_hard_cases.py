@@ -11,20 +11,20 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rsfstudy.named_studies.hard_cases import HardCase
-from running import named_results
+from study_runs import named_results
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.analysis.cycles import iterate_cycles
-from rsfstudy.declare import catalogue
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.rigid_response import RigidResponse
-from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.critical_steps.critical_step import CriticalStep
+from rsfstudy.limit_cycles.cycles import iterate_cycles
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.responses.rigid_response import RigidResponse
+from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.status import Status
+from rsfstudy.study import catalogue
 
 STUDY = catalogue.load_study("hard_cases")
 PROBLEMS = dict(zip(STUDY.axes[0].labels, STUDY.measure.problems, strict=True))

@@ -7,12 +7,12 @@ import pytest
 from conftest import reaches_instability_norm
 
 from rsfstudy import Scene, simulate
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.triggered import Triggered
+from rsfstudy.critical_steps.critical_step import CriticalStep
+from rsfstudy.critical_steps.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.events import fall, maximum
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.status import Status
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from extensions.order_four import OrderFour
-from running import run, run_command, study_of
+from study_runs import run, run_command, study_of
 
 import rsfstudy
 from rsfstudy import (
@@ -24,12 +24,12 @@ from rsfstudy import (
     simulate,
 )
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion import engines
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.responses.step_response import StepResponse
 
 PLAIN = {"normal_stress": "constant", "stiffness": 0.02, "a": 0.01, "b_over_a": 1.4}
 SLIDERS = {

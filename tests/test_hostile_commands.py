@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from fuzz_commands import STUDIES, Answer, Line, damage_files, draw_line, faults
-from running import call_main, run_command
+from study_runs import call_main, run_command
 
 from rsfstudy.cli import command_line
 from rsfstudy.cli.command_line import cli

@@ -14,15 +14,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from running import call_main, run
+from study_runs import call_main, run
+from test_altered_files import TINY
 from test_files import LAYOUT
-from test_strangers import TINY
 
 import rsfstudy
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.files import store
-from rsfstudy.files.journal import Journal, read_timings
-from rsfstudy.referee import problem
+from rsfstudy.referee import problem_files
+from rsfstudy.storage import store
+from rsfstudy.storage.journal import Journal, read_timings
 
 LONG = 130_000
 
@@ -100,7 +100,7 @@ def test_few_choices_are_compared_with_a_value(monkeypatch) -> None:
 def test_toml_that_cannot_be_parsed_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "deep.toml").write_text(text)
     with pytest.raises(DataError, match="deep.toml: cannot be read as TOML"):
-        problem.read_problem(tmp_path / "deep.toml")
+        problem_files.read_problem(tmp_path / "deep.toml")
 
 
 @pytest.mark.parametrize(

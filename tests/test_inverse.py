@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from rsfstudy.reduce import Inverse, apply_reductions
-from rsfstudy.reduce._crossing import CrossingStatus
+from rsfstudy.reductions import Inverse, apply_reductions
+from rsfstudy.study.reductions._crossing import CrossingStatus
 
 OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW = (float(verdict) for verdict in CrossingStatus)
 

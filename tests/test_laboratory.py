@@ -7,12 +7,12 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from running import call_main, run, run_command
+from study_runs import call_main, run, run_command
 
 import rsfstudy
 from rsfstudy import Axis, Rig, Scene, Study, limit_cycle, protocol, read_protocol, simulate
 from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.plots._motion import plot_motion
 from rsfstudy.slider.loading import Segment
 from rsfstudy.slider.registry import FIELD_QUANTITIES

@@ -9,19 +9,19 @@ from hypothesis import strategies as st
 from rsfstudy.named_studies._normal_stress_transient import NormalStressTransient
 
 from rsfstudy import Scene, simulate
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.rigid_response import RigidResponse
-from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.slider import laws, steady
+from rsfstudy.responses.rigid_response import RigidResponse
+from rsfstudy.responses.step_response import StepResponse
+from rsfstudy.slider import laws, steady_state
 from rsfstudy.slider.equations import compute_steady_states, single_state_evolution, state_evolution
 from rsfstudy.slider.laws.composite import lambert_w
-from rsfstudy.slider.system import build_scene_functions, velocity_ratios
+from rsfstudy.slider.scene_functions import build_scene_functions, velocity_ratios
 from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant"}
@@ -52,7 +52,7 @@ def test_every_law_rests_where_it_says(law):
 @pytest.mark.parametrize("law", CUT_OFFS)
 def test_friction_is_mu_star_at_the_reference_rate(law, cutoff):
     scene = Scene(law=law, cutoff_velocity_ratio=cutoff, stiffness=0.01)
-    assert steady.steady_friction_excess(scene, 0.0) == pytest.approx(0.0, abs=1e-16)
+    assert steady_state.steady_friction_excess(scene, 0.0) == pytest.approx(0.0, abs=1e-16)
 
 
 @given(st.floats(-3000.0, 30.0), st.floats(-60.0, 60.0), st.floats(-20.0, 5.0))
@@ -195,7 +195,7 @@ def test_with_any_b_below_a_every_spring_slides_steadily_in_the_end(law, b):
     accuracy = Accuracy(engine="compiled")
     assert scene.critical_stiffness == 0.0
     assert LimitCycle()(scene, accuracy).status is Status.NO_LIMIT_CYCLE
-    end = steady.steady_sliding(scene, scene.log_load_velocity)
+    end = steady_state.steady_sliding(scene, scene.log_load_velocity)
     assert end is not None
     if law in ("slip", "slowness", "perrin_rice_zheng"):
         assert end.frictional_stress == pytest.approx(

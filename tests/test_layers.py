@@ -9,8 +9,8 @@ from pathlib import Path
 
 import rsfstudy
 from rsfstudy import slider
-from rsfstudy.compute import cells
-from rsfstudy.declare import catalogue, names
+from rsfstudy.execution import cells
+from rsfstudy.study import catalogue, study_index
 
 ROOT = Path(rsfstudy.__file__).parent
 
@@ -18,34 +18,43 @@ FILES = sorted(ROOT.rglob("*.py"))
 #: From the bottom up: each imports from lower floors alone. The studies and their pages are above.
 FLOORS = (
     ("_deprecation",),
-    ("errors", "status", "defaults", "wording"),
+    ("errors", "status", "defaults", "formatting", "_lazy", "_former_modules"),
     ("argument_checks",),
     ("error_boundary",),
-    ("netcdf", "paths", "quantity"),
+    ("netcdf", "paths", "quantities"),
     ("slider",),
-    ("axes", "motion", "vocabulary"),
-    ("analysis", "reduce"),
+    ("parts", "vocabulary"),
+    ("axes", "motion"),
+    ("measure_base",),
+    ("critical_steps", "limit_cycles", "responses", "fitting"),
     ("measures", "rig"),
-    ("declare",),
-    ("files", "referee"),
-    ("compute", "plots"),
+    ("study",),
+    ("reductions", "referee"),
+    ("storage",),
+    ("execution", "plots"),
+    ("reporting",),
     ("api",),
-    ("cli", "__init__"),
+    ("__init__",),
+    ("cli",),
     ("named_studies",),
 )
 #: Only these may import a library that would weigh on all others.
 HOMES = {
-    "dask": {"compute/clusters", "files/store", "files/zarr_store"},
-    "distributed": {"compute/clusters", "compute/workers", "compute/worker_log"},
-    "llvmlite": {"motion/compiled/building", "motion/compiled/calls"},
+    "dask": {"execution/clusters", "storage/store", "storage/zarr_store"},
+    "distributed": {"execution/clusters", "execution/workers", "execution/worker_log"},
+    "llvmlite": {"motion/compiled/compile_cache", "motion/compiled/array_calls"},
     "matplotlib": {"plots"},
-    "numba": {f"motion/compiled/{name}" for name in ("building", "calls", "machine")},
+    "numba": {
+        "motion/compiled/compile_cache",
+        "motion/compiled/array_calls",
+        "motion/compiled/machine",
+    },
     "click": {"cli"},
     "pint": {"rig/units"},
     "rich": {"cli", "api/progress"},
-    "sqlite3": {"files/journal"},
+    "sqlite3": {"storage/journal"},
     "zarr": set(),  # xarray writes and reads it
-    "msgspec": {"files/contents", "files/restore", "referee/problem"},
+    "msgspec": {"storage/schema", "storage/rebuild", "referee/problem_files"},
 }
 
 
@@ -140,7 +149,7 @@ def test_the_guide_to_the_physics_names_modules_that_are_there():
 def test_studies_load_nothing_that_draws():
     """A worker that is given a cell of any of them has no matplotlib."""
     asked = (
-        "import sys; from rsfstudy.declare import catalogue, names\n"
+        "import sys; from rsfstudy.study import catalogue, study_index as names\n"
         "for name in names.study_names(): catalogue.load_study(name)\n"
         "print(*{'matplotlib'} & set(sys.modules))"
     )
@@ -150,19 +159,19 @@ def test_studies_load_nothing_that_draws():
 
 def test_a_worker_loads_nothing_more_for_a_measure_in_the_file_of_a_study(tmp_path):
     """It is sent what the measure draws on, and not what declares, reduces and draws."""
-    for name in names.study_names():
+    for name in study_index.study_names():
         study = catalogue.load_study(name)
         task = cells.Task(study.base, study.measure, study.accuracy)
         (tmp_path / name).write_bytes(cells.serialize_task(task))
     heavy = {"xarray", "pandas", "matplotlib", "netCDF4", "numba"}
     asked = (
-        "import pathlib, pickle, sys, rsfstudy.compute.cells\n"
+        "import pathlib, pickle, sys, rsfstudy.execution.cells\n"
         f"sent = [file.read_bytes() for file in pathlib.Path({str(tmp_path)!r}).iterdir()]\n"
         "print(len([pickle.loads(task) for task in sent]))\n"
         f"print(*{heavy} & set(sys.modules))"
     )
     ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
-    assert ran.stdout.split("\n") == [str(len(names.study_names())), "", ""]
+    assert ran.stdout.split("\n") == [str(len(study_index.study_names())), "", ""]
 
 
 HEAVY = (

@@ -12,7 +12,7 @@ import pytest
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.errors import NoResultWarning
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.recording import MOTION_VARIABLES
 from rsfstudy.status import Status

@@ -7,13 +7,13 @@ import pytest
 
 from rsfstudy import Scene, simulate
 from rsfstudy.errors import IncompleteWarning
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, fall, maximum, minimum, rise
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import MotionStopped, WorkMeter
+from rsfstudy.responses.linear_stability import LinearStability
+from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parts import number
 from rsfstudy.slider.stability import growth_rates

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 import xarray as xr
-from running import (
+from study_runs import (
     USER_MEASURE_SOURCE,
     call_main,
     example_claim,
@@ -21,13 +21,13 @@ from running import (
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.compute.plan import Plan
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
-from rsfstudy.files import contents, restore
-from rsfstudy.files.lattice import build_coordinates
+from rsfstudy.execution.plan import Plan
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.status import Status
+from rsfstudy.storage import rebuild, schema
+from rsfstudy.storage.lattice import build_coordinates
 
 BOTH = study_of(
     "both",
@@ -173,7 +173,7 @@ def test_claims_and_selection_reach_a_place_on_the_axis():
 def test_the_file_alone_reproduces_its_cells(tmp_path):
     found = run(BOTH, output=tmp_path).sel(direction="down", b_over_a=3.0)
     file = tmp_path / "both.nc"
-    restored = restore.study_from_declaration(contents.read_declaration(rsfstudy.open(file)), {})
+    restored = rebuild.study_from_declaration(schema.read_declaration(rsfstudy.open(file)), {})
     assert restored.describe() == BOTH.describe()
     xr.testing.assert_identical(
         xr.Dataset(coords=build_coordinates(restored)), xr.Dataset(coords=build_coordinates(BOTH))

@@ -3,15 +3,15 @@
 import numpy as np
 import test_figures as checks
 import xarray as xr
-from running import named_results, run
+from study_runs import named_results, run
 
 import rsfstudy
 from rsfstudy import Axis, Panel, Scene, Study, plots
-from rsfstudy.declare import catalogue
-from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.plots import _text, lines
+from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.rig.scales import Scale, apply_scales
 from rsfstudy.status import Status
+from rsfstudy.study import catalogue
 
 
 def test_the_picture_of_a_motion_is_printable():

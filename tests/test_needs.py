@@ -10,7 +10,7 @@ from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.fluid.dilatant import DilatantFluid
 from rsfstudy.slider.laws import Law
-from rsfstudy.slider.places import LAW, MU_STAR, A
+from rsfstudy.slider.parameter_layout import LAW, MU_STAR, A
 from rsfstudy.slider.requirements import PART_QUANTITIES, provided_quantities
 
 

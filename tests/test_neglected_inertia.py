@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene
-from rsfstudy.measures.healing import Healing
-from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.events import maximum
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.neglected_inertia import estimate_neglected_inertia
 from rsfstudy.motion.readings import growth_rate_along_path
 from rsfstudy.motion.recording import REGIME_COLUMN, Recording
+from rsfstudy.responses.healing import Healing
+from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.slider.equations import RUPTURE_REGIME
 from rsfstudy.status import Status
 

@@ -13,17 +13,17 @@ import pytest
 import xarray as xr
 from compliance_checker.cf import util as cfutil
 from compliance_checker.runner import CheckSuite, ComplianceChecker
-from running import study_of
 from scipy.stats import norm
+from study_runs import study_of
 from synthetic_records import synthetic_record
 
 import rsfstudy
 from rsfstudy import Axis, Rig, Scene
-from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.api.accessor import Accessor, Backend
-from rsfstudy.measures.healing import Healing
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.reduce import ProportionalFit
+from rsfstudy.fitting.record import Record
+from rsfstudy.reductions import ProportionalFit
+from rsfstudy.responses.healing import Healing
+from rsfstudy.responses.linear_stability import LinearStability
 
 QUICK = {"rtol": 1e-3}
 STEPPED = Scene(load_velocity_ratio=2.0, normal_stress="constant")

@@ -10,10 +10,10 @@ from scipy.linalg import block_diag, toeplitz
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from rsfstudy.analysis.fitting import noise as noises
-from rsfstudy.analysis.fitting.noise import NoiseModel
-from rsfstudy.analysis.fitting.noise_runs import SamplingRun, find_level_changes, find_runs
-from rsfstudy.analysis.fitting.outliers import find_kept_mask, find_quantum
+from rsfstudy.fitting import noise as noises
+from rsfstudy.fitting.noise import NoiseModel
+from rsfstudy.fitting.outliers import find_kept_mask, find_quantum
+from rsfstudy.fitting.sampling_runs import SamplingRun, find_level_changes, find_runs
 
 #: Coefficients of an autoregressive process of third order, with a pair of complex roots.
 AR3 = -np.real(np.poly([0.8, 0.5 + 0.4j, 0.5 - 0.4j]))[1:]

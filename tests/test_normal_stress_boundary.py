@@ -9,17 +9,17 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rsfstudy.named_studies._triggers import Triggers
+from rsfstudy.named_studies._critical_triggers import Triggers
 
 from rsfstudy import Scene
-from rsfstudy.analysis.after_step import (
+from rsfstudy.critical_steps import critical_step
+from rsfstudy.critical_steps.critical_step import CriticalStep
+from rsfstudy.critical_steps.forward_motion import (
     has_frictional_damping_only,
     is_neutral,
     may_have_closed_orbits,
     reaches_norm,
 )
-from rsfstudy.measures import critical_step
-from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.slider import closed_forms, stability

@@ -10,8 +10,8 @@ import synthetic_records as synthetic
 from synthetic_records import EXACT_PARAMETERS, STEP_UP, deviation_in_stderrs
 
 import rsfstudy
-from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.errors import InvalidValue
+from rsfstudy.fitting.record import Record
 from rsfstudy.status import STATUS_LABELS
 
 #: Stiffness of the machine in MPa/um: TRUTH["stiffness"] at 8 MPa.

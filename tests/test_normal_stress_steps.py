@@ -7,14 +7,14 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from running import start_point
 from scipy.optimize import brentq
+from study_runs import start_point
 
 from rsfstudy import Scene
-from rsfstudy.analysis.after_step import reaches_norm
+from rsfstudy.critical_steps.forward_motion import reaches_norm
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.initial_points import initial_point
 from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.motion.starting import initial_point
 
 
 @given(

@@ -6,7 +6,7 @@ from pathlib import Path
 import nbformat
 import pytest
 from nbclient import NotebookClient
-from running import HANG_TIMEOUT
+from study_runs import HANG_TIMEOUT
 
 HERE = Path(__file__).parent.parent / "studies"
 NOTEBOOK, FITTING = HERE / "analysis.ipynb", HERE / "fitting.ipynb"

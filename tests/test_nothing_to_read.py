@@ -10,15 +10,15 @@ import pytest
 from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
 
 from rsfstudy import Scene, measures, named_studies, vocabulary
-from rsfstudy.analysis.fitting.record import Record
+from rsfstudy.fitting.fit_measure import Fit
+from rsfstudy.fitting.record import Record
+from rsfstudy.measure_base.elasticities import Elasticities
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.elasticities import Elasticities
-from rsfstudy.measures.fit import Fit
-from rsfstudy.measures.healing import Healing
-from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantities import Quantity
+from rsfstudy.responses.healing import Healing
+from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.status import Status
 
 
@@ -92,9 +92,10 @@ SHARED = {"a", "mu_star", "slip_distance"}
 
 def every_measure() -> list[Measure]:
     """Those of rsfstudy, as they are without an argument."""
-    for package in (measures, named_studies):
-        for module in pkgutil.iter_modules(package.__path__):
-            importlib.import_module(f"{package.__name__}.{module.name}")
+    for name in measures.__all__:
+        getattr(measures, name)  # loads its module
+    for module in pkgutil.iter_modules(named_studies.__path__):
+        importlib.import_module(f"{named_studies.__name__}.{module.name}")
 
     def below(kind: type) -> list[type]:
         return [kind, *(one for derived in kind.__subclasses__() for one in below(derived))]

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from running import call_main, have_same_numbers, run
+from study_runs import call_main, have_same_numbers, run
 
 import rsfstudy
-from rsfstudy.compute import provenance
-from rsfstudy.declare import catalogue
-from rsfstudy.files import contents
+from rsfstudy.execution import provenance
 from rsfstudy.status import Status
+from rsfstudy.storage import schema
+from rsfstudy.study import catalogue
 
 #: Written by rsfstudy 0.1.0 before files named their layout: a study with its journal and as a
 #: store, a named one narrowed by --set, one with failed cells, and a motion.
@@ -56,7 +56,7 @@ def test_a_range_was_a_spread():
 
 def test_they_hold_what_they_held(older):
     narrowed = rsfstudy.open(older / "rate_step_boundary.nc")
-    assert contents.read_declaration(narrowed).overrides == {"b_over_a": [2.0, 3.0], "alpha": 0.4}
+    assert schema.read_declaration(narrowed).overrides == {"b_over_a": [2.0, 3.0], "alpha": 0.4}
     assert set(rsfstudy.check(narrowed).verdict) == {"not applicable", "reproduced"}
     failed = rsfstudy.open(older / "displacement_boundary.nc")
     assert (failed.status == int(Status.WORK_BUDGET_SPENT)).any()
@@ -74,7 +74,7 @@ def test_files_name_their_layout(tmp_path):
     words = ["simulate", "--set", "load_velocity_ratio=2", "--duration", "0.1", "--output"]
     call_main(*words, tmp_path / "m.png")
     for name in ("linear_stability.nc", "m.nc"):
-        assert xr.load_dataset(tmp_path / name).attrs["layout"] == contents.LAYOUT_VERSION
+        assert xr.load_dataset(tmp_path / name).attrs["layout"] == schema.LAYOUT_VERSION
 
 
 def test_a_motion_opens_and_is_drawn(older):
@@ -92,7 +92,7 @@ def test_a_run_goes_on(older, tmp_path, monkeypatch):
         (text,) = db.execute("SELECT json FROM fingerprint").fetchone()
         now = json.dumps({**json.loads(text), **provenance.run_fingerprint(study)}, sort_keys=True)
         db.execute("UPDATE fingerprint SET json = ?", (now,))
-    monkeypatch.setattr("rsfstudy.compute.cells.compute_cell", None)
+    monkeypatch.setattr("rsfstudy.execution.cells.compute_cell", None)
     resumed = run(study, output=tmp_path)
     assert np.array_equal(
         resumed.critical_stiffness, rsfstudy.open(older / "tiny.nc").critical_stiffness

@@ -6,13 +6,13 @@ import re
 
 import numpy as np
 import pytest
-from running import run, run_with_failures
+from study_runs import run, run_with_failures
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.quantity import Output, Quantity
+from rsfstudy.quantities import Output, Quantity
 from rsfstudy.status import Status
 
 

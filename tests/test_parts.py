@@ -6,17 +6,17 @@ import re
 from dataclasses import dataclass
 
 import pytest
-from rsfstudy.named_studies._triggers import Triggers
+from rsfstudy.named_studies._critical_triggers import Triggers
 
 from rsfstudy import Scene
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.responses.linear_stability import LinearStability
+from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import registry
 from rsfstudy.slider.fluid.dilatant import DilatantFluid
 from rsfstudy.slider.normal_stress.variable import VariableNormalStress
-from rsfstudy.slider.places import NORMAL_STRESS
+from rsfstudy.slider.parameter_layout import NORMAL_STRESS
 from rsfstudy.status import Status
 
 

@@ -7,11 +7,11 @@ import pytest
 from rsfstudy.named_studies._bifurcation import Bifurcation
 
 from rsfstudy import Scene
-from rsfstudy.analysis import return_map
-from rsfstudy.analysis.approach import CycleSearch, follow_to_orbit
-from rsfstudy.analysis.cycles import Cycle
-from rsfstudy.analysis.return_map import ReturnMap, chain_derivatives, section_at
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.limit_cycles import return_map
+from rsfstudy.limit_cycles.cycle_search import CycleSearch, follow_to_orbit
+from rsfstudy.limit_cycles.cycles import Cycle
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
+from rsfstudy.limit_cycles.return_map import ReturnMap, chain_derivatives, section_at
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.meter import WorkMeter

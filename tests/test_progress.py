@@ -4,7 +4,7 @@ import io
 import itertools
 
 import pytest
-from running import call_main
+from study_runs import call_main
 
 from rsfstudy.api import progress
 

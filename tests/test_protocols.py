@@ -8,21 +8,21 @@ import cloudpickle
 import numpy as np
 import pytest
 from rsfstudy.named_studies._bifurcation import Bifurcation
-from running import run, study_of
+from study_runs import run, study_of
 
 from rsfstudy import Axis, Scene, Segment, protocol, simulate
+from rsfstudy.critical_steps.triggered import Triggered
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.step_response import StepResponse
-from rsfstudy.measures.triggered import Triggered
-from rsfstudy.measures.velocity_step import VelocityStep
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import EventKind, maximum
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.responses.step_response import StepResponse
+from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.slider import loading
-from rsfstudy.slider.protocol import Protocol
+from rsfstudy.slider.protocols import Protocol
 from rsfstudy.status import Status
 
 STIFF = {"law": "slowness", "normal_stress": "constant", "stiffness_ratio": 3.0}

@@ -21,18 +21,18 @@ import click
 import numpy as np
 import pytest
 import xarray as xr
-from running import SMALL_STUDY, call_main, run, study_of
+from study_runs import SMALL_STUDY, call_main, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Rig, Scene, Study, read_record
-from rsfstudy.analysis.fitting.record import Record
 from rsfstudy.cli import command_line
-from rsfstudy.declare.claims import Claim
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
-from rsfstudy.files import journal
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.referee.problem import shipped_problems
+from rsfstudy.fitting.record import Record
+from rsfstudy.referee.problem_files import shipped_problems
+from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider.registry import FIELD_NAMES
+from rsfstudy.storage import journal
+from rsfstudy.study.claims import Claim
 
 JUNK = [
     None, True, -1, 0, 3, 1.5, float("nan"), float("inf"), 10**400, 1j, "", "other", "\0", "\udcff",

@@ -7,7 +7,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
-from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.equations import equations_between_ruptures, friction_relation
 

@@ -5,15 +5,15 @@ ramps of load point velocity, in stairs.
 import math
 
 import pytest
-from in_time import TimeDomainMotion
+from time_domain_reference import TimeDomainMotion
 
 from rsfstudy import Scene, simulate
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.events import EventKind, approach_to_steady_state
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
 
 IMPOSED = {"law": "slowness", "normal_stress": "imposed", "alpha": 0.3, "stiffness_ratio": 3.0}

@@ -11,10 +11,10 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from rsfstudy import Scene, protocol, simulate
-from rsfstudy.measures.healing import Healing
-from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.responses.healing import Healing
+from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.status import Status
 
 LAWS = ("slip", "slowness")

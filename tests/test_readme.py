@@ -11,12 +11,12 @@ import shutil
 from pathlib import Path
 
 import pytest
-from running import call_main, named_results
+from study_runs import call_main, named_results
 
 import rsfstudy
-from rsfstudy import measures, reduce
+from rsfstudy import measures, reductions
 from rsfstudy.cli.command_line import cli
-from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.slider import laws
 from rsfstudy.slider.parts import field_names
 
@@ -141,7 +141,7 @@ def test_the_command_of_the_readme_fits_the_record(tmp_path, monkeypatch):
     [
         (laws.Law, laws.BUILT_IN_PARTS["slowness"], ("evolution", "numbers", "check")),
         (measures.Measure, CriticalStep, ("compute", "error_scales")),
-        (reduce.Reduction, reduce.Reduction, ("__call__", "derivatives")),
+        (reductions.Reduction, reductions.Reduction, ("__call__", "derivatives")),
     ],
 )
 def test_help_states_the_signatures_of_what_one_writes(base, example, written):

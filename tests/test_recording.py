@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene, protocol, simulate
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.events import Event, EventKind
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.readings import sample_along_path
 from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLES, Recording
+from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.status import Status
 
 RTOL = 1e-6

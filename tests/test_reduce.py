@@ -9,12 +9,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from rsfstudy.named_studies.bounded_slip import PathSeparation
 from rsfstudy.named_studies.stability_map import CycleRegionEdge
-from running import example_claim
 from scipy.stats import linregress
+from study_runs import example_claim
 
-from rsfstudy.declare.claims import Claim, build_verdict_table
 from rsfstudy.errors import InvalidValue
-from rsfstudy.reduce import (
+from rsfstudy.reductions import (
     Boundary,
     ClosedFormRatio,
     Difference,
@@ -29,6 +28,7 @@ from rsfstudy.reduce import (
     apply_reductions,
 )
 from rsfstudy.status import Status
+from rsfstudy.study.claims import Claim, build_verdict_table
 
 X = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
 FIT = ProportionalFit(

@@ -15,20 +15,20 @@ import numpy as np
 import pytest
 from referee_numbers import UNITS, columns, second_way_rows
 from referee_page import PAGE, PROBLEMS_MARKER, all_sections
-from referee_ways import read_stated_problem, rounds_to
-from running import call_main
+from second_referee_way import read_stated_problem, rounds_to
+from study_runs import call_main
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.referee import ours, theirs
-from rsfstudy.referee.problem import BenchmarkProblem, read_problem, shipped_problems
-from rsfstudy.referee.verdict import (
+from rsfstudy.referee import external, reference
+from rsfstudy.referee.answer_comparison import (
     DEFAULT_REQUIRED_DIGITS,
     AnswerComparison,
     compare_answers,
     known_answer,
 )
+from rsfstudy.referee.problem_files import BenchmarkProblem, read_problem, shipped_problems
 
 NUMBERS = sorted(shipped_problems())
 RSFMODEL = Path(__file__).with_name("rsfmodel")
@@ -86,13 +86,13 @@ def test_files_of_problems_hold_all_that_they_are_asked_for(number):
 # ---- ours ----------------------------------------------------------------------------------------
 
 
-def told_of(table: ours.AnswerTable) -> dict[str, theirs.ReportedQuantity]:
-    return {name: theirs.ReportedQuantity(values, 0.0) for name, values in table.items()}
+def told_of(table: reference.AnswerTable) -> dict[str, external.ReportedQuantity]:
+    return {name: external.ReportedQuantity(values, 0.0) for name, values in table.items()}
 
 
 def digits_of_ours(number: int, rtol: float, engine: str) -> AnswerComparison:
     problem, answer = known_answer(of(number), shipped_problems()[number].with_suffix(".csv"))
-    table = ours.compute_answer(problem, Accuracy(rtol, 5_000_000, engine=engine))
+    table = reference.compute_answer(problem, Accuracy(rtol, 5_000_000, engine=engine))
     return compare_answers(problem, answer, told_of(table), 1.0)
 
 
@@ -200,7 +200,7 @@ def test_conventions_of_the_problem_explain_a_difference(number, changes, explan
         other = replace(problem, **changes)
     else:
         other = replace(problem, parameters={**problem.parameters, **changes})
-    table = ours.compute_answer(other, Accuracy(1e-8, engine=COMPILED))
+    table = reference.compute_answer(other, Accuracy(1e-8, engine=COMPILED))
     found = compare_answers(
         *known_answer(problem, shipped_problems()[number].with_suffix(".csv")),
         told_of(table),
@@ -301,7 +301,7 @@ def test_shear_stress_tells_friction_where_normal_stress_changes(number, tmp_pat
     }[number]
     header = [h.replace("friction (1)", "shear_stress (Pa)") for h in problem.header]
     columns = [told[n] * (sigma if n == "friction" else 1.0) for n in problem.columns]
-    found = theirs.read_answer(write(tmp_path / "mine.csv", header, columns), problem)
+    found = external.read_answer(write(tmp_path / "mine.csv", header, columns), problem)
     answer = known_answer(problem, shipped_problems()[number].with_suffix(".csv"))
     assert compare_answers(*answer, found, DEFAULT_REQUIRED_DIGITS).digits > 11.0
 
@@ -311,7 +311,7 @@ def test_shear_stress_beside_what_is_asked_for_is_left_alone(tmp_path):
     told = told_by_second_way(13)
     header = [*of(13).header, "shear_stress (Pa)"]
     columns = [*(told[name] for name in of(13).columns), told["slip_rate"]]
-    found = theirs.read_answer(write(tmp_path / "13.csv", header, columns), of(13))
+    found = external.read_answer(write(tmp_path / "13.csv", header, columns), of(13))
     assert [*found] == [*of(13).columns]
 
 
@@ -345,7 +345,7 @@ def test_what_is_no_answer_is_refused(spoil, error, tmp_path):
     header, columns = spoil(of(1).header, [told[name] for name in of(1).columns])
     file = write(tmp_path / "01.csv", header, columns)
     with pytest.raises(InvalidValue, match=re.escape(error)):
-        theirs.read_answer(file, of(1))
+        external.read_answer(file, of(1))
 
 
 def test_files_and_problems_that_are_not_there_are_said_so():

@@ -18,14 +18,14 @@ from rsfstudy._deprecation import (
     renamed_keywords,
     renamed_members,
 )
-from rsfstudy.analysis.fitting.record import Record
+from rsfstudy.critical_steps.critical_step import CriticalStep
+from rsfstudy.fitting.record import Record
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.critical_step import CriticalStep
 from rsfstudy.motion import layout
+from rsfstudy.motion.driver import PythonMotionState
 from rsfstudy.motion.events import maximum
-from rsfstudy.motion.running import PythonMotionState
-from rsfstudy.quantity import Output
-from rsfstudy.reduce import Reduction
+from rsfstudy.quantities import Output
+from rsfstudy.reductions import Reduction
 from rsfstudy.slider.assembly import SceneBase
 from rsfstudy.slider.laws import LawBase
 from rsfstudy.slider.parts import Part

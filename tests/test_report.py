@@ -11,14 +11,14 @@ from urllib.parse import unquote
 
 import pytest
 import xarray as xr
-from running import HANG_TIMEOUT, call_main, example_claim, run
+from study_runs import HANG_TIMEOUT, call_main, example_claim, run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
 from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
-from rsfstudy.files import store
-from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
+from rsfstudy.storage import store
 
 #: The page at some width, in CSS pixels: of a phone and of a desk.
 FRAME = '<iframe src="{}" style="width:{}px;height:900px;border:0"></iframe>'

@@ -10,8 +10,8 @@ import signal
 
 import psutil
 import pytest
-from faulty import faulty_study
-from running import (
+from faulty_study import faulty_study
+from study_runs import (
     FAULTY_STUDY_FILE,
     HANG_TIMEOUT,
     SMALL_STUDY,
@@ -28,10 +28,10 @@ from running import (
 )
 
 import rsfstudy
-from rsfstudy.compute import cells
 from rsfstudy.errors import DataError, RunError
-from rsfstudy.files import journal
+from rsfstudy.execution import cells
 from rsfstudy.status import Status
+from rsfstudy.storage import journal
 
 CELLS = 30
 
@@ -302,7 +302,7 @@ def test_two_runs_at_a_time_are_refused(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", ["physics", "numpy", "scipy"])
 def test_other_physics_or_versions_are_not_mixed(name, tmp_path, monkeypatch):
-    from rsfstudy.compute import provenance
+    from rsfstudy.execution import provenance
 
     run(output=tmp_path)
     other = {**provenance.code_fingerprint(), name: "other"}

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene, history, protocol, simulate
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.events import EventKind, maximum, minimum
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.readings import friction_event_quantity
+from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import friction_relation
 from rsfstudy.status import Status

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from running import run, run_command, study_of
+from study_runs import run, run_command, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Rig, Scene, Study
-from rsfstudy.api import summaries
-from rsfstudy.declare import catalogue, rigs
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.limit_cycle import SLIP_MODES, LimitCycle
-from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.limit_cycles.limit_cycle import SLIP_MODES, LimitCycle
+from rsfstudy.reporting import summaries
+from rsfstudy.responses.linear_stability import LinearStability
+from rsfstudy.study import catalogue, rig_studies
 
 STATED = {
     "normal_stress": "5 MPa",
@@ -260,14 +260,14 @@ def test_one_scale_for_several_rigs_is_refused(cycles):
 
 
 def test_figures_and_tables_show_units(cycles, capsys):
-    from rsfstudy.api import tables
-    from rsfstudy.cli import layout
+    from rsfstudy.cli import table_layout
+    from rsfstudy.reporting import tables
 
     drawn = rsfstudy.plot(cycles)
     texts = [axes.get_xlabel() + axes.get_ylabel() for axes in drawn.axes]
     assert any(r"Load point velocity" in text and r"($\mu$m/s)" in text for text in texts)
     assert any("(s)" in text for text in texts)
-    layout.print_piece(tables.headline_table(cycles))
+    table_layout.print_piece(tables.headline_table(cycles))
     said = capsys.readouterr().out
     assert "recurrence interval of stick-slip, in s" in said
     interval = float(cycles.rsf.in_units()["recurrence_interval"][0, 0, 0])
@@ -307,7 +307,7 @@ def test_a_study_of_no_rig_is_put_on_one(tmp_path):
     """Axes are in units then, what they hold is what they held; new values are in units."""
     studied = catalogue.load_study("slide_hold_slide")
     rig = Rig(**{n: v for n, v in STATED.items() if n != "stiffness"})
-    there = rigs.with_rig(studied, rig)
+    there = rig_studies.with_rig(studied, rig)
     assert [axis.units for axis in there.axes[1:]] == [{"stiffness": "MPa/um"}, {"hold_time": "s"}]
     # what is fitted is what was: D_c/V_* is 10 s
     assert [fit.within for fit in there.reductions] == [(1e5, 1e9)] * 2
@@ -335,6 +335,6 @@ def test_what_a_rig_states_of_its_dynamics_takes_the_place_of_that_of_a_study():
     study = catalogue.load_study("limit_cycles")
     damped = replace(study, base=study.base.with_(inertia=False, radiation_damping=1e-4))
     for before, rig, mass in ((study, radiates, False), (damped, swings, True)):
-        there = rigs.with_rig(before, rig).base
+        there = rig_studies.with_rig(before, rig).base
         assert there.has_mass is mass
         assert (there.radiation_damping == 0.0) is mass

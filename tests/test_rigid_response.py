@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import brentq
 
 from rsfstudy import Scene
-from rsfstudy.measures.rigid_response import RigidResponse
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.slider.equations import log_slip_rate_at
 from rsfstudy.status import Status
 

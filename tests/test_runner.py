@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from faulty import faulty_study
-from running import HANG_TIMEOUT, SMALL_STUDY, USER_MEASURE_SOURCE, have_same_numbers, run
+from faulty_study import faulty_study
+from study_runs import HANG_TIMEOUT, SMALL_STUDY, USER_MEASURE_SOURCE, have_same_numbers, run
 
 from rsfstudy import Scene, Study
-from rsfstudy.api import runs
-from rsfstudy.compute import plan, runner, workers
+from rsfstudy.api import study_runs
 from rsfstudy.errors import InvalidValue, RunError
+from rsfstudy.execution import plan, runner, workers
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.status import Status
@@ -122,7 +122,7 @@ def test_code_that_workers_do_not_import_needs_no_guard():
 LOSES_TRACKER = """
 import pathlib, sys
 import psutil
-from rsfstudy.compute import clusters
+from rsfstudy.execution import clusters
 
 if __name__ == "__main__":
     with clusters.start_local_cluster(1, pathlib.Path(sys.argv[1])) as client:
@@ -160,7 +160,9 @@ def test_runs_share_processes_that_are_started_once(monkeypatch, tmp_path):
 
         def ran(name, fault=""):
             study = replace(faulty_study(fault, (3.0,) if fault else ()), name=name)
-            results = runs.prepare_run(study, runner.OutputOptions(output=tmp_path), where, False)()
+            results = study_runs.prepare_run(
+                study, runner.OutputOptions(output=tmp_path), where, False
+            )()
             return [Status(code).name for code in results["status"].values]
 
         assert not started
@@ -189,7 +191,7 @@ def test_processes_that_are_lost_are_started_anew(monkeypatch, tmp_path):
     monkeypatch.setattr(workers, "start_local_cluster", start)
     monkeypatch.setattr(workers, "make_client_mapper", lambda *_where: mapper)
     with workers.Workers(1, log=tmp_path / "workers.log") as where:
-        begin = runs.prepare_run(
+        begin = study_runs.prepare_run(
             faulty_study(), runner.OutputOptions(output=tmp_path), where, False
         )
         with pytest.raises(RunError, match="is lost"):

@@ -8,18 +8,16 @@ import pandas as pd
 import pytest
 import xarray as xr
 from rsfstudy.named_studies import uncertain_recurrence
-from running import run, study_of
 from scipy.special import gammaln
 from scipy.stats import lognorm, norm, truncnorm, uniform
+from study_runs import run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Rig, Scene, Study, plots
-from rsfstudy.compute import cells
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning, InvalidValue
-from rsfstudy.files import restore
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.reduce import (
+from rsfstudy.execution import cells
+from rsfstudy.reductions import (
     Logarithm,
     Mean,
     Quantile,
@@ -28,8 +26,10 @@ from rsfstudy.reduce import (
     StatusShares,
     apply_reductions,
 )
-from rsfstudy.rig.reductions import InUnits
+from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
+from rsfstudy.storage import rebuild
+from rsfstudy.study.reductions.unit_conversion import InUnits
 
 RECORDS = Path(uncertain_recurrence.__file__).parent / "records"
 BASE = Scene(normal_stress="constant")
@@ -70,7 +70,7 @@ def test_fields_are_functions_of_what_is_drawn():
     how = json.loads(found["sample"].attrs["drawn"])
     assert (how["method"], how["n"], how["seed"]) == ("sobol", 8, 3)
     assert how["of"]["ln_a"].startswith("norm(")
-    again = restore.rebuild_study(found)
+    again = rebuild.rebuild_study(found)
     assert again.axes[1].describe() == samples.describe()
     assert list(again.scenes()) == list(study(Axis("law", ["slip", "slowness"]), samples).scenes())
 
@@ -139,7 +139,7 @@ def test_the_rows_of_a_table_are_cases(table):
     found = run(study(Axis.cases(table)))
     assert found["case"].values.tolist() == [0, 1, 2]
     np.testing.assert_allclose(found["critical_stiffness"], [0.005, 0.0048, 0.005], rtol=1e-7)
-    assert restore.rebuild_study(found).axes[0].rows == Axis("case", TABLE).rows
+    assert rebuild.rebuild_study(found).axes[0].rows == Axis("case", TABLE).rows
 
 
 def _with_units(tmp_path):
@@ -167,7 +167,7 @@ def test_a_table_in_units_of_a_rig(tmp_path):
         assert [scene.a for scene in scenes] == [0.01, 0.012]
         found = run(declared)
         assert found["slip_distance"].attrs["units"] in ("um", "m")
-        assert restore.rebuild_study(found).describe() == declared.describe()
+        assert rebuild.rebuild_study(found).describe() == declared.describe()
 
 
 # ---- from a fit ----------------------------------------------------------------------------------

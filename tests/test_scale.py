@@ -7,15 +7,15 @@ import os
 import numpy as np
 import pytest
 import xarray as xr
-from faulty import faulty_study
-from running import SMALL_STUDY, have_same_numbers, run
+from faulty_study import faulty_study
 from scale import measure_in_subprocess
+from study_runs import SMALL_STUDY, have_same_numbers, run
 
 import rsfstudy
 from rsfstudy import plots
-from rsfstudy.compute import plan
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.files import zarr_store
+from rsfstudy.execution import plan
+from rsfstudy.storage import zarr_store
 
 
 @functools.cache

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene
-from rsfstudy.analysis.settling import settled_flag, settles_to_steady_sliding
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.step_response import StepResponse
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
+from rsfstudy.measure_base.settling_checks import settled_flag, settles_to_steady_sliding
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import MotionStopped, WorkMeter
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantities import Quantity
+from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider.fluid import Fluid
+from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS
 from rsfstudy.slider.parts import POSITIVE, Numbers, number
-from rsfstudy.slider.places import FLUID, LARGEST_LOG_SLOWNESS
 from rsfstudy.slider.stability import largest_growth_rate
 from rsfstudy.status import Status
 

@@ -10,9 +10,9 @@ from rsfstudy import Scene
 from rsfstudy.slider import stability
 from rsfstudy.slider.law_slopes import compute_law_slopes
 from rsfstudy.slider.laws import Law
+from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import POSITIVE, Numbers, number
-from rsfstudy.slider.places import LAW
-from rsfstudy.slider.steady import steady_sliding
+from rsfstudy.slider.steady_state import steady_sliding
 
 #: ln(V/V_*) at which steady friction bends.
 BEND = 0.3

@@ -9,22 +9,22 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from running import call_main, run, study_of
 from scipy.stats import norm, uniform
+from study_runs import call_main, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.api.tables import answer_table, format_to_error
-from rsfstudy.declare import catalogue
-from rsfstudy.declare.claims import Claim, build_verdict_table
-from rsfstudy.declare.verdicts import VerdictTable
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
-from rsfstudy.files import lattice, restore, store
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.quantity import html_symbol, html_table
-from rsfstudy.reduce import SobolIndices
+from rsfstudy.quantities import html_symbol, html_table
+from rsfstudy.reductions import SobolIndices
+from rsfstudy.reporting.tables import answer_table, format_to_error
+from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
+from rsfstudy.storage import lattice, rebuild, store
+from rsfstudy.study import catalogue
+from rsfstudy.study.claims import Claim, build_verdict_table
+from rsfstudy.study.verdict_table import VerdictTable
 
 
 def rows(html):
@@ -114,7 +114,7 @@ def test_the_accessor_shows_numbers_and_verdicts():
     done = run(declared, rtol=1e-3)
     shown = rows(done.rsf._repr_html_())
     assert ["id", "claim", "published", "ours", "tolerance, and why", "verdict"] in shown
-    values = {f"{value:.8g}" for value in done[restore.find_primary_output(done)].values.flat}
+    values = {f"{value:.8g}" for value in done[rebuild.find_primary_output(done)].values.flat}
     assert len([row for row in shown if values & set(row)]) > 10
     scene = Scene(load_velocity_ratio=2.0, normal_stress="constant")
     motion = rsfstudy.simulate(scene, duration=0.1)

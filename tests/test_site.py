@@ -17,18 +17,18 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 import rsfstudy
-from rsfstudy import reduce
+from rsfstudy import measures, reductions
 from rsfstudy.api.accessor import Accessor
 from rsfstudy.cli.command_line import cli
-from rsfstudy.measures.elasticities import Elasticities
-from rsfstudy.measures.fit import Fit
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.fitting.fit_measure import Fit
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
+from rsfstudy.measure_base.elasticities import Elasticities
 from rsfstudy.slider import registry
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import QUANTITIES
 
 ROOT = Path(__file__).parent.parent
-SLIDER, MEASURES = (ROOT / "rsfstudy" / folder for folder in ("slider", "measures"))
+SLIDER = ROOT / "rsfstudy" / "slider"
 SLOTS = ("laws", "normal_stress", "fluid", "dynamics", "loading")
 
 
@@ -129,7 +129,7 @@ def test_examples_that_no_study_states_can_be_called(examples):
     known = {"Elasticities": Elasticities, "Fit": Fit, "LimitCycle": LimitCycle}
     record = rsfstudy.read_record(ROOT / "studies/pages/step.csv", normal_stress="20 MPa")
     for name, call in examples["CALLS"].items():
-        made = eval(call, {**vars(reduce), **known, "record": record})
+        made = eval(call, {**vars(reductions), **known, "record": record})
         assert type(made).__name__ == name
 
 
@@ -147,9 +147,17 @@ def names() -> Iterator[tuple[str, list[str]]]:
     yield "fields", [*rsfstudy.Scene().as_dict()]
     kept = [file.stem for slot in SLOTS for file in (SLIDER / slot).glob("[!_]*.py")]
     yield "parts", kept
-    yield "measures", [file.stem for file in MEASURES.glob("[!_]*.py")]
+    exported = [getattr(measures, name) for name in measures.__all__]
+    yield (
+        "measures",
+        [kind.__name__ for kind in exported if "name" in getattr(kind, "__dict__", {})],
+    )
     yield "outputs", [about.name for about in LimitCycle().outputs]
-    kinds = [n for n in reduce.__all__ if isinstance(getattr(reduce, n), type) and n != "Reduction"]
+    kinds = [
+        n
+        for n in reductions.__all__
+        if isinstance(getattr(reductions, n), type) and n != "Reduction"
+    ]
     yield "reductions", kinds
     yield "statuses", [status.label for status in Status]
     yield "numbers", [*QUANTITIES]

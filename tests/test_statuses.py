@@ -7,21 +7,21 @@ import math
 import numpy as np
 import pytest
 from rsfstudy.named_studies._bifurcation import Bifurcation
+from rsfstudy.named_studies._critical_triggers import Triggers
 from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
 from rsfstudy.named_studies._normal_stress_transient import NormalStressTransient
-from rsfstudy.named_studies._triggers import Triggers
 
 from rsfstudy import Scene
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.healing import Healing
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.measures.rigid_response import RigidResponse
-from rsfstudy.measures.step_response import StepResponse
-from rsfstudy.measures.triggered import Triggered
-from rsfstudy.measures.velocity_step import VelocityStep
+from rsfstudy.critical_steps.critical_step import CriticalStep
+from rsfstudy.critical_steps.triggered import Triggered
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.responses.healing import Healing
+from rsfstudy.responses.linear_stability import LinearStability
+from rsfstudy.responses.rigid_response import RigidResponse
+from rsfstudy.responses.step_response import StepResponse
+from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.slider import laws
 from rsfstudy.status import Status
 

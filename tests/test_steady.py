@@ -11,8 +11,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rsfstudy import Scene
-from rsfstudy.measures.linear_stability import compute_jacobian, max_growth_rate
-from rsfstudy.slider import closed_forms, laws, stability, steady
+from rsfstudy.responses.linear_stability import compute_jacobian, max_growth_rate
+from rsfstudy.slider import closed_forms, laws, stability, steady_state
 from rsfstudy.slider.equations import equations_by_displacement, normal_stress_at
 from rsfstudy.slider.laws.composite import lambert_w
 
@@ -96,7 +96,7 @@ def test_steady_stresses_satisfy_the_inclined_geometry(log_slip_rate, phi):
     scene = Scene(phi=phi)
     mu_ss = scene.mu_star - (scene.b - scene.a) * log_slip_rate
     assume(mu_ss * cot_phi(scene) < 0.99)
-    found = steady.steady_sliding(scene, log_slip_rate)
+    found = steady_state.steady_sliding(scene, log_slip_rate)
     ratio = normal_stress_at(scene, found.frictional_stress)
     assert ratio == pytest.approx(1.0 + cot_phi(scene) * found.frictional_stress, rel=1e-13)
     assert scene.mu_star + found.frictional_stress == pytest.approx(mu_ss * ratio, rel=1e-11)
@@ -104,15 +104,15 @@ def test_steady_stresses_satisfy_the_inclined_geometry(log_slip_rate, phi):
 
 def test_no_steady_state_below_the_slowest_rate():
     scene = Scene()
-    slowest = steady.min_steady_log_slip_rate(scene)
+    slowest = steady_state.min_steady_log_slip_rate(scene)
     mu_ss = scene.mu_star - (scene.b - scene.a) * slowest
     assert mu_ss * cot_phi(scene) == pytest.approx(1.0, rel=1e-9)
-    assert steady.steady_sliding(scene, slowest + 1e-6) is not None
-    assert steady.steady_sliding(scene, slowest - 1e-6) is None
+    assert steady_state.steady_sliding(scene, slowest + 1e-6) is not None
+    assert steady_state.steady_sliding(scene, slowest - 1e-6) is None
     assert math.isnan(stability.critical_stiffness(scene, slowest - 1.0))
     with pytest.raises(ValueError, match="no steady sliding"):
         stability.growth_rates(scene, slowest - 1.0)
-    assert steady.min_steady_log_slip_rate(Scene(normal_stress="constant")) == -math.inf
+    assert steady_state.min_steady_log_slip_rate(Scene(normal_stress="constant")) == -math.inf
 
 
 @pytest.mark.parametrize("period", [1e-3, 5.0, 1e4])
@@ -173,10 +173,10 @@ def test_critical_stiffness_of_cut_offs(log_slip_rate, log_cutoff, b_over_a):
 def test_no_steady_sliding_below_the_slowest_by_laws_with_a_rate_of_their_own():
     for law in CUT_OFFS:
         scene = Scene(law=law)
-        slowest = steady.min_steady_log_slip_rate(scene)
-        assert steady.steady_sliding(scene, slowest + 1e-6) is not None
-        assert steady.steady_sliding(scene, slowest - 1e-6) is None
-        assert steady.min_steady_log_slip_rate(scene.with_(**CONSTANT)) == -math.inf
+        slowest = steady_state.min_steady_log_slip_rate(scene)
+        assert steady_state.steady_sliding(scene, slowest + 1e-6) is not None
+        assert steady_state.steady_sliding(scene, slowest - 1e-6) is None
+        assert steady_state.min_steady_log_slip_rate(scene.with_(**CONSTANT)) == -math.inf
 
 
 @pytest.mark.parametrize("excess", [-0.02, -0.055, -0.1])
@@ -184,4 +184,6 @@ def test_stress_keeps_its_sign_however_weak_a_regularised_fault_becomes(excess):
     """Strength ``mu_* + excess = a ln(2 sinh(mu/a))`` has a root of either sign."""
     scene = Scene(regularised=True, mu_star=0.05, normal_stress="constant")
     mu = scene.a * math.asinh(0.5 * math.exp((scene.mu_star + excess) / scene.a))
-    assert steady.stress_after_jump(scene, excess) + scene.mu_star == pytest.approx(mu, rel=1e-9)
+    assert steady_state.stress_after_jump(scene, excess) + scene.mu_star == pytest.approx(
+        mu, rel=1e-9
+    )

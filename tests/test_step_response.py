@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import brentq
 
 from rsfstudy import Scene
-from rsfstudy.measures.step_response import StepResponse
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.status import Status
 
 SLOWNESS = {"law": "slowness", "normal_stress": "constant"}

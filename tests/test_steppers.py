@@ -16,12 +16,12 @@ from scipy.integrate import DOP853, RK45, Radau, solve_ivp
 from rsfstudy import Scene
 from rsfstudy.motion import layout
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.columns import in_place_functions, unpack_function
-from rsfstudy.motion.course import events_along, integrate_events
 from rsfstudy.motion.engines import PYTHON, SCIPY
+from rsfstudy.motion.inplace import in_place_functions, unpack_function
+from rsfstudy.motion.integrate import events_along, integrate_events
 from rsfstudy.motion.loop import accept_step
 from rsfstudy.motion.meter import MotionStopped, WorkMeter
-from rsfstudy.motion.steppers import Stepper, unrolled
+from rsfstudy.motion.steppers import Stepper, unrolled_step
 from rsfstudy.motion.steppers.order_eight import OrderEight
 from rsfstudy.motion.steppers.scipy import METHODS, SciPyStepper, _float_interpolant
 from rsfstudy.motion.workspace import Workspace, create_workspace, workspace_size
@@ -78,18 +78,18 @@ def plain_step(equations: Equations, y, length: float, tolerance: float):
 @pytest.mark.parametrize(("equations", "y"), SYSTEMS)
 def test_the_unrolled_step_is_that_of_plain_loops_to_the_bit(equations, y, length):
     n, tolerance = len(y), 1e-6
-    attempt = unrolled.build_attempt_function(
+    attempt = unrolled_step.build_attempt_function(
         equations.rate_function, n, unpack_function(len(equations.parameters))
     )
-    block = [math.nan] * (unrolled.HEADER_SIZE + 2 * n)
-    block[unrolled.LENGTH_INDEX], block[unrolled.TOLERANCE_INDEX] = length, tolerance
-    block[unrolled.HEADER_SIZE + n :] = equations.scales
-    stages = [*equations.evaluate_rates(y), *[math.nan] * (n * unrolled.STAGE_COUNT)]
+    block = [math.nan] * (unrolled_step.HEADER_SIZE + 2 * n)
+    block[unrolled_step.LENGTH_INDEX], block[unrolled_step.TOLERANCE_INDEX] = length, tolerance
+    block[unrolled_step.HEADER_SIZE + n :] = equations.scales
+    stages = [*equations.evaluate_rates(y), *[math.nan] * (n * unrolled_step.STAGE_COUNT)]
     attempt(y, stages, equations.parameters, block)
     by_loops, new, error = plain_step(equations, y, length, tolerance)
     assert stages == [rate for stage in by_loops for rate in stage]
-    assert tuple(block[unrolled.HEADER_SIZE : unrolled.HEADER_SIZE + n]) == new
-    assert block[unrolled.ERROR_INDEX] == error
+    assert tuple(block[unrolled_step.HEADER_SIZE : unrolled_step.HEADER_SIZE + n]) == new
+    assert block[unrolled_step.ERROR_INDEX] == error
     assert error > 0.0
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import synthetic_records as synthetic
 
-from rsfstudy.analysis.fitting.record import stepwise_loading
-from rsfstudy.analysis.fitting.steps import detect_velocity_steps
+from rsfstudy.fitting.record import stepwise_loading
+from rsfstudy.fitting.velocity_steps import detect_velocity_steps
 
 UP = ((0.0, 1.0), (60.0, 10.0))
 MANY = ((0.0, 1.0), (60.0, 10.0), (70.0, 1.0), (130.0, 0.0), (200.0, 1.0), (260.0, 3.0))

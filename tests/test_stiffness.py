@@ -7,12 +7,12 @@ import math
 import pytest
 
 from rsfstudy import Scene
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider import stability, steady
+from rsfstudy.responses.linear_stability import LinearStability
+from rsfstudy.slider import stability, steady_state
 from rsfstudy.status import Status
 
 STRENGTHENING = {"b_over_a": 0.8, "stiffness": 0.05}
@@ -43,7 +43,7 @@ def test_without_rate_weakening_stiffness_is_given_by_itself():
     scene = Scene(**STRENGTHENING)
     assert scene.critical_stiffness == 0.0
     assert scene.stiffness_ratio == math.inf
-    assert steady.min_steady_log_slip_rate(scene) == -math.inf
+    assert steady_state.min_steady_log_slip_rate(scene) == -math.inf
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])

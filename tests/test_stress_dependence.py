@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from test_steady import PLAIN, WITH_ONE_B
 
 from rsfstudy import Scene
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.measures.rigid_response import RigidResponse
+from rsfstudy.critical_steps.critical_step import CriticalStep
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.responses.linear_stability import LinearStability
+from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import friction_relation
 from rsfstudy.status import Status

@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 from synthetic_records import deviation_in_stderrs
 
 import rsfstudy
-from rsfstudy.analysis.fitting.record import Record
-from rsfstudy.analysis.fitting.stress_steps import find_stress_steps
+from rsfstudy.fitting.record import Record
+from rsfstudy.fitting.stress_steps import find_stress_steps
 from rsfstudy.status import STATUS_LABELS
 
 #: Parameters in um and s; the stiffness is that of the machine in MPa/um.

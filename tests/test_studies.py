@@ -14,17 +14,17 @@ import numpy as np
 import pytest
 from compliance_checker.cf import util as cfutil
 from compliance_checker.runner import CheckSuite, ComplianceChecker
-from running import named_results, reduced_study
+from study_runs import named_results, reduced_study
 
 import rsfstudy
 from rsfstudy import plots
-from rsfstudy.declare import catalogue, names
 from rsfstudy.status import Status
+from rsfstudy.study import catalogue, study_index
 
 FLAGS = {"slip_mode", "status", "regime", "inertia", "regularised"}
 
 
-@pytest.fixture(scope="module", params=names.study_names())
+@pytest.fixture(scope="module", params=study_index.study_names())
 def result(request, tmp_path_factory):
     """What is enough of each study, and where its file is."""
     return named_results(request.param, tmp_path_factory)
@@ -222,7 +222,7 @@ def test_what_is_reduced_carries_the_errors_of_its_cells(result):
         assert (error >= 0.0).where(dataset[reduction.name].notnull(), True).all(), reduction.name
 
 
-@pytest.mark.parametrize("result", names.study_names()[::7], indirect=True, scope="module")
+@pytest.mark.parametrize("result", study_index.study_names()[::7], indirect=True, scope="module")
 def test_the_plain_plot_draws_any_lattice(result):
     foreign = json.loads(result[0].attrs["declaration"])
     foreign["plot"] = "lines"

@@ -7,20 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from running import cell_key
+from study_runs import cell_key
 
 import rsfstudy
 from rsfstudy import Axis, Claim, Scene, Study, check
-from rsfstudy.compute import cells
-from rsfstudy.compute.plan import Plan
-from rsfstudy.declare import catalogue, names
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import InvalidValue
-from rsfstudy.files.lattice import build_coordinates
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.execution import cells
+from rsfstudy.execution.plan import Plan
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
+from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.parts import number
+from rsfstudy.storage.lattice import build_coordinates
+from rsfstudy.study import catalogue, study_index
 
 CASES = {
     "constant": {"normal_stress": "constant"},
@@ -213,7 +213,7 @@ MIXED = Study(
 )
 
 
-@pytest.mark.parametrize("name", ["mixed", *names.study_names()])
+@pytest.mark.parametrize("name", ["mixed", *study_index.study_names()])
 def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
     """What is sent are the name of each cell and what it changes of scene and measure; of large
     lattices, a sample of the cells.

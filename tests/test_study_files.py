@@ -5,18 +5,18 @@ from typing import ClassVar
 
 import pytest
 import xarray as xr
-from running import run, study_of
+from study_runs import run, study_of
 
 import rsfstudy
 from rsfstudy import Axis
-from rsfstudy.declare import catalogue
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import InvalidValue, RunError
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.reduce import Reduction
+from rsfstudy.reductions import Reduction
+from rsfstudy.study import catalogue
 
 DECLARATION = """
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.measures.critical_step import CriticalStep
+from rsfstudy.critical_steps.critical_step import CriticalStep
 
 study = Study(
     name="mine",

@@ -3,18 +3,19 @@
 import numpy as np
 import pytest
 import xarray as xr
-from running import call_main, named_results
+from study_runs import call_main, named_results
 from test_shown import rows as of_html
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.api import runs, tables
-from rsfstudy.api.tables import Table
-from rsfstudy.cli import layout, terminal
-from rsfstudy.declare import catalogue, names
+from rsfstudy.api import study_runs
+from rsfstudy.cli import printing, table_layout
+from rsfstudy.formatting import format_overrides
 from rsfstudy.measures import Outcome
+from rsfstudy.reporting import tables
+from rsfstudy.reporting.tables import Table
 from rsfstudy.status import Status
-from rsfstudy.wording import format_overrides
+from rsfstudy.study import catalogue, study_index
 
 WIDTHS = (40, 80)
 
@@ -48,7 +49,7 @@ def in_one_piece(piece: str, lines: list[str]) -> bool:
     return any(f" {piece} " in f" {line} " for line in lines)
 
 
-@pytest.mark.parametrize("name", names.study_names())
+@pytest.mark.parametrize("name", study_index.study_names())
 def test_results_of_every_study(name, printed, tmp_path_factory):
     dataset, _path = named_results(name, tmp_path_factory)
     shown = [
@@ -56,19 +57,19 @@ def test_results_of_every_study(name, printed, tmp_path_factory):
         *tables.reduction_tables(dataset),
         tables.contents_table(dataset),
     ]
-    shown += [tables.claims_table(runs.check(dataset))]
+    shown += [tables.claims_table(study_runs.check(dataset))]
     for table in (table for table in shown if table.rows):
         for width in WIDTHS:
-            lines = printed(width, layout.print_piece, table)
+            lines = printed(width, table_layout.print_piece, table)
             assert not [piece for piece in pieces(table) if not in_one_piece(piece, lines)]
 
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_declarations_of_every_study(width, printed, tmp_path):
     """The points of their axes are there, each in one piece."""
-    for name in names.study_names():
+    for name in study_index.study_names():
         study = catalogue.load_study(name)
-        lines = printed(width, terminal.print_declaration, study, tmp_path)
+        lines = printed(width, printing.print_declaration, study, tmp_path)
         for axis in study.axes:
             shown = (
                 axis.point_names
@@ -91,20 +92,20 @@ def test_where_no_cell_has_a_number_the_status_is_explained():
 def test_a_relation_stays_with_its_number(printed):
     row = {"id": "C1", "claim": "a long sentence " * 9, "published": "< 1", "ours": "-4.56032e-07"}
     for width in range(16, 121):
-        lines = printed(width, layout.print_piece, Table([row, row], wrappable={"claim"}))
+        lines = printed(width, table_layout.print_piece, Table([row, row], wrappable={"claim"}))
         assert sum(in_one_piece("< 1", [line]) for line in lines) == 2
         assert sum(in_one_piece("-4.56032e-07", [line]) for line in lines) == 2
 
 
 def test_what_is_wider_than_the_terminal_is_there_to_its_last_character(printed):
     path = "/a/very/long/path" * 9
-    lines = printed(40, layout.print_piece, {"file": path})
+    lines = printed(40, table_layout.print_piece, {"file": path})
     assert path in "".join("".join(lines).split())
 
 
 def test_a_column_of_numbers_ends_at_one_place(printed):
     lines = printed(
-        80, layout.print_piece, Table([{"a": "x", "n": "1"}, {"a": "yy", "n": "-10.5"}])
+        80, table_layout.print_piece, Table([{"a": "x", "n": "1"}, {"a": "yy", "n": "-10.5"}])
     )
     found = [line.rstrip() for line in lines[2:4]]
     width = len(found[0])  # which depends on the version of rich
@@ -124,7 +125,7 @@ def test_a_cell_is_told_in_a_line_for_each_number_beside_that_of_its_file(printe
     orbit, other = np.linspace(0.0, 2.0, 400), np.linspace(0.0, 3.0, 400)
     there = xr.Dataset({"interval": 1.5, "orbit": ("phase", other)})
     now = Outcome(Status.OK, {"interval": 1.5, "orbit": orbit})
-    told = printed(80, terminal.print_outcome, Scene(), now, there)
+    told = printed(80, printing.print_outcome, Scene(), now, there)
     lines = [" ".join(line.split()) for line in told]
     assert "interval 1.5 same" in lines
     assert "orbit 400 values, 0 to 2 400 values, 0 to 3" in lines

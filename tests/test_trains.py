@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from running import cell_key
+from study_runs import cell_key
 
 from rsfstudy import Scene, history, simulate
-from rsfstudy.measures.limit_cycle import LimitCycle
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.events import EventKind, approach_to_steady_state
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.slider.laws import BUILT_IN_PARTS as LAWS
 

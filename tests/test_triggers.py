@@ -5,16 +5,16 @@ slider back from.
 from __future__ import annotations
 
 import pytest
-from rsfstudy.named_studies._triggers import TRIGGERS, Triggers
+from rsfstudy.named_studies._critical_triggers import TRIGGERS, Triggers
 
 from rsfstudy import Scene
-from rsfstudy.analysis.overdamped import monotone_rise_events, rises_monotonically
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.triggered import Triggered
+from rsfstudy.critical_steps.critical_step import CriticalStep
+from rsfstudy.critical_steps.monotone_approach import monotone_rise_events, rises_monotonically
+from rsfstudy.critical_steps.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, maximum
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.status import Status
 

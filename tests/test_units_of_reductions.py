@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 import xarray as xr
-from running import run, study_of
+from study_runs import run, study_of
 
 from rsfstudy import Rig
-from rsfstudy.api import tables
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.reduce import (
+from rsfstudy.reductions import (
     Boundary,
     ClosedFormRatio,
     Difference,
@@ -24,9 +22,11 @@ from rsfstudy.reduce import (
     StandardDeviation,
     apply_reductions,
 )
-from rsfstudy.reduce.base import read_quantities
-from rsfstudy.rig.reductions import InUnits
+from rsfstudy.reporting import tables
+from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.rig.scales import convert_to_display_units
+from rsfstudy.study.reductions.base import read_quantities
+from rsfstudy.study.reductions.unit_conversion import InUnits
 
 X = np.geomspace(1.0, 30.0, 12)
 

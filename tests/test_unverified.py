@@ -12,15 +12,15 @@ from rsfstudy.named_studies._normal_stress_response import NormalStressResponse
 from rsfstudy.named_studies._normal_stress_transient import NormalStressTransient
 
 from rsfstudy import Scene
+from rsfstudy.critical_steps.critical_step import CriticalStep
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.healing import Healing
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.rigid_response import RigidResponse
-from rsfstudy.measures.step_response import StepResponse
-from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.responses.healing import Healing
+from rsfstudy.responses.rigid_response import RigidResponse
+from rsfstudy.responses.step_response import StepResponse
+from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.status import Status
 
 IMPOSED = {"normal_stress": "imposed", "alpha": 0.3}

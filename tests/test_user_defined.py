@@ -10,21 +10,21 @@ from typing import ClassVar
 
 import pytest
 import xarray as xr
-from running import run, study_of
+from study_runs import run, study_of
 
 import rsfstudy
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Rig, Scene, Study
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.linear_stability import LinearStability
 from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.quantity import Output
-from rsfstudy.reduce import LinearFit, ProportionalFit, Reduction
+from rsfstudy.quantities import Output
+from rsfstudy.reductions import LinearFit, ProportionalFit, Reduction
+from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider.laws import Law, LawBase
 from rsfstudy.slider.normal_stress import NormalStress
+from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import collect_numbers, number
-from rsfstudy.slider.places import LAW
 from rsfstudy.status import Status
 
 # ---- reductions ---------------------------------------------------------------------------------

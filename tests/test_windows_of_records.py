@@ -10,9 +10,9 @@ import synthetic_records as synthetic
 from synthetic_records import EXACT_PARAMETERS, deviation_in_stderrs
 
 import rsfstudy
-from rsfstudy.analysis.fitting.record import Record
-from rsfstudy.analysis.fitting.straight import find_linear_start
 from rsfstudy.errors import InvalidValue
+from rsfstudy.fitting.linear_portion import find_linear_start
+from rsfstudy.fitting.record import Record
 from rsfstudy.status import STATUS_LABELS
 
 LOADING = ((0.0, 2.0), (150.0, 20.0))

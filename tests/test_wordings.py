@@ -22,26 +22,26 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from running import call_main
 from scipy.stats import norm
+from study_runs import call_main
 
 import rsfstudy
 from rsfstudy import Axis, Rig, Scene
-from rsfstudy.declare import catalogue
-from rsfstudy.declare.claims import Claim
-from rsfstudy.declare.names import study_names
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import InvalidValue
+from rsfstudy.measure_base.elasticities import Elasticities
 from rsfstudy.measures import Measure
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.elasticities import Elasticities
 from rsfstudy.motion import engines
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.quantity import Output
-from rsfstudy.reduce import Reduction
+from rsfstudy.quantities import Output
+from rsfstudy.reductions import Reduction
 from rsfstudy.rig.units import convert_to_si
-from rsfstudy.slider.numbers import SliderParameters
 from rsfstudy.slider.parts import RULES, field_names, is_boolean_field
 from rsfstudy.slider.registry import FIELD_OWNERS, SLOTS
+from rsfstudy.slider.slider_parameters import SliderParameters
+from rsfstudy.study import catalogue
+from rsfstudy.study.claims import Claim
+from rsfstudy.study.study_index import study_names
 
 WORDINGS = Path(__file__).with_name("wordings.txt")
 

@@ -1,3 +1,38 @@
-"""Functions that users call: for studies, scenes and motions; and the accessor of datasets."""
+"""Functions that users call, and the accessor ``dataset.rsf``.
 
-from rsfstudy.api import accessor as accessor  # datasets have it from now on
+``rsfstudy`` exports these functions. They check their arguments, and combine the packages below:
+running and opening studies, simulating motions, fitting records, and computing measures of one
+scene. The package contains no physics, and never prints.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rsfstudy._lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from rsfstudy.api.export import to_csv, to_mat
+    from rsfstudy.api.html_report import write_report
+    from rsfstudy.api.simulation import BEYOND_NORM_ATTRIBUTE
+    from rsfstudy.api.study_runs import apply_overrides, prepare_run
+else:
+    __getattr__, __dir__ = lazy_exports(
+        __name__,
+        {
+            "api.export": ("to_csv", "to_mat"),
+            "api.html_report": ("write_report",),
+            "api.simulation": ("BEYOND_NORM_ATTRIBUTE",),
+            "api.study_runs": ("apply_overrides", "prepare_run"),
+        },
+    )
+
+__all__ = [
+    "BEYOND_NORM_ATTRIBUTE",
+    "apply_overrides",
+    "prepare_run",
+    "to_csv",
+    "to_mat",
+    "write_report",
+]
+from rsfstudy.api import accessor as accessor  # registers the accessor of datasets

@@ -20,10 +20,10 @@ from rsfstudy.errors import DataError, InvalidValue
 if TYPE_CHECKING:
     import pandas as pd
 
-    from rsfstudy import plots
-    from rsfstudy.declare.study import Study
-    from rsfstudy.rig.laboratory import Rig
-    from rsfstudy.slider.scene import Scene
+    from rsfstudy.plots import Figure
+    from rsfstudy.rig import Rig
+    from rsfstudy.slider import Scene
+    from rsfstudy.study import Study
 
 _FOREIGN_DATASET = (
     "the dataset is not of rsfstudy: it has neither the attribute 'scene' nor 'declaration'. "
@@ -50,10 +50,10 @@ class Accessor:
     @error_boundary
     def _repr_html_(self) -> str:
         """Return an HTML table of the dataset and the verdicts of its claims."""
-        from rsfstudy.api import report
+        from rsfstudy.api import html_report
 
         self._require_rsfstudy_dataset()
-        return report.dataset_html(self._dataset)
+        return html_report.dataset_html(self._dataset)
 
     @property
     @error_boundary
@@ -66,13 +66,14 @@ class Accessor:
         InvalidValue
             Where no single cell is selected, or a part is a user's own and not known here.
         """
-        from rsfstudy.api import fit_results, scenes
+        from rsfstudy.api import file_scenes
+        from rsfstudy.reporting import fitted_scene, is_fit
 
-        if fit_results.is_fit(self._dataset):
-            return fit_results.fitted_scene(self._dataset)
+        if is_fit(self._dataset):
+            return fitted_scene(self._dataset)
         if self._is_study:
-            return self.study.scene(scenes.selected_cell_number(self._dataset, self.study))
-        return scenes.described_scene(self._dataset)
+            return self.study.scene(file_scenes.selected_cell_number(self._dataset, self.study))
+        return file_scenes.described_scene(self._dataset)
 
     @property
     @error_boundary
@@ -88,9 +89,9 @@ class Accessor:
         InvalidValue
             Where several fits are selected, or the record does not tell normal stress.
         """
-        from rsfstudy.api import fit_results
+        from rsfstudy.reporting import fitted_rig
 
-        return fit_results.fitted_rig(self._dataset)
+        return fitted_rig(self._dataset)
 
     @property
     @error_boundary
@@ -104,18 +105,24 @@ class Accessor:
         InvalidValue
             Where the study has code of a user's own.
         """
-        from rsfstudy.files import contents, loadings, restore
+        from rsfstudy.storage import (
+            has_user_code,
+            read_declaration,
+            read_loadings,
+            read_provenance,
+            study_from_declaration,
+        )
 
         self._require_study()
         declared, about = (
-            contents.read_declaration(self._dataset),
-            contents.read_provenance(self._dataset),
+            read_declaration(self._dataset),
+            read_provenance(self._dataset),
         )
-        if restore.has_user_code(self._dataset):
+        if has_user_code(self._dataset):
             rule = "has code of a user's own, and code is never taken from a dataset"
             remedy = f"Import the study from the file that declares it. {about['declared_in']}"
             raise InvalidValue("study", declared.name, rule, remedy=remedy.strip())
-        return restore.study_from_declaration(declared, loadings.read_loadings(self._dataset))
+        return study_from_declaration(declared, read_loadings(self._dataset))
 
     @error_boundary
     def to_si(self, **scales: Any) -> xr.Dataset:
@@ -126,7 +133,7 @@ class Accessor:
         **scales
             ``normal_stress``, ``slip_distance`` and ``reference_rate`` of `rsfstudy.to_si`.
         """
-        from rsfstudy.api.one_scene import to_si
+        from rsfstudy.api.single_scene import to_si
 
         self._require_rsfstudy_dataset()
         return to_si(self._dataset, **scales)
@@ -146,7 +153,7 @@ class Accessor:
         InvalidValue
             For units of another kind, and for results that hold no scales: those of no rig.
         """
-        from rsfstudy.rig.scales import convert_units, read_scales
+        from rsfstudy.rig import convert_units, read_scales
 
         self._require_rsfstudy_dataset()
         return convert_units(self._dataset, read_scales(self._dataset), stress, length, time)
@@ -156,14 +163,14 @@ class Accessor:
         """The claims of the study held against the dataset, as `rsfstudy.check` gives them: none
         applies in other units.
         """
-        from rsfstudy.api import runs
+        from rsfstudy.api import study_runs
 
         self._require_study()
         self._require_all_cells("claims are held against")
-        return runs.check(self._dataset)
+        return study_runs.check(self._dataset)
 
     @error_boundary
-    def plot(self, *what: Any, **how: Any) -> plots.Figure:
+    def plot(self, *what: Any, **how: Any) -> Figure:
         """The figure of the results of a study, or the picture of a motion or a limit cycle, in the
         units that they have.
 
@@ -173,12 +180,12 @@ class Accessor:
             As of `rsfstudy.plot` for the results of a study (`variable`, `style`), and as of
             `rsfstudy.plot_motion` for a motion or a cycle (`rig`, `against`).
         """
-        from rsfstudy.api import runs
-        from rsfstudy.plots._motion import plot_motion
+        from rsfstudy.api import study_runs
+        from rsfstudy.plots import plot_motion
 
         if self._is_study:
             self._require_all_cells("figures show")
-            return runs.plot(self._dataset, *what, **how)
+            return study_runs.plot(self._dataset, *what, **how)
         return plot_motion(self._dataset, *what, **how)
 
     @error_boundary
@@ -236,8 +243,8 @@ class Accessor:
         DataError
             For a dataset without limit cycles.
         """
-        from rsfstudy.measures.limit_cycle import SLIP_MODES
-        from rsfstudy.rig.units import convert_to_si, unit_factor
+        from rsfstudy.limit_cycles import SLIP_MODES
+        from rsfstudy.rig import convert_to_si, unit_factor
 
         least = convert_to_si("stick_slip_from", stick_slip_from, "m/s")
         if "slip_mode" not in self._dataset:
@@ -259,7 +266,7 @@ class Accessor:
             each: orbits within cells are left out. Of another answer for one scene, its numbers in
             one row. What never changes is in ``attrs["constant"]``.
         """
-        from rsfstudy.api.exchange import to_dataframe
+        from rsfstudy.api.export import to_dataframe
 
         self._require_rsfstudy_dataset()
         return to_dataframe(self._dataset)
@@ -279,9 +286,9 @@ class Accessor:
         DataError
             Where the dataset is no fit.
         """
-        from rsfstudy.api import fit_results
+        from rsfstudy.reporting import fit_table
 
-        return fit_results.fit_table(self._dataset)
+        return fit_table(self._dataset)
 
     @error_boundary
     def sample_parameters(self, n: int, seed: int = 0) -> xr.Dataset:
@@ -304,9 +311,9 @@ class Accessor:
         InvalidValue
             Where several fits are selected, or the record does not tell a parameter at all.
         """
-        from rsfstudy.api import fit_results
+        from rsfstudy.reporting import sample_parameters
 
-        return fit_results.sample_parameters(self._dataset, n, seed)
+        return sample_parameters(self._dataset, n, seed)
 
     @error_boundary
     def failures(self) -> pd.DataFrame:
@@ -320,15 +327,13 @@ class Accessor:
         """
         import pandas as pd
 
-        from rsfstudy.api import tables
-        from rsfstudy.files import contents
+        from rsfstudy.reporting import cells_frame
         from rsfstudy.status import Status
+        from rsfstudy.storage import read_declaration
 
         if self._is_study:
-            axes = [axis["dimension"] for axis in contents.read_declaration(self._dataset).axes]
-            return tables.cells_frame(
-                self._dataset, self._dataset["status"] != int(Status.OK), axes
-            )
+            axes = [axis["dimension"] for axis in read_declaration(self._dataset).axes]
+            return cells_frame(self._dataset, self._dataset["status"] != int(Status.OK), axes)
         ended = {name: self._dataset.attrs.get(name, "") for name in ("status", "message")}
         rows = [] if ended["status"] == Status.OK.label else [ended]
         return pd.DataFrame(rows, columns=list(ended))
@@ -344,9 +349,9 @@ class Accessor:
 
     def _require_all_cells(self, what: str) -> None:
         """Refuse results of which cells were selected."""
-        from rsfstudy.files import contents
+        from rsfstudy.storage import read_declaration
 
-        axes = [axis["dimension"] for axis in contents.read_declaration(self._dataset).axes]
+        axes = [axis["dimension"] for axis in read_declaration(self._dataset).axes]
         selected = [name for name in axes if name not in self._dataset["status"].dims]
         if selected:
             text = f"{what} all results of a study, and of these {', '.join(selected)} is selected"
@@ -369,6 +374,6 @@ class Backend(BackendEntrypoint):
         self, filename_or_obj: str | Path, *, drop_variables: str | Iterable[str] | None = None
     ) -> xr.Dataset:
         """The results in a file, in memory."""
-        from rsfstudy.api import runs
+        from rsfstudy.api import study_runs
 
-        return runs.open(filename_or_obj).drop_vars(drop_variables or [])
+        return study_runs.open(filename_or_obj).drop_vars(drop_variables or [])

@@ -11,11 +11,11 @@ from scipy.interpolate import KroghInterpolator
 from scipy.ndimage import find_objects, label
 from scipy.optimize import brentq
 
-from rsfstudy.analysis.drops import EventNumbers
-from rsfstudy.api.events import build_catalogue
+from rsfstudy.api.event_catalogue import build_catalogue
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.scales import Scale, slip_rate_from_log
-from rsfstudy.slider.scene import Scene
+from rsfstudy.fitting import EventNumbers
+from rsfstudy.rig import Scale, slip_rate_from_log
+from rsfstudy.slider import Scene
 
 #: Slip rate over that of the load point from which on a motion is an event. Steady sliding is 1,
 #: and a step of the load point that a stable slider follows overshoots by less.

@@ -11,10 +11,9 @@ from dataclasses import replace
 from rich import progress as bars
 from rich.console import Console
 
-from rsfstudy.compute.runner import ProgressCallback
-from rsfstudy.motion.engine_factory import compiled_engine
-from rsfstudy.motion.engines import compilation_log
-from rsfstudy.slider.scene import Scene
+from rsfstudy.execution import ProgressCallback
+from rsfstudy.motion import compilation_log, compiled_engine
+from rsfstudy.slider import Scene
 
 #: Most lines of a whole run, where there is no bar, and s between two of them.
 _MAX_LINES, _MIN_LINE_INTERVAL = 10, 10.0

@@ -15,9 +15,9 @@ import numpy as np
 from rsfstudy._deprecation import renamed_keywords, renamed_members, warn_renamed
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import is_variable_name
-from rsfstudy.slider.registry import normalise_field_value
-from rsfstudy.wording import format_value, is_list_like
+from rsfstudy.formatting import format_value, is_list_like
+from rsfstudy.quantities import is_variable_name
+from rsfstudy.slider import normalise_field_value
 
 Row = Mapping[str, Any]
 

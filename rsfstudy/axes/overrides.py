@@ -9,7 +9,7 @@ from typing import Any
 
 from rsfstudy.axes.axis import Axis, Row, point_key, to_plain_value
 from rsfstudy.errors import InvalidValue
-from rsfstudy.wording import format_value
+from rsfstudy.formatting import format_value
 
 
 def select_points(axis: Axis, points: Sequence[Any]) -> Axis:

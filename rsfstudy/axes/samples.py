@@ -13,7 +13,7 @@ from scipy.stats import qmc
 
 from rsfstudy.argument_checks import MAX_ITEMS
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import parse_heading
+from rsfstudy.quantities import parse_heading
 
 #: What a field is set by: a quantity that is drawn, or a function of all of them.
 FieldSource = str | Callable[[Mapping[str, np.ndarray]], Any]

@@ -6,14 +6,10 @@ from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from rsfstudy.declare.study import Study
+from rsfstudy import Rig, Study, history, read_protocol, read_table
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.history import history, read_protocol
-from rsfstudy.rig.laboratory import Rig
-from rsfstudy.rig.quantities import REQUIRED_QUANTITIES, RIG_QUANTITIES
-from rsfstudy.rig.table import read_table
-from rsfstudy.rig.units import expand_range, parse_number
-from rsfstudy.slider.protocol import UserLoading
+from rsfstudy.rig import REQUIRED_QUANTITIES, RIG_QUANTITIES, expand_range, parse_number
+from rsfstudy.slider import UserLoading
 
 _FLAG_VALUES = {"true": True, "yes": True, "false": False, "no": False}
 

@@ -15,8 +15,7 @@ from typing import Any
 
 import click
 
-from rsfstudy.cli import command_line_motions, options
-from rsfstudy.declare import names
+from rsfstudy.cli import command_line_scenes, options
 from rsfstudy.defaults import OUTPUT_DIRECTORY, RESULT_FORMATS
 from rsfstudy.error_boundary import format_exception
 from rsfstudy.errors import (
@@ -28,6 +27,7 @@ from rsfstudy.errors import (
     escape_control,
     shorten,
 )
+from rsfstudy.study import study_titles
 
 OK, FAILED, WRONG_USAGE = 0, 1, 2
 #: Signals that end a command as Ctrl-C does.
@@ -157,7 +157,7 @@ def _print_error(text: str) -> None:
 def list_studies(context: click.Context) -> None:
     """Name the studies."""
     text = context.make_formatter()
-    text.write_dl(list(names.study_titles().items()))
+    text.write_dl(list(study_titles().items()))
     text.write_paragraph()
     text.write_text("rsfstudy show NAME tells what one consists of, rsfstudy run NAME computes it.")
     click.echo(text.getvalue().rstrip())
@@ -310,7 +310,7 @@ def export() -> None:
     """
 
 
-for one in command_line_motions.COMMANDS:
+for one in command_line_scenes.COMMANDS:
     cli.add_command(one)
 
 if __name__ == "__main__":

@@ -18,27 +18,32 @@ import click
 import numpy as np
 import xarray as xr
 
-from rsfstudy import plots
-from rsfstudy.api import exchange, runs
-from rsfstudy.api import report as reports
-from rsfstudy.cli import assignments, terminal
+from rsfstudy import Study, recompute_cell
+from rsfstudy import compare as compare_results
+from rsfstudy import open as open_results
+from rsfstudy import rerun as rerun_file
+from rsfstudy.api import apply_overrides, prepare_run, to_csv, to_mat, write_report
+from rsfstudy.cli import assignments, printing
 from rsfstudy.cli.console import console, stderr
 from rsfstudy.cli.cost import format_duration
 from rsfstudy.cli.options import CommandOptions
-from rsfstudy.cli.terminal import FAILED, OK, RunSummary
-from rsfstudy.compute.clusters import connect_to_cluster
-from rsfstudy.compute.runner import OutputOptions
-from rsfstudy.compute.workers import Workers
-from rsfstudy.declare import catalogue, names, rigs
-from rsfstudy.declare.study import Study
+from rsfstudy.cli.printing import FAILED, OK, RunSummary
 from rsfstudy.defaults import FIGURE_FORMATS, OUTPUT_DIRECTORY
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError
-from rsfstudy.files import contents, places, restore, store
-from rsfstudy.files.comparison import find_cell_number
-from rsfstudy.motion.engine_factory import missing_packages
-from rsfstudy.rig.quantities import RIG_QUANTITIES
-from rsfstudy.rig.units import parse_number
+from rsfstudy.execution import OutputOptions, Workers, connect_to_cluster
+from rsfstudy.motion import missing_packages
+from rsfstudy.plots import FIGURE_NAMES, save_figure
+from rsfstudy.rig import RIG_QUANTITIES, parse_number
+from rsfstudy.storage import (
+    find_cell_number,
+    find_results,
+    is_single_scene,
+    load_user_figure,
+    read_dataset,
+    read_declaration,
+)
+from rsfstudy.study import load_study, study_names, with_rig
 
 _FILE_SUFFIXES = {"netcdf": "nc", "zarr": "zarr"}
 _RESULT_SUFFIXES = (".nc", ".zarr")
@@ -48,11 +53,11 @@ _UNIT_KINDS = ("stress", "length", "time")
 def show(given: CommandOptions) -> int:
     """Show a study, or a results file."""
     if Path(given.name).suffix not in _RESULT_SUFFIXES:
-        terminal.print_declaration(_build_study(given.name, given), given.output)
+        printing.print_declaration(_build_study(given.name, given), given.output)
         return OK
     if given.settings or given.rtol is not None or given.rig:
         raise click.UsageError("a results file is shown as it is, without --set, --rtol or a rig")
-    return terminal.print_results(_read_file(Path(given.name), given.study), given.name)
+    return printing.print_results(_read_file(Path(given.name), given.study), given.name)
 
 
 def run(given: CommandOptions) -> int:
@@ -64,11 +69,11 @@ def run(given: CommandOptions) -> int:
     log = given.output / "workers.log" if given.every else None
     with _open_workers(given, log) as where:
         ready = [
-            (s, runs.prepare_run(s, OutputOptions(**kept), where, not given.quiet)) for s in studies
+            (s, prepare_run(s, OutputOptions(**kept), where, not given.quiet)) for s in studies
         ]
         advice = not (given.every or given.quiet)
         for study in studies:
-            terminal.print_expected_cost(study, given.output, given.rtol is not None, advice)
+            printing.print_expected_cost(study, given.output, given.rtol is not None, advice)
         if given.every:
             return _run_all(ready, given, left_out)
         return FAILED if _run_study(*ready[0], given).colour == "red" else OK
@@ -83,8 +88,8 @@ def _run_study(
     file = given.output / f"{study.name}.{_FILE_SUFFIXES[given.format]}"
     own = None if isinstance(study.plot, str) else study.plot
     drawn = _save_figure(dataset, _default_figure_path(file, given), given, own)
-    end = terminal.run_summary(dataset, study.name, time.monotonic() - began, bool(drawn))
-    (terminal.print_short if given.every else terminal.print_report)(dataset, end, [file, *drawn])
+    end = printing.run_summary(dataset, study.name, time.monotonic() - began, bool(drawn))
+    (printing.print_short if given.every else printing.print_report)(dataset, end, [file, *drawn])
     return end
 
 
@@ -121,7 +126,7 @@ def _run_all(
                     )
                 )
     finally:
-        terminal.print_run_summaries([*ends, *left_out])
+        printing.print_run_summaries([*ends, *left_out])
     return FAILED if any(end.colour == "red" for end in ends) else OK
 
 
@@ -131,25 +136,25 @@ def rerun(given: CommandOptions) -> int:
         place = dict(map(assignments.parse_cell_coordinate, given.place))
         try:
             with warnings.catch_warnings(record=True, action="always") as caught:
-                scene, outcome = runs.recompute_cell(given.file, place, study=given.study)
+                scene, outcome = recompute_cell(given.file, place, study=given.study)
         except RsfStudyError:
             raise
         except Exception:  # it fails as it fails
             traceback.print_exc()
             return FAILED
-        results = runs.open(given.file)
+        results = open_results(given.file)
         index = np.unravel_index(find_cell_number(results, place), results["status"].shape)
         there = results.isel(dict(zip(results["status"].dims, index, strict=True)))
-        return terminal.print_outcome(scene, outcome, there, [str(one.message) for one in caught])
+        return printing.print_outcome(scene, outcome, there, [str(one.message) for one in caught])
     with _open_workers(given) as where:
         asked = given.select("study", "output", "time_limit") | {"progress": not given.quiet}
-        table = runs.rerun(given.file, workers=where.processes, client=where.client, **asked)
-    return terminal.print_agreement(table)
+        table = rerun_file(given.file, workers=where.processes, client=where.client, **asked)
+    return printing.print_agreement(table)
 
 
 def report(given: CommandOptions) -> int:
     """Write a page of all results."""
-    page, unread = reports.write_report(given.directory, given.output)
+    page, unread = write_report(given.directory, given.output)
     console.print(f"wrote {page}", soft_wrap=True)
     for file in unread:
         console.print(f"{file} cannot be read: the page says why", style="red", soft_wrap=True)
@@ -158,9 +163,9 @@ def report(given: CommandOptions) -> int:
 
 def compare(given: CommandOptions) -> int:
     """Compare two results files."""
-    files = [places.find_results(name, given.output) for name in (given.first, given.second)]
-    datasets = [runs.open(file) for file in files]
-    return terminal.print_comparison(files, datasets, runs.compare(*datasets))
+    files = [find_results(name, given.output) for name in (given.first, given.second)]
+    datasets = [open_results(file) for file in files]
+    return printing.print_comparison(files, datasets, compare_results(*datasets))
 
 
 def check(given: CommandOptions) -> int:
@@ -168,26 +173,26 @@ def check(given: CommandOptions) -> int:
     status, datasets = OK, []
     for name in _selected_names(given):
         if not given.every or (given.output / f"{name}.nc").exists():
-            datasets.append(runs.open(name, given.output))
-        elif why := missing_packages(catalogue.load_study(name).accuracy.engine):
+            datasets.append(open_results(name, given.output))
+        elif why := missing_packages(load_study(name).accuracy.engine):
             console.print(f"{name}: left out: {why}", style="yellow")
         else:
             console.print(f"{name}: not run yet", style="red")
             status = FAILED
-    return max(status, terminal.print_checks(datasets, given.claims)) if datasets else status
+    return max(status, printing.print_checks(datasets, given.claims)) if datasets else status
 
 
 def plot(given: CommandOptions) -> int:
     """Draw results, or a motion."""
     status, target = OK, _figure_target(given)
     for name in _selected_names(given):
-        results = places.find_results(name, OUTPUT_DIRECTORY if target else given.output)
+        results = find_results(name, OUTPUT_DIRECTORY if target else given.output)
         dataset = _read_file(results, given.study)
         beside = results if given.output is None else given.output / results.name
         place = target or _default_figure_path(beside, given)
-        if contents.is_single_scene(dataset):
+        if is_single_scene(dataset):
             drawing = dataset.rsf.plot(against=given.against)
-            terminal.write_figure(drawing, place, given.style)
+            printing.write_figure(drawing, place, given.style)
             drawn = [place]
         else:
             own = None if given.variable else _load_user_figure(dataset, given.study)
@@ -200,11 +205,11 @@ def plot(given: CommandOptions) -> int:
 
 def export(given: CommandOptions) -> int:
     """Write a file for other programs, or two."""
-    writers = {"csv": exchange.to_csv, "mat": exchange.to_mat}
+    writers = {"csv": to_csv, "mat": to_mat}
     asked = [ending for ending in writers if getattr(given, ending)]
     if not asked:
         raise click.UsageError("say --csv or --mat, or both")
-    dataset = store.read_dataset(given.file)
+    dataset = read_dataset(given.file)
     paths = {ending: (given.output or given.file).with_suffix(f".{ending}") for ending in asked}
     for path in paths.values():
         if os.path.lexists(path):
@@ -223,8 +228,8 @@ def export(given: CommandOptions) -> int:
 def _read_file(file: Path, study: Path | None) -> xr.Dataset:
     """What a file holds, once the parts of its scenes are known that a study file defines."""
     if study is not None:
-        catalogue.load_study(str(study))
-    return store.read_dataset(file)
+        load_study(str(study))
+    return read_dataset(file)
 
 
 # ---- what options say -----------------------------------------------------------------------
@@ -234,19 +239,19 @@ def _selected_names(given: CommandOptions) -> list[str]:
     """The study or file that is named, or all studies."""
     if given.every == (given.name is not None):
         raise click.UsageError("name one study, or say --all")
-    return list(names.study_names()) if given.every else [given.name]
+    return list(study_names()) if given.every else [given.name]
 
 
 def _build_study(name: str, given: CommandOptions) -> Study:
     """A study with the values that options set, on the rig that they state, whose stiffness takes
     the place of those on an axis.
     """
-    study, stated = catalogue.load_study(name), given.rig
+    study, stated = load_study(name), given.rig
     varied = {field for axis in study.axes for field in axis.fields}
     taken = {"load_velocity", *(["stiffness"] * bool(varied & {"stiffness", "stiffness_ratio"}))}
     if {*stated} - taken and study.rig is None:
         rig = {name: text for name, text in stated.items() if name not in taken}
-        study = rigs.with_rig(study, assignments.parse_rig(rig))
+        study = with_rig(study, assignments.parse_rig(rig))
         study = replace(study, overrides={**study.overrides, **rig})
         stated = {name: text for name, text in stated.items() if name in taken}
     in_si = {
@@ -255,7 +260,7 @@ def _build_study(name: str, given: CommandOptions) -> Study:
     }
     texts = {n: t if parse_number(t) is None else f"{t} {in_si[n]}" for n, t in stated.items()}
     changes = texts | assignments.parse_overrides(study, given.settings)
-    return runs.apply_overrides(study, changes, **given.select("rtol", "engine", "budget"))
+    return apply_overrides(study, changes, **given.select("rtol", "engine", "budget"))
 
 
 @contextlib.contextmanager
@@ -302,10 +307,10 @@ def _figure_target(given: CommandOptions) -> Path | None:
 
 def _load_user_figure(dataset: xr.Dataset, study: Path | None) -> Any:
     """What draws a figure that is not part of rsfstudy: the study file's own, or maps or lines."""
-    if contents.read_declaration(dataset).plot in plots.FIGURE_NAMES:
+    if read_declaration(dataset).plot in FIGURE_NAMES:
         return None
     try:
-        return restore.load_user_figure(dataset, study)
+        return load_user_figure(dataset, study)
     except RsfStudyError as error:
         if study is not None:
             raise
@@ -316,7 +321,7 @@ def _load_user_figure(dataset: xr.Dataset, study: Path | None) -> Any:
 def _save_figure(dataset: xr.Dataset, path: Path, given: CommandOptions, own: Any) -> list[Path]:
     """The figure, if it can be drawn; the results are there already."""
     try:
-        plots.save_figure(dataset, path, own, variable=given.variable, style=given.style)
+        save_figure(dataset, path, own, variable=given.variable, style=given.style)
     except (OSError, RsfStudyError) as error:
         stderr.print(f"no figure: {error}")
         return []

@@ -7,22 +7,20 @@ from pathlib import Path
 
 import numpy as np
 
-from rsfstudy.cli import assignments, terminal
+from rsfstudy.cli import assignments, printing
 from rsfstudy.cli.console import console
 from rsfstudy.cli.options import CommandOptions
 from rsfstudy.errors import InvalidValue
-from rsfstudy.referee import theirs
-from rsfstudy.referee.problem import (
-    BenchmarkProblem,
-    read_problem,
-    shipped_problems,
-    write_problems,
-)
-from rsfstudy.referee.verdict import (
+from rsfstudy.referee import (
     AnswerComparison,
+    BenchmarkProblem,
     compare_answers,
     known_answer,
+    read_answer,
+    read_problem,
     round_digits_down,
+    shipped_problems,
+    write_problems,
 )
 
 
@@ -30,7 +28,7 @@ def problems(given: CommandOptions) -> int:
     """Write all problems."""
     write_problems(given.directory)
     console.print(f"wrote {len(shipped_problems())} problems into {given.directory}")
-    return terminal.OK
+    return printing.OK
 
 
 def verify(given: CommandOptions) -> int:
@@ -43,7 +41,7 @@ def verify(given: CommandOptions) -> int:
     console.print(_quotable_summary(found), style="bold")
     if given.figure is not None:
         _draw_agreement(found, given.figure)
-    return terminal.OK if all(one.passes for one in found) else terminal.FAILED
+    return printing.OK if all(one.passes for one in found) else printing.FAILED
 
 
 def _judge_file(file: Path, given: CommandOptions) -> AnswerComparison:
@@ -57,7 +55,7 @@ def _judge_file(file: Path, given: CommandOptions) -> AnswerComparison:
         remedy = "Give --problem, or a file name that begins with it, as in 01_mine.csv."
         raise InvalidValue("problem", number, "is none", choices=map(str, there), remedy=remedy)
     columns = assignments.parse_columns(given.columns)
-    told = theirs.read_answer(file, posed, columns)
+    told = read_answer(file, posed, columns)
     return compare_answers(*known_answer(posed, path), told, given.digits)
 
 
@@ -101,8 +99,7 @@ def _quotable_summary(found: list[AnswerComparison]) -> str:
 
 def _draw_agreement(found: list[AnswerComparison], path: Path) -> None:
     """Digits along the rows of one problem, or by problem."""
-    from rsfstudy.plots import style_context
-    from rsfstudy.plots._agreement import draw_agreement
+    from rsfstudy.plots import draw_agreement, style_context
 
     digits: dict[str, list[tuple[float, float]]] = {}
     problem, label = found[0].problem, "problem"
@@ -118,4 +115,4 @@ def _draw_agreement(found: list[AnswerComparison], path: Path) -> None:
                 digits.setdefault(one.quantity, []).append((at, one.digits))
     with style_context(None):
         drawn = draw_agreement(digits, label, found[0].required_digits)
-    terminal.write_figure(drawn, path)
+    printing.write_figure(drawn, path)

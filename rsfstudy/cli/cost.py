@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rsfstudy.compute.plan import Plan, estimate_cost
-from rsfstudy.files import journal
-from rsfstudy.motion.engine_factory import missing_packages
-from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.execution import Plan, estimate_cost
+from rsfstudy.motion import COMPILED, SCIPY, missing_packages
+from rsfstudy.storage import CellTimings, read_timings
 
 #: How many times as long a call takes with SciPy as compiled, by measure. The page of benchmarks
 #: has 7 to 12 times, and 31 to 72 times, the more the more accurate.
@@ -34,7 +33,7 @@ def cost_text(plan: Plan, output: Path) -> str:
     work = round(work, 2 - len(str(work)))  # more digits than two would claim too much
     text = f"about {work:,} right-hand sides at rtol {plan.study.accuracy.rtol:g}; "
     kept = output / f"{plan.study.name}.cells.sqlite"
-    took = journal.read_timings(kept)
+    took = read_timings(kept)
     if took is None or not _has_same_accuracy(plan, took) or not took.seconds:
         return (
             f"{text}at a guess {format_duration(guess)} on one core, "
@@ -84,7 +83,7 @@ def format_duration(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
-def _has_same_accuracy(plan: Plan, took: journal.CellTimings) -> bool:
+def _has_same_accuracy(plan: Plan, took: CellTimings) -> bool:
     """True if cells were computed as accurately as they are to be now, and by the same engine."""
     asked = plan.study.accuracy
     return took.fingerprint.get("rtol") == asked.rtol and took.fingerprint.get("engine") == (

@@ -19,7 +19,7 @@ import click
 from rsfstudy.defaults import CELL_TIME_LIMIT, FIGURE_FORMATS, OUTPUT_DIRECTORY
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion.engines import ENGINES
+from rsfstudy.motion import ENGINES
 from rsfstudy.paths import check_path
 
 F = TypeVar("F", bound=Callable[..., Any])

@@ -16,7 +16,7 @@ from rsfstudy.motion.engines import (
     unknown_engine_error,
     user_stepper,
 )
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider import Numbers
 
 if TYPE_CHECKING:
     import numpy as np

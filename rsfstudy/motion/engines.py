@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import is_variable_name
+from rsfstudy.quantities import is_variable_name
 
 SCIPY, PYTHON, COMPILED = "scipy", "python", "compiled"
 ENGINES = (SCIPY, PYTHON, COMPILED)

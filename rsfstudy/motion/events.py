@@ -1,6 +1,6 @@
 """Kinds of events of a motion, and the rows of the event table.
 
-The module ``within_steps`` detects and locates the events. The table lists the events in order,
+The module ``step_events`` detects and locates the events. The table lists the events in order,
 each with its time, slip and point. A measure can request the following events:
 
     maximum(quantity), minimum(quantity)
@@ -35,7 +35,7 @@ from rsfstudy._deprecation import (
     renamed_names,
     renamed_value,
 )
-from rsfstudy.slider.point import Point
+from rsfstudy.slider import Point
 
 
 class EventKind(StrEnum):

@@ -104,7 +104,7 @@ MOTION = np.dtype(
 CALL_FORMAT, COUNTER_FORMAT = struct.Struct("=7d4q"), struct.Struct("=6q")
 CALL_FIELDS = (MOTION.names or ())[:11]
 #: Rows of the table of functions; and how many equations have there, of which the last may be
-#: missing (see `columns.InPlaceFunctions`).
+#: missing (see `inplace.InPlaceFunctions`).
 SLOW_REGIME, FAST_REGIME = 0, 1
 FUNCTIONS_PER_REGIME = 4
 
@@ -148,8 +148,8 @@ APPARENT_FRICTION, APPARENT_FRICTION_RATE, FIRST_STATE = 10, 11, 12
 
 #: Why a call returns: to be called again once its tables are read; because the motion has ended;
 #: because its regime ends; because it cannot go on; or because its segment of loading ends. (The
-#: change of regimes has a file, `handover`; `REGIME_CODE` and `KINK_CODE` above are what is told of
-#: both.)
+#: change of regimes has a file, `regime_switching`; `REGIME_CODE` and `KINK_CODE` above are what is
+#: told of both.)
 (
     PAUSED,
     MOTION_ENDED,

@@ -1,7 +1,7 @@
 """The loop of all motions: step by step through their regimes, until there is something to tell.
 
 Plain Python of a kind that Numba compiles. What takes the steps is a stepper (`steppers`); compiled
-or not, with whatever stepper, events are found here. `running` calls it.
+or not, with whatever stepper, events are found here. `driver` calls it.
 
 To follow a rupture with a debugger, simulate a scene with ``inertia=True``, because without mass
 there is one regime only; with ``engine="scipy"``, or ``engine="python"`` to see inside of steps.
@@ -17,16 +17,7 @@ from __future__ import annotations
 
 import math
 
-from rsfstudy.motion.calls import as_pointer, copy_values, evaluate, offset_by
-from rsfstudy.motion.handover import (
-    CONTINUES,
-    SwitchThresholds,
-    find_termination,
-    may_switch_back,
-    should_switch_back,
-    starts_on_manifold,
-    termination_margin,
-)
+from rsfstudy.motion.array_calls import as_pointer, copy_values, evaluate, offset_by
 from rsfstudy.motion.layout import (
     END_CODE,
     FAST_REGIME,
@@ -53,16 +44,16 @@ from rsfstudy.motion.layout import (
     TERMINATED,
 )
 from rsfstudy.motion.recording import SAMPLES_PER_STEP
-from rsfstudy.motion.steppers import begin, retake
-from rsfstudy.motion.steps import (
-    halve_unresolved_step,
-    regime_time,
-    take_step,
-    time_at_begin,
-    time_at_end,
-    truncate_at,
+from rsfstudy.motion.regime_switching import (
+    CONTINUES,
+    SwitchThresholds,
+    find_termination,
+    may_switch_back,
+    should_switch_back,
+    starts_on_manifold,
+    termination_margin,
 )
-from rsfstudy.motion.within_steps import (
+from rsfstudy.motion.step_events import (
     SWITCH_CONDITION,
     TERMINATION_CONDITION,
     TIME_CONDITION,
@@ -77,8 +68,17 @@ from rsfstudy.motion.within_steps import (
     slip_since_start,
     switch_excess,
 )
+from rsfstudy.motion.steppers import begin, retake
+from rsfstudy.motion.steps import (
+    halve_unresolved_step,
+    regime_time,
+    take_step,
+    time_at_begin,
+    time_at_end,
+    truncate_at,
+)
 from rsfstudy.motion.workspace import create_workspace
-from rsfstudy.slider.places import (
+from rsfstudy.parts import (
     BOUNDARY_PRESSURE_RATE,
     LAW,
     LOAD_VELOCITY,

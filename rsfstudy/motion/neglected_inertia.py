@@ -20,10 +20,7 @@ from rsfstudy.motion.recording import (
     SAMPLES_PER_STEP,
     STRESS_COLUMNS,
 )
-from rsfstudy.slider.dynamics.inertia import NEGLIGIBLE_SECOND_ORDER_WEIGHT
-from rsfstudy.slider.equations import equations_by_displacement
-from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.places import (
+from rsfstudy.parts import (
     BOUNDARY_PRESSURE_RATE,
     LOAD_VELOCITY,
     LOADING,
@@ -34,7 +31,12 @@ from rsfstudy.slider.places import (
     SEGMENT_VELOCITY,
     A,
 )
-from rsfstudy.slider.scene import Scene
+from rsfstudy.slider import (
+    NEGLIGIBLE_SECOND_ORDER_WEIGHT,
+    Numbers,
+    Scene,
+    equations_by_displacement,
+)
 
 #: Largest ratio of errors to estimates without this factor, rounded up: over random scenes with
 #: thresholds loosened three to ten times, friction errs by up to 1.4 times its estimate.

@@ -17,10 +17,7 @@ from rsfstudy.motion.recording import (
     SAMPLES_PER_STEP,
     resample_along_path,
 )
-from rsfstudy.slider.equations import RUPTURE_REGIME
-from rsfstudy.slider.point import Point
-from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.system import PATH_LOG_RATE_SCALE, path_metric
+from rsfstudy.slider import PATH_LOG_RATE_SCALE, RUPTURE_REGIME, Point, Scene, path_metric
 
 #: Smallest square of a direction cosine of the path in a rupture, where ln V changes at once.
 MIN_SQUARED_COSINE = 1e-12

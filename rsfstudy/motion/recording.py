@@ -11,8 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rsfstudy.motion.events import Event
-from rsfstudy.slider.point import Point
-from rsfstudy.slider.scene import Scene
+from rsfstudy.slider import Point, Scene
 
 #: What is recorded, in this order.
 MOTION_VARIABLES = (

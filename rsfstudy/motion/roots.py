@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rsfstudy.slider.parts import Function
+from rsfstudy.slider import Function
 
 _MAX_ITERATIONS = 100
 

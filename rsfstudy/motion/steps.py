@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rsfstudy.motion.calls import copy_values, evaluate
+from rsfstudy.motion.array_calls import copy_values, evaluate
 from rsfstudy.motion.layout import (
     BUDGET_EXCEEDED,
     FAST_REGIME,
@@ -17,8 +17,8 @@ from rsfstudy.motion.layout import (
 )
 from rsfstudy.motion.steppers import attempt, retake, step_to_segment_end, unknowns_at
 from rsfstudy.motion.workspace import count_evaluations, step_rates
-from rsfstudy.slider.equations import LONGEST_STEP, compute_longest_step
-from rsfstudy.slider.places import LOG_LOAD_VELOCITY
+from rsfstudy.parts import LOG_LOAD_VELOCITY
+from rsfstudy.slider import LONGEST_STEP, compute_longest_step
 
 #: What slopes of dense output may differ by from rates over a step, in local tolerances; how often
 #: a step is halved for that, and by how much the next may be longer; and how far apart, over the

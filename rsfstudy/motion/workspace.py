@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from rsfstudy._deprecation import renamed_members
-from rsfstudy.motion.calls import copy_values, evaluate, offset_by
-from rsfstudy.motion.handover import SwitchThresholds
+from rsfstudy.motion.array_calls import copy_values, evaluate, offset_by
 from rsfstudy.motion.layout import FIRST_STATE, FUNCTIONS_PER_REGIME, SLOW_REGIME
-from rsfstudy.motion.steppers.unrolled import (
+from rsfstudy.motion.regime_switching import SwitchThresholds
+from rsfstudy.motion.steppers.unrolled_step import (
     DENSE_ROW_COUNT,
     HEADER_SIZE,
     STAGE_COUNT,
@@ -43,7 +43,7 @@ class Workspace(NamedTuple):
     event_clocks : array
         Clocks at which events happen within a step.
     rate, point, attempt, balance : function
-        The equations (see `columns`).
+        The equations (see `inplace`).
     specs : array
         Event specifications, one row of numbers after the other.
     spec_count : int

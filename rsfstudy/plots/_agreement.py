@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
 
-from rsfstudy.plots import NotebookFigure
+from rsfstudy.plots._figures import NotebookFigure
 from rsfstudy.plots._style import (
     add_legend,
     cycle_marker,

@@ -16,6 +16,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
+from rsfstudy.formatting import read_flag_meanings
 from rsfstudy.plots._text import (
     axis_label,
     format_number,
@@ -26,9 +27,8 @@ from rsfstudy.plots._text import (
     visible_length,
     wrap_text,
 )
-from rsfstudy.reduce.base import read_quantities
+from rsfstudy.study import read_quantities
 from rsfstudy.vocabulary import coverage_content_type, find_quantity
-from rsfstudy.wording import read_flag_meanings
 
 #: Values that span more than this are drawn on a log axis.
 _LOG_SCALE_RATIO = 100.0

@@ -16,9 +16,8 @@ from matplotlib.figure import Figure
 from rsfstudy._deprecation import renamed_keywords
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.files import contents
-from rsfstudy.plots import NotebookFigure
 from rsfstudy.plots._axes import set_log_scale
+from rsfstudy.plots._figures import NotebookFigure
 from rsfstudy.plots._style import (
     add_legend,
     add_panel_letters,
@@ -30,10 +29,9 @@ from rsfstudy.plots._style import (
     style_context,
 )
 from rsfstudy.plots._text import to_mathtext, wrap_text
-from rsfstudy.rig.laboratory import Rig
-from rsfstudy.rig.scales import DISPLAY_BASE_UNITS
-from rsfstudy.slider.scene import Scene
-from rsfstudy.slider.steady import steady_friction_excess
+from rsfstudy.rig import DISPLAY_BASE_UNITS, Rig
+from rsfstudy.slider import Scene, steady_friction_excess
+from rsfstudy.storage import read_scene_fields
 
 #: Of a panel, in mm.
 PANEL_HEIGHT = 48.0
@@ -183,7 +181,7 @@ def _draw_phase_plane(motion: xr.Dataset, shown: xr.Dataset, axes: Axes) -> None
         scale * 10.0 ** logs[0], friction[0], "o", color=cycle_style(0)["color"], label="its start"
     )
     beyond = np.linspace(float(logs.min()) - 0.3, float(logs.max()) + 0.3, 201)
-    steady = _steady_friction(contents.read_scene_fields(motion), beyond)
+    steady = _steady_friction(read_scene_fields(motion), beyond)
     if steady is not None:
         axes.plot(scale * 10.0**beyond, steady, "--", color="0.4", label="steady sliding")
     set_log_scale(axes, "x")

@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from rsfstudy.declare.figure import Panel
 from rsfstudy.plots._axes import (
     add_colour_bar,
     describe_point,
@@ -32,8 +31,8 @@ from rsfstudy.plots._style import (
 )
 from rsfstudy.plots._text import axis_label as labelled
 from rsfstudy.plots._text import format_slope, to_mathtext, wrap_text
-from rsfstudy.reduce.base import read_quantities
 from rsfstudy.status import Status
+from rsfstudy.study import Panel, read_quantities
 from rsfstudy.vocabulary import find_quantity
 
 #: Of the second axis of `hue`: dashes, and how markers are filled.

@@ -9,7 +9,7 @@ from typing import Any
 import xarray as xr
 from matplotlib.mathtext import MathTextParser
 
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantities import Quantity
 
 _MATH_PARSER = MathTextParser("path")
 _MATH_PATTERN = re.compile(r"((?<!\\)\$(?:[^$\\]|\\.)*\$)")

@@ -13,11 +13,10 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.text import Text
 
-from rsfstudy.analysis.fitting.joint import split_window_number
-from rsfstudy.analysis.fitting.model import PARAMETERS
-from rsfstudy.declare.figure import Panel
+from rsfstudy.fitting import PARAMETERS, split_window_number
 from rsfstudy.plots._axes import describe_point
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_style
+from rsfstudy.study import Panel
 
 #: Lags of the autocorrelation, most rows of a record that are drawn, and most records with a panel.
 _MAX_LAGS, _MAX_ROWS, _MAX_RECORDS = 40, 20_000, 4

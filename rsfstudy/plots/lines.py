@@ -9,8 +9,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from rsfstudy.declare.figure import Panel
-from rsfstudy.files.contents import read_declaration
 from rsfstudy.plots._axes import (
     add_colour_bar,
     describe_point,
@@ -25,7 +23,8 @@ from rsfstudy.plots._axes import (
 )
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_marker, cycle_style
 from rsfstudy.plots._text import axis_label, to_mathtext
-from rsfstudy.reduce.base import read_quantities
+from rsfstudy.storage import read_declaration
+from rsfstudy.study import Panel, read_quantities
 from rsfstudy.vocabulary import find_quantity
 
 #: Most panels, and most lines that a legend names; lines along a longer axis of numbers are told

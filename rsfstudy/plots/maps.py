@@ -20,7 +20,6 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, MaxNLocator
 from scipy.spatial import cKDTree
 
-from rsfstudy.declare.figure import Panel
 from rsfstudy.plots._axes import (
     flag_meanings,
     has_numeric_points,
@@ -30,8 +29,8 @@ from rsfstudy.plots._axes import (
     spans_decades,
 )
 from rsfstudy.plots._text import axis_label, to_mathtext
-from rsfstudy.reduce.base import read_quantities
 from rsfstudy.status import Status
+from rsfstudy.study import Panel, read_quantities
 from rsfstudy.vocabulary import find_quantity
 
 #: Fewest points of an axis of a map, and most maps.

@@ -13,8 +13,6 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from rsfstudy.declare.figure import DrawFunction, Panel
-from rsfstudy.files import contents
 from rsfstudy.plots._axes import (
     describe_point,
     has_numeric_points,
@@ -23,7 +21,8 @@ from rsfstudy.plots._axes import (
 )
 from rsfstudy.plots._style import cycle_style
 from rsfstudy.plots._text import format_units, quantity_symbol, wrap_text
-from rsfstudy.reduce.base import read_quantities
+from rsfstudy.storage import build_axis, read_declaration
+from rsfstudy.study import DrawFunction, Panel, read_quantities
 from rsfstudy.vocabulary import find_quantity
 
 #: Most quantities that are shown, the headline among them, and most ticks of each.
@@ -55,7 +54,7 @@ def square_side(panels: Sequence[Panel]) -> int:
 def _sampled_fields(dataset: xr.Dataset) -> dict[str, list[str]]:
     """Fields along each axis whose points are numbered, by its dimension."""
     found: dict[str, list[str]] = {}
-    for axis in map(contents.build_axis, contents.read_declaration(dataset).axes):
+    for axis in map(build_axis, read_declaration(dataset).axes):
         if axis.has_numbered_points and dataset.sizes.get(axis.dimension, 1) > 1:
             found[axis.dimension] = [name for name in axis.fields if name in dataset.coords]
     return found

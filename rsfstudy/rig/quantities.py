@@ -11,8 +11,7 @@ import numpy as np
 from rsfstudy.error_boundary import user_stacklevel
 from rsfstudy.errors import InvalidValue, RsfStudyWarning
 from rsfstudy.rig.units import convert_to_si
-from rsfstudy.slider.numbers import STIFFNESS_FIELDS
-from rsfstudy.slider.registry import FIELD_QUANTITIES
+from rsfstudy.slider import FIELD_QUANTITIES, STIFFNESS_FIELDS
 
 
 class RigQuantity(NamedTuple):

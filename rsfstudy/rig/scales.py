@@ -12,7 +12,7 @@ import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.netcdf import with_cf_encoding
-from rsfstudy.quantity import format_unit_quotient, split_unit_quotient
+from rsfstudy.quantities import format_unit_quotient, split_unit_quotient
 from rsfstudy.rig.units import unit_factor
 
 #: What ratios of the slider are, once they are in other units. Scenes have another `normal_stress`.

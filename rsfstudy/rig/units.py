@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes.axis import to_plain_value
+from rsfstudy.axes import to_plain_value
 from rsfstudy.errors import InvalidValue
 
 #: A factor to SI, and the exponents of kilogram, metre and second.

@@ -1,39 +1,298 @@
-"""The physics of a spring-slider: floats in, floats out. It can be read alone.
+"""Physics of one spring-slider: parts, parameters, equations and stability.
+
+A ``Scene`` describes a slider by five parts: a state evolution law, a normal stress condition, a
+pore fluid, the dynamics and the loading. The package checks scenes and provides their equations of
+motion, their steady states and the stability of these. It never integrates the equations, never
+reads or writes a file, and needs nothing but Python, NumPy and SciPy.
 
 A slider is five choices, each one file of `laws`, `normal_stress`, `fluid`, `dynamics` and
 `loading`; a `scene` says which. Read in this order: `friction` puts law, normal stress and pore
 pressure into one relation between stress, slip rate and state, with `states` beside it; a file of
-`dynamics` says how slip rate follows; `system` makes equations of motion of both, for whatever
-parts a scene has; `equations` gives what an integrator takes. Their numbers stand where `places`
-says. `steady` asks the same relation for steady sliding and its stability. `closed_forms` are what
-others have published.
+`dynamics` says how slip rate follows; `scene_functions` makes equations of motion of both, for
+whatever parts a scene has; `equations` gives what an integrator takes. Their numbers stand where
+`parameter_layout` says. `steady_state` asks the same relation for steady sliding and its stability.
+`closed_forms` are what others have published.
 
 From a law to a motion, each hop a function that the next one holds:
 
 1. ``evolution`` of a file in `laws`: the change of the state per unit slip.
 2. `states.evolutions_from_single_state` makes ``evolutions`` of it, which takes a tuple of states
-   and returns one; a law of several states states that itself. `system.build_scene_functions`
-   chooses.
+   and returns one; a law of several states states that itself.
+   `scene_functions.build_scene_functions` chooses.
 3. `friction.build_friction_functions` adds the unknowns of a fluid or a loading behind those of the
    law: ``FrictionFunctions.evolutions``.
-4. `system` makes rates of it: `system.displacement_rate_function` between ruptures, and of a rigid
-   slider `system.rigid_rate_function`. In a rupture `dynamics.inertia.rupture_rate` calls it;
-   between ruptures with mass, `dynamics.inertia.slip_rate` as well.
+4. `scene_functions` makes rates of it: `scene_functions.displacement_rate_function` between
+   ruptures, and of a rigid slider `scene_functions.rigid_rate_function`. In a rupture
+   `dynamics.inertia.rupture_rate` calls it; between ruptures with mass,
+   `dynamics.inertia.slip_rate` as well.
 5. `equations` puts the rates of a scene, its unknowns and its numbers together.
-6. `motion.columns` makes functions of them that fill arrays; a stepper calls these (the one of
+6. `motion.inplace` makes functions of them that fill arrays; a stepper calls these (the one of
    SciPy calls ``Equations.rate_function`` itself), and `motion.loop` the stepper, step by step.
 
 Where the equations of the paper are:
 
-    1a, 4a    friction                                   friction
-    1b        slip law                                   laws.slip
-    4b        slowness law                               laws.slowness
-    1b to 3   effect of normal stress on the state       normal_stress.variable
-    5         normal stress follows shear stress         normal_stress.variable
-    6         motion with mass                           dynamics.inertia
-    15        quasi-static motion                        dynamics.quasi_static, system
-    7, 9      critical stiffness, no steady sliding      steady
-    8, 10, 11, 14   closed forms of boundaries           closed_forms
-    12, 13    stress and slip rate after a jump          friction, steady
-    16, 17    a rigid slider                             system, laws.slip, laws.slowness
+    1a, 4a    friction                                  friction
+    1b        slip law                                  laws.slip
+    4b        slowness law                              laws.slowness
+    1b to 3   effect of normal stress on the state      normal_stress.variable
+    5         normal stress follows shear stress        normal_stress.variable
+    6         motion with mass                          dynamics.inertia
+    15        quasi-static motion                       dynamics.quasi_static, scene_functions
+    7, 9      critical stiffness, no steady sliding     steady_state
+    8, 10, 11, 14   closed forms of boundaries          closed_forms
+    12, 13    stress and slip rate after a jump         friction, steady_state
+    16, 17    a rigid slider                            scene_functions, laws.slip, laws.slowness
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rsfstudy._lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.assembly import find_inapplicable_fields, replace_field_values
+    from rsfstudy.slider.caching import cached_attribute, cached_per_scene
+    from rsfstudy.slider.closed_forms import CLOSED_FORMS, effective_friction
+    from rsfstudy.slider.closed_forms import critical_stiffness as critical_stiffness_closed_form
+    from rsfstudy.slider.dynamics.inertia import NEGLIGIBLE_SECOND_ORDER_WEIGHT
+    from rsfstudy.slider.equations import (
+        LONGEST_STEP,
+        RUPTURE_REGIME,
+        Equations,
+        compute_longest_step,
+        compute_steady_states,
+        equations_between_ruptures,
+        equations_by_displacement,
+        equations_by_inertial_time,
+        equations_in_rupture,
+        equations_of_rigid_slider,
+        equations_without_mass,
+        friction_relation,
+        log_slip_rate_at,
+        normal_stress_at,
+        single_state_evolution,
+        state_evolution,
+    )
+    from rsfstudy.slider.fluid import BUILT_IN_PARTS
+    from rsfstudy.slider.friction import FrictionFunctions
+    from rsfstudy.slider.hints import suggest_field
+    from rsfstudy.slider.loading import MIN_SEGMENT_DURATION
+    from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLIP_RATE
+    from rsfstudy.slider.parts import Function, Numbers, field_names
+    from rsfstudy.slider.point import Point
+    from rsfstudy.slider.protocols import SEGMENT_KEYS, Protocol, UserLoading, protocol
+    from rsfstudy.slider.registry import (
+        FIELD_NAMES,
+        FIELD_QUANTITIES,
+        FIELD_TYPES,
+        OMITTED_IF_NONE,
+        SELECTOR_FIELDS,
+        SLOT_NAMES,
+        SLOTS,
+        UserPart,
+        field_defaults,
+        field_types,
+        find_named_user_parts,
+        names_to_parts,
+        normalise_field_value,
+        quantities_with_values,
+        register_parts,
+        scene_fields,
+        user_field_quantities,
+        with_field_signature,
+    )
+    from rsfstudy.slider.sampled_history import (
+        STRESS_RATE_COLUMN,
+        SampledHistory,
+        build_sampled_history,
+        history_from_table,
+    )
+    from rsfstudy.slider.scene import ENDLESS_SEGMENT_TABLE, Scene, check_scene
+    from rsfstudy.slider.scene_functions import (
+        PATH_LOG_RATE_SCALE,
+        STOPPED_LOG_SLIP_RATE,
+        path_metric,
+    )
+    from rsfstudy.slider.slider_parameters import STIFFNESS_FIELDS, SliderParameters
+    from rsfstudy.slider.stability import (
+        critical_stiffness,
+        critical_stiffnesses,
+        growth_rates,
+        largest_growth_rate,
+    )
+    from rsfstudy.slider.steady_state import (
+        SteadySliding,
+        min_steady_log_slip_rate,
+        steady_friction_excess,
+        steady_sliding,
+        stress_after_jump,
+        stress_for_friction,
+    )
+else:
+    __getattr__, __dir__ = lazy_exports(
+        __name__,
+        {
+            "slider.assembly": ("find_inapplicable_fields", "replace_field_values"),
+            "slider.caching": ("cached_attribute", "cached_per_scene"),
+            "slider.closed_forms": (
+                "CLOSED_FORMS",
+                "critical_stiffness as critical_stiffness_closed_form",
+                "effective_friction",
+            ),
+            "slider.dynamics.inertia": ("NEGLIGIBLE_SECOND_ORDER_WEIGHT",),
+            "slider.equations": (
+                "Equations",
+                "LONGEST_STEP",
+                "RUPTURE_REGIME",
+                "compute_longest_step",
+                "compute_steady_states",
+                "equations_between_ruptures",
+                "equations_by_displacement",
+                "equations_by_inertial_time",
+                "equations_in_rupture",
+                "equations_of_rigid_slider",
+                "equations_without_mass",
+                "friction_relation",
+                "log_slip_rate_at",
+                "normal_stress_at",
+                "single_state_evolution",
+                "state_evolution",
+            ),
+            "slider.fluid": ("BUILT_IN_PARTS",),
+            "slider.friction": ("FrictionFunctions",),
+            "slider.hints": ("suggest_field",),
+            "slider.loading": ("MIN_SEGMENT_DURATION",),
+            "slider.parameter_layout": ("LARGEST_LOG_SLIP_RATE",),
+            "slider.parts": ("Function", "Numbers", "field_names"),
+            "slider.point": ("Point",),
+            "slider.protocols": ("Protocol", "SEGMENT_KEYS", "UserLoading", "protocol"),
+            "slider.registry": (
+                "FIELD_NAMES",
+                "FIELD_QUANTITIES",
+                "FIELD_TYPES",
+                "OMITTED_IF_NONE",
+                "SELECTOR_FIELDS",
+                "SLOTS",
+                "SLOT_NAMES",
+                "UserPart",
+                "field_defaults",
+                "field_types",
+                "find_named_user_parts",
+                "names_to_parts",
+                "normalise_field_value",
+                "quantities_with_values",
+                "register_parts",
+                "scene_fields",
+                "user_field_quantities",
+                "with_field_signature",
+            ),
+            "slider.sampled_history": (
+                "STRESS_RATE_COLUMN",
+                "SampledHistory",
+                "build_sampled_history",
+                "history_from_table",
+            ),
+            "slider.scene": ("ENDLESS_SEGMENT_TABLE", "Scene", "check_scene"),
+            "slider.scene_functions": (
+                "PATH_LOG_RATE_SCALE",
+                "STOPPED_LOG_SLIP_RATE",
+                "path_metric",
+            ),
+            "slider.slider_parameters": ("STIFFNESS_FIELDS", "SliderParameters"),
+            "slider.stability": (
+                "critical_stiffness",
+                "critical_stiffnesses",
+                "growth_rates",
+                "largest_growth_rate",
+            ),
+            "slider.steady_state": (
+                "SteadySliding",
+                "min_steady_log_slip_rate",
+                "steady_friction_excess",
+                "steady_sliding",
+                "stress_after_jump",
+                "stress_for_friction",
+            ),
+        },
+    )
+
+__all__ = [
+    "BUILT_IN_PARTS",
+    "CLOSED_FORMS",
+    "ENDLESS_SEGMENT_TABLE",
+    "Equations",
+    "FIELD_NAMES",
+    "FIELD_QUANTITIES",
+    "FIELD_TYPES",
+    "FrictionFunctions",
+    "Function",
+    "LARGEST_LOG_SLIP_RATE",
+    "LONGEST_STEP",
+    "MIN_SEGMENT_DURATION",
+    "NEGLIGIBLE_SECOND_ORDER_WEIGHT",
+    "Numbers",
+    "OMITTED_IF_NONE",
+    "PATH_LOG_RATE_SCALE",
+    "Point",
+    "Protocol",
+    "RUPTURE_REGIME",
+    "SEGMENT_KEYS",
+    "SELECTOR_FIELDS",
+    "SLOTS",
+    "SLOT_NAMES",
+    "STIFFNESS_FIELDS",
+    "STOPPED_LOG_SLIP_RATE",
+    "STRESS_RATE_COLUMN",
+    "SampledHistory",
+    "Scene",
+    "SliderParameters",
+    "SteadySliding",
+    "UserLoading",
+    "UserPart",
+    "build_sampled_history",
+    "cached_attribute",
+    "cached_per_scene",
+    "check_scene",
+    "compute_longest_step",
+    "compute_steady_states",
+    "critical_stiffness",
+    "critical_stiffness_closed_form",
+    "critical_stiffnesses",
+    "effective_friction",
+    "equations_between_ruptures",
+    "equations_by_displacement",
+    "equations_by_inertial_time",
+    "equations_in_rupture",
+    "equations_of_rigid_slider",
+    "equations_without_mass",
+    "field_defaults",
+    "field_names",
+    "field_types",
+    "find_inapplicable_fields",
+    "find_named_user_parts",
+    "friction_relation",
+    "growth_rates",
+    "history_from_table",
+    "largest_growth_rate",
+    "log_slip_rate_at",
+    "min_steady_log_slip_rate",
+    "names_to_parts",
+    "normal_stress_at",
+    "normalise_field_value",
+    "path_metric",
+    "protocol",
+    "quantities_with_values",
+    "register_parts",
+    "replace_field_values",
+    "scene_fields",
+    "single_state_evolution",
+    "state_evolution",
+    "steady_friction_excess",
+    "steady_sliding",
+    "stress_after_jump",
+    "stress_for_friction",
+    "suggest_field",
+    "user_field_quantities",
+    "with_field_signature",
+]

@@ -12,12 +12,12 @@ from typing import Any, NamedTuple, Self
 from rsfstudy._deprecation import renamed_attribute
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import HtmlTableMixin, Quantity
+from rsfstudy.quantities import HtmlTableMixin, Quantity
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
-from rsfstudy.slider.derived import cached_attribute
-from rsfstudy.slider.numbers import STIFFNESS_FIELDS, SliderParameters, with_stiffness_default
+from rsfstudy.slider.caching import cached_attribute
+from rsfstudy.slider.hints import suggest_choice, suggest_field, suggest_keyword
 from rsfstudy.slider.parts import Part, field_names, validate_value
-from rsfstudy.slider.protocol import UserLoading
+from rsfstudy.slider.protocols import UserLoading
 from rsfstudy.slider.registry import (
     FIELD_OWNERS,
     NAMED_SLOTS,
@@ -34,7 +34,11 @@ from rsfstudy.slider.registry import (
     scene_fields,
     with_field_signature,
 )
-from rsfstudy.slider.synonyms import suggest_choice, suggest_field, suggest_keyword
+from rsfstudy.slider.slider_parameters import (
+    STIFFNESS_FIELDS,
+    SliderParameters,
+    with_stiffness_default,
+)
 
 
 class SceneParts(NamedTuple):

@@ -6,11 +6,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from rsfstudy._deprecation import renamed_members
-from rsfstudy.slider.derived import cached_per_scene
+from rsfstudy.slider.caching import cached_per_scene
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
-from rsfstudy.slider.parts import Function, Numbers, Scene
+from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.point import Point
-from rsfstudy.slider.system import RegimeFunctions, SceneFunctions, build_scene_functions
+from rsfstudy.slider.scene_functions import RegimeFunctions, SceneFunctions, build_scene_functions
+from rsfstudy.slider.scene_view import SceneView
 
 #: The regime of the full equations of a scene with mass, and that of a rigid slider.
 RUPTURE_REGIME, RIGID_REGIME = "inertial", "rigid"
@@ -81,7 +82,7 @@ class Equations(NamedTuple):
 
 
 @cached_per_scene
-def equations_between_ruptures(scene: Scene, *, clock: bool) -> Equations:
+def equations_between_ruptures(scene: SceneView, *, clock: bool) -> Equations:
     """The form of a scene where mass, if it has any, hardly acts: unknowns f and Psi (or the states
     of a law that has several), and time as a passenger where a `clock` is wanted.
     """
@@ -89,7 +90,7 @@ def equations_between_ruptures(scene: Scene, *, clock: bool) -> Equations:
 
 
 @cached_per_scene
-def equations_without_mass(scene: Scene, *, clock: bool) -> Equations:
+def equations_without_mass(scene: SceneView, *, clock: bool) -> Equations:
     """The form between ruptures with mass left out altogether."""
     if scene.dynamics.rupture_rate is None:
         return equations_between_ruptures(scene, clock=clock)
@@ -99,7 +100,7 @@ def equations_without_mass(scene: Scene, *, clock: bool) -> Equations:
 
 
 def _build_slow_equations(
-    scene: Scene, forms: SceneFunctions, regime: str, *, clock: bool
+    scene: SceneView, forms: SceneFunctions, regime: str, *, clock: bool
 ) -> Equations:
     unknowns, form = ("spring_stress", *_state_names(scene)), forms.between_ruptures
     unknowns, scales, rate = _with_optional_time(
@@ -120,7 +121,7 @@ def _with_optional_time(
     return (*unknowns, "time"), (*scales, 1.0), form.path_rates_with_time
 
 
-def _state_names(scene: Scene) -> tuple[str, ...]:
+def _state_names(scene: SceneView) -> tuple[str, ...]:
     """Names of the states."""
     count = scene.parts.law.state_count
     of_law = ["psi"] if count == 1 else [f"psi_{i + 1}" for i in range(count)]
@@ -128,7 +129,7 @@ def _state_names(scene: Scene) -> tuple[str, ...]:
 
 
 @cached_per_scene
-def equations_in_rupture(scene: Scene, *, clock: bool = False) -> Equations:
+def equations_in_rupture(scene: SceneView, *, clock: bool = False) -> Equations:
     """The full equations of a scene with mass: f, ln(V/V_*) and g, and the states but the first;
     and inertial time, in T/(2 pi), as a passenger where a `clock` is wanted.
     """
@@ -141,14 +142,14 @@ def equations_in_rupture(scene: Scene, *, clock: bool = False) -> Equations:
     )
 
 
-def _rupture_functions(scene: Scene) -> RegimeFunctions:
+def _rupture_functions(scene: SceneView) -> RegimeFunctions:
     full = scene.functions.in_rupture
     if full is None:
         raise TypeError(f"{scene.dynamics.name} has no equations of ruptures")
     return full
 
 
-def equations_by_displacement(scene: Scene) -> Equations:
+def equations_by_displacement(scene: SceneView) -> Equations:
     """The form between ruptures against slip plus load point displacement: differences of its rates
     are linear in departures farther from steady sliding than those along the path.
     """
@@ -156,12 +157,12 @@ def equations_by_displacement(scene: Scene) -> Equations:
     return along._replace(rate_function=scene.functions.between_ruptures.clock_rates)
 
 
-def equations_by_inertial_time(scene: Scene) -> Equations:
+def equations_by_inertial_time(scene: SceneView) -> Equations:
     """The full equations in inertial time T/(2 pi)."""
     return equations_in_rupture(scene)._replace(rate_function=_rupture_functions(scene).clock_rates)
 
 
-def equations_of_rigid_slider(scene: Scene, log_slip_rate: float) -> Equations:
+def equations_of_rigid_slider(scene: SceneView, log_slip_rate: float) -> Equations:
     """A rigid slider at prescribed ln(V/V_*), against slip: g, and the states but the first."""
     forms, unknowns = scene.functions, ("friction", *_state_names(scene)[1:])
     scales, p = (scene.a,) * len(unknowns), (*scene.numbers, log_slip_rate)
@@ -177,7 +178,7 @@ def equations_of_rigid_slider(scene: Scene, log_slip_rate: float) -> Equations:
 
 
 def friction_relation(
-    scene: Scene, psis: Numbers = ()
+    scene: SceneView, psis: Numbers = ()
 ) -> Callable[[float], tuple[float, float, float, float]]:
     """The friction relation of a scene: g -> (strength, slope, shift, slope of the shift); at the
     pore pressure of steady sliding, unless states are given.
@@ -187,7 +188,7 @@ def friction_relation(
     return lambda friction: strength(friction, known, p)
 
 
-def normal_stress_at(scene: Scene, friction: float, psis: Numbers = ()) -> float:
+def normal_stress_at(scene: SceneView, friction: float, psis: Numbers = ()) -> float:
     """Effective normal stress over sigma_* under a deviation of frictional stress, at steady
     sliding unless states are given.
     """
@@ -196,7 +197,7 @@ def normal_stress_at(scene: Scene, friction: float, psis: Numbers = ()) -> float
     return 1.0 + float(stress[0])
 
 
-def log_slip_rate_at(scene: Scene, spring_stress: float, psi: float) -> float:
+def log_slip_rate_at(scene: SceneView, spring_stress: float, psi: float) -> float:
     """ln(V/V_*) for a spring stress and state (the sum, of several) where mass does not act, and
     there is no pore pressure.
     """
@@ -205,19 +206,19 @@ def log_slip_rate_at(scene: Scene, spring_stress: float, psi: float) -> float:
     return float(forms.balance_function(spring_stress, psis, scene.numbers)[0])
 
 
-def single_state_evolution(scene: Scene) -> Callable[[float, float], float]:
+def single_state_evolution(scene: SceneView) -> Callable[[float, float], float]:
     """The law of a scene with one state: (ln(V/V_*), Theta) -> dTheta per unit slip."""
     evolve = state_evolution(scene)
     return lambda log_slip_rate, state: evolve(log_slip_rate, (state,), 0.0)[0]
 
 
-def state_evolution(scene: Scene) -> Callable[[float, Numbers, float], Numbers]:
+def state_evolution(scene: SceneView) -> Callable[[float, Numbers, float], Numbers]:
     """The law of a scene: (ln(V/V_*), Psi, shift) -> change of each state per unit slip."""
     evolutions, p = scene.functions.friction.evolutions, scene.friction_numbers
     return lambda log_slip_rate, psis, shift: evolutions(log_slip_rate, psis, shift, 1.0, p)
 
 
-def compute_steady_states(scene: Scene, log_slip_rate: float, shift: float) -> Numbers:
+def compute_steady_states(scene: SceneView, log_slip_rate: float, shift: float) -> Numbers:
     """The states of steady sliding at ln(V/V_*), of which stress has taken `shift`."""
     p = scene.friction_numbers
     return scene.functions.friction.steady_states(log_slip_rate, shift, p)

@@ -1,5 +1,5 @@
 """Friction: what ties stress, slip rate and states together. Read this first, then
-`states` and `system`.
+`states` and `scene_functions`.
 
 With g = (tau - tau_*)/sigma_*, the deviation of frictional stress, s = sigma/sigma_*, and the state
 freed of stress, Psi = Theta + shift(g),
@@ -20,7 +20,7 @@ g are those without it, which friction, and it alone, adds: mass and waves know 
 
 Functions here take the functions of the parts of a scene, and return one that is made of them: the
 plainest that holds all effects there are. What they return takes floats, and the numbers of a scene
-as ``p`` (see `places`); it holds none of them, and serves every scene of the same parts.
+as ``p`` (see `parameter_layout`); it holds none of them, and serves every scene of the same parts.
 """
 
 from __future__ import annotations
@@ -30,8 +30,7 @@ from functools import cache, reduce
 from typing import NamedTuple
 
 from rsfstudy._deprecation import renamed_members
-from rsfstudy.slider.parts import Function, Numbers
-from rsfstudy.slider.places import (
+from rsfstudy.slider.parameter_layout import (
     LARGEST_NORMAL_STRESS_EXCESS,
     LOADING,
     MU_STAR,
@@ -39,6 +38,7 @@ from rsfstudy.slider.places import (
     STRESS_DEPENDENCE,
     A,
 )
+from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.states import (
     state_contribution_function,
     states_from_strength_function,

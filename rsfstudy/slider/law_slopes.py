@@ -7,8 +7,9 @@ from collections.abc import Callable
 from typing import NamedTuple, cast
 
 from rsfstudy.slider.equations import compute_steady_states, friction_relation
-from rsfstudy.slider.parts import Numbers, Scene
-from rsfstudy.slider.steady import SteadySliding
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.scene_view import SceneView
+from rsfstudy.slider.steady_state import SteadySliding
 
 #: Largest step of the differences, relative to the scale of each argument, and the weights of
 #: central differences of order eight.
@@ -54,7 +55,7 @@ class LawSlopes(NamedTuple):
         return self._replace(by_rate=by_rate, by_shift=by_shift, by_state=by_state)
 
 
-def compute_law_slopes(scene: Scene, steady: SteadySliding) -> LawSlopes:
+def compute_law_slopes(scene: SceneView, steady: SteadySliding) -> LawSlopes:
     """Compute the derivatives of the state evolution in steady sliding.
 
     The step of the finite differences is halved until two successive estimates agree. Laws whose
@@ -132,7 +133,7 @@ def _central_differences(
     return slopes, sizes
 
 
-def _difference_scales(scene: Scene, steady: SteadySliding, shift: float) -> list[float]:
+def _difference_scales(scene: SceneView, steady: SteadySliding, shift: float) -> list[float]:
     """Return the scales of ln V, the shift and each state for finite differences."""
     size = _STATE_SCALE_OVER_B * scene.a * scene.parts.law.state_change_over_a
     # b of several states may be next to nothing where each has a large one

@@ -4,7 +4,7 @@ A scene fills five slots: state evolution law, normal stress, fluid, dynamics an
 choice is one file, with a frozen dataclass derived from `Part` that owns its fields: default, rule,
 symbol, units and description. Its functions are plain functions of floats: they take the numbers of
 a scene as one flat tuple ``p``, in which those of the part begin at the place of its slot, such as
-``p[LAW]`` (see `places`). `friction` and `system` put them together.
+``p[LAW]`` (see `parameter_layout`). `friction` and `scene_functions` put them together.
 
 What an effect of your own overrides: how the state evolves, a `Law` (`evolution`) or a
 `LawBase` (`evolutions`, `steady_states`; whatever weakens friction may be a state); how normal
@@ -31,12 +31,8 @@ from rsfstudy._deprecation import (
 )
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import Quantity
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.scene import Scene as Scene
-else:  # parts name it in annotations only, and a scene is made of them
-    Scene = Any
+from rsfstudy.quantities import Quantity
+from rsfstudy.slider.scene_view import SceneView
 
 #: Rules of most fields; counts are of segments of loading.
 POSITIVE, NON_NEGATIVE = "must be greater than 0", "must be 0 or greater"
@@ -91,17 +87,17 @@ class Part:
                 if name not in vars(cls):
                     setattr(cls, name, vars(base)[name])
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """Return the values that the functions of the part read from ``p``.
 
         The first value is stored at the place of the slot. A law can have any number of values. The
-        other kinds of part have room for a few values only (see ``places``). Fields that a subclass
-        declares with ``number`` are appended in the order of their declaration. Override this
-        method only if the functions read values other than these fields.
+        other kinds of part have room for a few values only (see ``parameter_layout``). Fields that
+        a subclass declares with ``number`` are appended in the order of their declaration. Override
+        this method only if the functions read values other than these fields.
         """
         return ()
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: SceneView) -> None:
         """Raise InvalidValue where its values do not go with one another or with the scene."""
 
     @property
@@ -209,7 +205,7 @@ def _appended_fields(part: type[Part]) -> tuple[str, ...]:
     )
 
 
-def collect_numbers(part: Part, scene: Scene) -> Numbers:
+def collect_numbers(part: Part, scene: SceneView) -> Numbers:
     """Return the values of ``part.numbers``, followed by the appended fields."""
     values = (getattr(part, name) for name in _appended_fields(type(part)))  # type: ignore[arg-type]
     others = (math.nan if value is None else float(value) for value in values)

@@ -16,13 +16,13 @@ from types import FunctionType
 from typing import Any, TypeVar
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantity import Quantity, is_variable_name
+from rsfstudy.quantities import Quantity, is_variable_name
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
-from rsfstudy.slider.numbers import SliderParameters
+from rsfstudy.slider.hints import canonical_law_name
 from rsfstudy.slider.parts import Part, field_names, field_quantities, is_boolean_field
-from rsfstudy.slider.protocol import UserLoading
+from rsfstudy.slider.protocols import UserLoading
 from rsfstudy.slider.requirements import check_declared_needs
-from rsfstudy.slider.synonyms import canonical_law_name
+from rsfstudy.slider.slider_parameters import SliderParameters
 
 F = TypeVar("F", bound=Callable[..., Any])
 #: A part of a user's own: its class, whose fields are fields of the scene; or a loading, which is

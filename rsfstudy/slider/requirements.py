@@ -13,9 +13,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.scene_view import SceneView
 
 if TYPE_CHECKING:
-    from rsfstudy.slider.parts import Part, Scene
+    from rsfstudy.slider.parts import Part
 
 SLIP_RATE, STATE, FRICTION_COEFFICIENT = "slip_rate", "state", "friction_coefficient"
 SHEAR_STRESS, NORMAL_STRESS = "shear_stress", "normal_stress"
@@ -51,7 +52,7 @@ def check_declared_needs(slot: str, part: type[Part]) -> None:
             raise InvalidValue("needs", name, rule, choices=PART_QUANTITIES)
 
 
-def check_needs(scene: Scene) -> None:
+def check_needs(scene: SceneView) -> None:
     """Raise ``InvalidValue`` if a scene lacks a quantity that one of its parts needs."""
     for slot, part in zip(scene.parts._fields, scene.parts, strict=True):
         missing = sorted(set(part.needs) - provided_quantities(scene, part)) if part.needs else []
@@ -59,7 +60,7 @@ def check_needs(scene: Scene) -> None:
             raise _missing_quantities_error(scene, slot, part, missing)
 
 
-def provided_quantities(scene: Scene, part: Part) -> frozenset[str]:
+def provided_quantities(scene: SceneView, part: Part) -> frozenset[str]:
     """Return the quantities that are known to the functions of a part.
 
     These are the quantities that the functions receive, and the quantities that can be computed
@@ -75,7 +76,7 @@ def provided_quantities(scene: Scene, part: Part) -> frozenset[str]:
         change.quantity for change in _unknown_quantities(scene)
     }
     found = constant | part.received_quantities
-    if part is scene.parts.law and scene.parts.law.regularised:
+    if scene.parts.law.regularised and part is scene.parts.law:
         found -= {FRICTION_COEFFICIENT}  # that of forward slip does not hold where slip reverses
     return frozenset(found | {name for name, terms in _COMPUTED_FROM.items() if found >= terms})
 
@@ -88,7 +89,7 @@ class _UnknownQuantity(NamedTuple):
     remedy: str
 
 
-def _unknown_quantities(scene: Scene) -> list[_UnknownQuantity]:
+def _unknown_quantities(scene: SceneView) -> list[_UnknownQuantity]:
     """Return the fields of a scene that make normal stress or friction variable."""
     parts, found = scene.parts, []
     if parts.normal_stress.normal_stress is not None:
@@ -108,7 +109,7 @@ def _unknown_quantities(scene: Scene) -> list[_UnknownQuantity]:
 
 
 def _missing_quantities_error(
-    scene: Scene, slot: str, part: Part, missing: list[str]
+    scene: SceneView, slot: str, part: Part, missing: list[str]
 ) -> InvalidValue:
     """Return the error for a part that needs quantities its rates do not receive."""
     known = provided_quantities(scene, part)

@@ -20,19 +20,19 @@ from rsfstudy.slider import (
     laws,
     loading,
     normal_stress,
-    places,
+    parameter_layout,
     registry,
+    scene_functions,
     stability,
-    system,
 )
 from rsfstudy.slider.assembly import SceneBase, SceneParts
-from rsfstudy.slider.derived import cached_attribute
+from rsfstudy.slider.caching import cached_attribute
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
-from rsfstudy.slider.fluid._recharged import FluidWithBoundaryPressure
+from rsfstudy.slider.fluid._boundary_pressure import FluidWithBoundaryPressure
 from rsfstudy.slider.loading.step import StepLoading
-from rsfstudy.slider.numbers import SliderParameters
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.requirements import check_needs
+from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.slider.states import check_steady_states
 
 #: Critical stiffnesses that are kept: studies come back to those along their other axes.
@@ -222,7 +222,7 @@ class Scene(SceneBase):
     @cached_attribute
     def continuous_segments(self) -> tuple[tuple[Scene, np.ndarray], ...]:
         """Its segments of loading as far as each follows on another without a jump: the scene as
-        the first of them has it, and their table (see `places`).
+        the first of them has it, and their table (see `parameter_layout`).
         """
         if len(self._segments) == 1:
             return ((self, ENDLESS_SEGMENT_TABLE),)
@@ -230,7 +230,7 @@ class Scene(SceneBase):
             np.array, (self.parts.loading.segment_table, self.parts.loading.jump_mask)
         )
         if self.parts.law.regularised:  # where slip has reversed, a hold may have no answer
-            breaks = breaks | (table[:, places.SEGMENT_VELOCITY] == 0.0)
+            breaks = breaks | (table[:, parameter_layout.SEGMENT_VELOCITY] == 0.0)
         first = np.flatnonzero(breaks[1:]) + 1
         acting = map(self.segment_scene, (0, *first.tolist()))
         return tuple(zip(acting, np.split(table, first), strict=True))
@@ -248,18 +248,18 @@ class Scene(SceneBase):
 
     @cached_attribute
     def numbers(self) -> Numbers:
-        """All numbers, as the functions of the equations read them (see `places`)."""
-        return places.pack_numbers(self)
+        """All numbers, as the functions of the equations read them (see `parameter_layout`)."""
+        return parameter_layout.pack_numbers(self)
 
     @cached_attribute
     def friction_numbers(self) -> Numbers:
         """Numbers for functions that friction alone decides."""
-        return places.pack_friction_numbers(self)
+        return parameter_layout.pack_friction_numbers(self)
 
     @cached_attribute
-    def functions(self) -> system.SceneFunctions:
-        """The functions of the equations, by name (see `system`)."""
-        return system.build_scene_functions(self)
+    def functions(self) -> scene_functions.SceneFunctions:
+        """The functions of the equations, by name (see `scene_functions`)."""
+        return scene_functions.build_scene_functions(self)
 
     # ---- what follows from its fields -----------------------------------------------------------
 

@@ -32,11 +32,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.slider.derived import cached_per_scene
+from rsfstudy.slider.caching import cached_per_scene
 from rsfstudy.slider.equations import friction_relation
 from rsfstudy.slider.law_slopes import LawSlopes, Matrix, compute_law_slopes
-from rsfstudy.slider.parts import Scene
-from rsfstudy.slider.steady import SteadySliding, steady_sliding
+from rsfstudy.slider.scene_view import SceneView
+from rsfstudy.slider.steady_state import SteadySliding, steady_sliding
 
 #: Critical stiffness over a, and growth per slip in D_c, that rounding leaves where there is none.
 _MIN_CRITICAL_STIFFNESS_OVER_A, _GROWTH_RATE_FLOOR = 1e-12, 1e-9
@@ -50,7 +50,9 @@ _SMALL_MASS_RATIO, _NEWTON_STEPS = 1e-6, 2
 Polynomial = list[float]
 
 
-def critical_stiffness(scene: Scene, log_slip_rate: float, *, quasi_static: bool = False) -> float:
+def critical_stiffness(
+    scene: SceneView, log_slip_rate: float, *, quasi_static: bool = False
+) -> float:
     """Critical stiffness ``k_cr D_c/sigma_*`` of steady sliding at ln(V/V_*).
 
     Parameters
@@ -86,7 +88,7 @@ def critical_stiffness(scene: Scene, log_slip_rate: float, *, quasi_static: bool
     return math.inf if _is_unstable(around, 2.0 * critical or scene.a) else critical
 
 
-def critical_stiffnesses(scene: Scene, log_slip_rate: float) -> list[float]:
+def critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[float]:
     """Every stiffness over sigma_*/D_c at which small changes of steady sliding come to grow or to
     decay, or more of them grow, from the smallest up: several states may have more than one.
 
@@ -113,7 +115,7 @@ class _LinearisedBalance(NamedTuple):
 
 
 def _linearise(
-    scene: Scene,
+    scene: SceneView,
     steady: SteadySliding,
     slopes: LawSlopes | None = None,
     *,
@@ -173,7 +175,7 @@ def _is_unstable(around: _LinearisedBalance, stiffness: float) -> bool:
 
 
 def friction_response(
-    scene: Scene, steady: SteadySliding, slopes: LawSlopes | None = None
+    scene: SceneView, steady: SteadySliding, slopes: LawSlopes | None = None
 ) -> tuple[Polynomial, Polynomial]:
     """Compute the response of friction to small changes of slip in steady sliding.
 
@@ -213,7 +215,7 @@ def friction_response(
     return above, below
 
 
-def _state_weights(scene: Scene, steady: SteadySliding) -> tuple[list[float], float]:
+def _state_weights(scene: SceneView, steady: SteadySliding) -> tuple[list[float], float]:
     """Change of a ln V by each state, and by how much the last moves the shift."""
     law, fluid = scene.parts.law.state_count, len(scene.parts.fluid.unknowns)
     if not fluid:
@@ -243,7 +245,7 @@ def resolvent(matrix: Matrix) -> tuple[Polynomial, list[Matrix]]:
     return coefficients, terms[1:]
 
 
-def growth_rates(scene: Scene, log_slip_rate: float) -> np.ndarray:
+def growth_rates(scene: SceneView, log_slip_rate: float) -> np.ndarray:
     """Growth rates p of small changes of steady sliding at the stiffness of the scene.
 
     The roots of ``K (1 + w**2 p**2) + eta V p + G(p) = 0`` with w = V T/(2 pi D_c). Small changes
@@ -297,7 +299,7 @@ class GrowthRate(NamedTuple):
 
 
 @cached_per_scene
-def largest_growth_rate(scene: Scene, log_slip_rate: float) -> GrowthRate | None:
+def largest_growth_rate(scene: SceneView, log_slip_rate: float) -> GrowthRate | None:
     """Compute the largest growth rate of small perturbations of steady sliding.
 
     The growth rate is computed at the stiffness of the scene. Its error estimate includes the
@@ -335,7 +337,7 @@ def largest_growth_rate(scene: Scene, log_slip_rate: float) -> GrowthRate | None
     return GrowthRate(float(found[0].real), float(max(changes)) + rounding + _GROWTH_RATE_FLOOR)
 
 
-def response_to_normal_stress(scene: Scene, log_slip_rate: float, frequency: float) -> complex:
+def response_to_normal_stress(scene: SceneView, log_slip_rate: float, frequency: float) -> complex:
     """Spring stress over imposed normal stress in small oscillations around steady sliding, of a
     scene whose loading goes on changing that.
 
@@ -376,7 +378,7 @@ def response_to_normal_stress(scene: Scene, log_slip_rate: float, frequency: flo
     return stiffness * left / (balance * below + at * above)
 
 
-def _require_steady_sliding(scene: Scene, log_slip_rate: float) -> SteadySliding:
+def _require_steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding:
     """Steady sliding, which there must be."""
     steady = steady_sliding(scene, log_slip_rate)
     if steady is None:

@@ -11,8 +11,9 @@ from functools import cache
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import Function, Numbers, Scene
-from rsfstudy.slider.places import A, B
+from rsfstudy.slider.parameter_layout import A, B
+from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.scene_view import SceneView
 
 #: ln(V/V_*) at which a law must rest in its steady states, and the change of a state per slip of
 #: D_c, over a, that is still rest: far above rounding.
@@ -129,7 +130,7 @@ def states_from_strength_function(count: int) -> Function:
     return several_law_states
 
 
-def check_steady_states(scene: Scene) -> None:
+def check_steady_states(scene: SceneView) -> None:
     """Raise InvalidValue where the law of a scene still changes in the states that it states, or is
     given, as those of steady sliding, or moves away from them: critical stiffness and cycles would
     contradict each other.

@@ -16,7 +16,7 @@ from dask_jobqueue.slurm import SLURMCluster
 
 import rsfstudy
 from rsfstudy.cli import assignments, options
-from rsfstudy.declare import catalogue
+from rsfstudy.study import catalogue
 
 #: One job: 16 worker processes of one thread each, because a cell keeps its thread busy.
 JOB_OPTIONS = {

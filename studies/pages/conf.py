@@ -17,7 +17,7 @@ from typing import Any
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
-import _made  # type: ignore[import-not-found]  # noqa: E402 (it stands beside this file)
+import _generated_content  # type: ignore[import-not-found]  # noqa: E402 (it stands beside this file)
 
 project = "rsfstudy"
 author = copyright = "The rsfstudy developers"
@@ -72,7 +72,7 @@ def _fill_source(app: Any, page: str, text: list[str]) -> None:
     """Fill in what is made; a notebook becomes Markdown, and the first page has the contents."""
     if str(app.env.doc2path(page)).endswith(".ipynb"):
         text[0] = _notebook_to_markdown(text[0])
-    text[0] = _made.fill_page(_made.escape_asterisks(text[0]))
+    text[0] = _generated_content.fill_page(_generated_content.escape_asterisks(text[0]))
     if page == root_doc:
         text[0] += _site_contents()
 
@@ -83,7 +83,11 @@ def _notebook_to_markdown(notebook: str) -> str:
     for cell in json.loads(notebook)["cells"]:
         text = "".join(cell["source"])
         if cell["cell_type"] == "markdown":
-            parts.append(re.sub(r"\$[^$]+\$", lambda formula: _made.html_symbol(formula[0]), text))
+            parts.append(
+                re.sub(
+                    r"\$[^$]+\$", lambda formula: _generated_content.html_symbol(formula[0]), text
+                )
+            )
             continue
         parts.append(f"```python\n{text}\n```")
         for output in cell["outputs"]:

@@ -22,9 +22,9 @@ from rich.table import Table
 from rsfstudy.named_studies._random_scenes import MOTION_QUESTIONS, random_scene
 
 from rsfstudy import Scene
-from rsfstudy.declare import catalogue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.study import catalogue
 
 #: What random scenes are like.
 RANDOM_SCENE_TEMPLATES = [

@@ -20,14 +20,14 @@ import xarray as xr
 from scipy.optimize import brentq
 
 from rsfstudy import Scene
+from rsfstudy.critical_steps.critical_step import CriticalStep
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
+from rsfstudy.measure_base.elasticities import Elasticities
 from rsfstudy.measures import Measure
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.elasticities import Elasticities
-from rsfstudy.measures.healing import Healing
-from rsfstudy.measures.limit_cycle import LimitCycle
-from rsfstudy.measures.velocity_step import VelocityStep
 from rsfstudy.motion.accuracy import MIN_RTOL, Accuracy
-from rsfstudy.reduce import Inverse, apply_reductions
+from rsfstudy.reductions import Inverse, apply_reductions
+from rsfstudy.responses.healing import Healing
+from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.status import Status
 
 Random = np.random.Generator

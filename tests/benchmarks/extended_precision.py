@@ -6,8 +6,8 @@ normal stress; extrapolated modified midpoint steps (Gragg, Bulirsch and Stoer) 
 rate norm w, at constant normal stress with an error of the order of w**4 that two values of w
 remove (Richardson).
 
-``python tests/benchmarks/extended_precision.py`` prints the references of `studies/_references.py`
-(minutes).
+``python tests/benchmarks/extended_precision.py`` prints the references of
+`studies/_reference_values.py` (minutes).
 """
 
 from __future__ import annotations

@@ -395,8 +395,8 @@ def _option(name: str, param: click.Parameter, chance: random.Random) -> list[st
 
 TINY_STUDY_SOURCE = """
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.reduce import LinearFit
+from rsfstudy.responses.linear_stability import LinearStability
+from rsfstudy.reductions import LinearFit
 
 study = Study(
     name="tiny", title="A tiny lattice", base=Scene(),

@@ -33,14 +33,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from file_mutations import damage_bytes, hostile_dataset, hostile_text
-from forked import call_in_child
+from forked_calls import call_in_child
 
 import rsfstudy
 from rsfstudy.errors import RsfStudyError
-from rsfstudy.files import store
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.reduce import LinearFit
-from rsfstudy.referee import problem, theirs
+from rsfstudy.reductions import LinearFit
+from rsfstudy.referee import external, problem_files
+from rsfstudy.responses.linear_stability import LinearStability
+from rsfstudy.storage import store
 
 STUDY = rsfstudy.Study(
     name="small",
@@ -118,7 +118,9 @@ def resume_run(path: Path) -> xr.Dataset:
 
 
 def answer_record(path: Path) -> Any:
-    return theirs.read_answer(path, problem.read_problem(problem.shipped_problems()[1]))
+    return external.read_answer(
+        path, problem_files.read_problem(problem_files.shipped_problems()[1])
+    )
 
 
 def read_cases(path: Path) -> Any:
@@ -255,7 +257,10 @@ KINDS = {
     ),
     "problem.toml": Kind(
         "problem",
-        (problem.read_problem, command_reader("verify", "{1}/01_answer.csv", "--problem", "{0}")),
+        (
+            problem_files.read_problem,
+            command_reader("verify", "{1}/01_answer.csv", "--problem", "{0}"),
+        ),
         _TEXT_CHANGES,
     ),
     "01_answer.csv": Kind(
@@ -283,8 +288,8 @@ def write_valid_files(place: Path) -> dict[str, Any]:
     (place / "record.csv").write_text("\n".join([header, *rows]))
     (place / "record.dat").write_bytes(_xlook(np.full(600, 0.2), moved, stress))
     (place / "protocol.csv").write_text("velocity (um/s),duration (s)\n1,10\n10,20\n0,5\n")
-    shutil.copy(problem.shipped_problems()[1], place / "problem.toml")
-    shutil.copy(problem.shipped_problems()[1].with_suffix(".csv"), place / "01_answer.csv")
+    shutil.copy(problem_files.shipped_problems()[1], place / "problem.toml")
+    shutil.copy(problem_files.shipped_problems()[1].with_suffix(".csv"), place / "01_answer.csv")
     (place / "cases.csv").write_text("a (1),b_over_a (1)\n0.01,1.5\n0.012,1.6\n0.01,2\n")
     (place / "mine.mplstyle").write_text("font.size: 9\naxes.grid: True\nlines.linewidth: 1.5\n")
     (place / "study.txt").write_text("study.py")

@@ -45,10 +45,10 @@ import xarray as xr
 from scipy.stats import norm
 
 import rsfstudy
-from rsfstudy import Axis, Rig, Scene, Study, reduce
+from rsfstudy import Axis, Rig, Scene, Study, reductions
+from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import RsfStudyError
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.responses.linear_stability import LinearStability
 
 CALL_TIME_LIMIT = 20.0
 START_TIME_LIMIT = 120.0
@@ -261,15 +261,15 @@ def call_targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], d
             for inner in ("samples", "cases", "caption"):
                 if hasattr(member, inner):
                     found[f"{name}.{inner}"] = getattr(member, inner), valid[f"{name}.{inner}"]
-    for name in reduce.__all__:
-        member = getattr(reduce, name)
+    for name in reductions.__all__:
+        member = getattr(reductions, name)
         taken = inspect.signature(member).parameters
         found[f"reduce.{name}"] = (
             member,
             {n: v for n, v in REDUCTION_ARGUMENTS.items() if n in taken},
         )
     found["reduce.apply_reductions"] = (
-        reduce.apply_reductions,
+        reductions.apply_reductions,
         {"dataset": dataset, "reductions": ()},
     )
     for module in ("critical_step", "elasticities", "healing", "limit_cycle", "linear_stability",
@@ -286,7 +286,7 @@ def call_targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], d
         "Protocol": rsfstudy.protocol([{"velocity": 2.0}]), "History": rsfstudy.history(stated),
         "Comparison": rsfstudy.compare(dataset, dataset), "Measure": known["measure"],
         "CriticalStep": CriticalStep(), "Segment": rsfstudy.Segment(1.0),
-        "Reduction": reduce.LinearFit("made", of="critical_stiffness", on="b_over_a"),
+        "Reduction": reductions.LinearFit("made", of="critical_stiffness", on="b_over_a"),
         "Figure": rsfstudy.Figure([]), "Accuracy": rsfstudy.Accuracy(),
     }  # fmt: skip
     for title, thing in objects.items():
@@ -317,9 +317,9 @@ def composed_functions(
     declared = {name: getattr(study, name) for name in parts}
 
     def reduction_on_results(kind: str, **options: Any) -> Any:
-        made = {name: getattr(reduce, name) for name in reduce.__all__}[kind](**options)
+        made = {name: getattr(reductions, name) for name in reductions.__all__}[kind](**options)
         return (
-            reduce.apply_reductions(dataset, (made,)),
+            reductions.apply_reductions(dataset, (made,)),
             made(dataset),
             made.quantities,
             made.describe(),
@@ -402,9 +402,9 @@ def composed_functions(
     }
     for name, use in uses.items():
         found[f"{name} a file"] = (lambda of, use=use: through_a_file(of, use)), {"of": dataset}
-    for kind in reduce.__all__:
+    for kind in reductions.__all__:
         if kind not in ("Reduction", "apply_reductions"):
-            taken = inspect.signature(getattr(reduce, kind)).parameters
+            taken = inspect.signature(getattr(reductions, kind)).parameters
             options = {n: v for n, v in REDUCTION_ARGUMENTS.items() if n in taken}
             found[f"reduced by {kind}"] = reduction_on_results, {"kind": kind, **options}
     return found

@@ -3,7 +3,7 @@ with the digits that two ways agree on (a quarter of an hour for all).
 
 The first way, here, solves the equations as the problems state them, in SI units: spring stress,
 theta in s and slip, slip rate by the friction law (or the root of it and damping), with 30 digits
-(mpmath), of order 20. The second is `referee_ways.py`.
+(mpmath), of order 20. The second is `second_referee_way.py`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from referee_numbers import (
     second_way_rows,
     velocity_excess,
 )
-from referee_ways import (
+from second_referee_way import (
     PROBLEMS,
     ExtrapolatedSteps,
     ProblemSlider,

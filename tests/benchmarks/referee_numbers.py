@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from referee_ways import LogarithmicEquations, locate_extremum, rows_by_way
 from scipy.optimize import brentq
+from second_referee_way import LogarithmicEquations, locate_extremum, rows_by_way
 
 Numbers = dict[str, Any]
 UNITS = {

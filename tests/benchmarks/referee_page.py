@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from referee_ways import PROBLEMS, read_stated_problem
+from second_referee_way import PROBLEMS, read_stated_problem
 
 PAGE = Path(__file__).parents[2] / "studies" / "pages" / "referee.md"
 PROBLEMS_MARKER = "<!-- problems: written by tests/benchmarks/referee_page.py -->\n"

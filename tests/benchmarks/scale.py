@@ -26,7 +26,7 @@ import numpy as np
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.compute import runner
+from rsfstudy.execution import runner
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import WorkMeter

@@ -2,15 +2,10 @@
 
 from dataclasses import dataclass
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion.accuracy import estimate_error
-from rsfstudy.motion.course import integrate_events
-from rsfstudy.motion.events import EventKind, maximum
-from rsfstudy.quantity import Output
-from rsfstudy.slider.loading import Loading, Segment
-from rsfstudy.slider.parts import number
-from rsfstudy.status import Status
+from rsfstudy import Axis, Scene, Segment, Study
+from rsfstudy.measures import Measure, Outcome, Output, Status
+from rsfstudy.motion import EventKind, estimate_error, integrate_events, maximum
+from rsfstudy.parts import Loading, number
 
 
 @dataclass(frozen=True, kw_only=True)

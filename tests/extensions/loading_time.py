@@ -4,9 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.measures import Measure, Outcome
-from rsfstudy.quantity import Output
-from rsfstudy.status import Status
+from rsfstudy.measures import Measure, Outcome, Output, Status
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from rsfstudy import Axis, Scene, Study
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy import Accuracy, Axis, Scene, Study
+from rsfstudy.measures import CriticalStep
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper
 from rsfstudy.motion.workspace import count_evaluations
 

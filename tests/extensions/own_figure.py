@@ -1,7 +1,7 @@
 """A figure: a function that draws a dataset."""
 
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.measures import LinearStability
 
 
 def stiffness_map(dataset, axes):

@@ -6,9 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.measures.linear_stability import LinearStability
-from rsfstudy.quantity import Quantity
-from rsfstudy.reduce import Reduction
+from rsfstudy.measures import LinearStability, Quantity
+from rsfstudy.reductions import Reduction
 
 
 @dataclass(frozen=True)

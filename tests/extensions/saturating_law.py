@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.slider.laws import Law
-from rsfstudy.slider.parts import number
-from rsfstudy.slider.places import LAW
+from rsfstudy.measures import CriticalStep
+from rsfstudy.parts import LAW, Law, number
 
 
 def evolution(log_slip_rate, state, p):

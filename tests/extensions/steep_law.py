@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.measures.critical_step import CriticalStep
-from rsfstudy.slider.laws import Law
-from rsfstudy.slider.places import LAW
+from rsfstudy.measures import CriticalStep
+from rsfstudy.parts import LAW, Law
 
 #: Only trial steps, which the integrator rejects, go further from steady sliding.
 FARTHEST = 300.0

@@ -7,10 +7,9 @@ and its slope. (At constant normal stress the field `stress_dependence` of every
 from dataclasses import dataclass
 
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.measures.linear_stability import LinearStability
+from rsfstudy.measures import LinearStability
+from rsfstudy.parts import LAW, MU_STAR, number
 from rsfstudy.slider.laws.slowness import SlownessLaw
-from rsfstudy.slider.parts import number
-from rsfstudy.slider.places import LAW, MU_STAR
 
 
 def stress_state_effect(friction, ratio, change, p):

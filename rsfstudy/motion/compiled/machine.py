@@ -14,19 +14,20 @@ from numba import types
 from numba.core.errors import NumbaError
 
 from rsfstudy.motion import layout
-from rsfstudy.motion.columns import in_place_functions
-from rsfstudy.motion.compiled.building import compile_cfuncs, compile_function
-from rsfstudy.motion.compiled.refusal import check_no_raise, compilation_error
-from rsfstudy.motion.handover import SwitchThresholds
+from rsfstudy.motion.compiled.compile_cache import compile_cfuncs, compile_function
+from rsfstudy.motion.compiled.diagnostics import check_no_raise, compilation_error
+from rsfstudy.motion.inplace import in_place_functions
 from rsfstudy.motion.loop import advance
-from rsfstudy.slider.equations import (
+from rsfstudy.motion.regime_switching import SwitchThresholds
+from rsfstudy.slider import (
     Equations,
+    Function,
+    Numbers,
+    Scene,
     equations_between_ruptures,
     equations_in_rupture,
     equations_without_mass,
 )
-from rsfstudy.slider.parts import Function, Numbers
-from rsfstudy.slider.scene import Scene
 
 _ARRAY_TYPE, _TABLE_TYPE = types.float64[::1], types.float64[:, ::1]
 _THRESHOLDS_TYPE = types.UniTuple(types.float64, len(SwitchThresholds._fields))
@@ -40,7 +41,7 @@ atexit.register(gc.freeze)
 
 
 class NumbaBackend:
-    """The loop, compiled, and its arguments (see `running.PythonBackend`)."""
+    """The loop, compiled, and its arguments (see `driver.PythonBackend`)."""
 
     def initial_values(self, fields: tuple[tuple[str, float], ...]) -> bytes:
         return _pack_initial_values(fields)

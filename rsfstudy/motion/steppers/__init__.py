@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from rsfstudy._deprecation import adopt_former_members, renamed_members
-from rsfstudy.slider.equations import Equations
+from rsfstudy.slider import Equations
 
 #: What `Stepper.attempt` returns where it takes no step: none is long enough, or the budget is
 #: spent.

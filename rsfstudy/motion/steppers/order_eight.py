@@ -9,9 +9,9 @@ import math
 
 from scipy.integrate import DOP853
 
-from rsfstudy.motion.calls import evaluate, offset_by
+from rsfstudy.motion.array_calls import evaluate, offset_by
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper
-from rsfstudy.motion.steppers.unrolled import (
+from rsfstudy.motion.steppers.unrolled_step import (
     DENSE_ROW_COUNT,
     ERROR_INDEX,
     EXTRA_STAGE_COUNT,
@@ -21,7 +21,7 @@ from rsfstudy.motion.steppers.unrolled import (
     TOTAL_STAGE_COUNT,
 )
 from rsfstudy.motion.workspace import count_evaluations, step_rates
-from rsfstudy.slider.equations import LONGEST_STEP
+from rsfstudy.slider import LONGEST_STEP
 
 #: Weights of the stages of dense output, and of all stages in its rows.
 _EXTRA_WEIGHTS, _DENSE_WEIGHTS = (tuple(x.ravel().tolist()) for x in (DOP853.A_EXTRA, DOP853.D))

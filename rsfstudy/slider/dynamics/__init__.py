@@ -17,8 +17,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy._deprecation import renamed_members
-from rsfstudy.slider.parts import Function, Part, Scene, discover_parts
+from rsfstudy.slider.parts import Function, Part, discover_parts
 from rsfstudy.slider.requirements import PART_QUANTITIES
+from rsfstudy.slider.scene_view import SceneView
 
 
 @renamed_members
@@ -46,7 +47,7 @@ class Dynamics(Part):
         """Derivative of the radiated stress with respect to ln V."""
         return 0.0
 
-    def slip_rate_norm(self, scene: Scene, log_slip_rate: float) -> float:
+    def slip_rate_norm(self, scene: SceneView, log_slip_rate: float) -> float:
         """w = V T/(2 pi D_c) where mass acts, and 0 where there is none."""
         return 0.0
 

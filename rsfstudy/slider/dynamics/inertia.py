@@ -13,10 +13,17 @@ from typing import Any
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.friction import FrictionFunctions
-from rsfstudy.slider.parts import Function, Numbers, Scene, flag
-from rsfstudy.slider.places import DYNAMICS, LARGEST_LOG_SLIP_RATE, LOAD_VELOCITY, STIFFNESS, A
+from rsfstudy.slider.parameter_layout import (
+    DYNAMICS,
+    LARGEST_LOG_SLIP_RATE,
+    LOAD_VELOCITY,
+    STIFFNESS,
+    A,
+)
+from rsfstudy.slider.parts import Function, Numbers, flag
+from rsfstudy.slider.scene_functions import velocity_ratios
+from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.states import state_step_function
-from rsfstudy.slider.system import velocity_ratios
 
 #: Rates beyond this, per inertial time, occur in trial steps only. A motion hands over to the slow
 #: manifold long before its slip rate relaxes that fast.
@@ -208,11 +215,11 @@ class Inertia(Dynamics):
     def effects(self) -> tuple[str, ...]:
         return ("inertia",)
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """T V_*/(2 pi D_c) and its logarithm."""
         return scene.inertial_time, math.log(scene.inertial_time)
 
-    def slip_rate_norm(self, scene: Scene, log_slip_rate: float) -> float:
+    def slip_rate_norm(self, scene: SceneView, log_slip_rate: float) -> float:
         return scene.inertial_time * math.exp(log_slip_rate)
 
     @classmethod

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.friction import FrictionFunctions
+from rsfstudy.slider.parameter_layout import A
 from rsfstudy.slider.parts import Function, Numbers
-from rsfstudy.slider.places import A
 
 
 def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:

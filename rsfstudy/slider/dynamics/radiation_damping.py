@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.friction import FrictionFunctions
-from rsfstudy.slider.parts import NON_NEGATIVE, Function, Numbers, Scene, number
-from rsfstudy.slider.places import DYNAMICS, LARGEST_LOG_SLIP_RATE, A
+from rsfstudy.slider.parameter_layout import DYNAMICS, LARGEST_LOG_SLIP_RATE, A
+from rsfstudy.slider.parts import NON_NEGATIVE, Function, Numbers, number
+from rsfstudy.slider.scene_view import SceneView
 
 _MAX_ITERATIONS = 200
 _STEP_TOLERANCE = 1e-15
@@ -114,7 +115,7 @@ class RadiationDamping(Dynamics):
     def effects(self) -> tuple[str, ...]:
         return ("radiation_damping",)
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """eta V_*/sigma_*."""
         return (self.radiation_damping,)
 

@@ -7,11 +7,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantities import Quantity
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.laws import lacks_critical_stiffness
-from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, Numbers, Scene, number
-from rsfstudy.slider.places import FLUID, LARGEST_LOG_SLOWNESS
+from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS
+from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, Numbers, number
+from rsfstudy.slider.scene_view import SceneView
 
 
 def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
@@ -96,7 +97,7 @@ class DilatantFluid(Fluid):
     auxiliary_rates = staticmethod(auxiliary_rates)
     auxiliary_steady_states = staticmethod(auxiliary_steady_states)
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: SceneView) -> None:
         """Some critical stiffness, where the spring is given by its ratio to that."""
         if lacks_critical_stiffness(scene):
             rule = f"leaves no critical stiffness with dilatancy = {self.dilatancy:g}"
@@ -113,6 +114,6 @@ class DilatantFluid(Fluid):
     def effects(self) -> tuple[str, ...]:
         return ("dilatancy",)
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """Dilatancy and drainage."""
         return self.dilatancy, self.drainage

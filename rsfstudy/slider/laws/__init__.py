@@ -21,12 +21,12 @@ from rsfstudy.slider.parts import (
     Function,
     Numbers,
     Part,
-    Scene,
     discover_parts,
     flag,
     number,
 )
 from rsfstudy.slider.requirements import LAW_QUANTITIES
+from rsfstudy.slider.scene_view import SceneView
 
 #: Exponents of evolution laws beyond this occur in trial steps only, which the integrator rejects:
 #: the equations of motion stop at slip rates of 10^-290 V_*.
@@ -125,7 +125,7 @@ class LawBase(Part):
         """Evolution effect of all states together, over the direct effect."""
         raise TypeError(f"{type(self).__name__} states no b_over_a")
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """Return the parameters that precede the fields of a law.
 
         The base class has no such parameters.
@@ -147,7 +147,7 @@ class LawBase(Part):
         named = {"stress_dependence": self.stress_dependence, "regularised": self.regularised}
         return tuple(name for name, acts in named.items() if acts)
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: SceneView) -> None:
         """Normal stress of which the integral of ``dtau/sigma`` is known, and motion that may
         reverse, where that matters.
         """
@@ -182,7 +182,7 @@ class Law(LawBase):
 
     The function returns the change of Theta per unit slip in D_c at constant normal stress. The
     argument ``log_slip_rate`` is ln(V/V_*), and ``state`` is Theta. The element ``p[LAW]`` is b
-    (``rsfstudy.slider.places.LAW``). Declare the parameters of the law as fields, with
+    (``rsfstudy.slider.parameter_layout.LAW``). Declare the parameters of the law as fields, with
     ``rsfstudy.slider.parts.number``. The parameters follow b in the order of their declaration, as
     ``p[LAW + 1]``, ``p[LAW + 2]`` and so on. Two methods are optional::
 
@@ -199,7 +199,7 @@ class Law(LawBase):
 
     b_over_a: float = number(2.0, "$b/a$", "1", "ratio of evolution effect to direct effect")
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """b; of no effect at all, one that nothing feels, because equations divide by it."""
         return (scene.a * (self.b_over_a or VANISHING_B_OVER_A),)
 
@@ -208,7 +208,7 @@ class Law(LawBase):
         """Smallest b/a for steady friction to fall with slip rate at V_*."""
         return 1.0
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: SceneView) -> None:
         """A critical stiffness, where the spring is given by its ratio to it; rate weakening is
         enough.
         """
@@ -238,7 +238,7 @@ MIN_B_OVER_A = 1e-30
 STIFFNESS_REMEDY = "Sliding is then stable at every stiffness, or at none: give stiffness itself."
 
 
-def lacks_critical_stiffness(scene: Scene) -> bool:
+def lacks_critical_stiffness(scene: SceneView) -> bool:
     """True if the spring is given by its ratio to a critical stiffness that there is not: stable or
     unstable is then every spring.
     """

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.laws import STIFFNESS_REMEDY, LawBase, lacks_critical_stiffness
-from rsfstudy.slider.parts import POSITIVE, Numbers, Scene, number
-from rsfstudy.slider.places import LAW
+from rsfstudy.slider.parameter_layout import LAW
+from rsfstudy.slider.parts import POSITIVE, Numbers, number
+from rsfstudy.slider.scene_view import SceneView
 
 #: Places of the numbers of the law: b of each state, the part each has in what stress takes from
 #: the state variable, and L_1/L_2.
@@ -63,7 +64,7 @@ class TwoStateLaw(LawBase):
     def state_change_over_a(self) -> float:
         return abs(self.b1_over_a) + abs(self.b2_over_a)
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """b_1, b_2, their shares in what stress takes, and L_1/L_2."""
         both, size = (self.b1_over_a, self.b2_over_a), self.state_change_over_a
         # of two states without effect there are no shares: see `check`
@@ -77,7 +78,7 @@ class TwoStateLaw(LawBase):
             return InvalidValue(name, value, rule, remedy="Give those.")
         return super().rejection_error(name, value)
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: SceneView) -> None:
         """States that do something, and a critical stiffness where the spring is given by its ratio
         to it.
         """

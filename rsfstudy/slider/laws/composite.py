@@ -8,8 +8,9 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity_field
-from rsfstudy.slider.parts import Numbers, Scene
-from rsfstudy.slider.places import LAW
+from rsfstudy.slider.parameter_layout import LAW
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.scene_view import SceneView
 
 #: Steps of third order that take Lambert's W to rounding from the guess below.
 HALLEY_STEPS = 4
@@ -89,7 +90,7 @@ class CompositeLaw(Law):
         ahead = self._reference_steady_offset()
         return 1.0 / (1.0 + ahead / ((1.0 + ahead) * self.cutoff_velocity_ratio))
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """b, ln(V_c/V_*), and u_* of steady sliding at V_*."""
         logarithm = math.log(self.cutoff_velocity_ratio)
         return (*super().numbers(scene), logarithm, self._reference_steady_offset())

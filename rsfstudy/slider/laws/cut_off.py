@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity_field, fast_expm1
-from rsfstudy.slider.parts import Numbers, Scene
-from rsfstudy.slider.places import LAW
+from rsfstudy.slider.parameter_layout import LAW
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.scene_view import SceneView
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
@@ -75,7 +76,7 @@ class CutOffLaw(Law):
         """Steady friction falls as ``b/(1 + V_*/V_c) - a`` with ln V, at V_*."""
         return 1.0 + 1.0 / self.cutoff_velocity_ratio
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """b, V_c/(V_c + V_*) and V_*/(V_c + V_*)."""
         return (*super().numbers(scene), *self._velocity_fractions())
 

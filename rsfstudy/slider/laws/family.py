@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, fast_expm1
-from rsfstudy.slider.parts import Numbers, Scene, number
-from rsfstudy.slider.places import LAW
+from rsfstudy.slider.parameter_layout import LAW
+from rsfstudy.slider.parts import Numbers, number
+from rsfstudy.slider.scene_view import SceneView
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
@@ -64,6 +65,6 @@ class LawFamily(Law):
             return rate * math.exp(-slip)
         return math.log(-math.expm1(-slip) + math.exp(power - slip)) / self.law_exponent
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """b and eps."""
         return (*super().numbers(scene), self.law_exponent)

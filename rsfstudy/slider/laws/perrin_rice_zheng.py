@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.laws import LARGEST_EXPONENT, Law
+from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.places import LAW
 
 #: Distance above steady sliding that only trial steps exceed: a motion ends at ln(V/V_*) = 276, and
 #: the square of what is larger overflows in an estimate of the first step.

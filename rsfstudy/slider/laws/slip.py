@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.laws import Law
+from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.places import LAW
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:

@@ -14,7 +14,8 @@ from rsfstudy.slider.laws._two_states import (
     SECOND_SHARE,
     TwoStateLaw,
 )
-from rsfstudy.slider.parts import Numbers, Scene
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.scene_view import SceneView
 
 
 def evolutions(
@@ -58,7 +59,7 @@ class TwoStateSlownessLaw(TwoStateLaw):
     name = "two_slowness_states"
     evolutions = staticmethod(evolutions)
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: SceneView) -> None:
         """And no state without effect, which theta would be unknown of."""
         for name in ("b1_over_a", "b2_over_a"):
             if not getattr(self, name):

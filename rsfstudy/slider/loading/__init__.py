@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from rsfstudy._deprecation import renamed_members
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, Part, Scene, discover_parts, number
+from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, Part, discover_parts, number
 from rsfstudy.slider.requirements import SLIP_RATE
+from rsfstudy.slider.scene_view import SceneView
 
 #: Duration of a segment in D_c/V_* below which no step of an integrator is taken; from a time of 1
 #: on rounding is longer.
@@ -84,11 +85,11 @@ class Loading(Part):
     #: its surroundings.
     of_pressure: ClassVar[bool] = True
 
-    def initial_unknowns(self, scene: Scene) -> Numbers:
+    def initial_unknowns(self, scene: SceneView) -> Numbers:
         """Initial values of its unknowns."""
         return ()
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: SceneView) -> None:
         """Segments that take time; no fluid that changes normal stress too, unless it is its
         pressure that is loaded.
         """
@@ -141,7 +142,7 @@ class Loading(Part):
 
     @property
     def segment_table(self) -> Any:
-        """The segments as motions read them, a row each (see `places`)."""
+        """The segments as motions read them, a row each (see `parameter_layout`)."""
         rows, begins = [], 0.0
         for velocity, _step, lasts, _stress in self.segments:
             log = math.log(abs(velocity)) if velocity else -math.inf

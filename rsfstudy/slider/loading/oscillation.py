@@ -7,13 +7,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.quantity import Quantity
-from rsfstudy.slider.loading import _train
-from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, Scene, number
+from rsfstudy.quantities import Quantity
+from rsfstudy.slider.loading import _oscillation_base
+from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, number
+from rsfstudy.slider.scene_view import SceneView
 
 
 @dataclass(frozen=True, kw_only=True)
-class NormalStressOscillation(_train.OscillationBase):
+class NormalStressOscillation(_oscillation_base.OscillationBase):
     """Oscillation of imposed normal stress under a steady load point velocity V_0.
 
     ``sigma/sigma_* = 1 + A sin(2 pi (t - t_b)/T_o + phi_o)`` for t from t_b to t_b + N_o T_o, with
@@ -42,18 +43,18 @@ class NormalStressOscillation(_train.OscillationBase):
         Quantity("oscillation_relief", "$P$", "1", "imposed fall of normal stress", "sigma_*"),
     )
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: SceneView) -> None:
         """Normal stress that stays positive; see `Train`."""
         if self.oscillation_amplitude >= 1.0:
             remedy = "Normal stress stays positive: it oscillates by less than all of it."
             raise self.field_error("oscillation_amplitude", "must be less than 1", remedy)
         super().check(scene)
 
-    def initial_unknowns(self, scene: Scene) -> Numbers:
+    def initial_unknowns(self, scene: SceneView) -> Numbers:
         """y and P of its phase."""
         amplitude, angle = self.oscillation_amplitude, self.initial_phase
         return amplitude * math.cos(angle), -amplitude * math.sin(angle)
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """omega D_c/V_*, and A."""
         return self.angular_frequency, self.oscillation_amplitude

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.quantity import Quantity
+from rsfstudy.quantities import Quantity
 from rsfstudy.slider.loading import LoadingAtVelocity, Segment, load_velocity_field
-from rsfstudy.slider.parts import POSITIVE, Numbers, Scene, number
-from rsfstudy.slider.places import LARGEST_LOG_SLOWNESS, LOADING
+from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLOWNESS, LOADING
+from rsfstudy.slider.parts import POSITIVE, Numbers, number
+from rsfstudy.slider.scene_view import SceneView
 
 
 def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
@@ -78,10 +79,10 @@ class NormalStressRamp(LoadingAtVelocity):
         last = Segment(self.load_velocity, normal_stress=self.normal_stress_ramp)
         return last._replace(duration=self.ramp_duration), last
 
-    def initial_unknowns(self, scene: Scene) -> Numbers:
+    def initial_unknowns(self, scene: SceneView) -> Numbers:
         """All of the change is yet to come."""
         return (self.normal_stress_ramp,)
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """Its rate."""
         return (self.normal_stress_ramp / self.ramp_duration,)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsfstudy.slider.derived import cached_attribute
+from rsfstudy.slider.caching import cached_attribute
 from rsfstudy.slider.loading import LoadingAtVelocity, Segment, load_velocity_field
 from rsfstudy.slider.parts import number
 

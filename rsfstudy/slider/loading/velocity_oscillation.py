@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.quantity import Quantity
-from rsfstudy.slider.loading import _train
-from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, Scene, number
+from rsfstudy.quantities import Quantity
+from rsfstudy.slider.loading import _oscillation_base
+from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, number
+from rsfstudy.slider.scene_view import SceneView
 
 
 @dataclass(frozen=True, kw_only=True)
-class VelocityOscillation(_train.OscillationBase):
+class VelocityOscillation(_oscillation_base.OscillationBase):
     """Oscillation of load point velocity about its mean V_0.
 
     ``V_load(t) = V_0 [1 + A_V sin(2 pi (t - t_b)/T_o + phi_o)]`` for t from t_b to t_b + N_o T_o,
@@ -39,7 +40,7 @@ class VelocityOscillation(_train.OscillationBase):
         Quantity("load_point_ahead", "$P$", "1", "stress by the load point", "sigma_*"),
     )
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: SceneView) -> None:
         """A load point that moves, back only where slip may; see `Train`."""
         if (self.velocity_oscillation or 0.0) > 1.0 and not scene.parts.law.regularised:
             rule = "must be 1 or less: the load point moves back, and friction is of forward slip"
@@ -50,16 +51,16 @@ class VelocityOscillation(_train.OscillationBase):
             raise self.field_error("load_velocity_ratio", rule)
         super().check(scene)
 
-    def initial_unknowns(self, scene: Scene) -> Numbers:
+    def initial_unknowns(self, scene: SceneView) -> Numbers:
         """The pair whose last is ``-K R cos(omega t + phase)``."""
         stress = self.stress_amplitude(scene)
         return -stress * math.sin(self.initial_phase), -stress * math.cos(self.initial_phase)
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """omega D_c/V_*, K R, and what the last unknown begins with."""
         return self.angular_frequency, self.stress_amplitude(scene), self.initial_unknowns(scene)[1]
 
-    def stress_amplitude(self, scene: Scene) -> float:
+    def stress_amplitude(self, scene: SceneView) -> float:
         """K R."""
         amplitude = (self.velocity_oscillation or 0.0) * self.load_velocity
         return scene.stiffness * amplitude / self.angular_frequency

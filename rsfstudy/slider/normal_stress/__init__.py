@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy._deprecation import renamed_members
-from rsfstudy.slider.parts import Function, Part, Scene, discover_parts
+from rsfstudy.slider.parts import Function, Part, discover_parts
 from rsfstudy.slider.requirements import SHEAR_STRESS
+from rsfstudy.slider.scene_view import SceneView
 
 
 @renamed_members
@@ -43,7 +44,7 @@ class NormalStress(Part):
         """d sigma/d tau, and the effect alpha of normal stress on the state, if that is all."""
         return None
 
-    def min_frictional_stress(self, scene: Scene) -> float:
+    def min_frictional_stress(self, scene: SceneView) -> float:
         """Deviation of frictional stress, over sigma_*, at which normal stress vanishes."""
         return -math.inf
 

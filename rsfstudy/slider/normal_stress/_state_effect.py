@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.normal_stress import NormalStress
+from rsfstudy.slider.parameter_layout import NORMAL_STRESS
 from rsfstudy.slider.parts import NON_NEGATIVE, Function, Numbers, number
-from rsfstudy.slider.places import NORMAL_STRESS
 
 
 def linker_dieterich_effect(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.normal_stress import NormalStress
-from rsfstudy.slider.parts import Scene
+from rsfstudy.slider.scene_view import SceneView
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,7 +17,7 @@ class ConstantNormalStress(NormalStress):
     rejection_hint = "while normal stress is constant", "set normal_stress='variable'"
     coupling = (0.0, 0.0)
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: SceneView) -> None:
         """Nothing that changes it."""
         if scene.parts.loading.changes_normal_stress:
             remedy = "Set normal_stress='imposed', or 'variable' where it follows shear stress too."

@@ -7,8 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.slider.normal_stress._state_effect import NormalStressWithStateEffect
-from rsfstudy.slider.parts import Numbers, Scene
-from rsfstudy.slider.places import IMPOSED_NORMAL_STRESS
+from rsfstudy.slider.parameter_layout import IMPOSED_NORMAL_STRESS
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.scene_view import SceneView
 
 
 def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
@@ -42,6 +43,6 @@ class ImposedNormalStress(NormalStressWithStateEffect):
     def coupling(self) -> tuple[float, float]:
         return 0.0, self.alpha
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """alpha."""
         return (self.alpha,)

@@ -8,13 +8,14 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.slider.normal_stress._state_effect import NormalStressWithStateEffect
-from rsfstudy.slider.parts import POSITIVE, Numbers, Scene, number
-from rsfstudy.slider.places import (
+from rsfstudy.slider.parameter_layout import (
     IMPOSED_NORMAL_STRESS,
     LARGEST_NORMAL_STRESS_EXCESS,
     NORMAL_STRESS,
     SMALLEST_NORMAL_STRESS_EXCESS,
 )
+from rsfstudy.slider.parts import POSITIVE, Numbers, number
+from rsfstudy.slider.scene_view import SceneView
 
 
 def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
@@ -76,14 +77,14 @@ class VariableNormalStress(NormalStressWithStateEffect):
     def effects(self) -> tuple[str, ...]:
         return ("inclined_driving", *super().effects)
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def numbers(self, scene: SceneView) -> Numbers:
         """alpha and cot(phi)."""
         return self.alpha, self.cot_phi
 
-    def min_frictional_stress(self, scene: Scene) -> float:
+    def min_frictional_stress(self, scene: SceneView) -> float:
         return -(1.0 + scene.imposed_normal_stress) / self.cot_phi
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: SceneView) -> None:
         """An angle at which normal stress varies, and sigma_3 is positive."""
         if self.phi >= 90.0:
             remedy = "At 90 degrees it no longer varies: set normal_stress='constant'."

@@ -1,1 +1,1 @@
-"""Who takes part in the benchmark ``tests/benchmarks/peers.py``, and in what."""
+"""Who takes part in the benchmark ``tests/benchmarks/engine_benchmark.py``, and in what."""

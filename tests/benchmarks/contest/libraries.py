@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from contest.hand import COMPILED, CycleNumbers, call_compiled, loop_over_problems
+from contest.hand_written_loops import COMPILED, CycleNumbers, call_compiled, loop_over_problems
 from contest.problem import Problem, cycle_function, equations, problem_arrays, unknown_scales
 
 
@@ -133,7 +133,7 @@ class Sundae:
         import numba
         from sksundae.cvode import CVODE
 
-        from contest.hand import FLOATS
+        from contest.hand_written_loops import FLOATS
 
         ready = numba.njit(error_model="numpy")
         made, plain = equations(COMPILED, law, variable, ready), equations(FLOATS, law, variable)

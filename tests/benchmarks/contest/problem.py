@@ -18,16 +18,16 @@ from typing import Any
 import numpy as np
 
 from rsfstudy import Scene
-from rsfstudy.analysis.approach import CycleSearch
-from rsfstudy.analysis.cycles import _event_specifications, iterate_cycles
+from rsfstudy.limit_cycles.cycle_search import CycleSearch
+from rsfstudy.limit_cycles.cycles import _event_specifications, iterate_cycles
 from rsfstudy.motion.accuracy import MIN_RTOL, Accuracy
-from rsfstudy.motion.course import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
+from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.slider.dynamics.inertia import DIFFERENCE_STEP, NEGLIGIBLE_SECOND_ORDER_WEIGHT
 from rsfstudy.slider.equations import RUPTURE_REGIME, equations_between_ruptures
 from rsfstudy.slider.point import Point
-from rsfstudy.slider.system import PATH_LOG_RATE_SCALE
+from rsfstudy.slider.scene_functions import PATH_LOG_RATE_SCALE
 
 BUDGET = 10**9
 #: Places of the numbers of a scene.

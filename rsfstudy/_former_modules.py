@@ -1,0 +1,89 @@
+"""Former paths of modules, which stay importable with a DeprecationWarning until version 1.0.0."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import warnings
+from collections.abc import Sequence
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Any
+
+#: For each former module or package below ``rsfstudy``: the module that has its names now, and the
+#: module to import them from. Former packages without names have two empty strings.
+FORMER_MODULES = {
+    "analysis": ("", ""),
+    "analysis.fitting": ("", ""),
+    "analysis.fitting.filters": ("fitting.filters", "fitting"),
+    "analysis.fitting.record": ("fitting.record", "fitting"),
+    "declare": ("", ""),
+    "declare.catalogue": ("study.catalogue", "study"),
+    "declare.figure": ("study.figure_declarations", "study"),
+    "measures.critical_step": ("critical_steps.critical_step", "measures"),
+    "measures.elasticities": ("measure_base.elasticities", "measures"),
+    "measures.fit": ("fitting.fit_measure", "measures"),
+    "measures.healing": ("responses.healing", "measures"),
+    "measures.limit_cycle": ("limit_cycles.limit_cycle", "measures"),
+    "measures.linear_stability": ("responses.linear_stability", "measures"),
+    "measures.rigid_response": ("responses.rigid_response", "measures"),
+    "measures.step_response": ("responses.step_response", "measures"),
+    "measures.triggered": ("critical_steps.triggered", "measures"),
+    "measures.velocity_step": ("responses.velocity_step", "measures"),
+    "quantity": ("quantities", "measures"),
+    "reduce": ("reductions", ""),
+    "reduce.base": ("study.reductions.base", "reductions"),
+    "reduce.boundaries": ("study.reductions.boundaries", "reductions"),
+    "reduce.comparisons": ("study.reductions.comparisons", "reductions"),
+    "reduce.fits": ("study.reductions.fits", "reductions"),
+    "reduce.samples": ("study.reductions.statistics", "reductions"),
+    "reduce.sobol_indices": ("study.reductions.sobol_indices", "reductions"),
+    "rig.laboratory": ("rig.rig", "rig"),
+    "rig.reductions": ("study.reductions.unit_conversion", "reductions"),
+    "slider.places": ("slider.parameter_layout", "parts"),
+    "slider.protocol": ("slider.protocols", "slider"),
+}
+
+
+class FormerModules(MetaPathFinder, Loader):
+    """Import hook that finds modules under their former paths."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return the specification of a module with a former path, and None for other modules."""
+        top, _, name = fullname.partition(".")
+        if top != "rsfstudy" or name not in FORMER_MODULES:
+            return None
+        _present, public = FORMER_MODULES[name]
+        if public:
+            text = f"The module {fullname} is deprecated. Import from rsfstudy.{public}."
+            warnings.warn(text, DeprecationWarning, stacklevel=2)
+        is_package = any(other.startswith(f"{name}.") for other in FORMER_MODULES)
+        return ModuleSpec(fullname, self, is_package=is_package)
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        """Return a module that reads its attributes from the module at the present path."""
+        return _FormerModule(spec.name)
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Do nothing, because the module at the present path contains the code."""
+
+
+class _FormerModule(ModuleType):
+    def __getattr__(self, name: str) -> Any:
+        present, _public = FORMER_MODULES[self.__name__.partition(".")[2]]
+        if not present or (name.startswith("__") and name != "__all__"):
+            raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+        return getattr(importlib.import_module(f"rsfstudy.{present}"), name)
+
+    def __dir__(self) -> list[str]:
+        present, _public = FORMER_MODULES[self.__name__.partition(".")[2]]
+        return dir(importlib.import_module(f"rsfstudy.{present}")) if present else []
+
+
+def install() -> None:
+    """Add the import hook, before the finders of files."""
+    if not any(isinstance(finder, FormerModules) for finder in sys.meta_path):
+        sys.meta_path.insert(0, FormerModules())

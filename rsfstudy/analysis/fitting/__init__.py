@@ -1,1 +1,0 @@
-"""Friction parameters from records of a laboratory, with errors that count correlated noise."""

@@ -1,0 +1,306 @@
+"""Event catalogues, and detection of stress drops in laboratory records."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.error_boundary import error_boundary, user_stacklevel
+from rsfstudy.errors import InvalidValue, NoResultWarning
+from rsfstudy.execution import provenance_attributes
+from rsfstudy.fitting import (
+    EVENT_QUANTITIES,
+    MIN_SAMPLES,
+    Detection,
+    EventNumbers,
+    Record,
+    read_drops,
+)
+from rsfstudy.netcdf import with_cf_encoding
+from rsfstudy.rig import convert_to_si, read_table, unit_factor
+
+#: What quantities are measured in: as these variables, by their scales.
+_REFERENCE_VARIABLES = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
+#: Quantities that are read from displacement.
+_SLIP_QUANTITIES = ("slip", "peak_slip_rate", "dynamic_stress_drop")
+#: What part of an event is missing, by its flag.
+_CUT_MEANINGS = ("whole", "begins_before", "lasts_beyond", "both")
+
+#: Falls of stress, in smallest drops, from which it is suspect that no drop is found.
+_SUSPICIOUS_VARIATION = 10.0
+
+
+def build_catalogue(
+    found: Sequence[EventNumbers], about: Mapping[str, Mapping[Any, Any]]
+) -> xr.Dataset:
+    """Events as a dataset, in the units of what they were read from."""
+    rows = [numbers for numbers, _cut in found]
+    for row, earlier in zip(rows, [{}, *rows], strict=False):
+        (time, error), (before, unsure) = row["time"], earlier.get("time", (math.nan, math.nan))
+        row["interval"] = time - before, error + unsure
+    number = {"long_name": "number of the event", "units": "1"}
+    dataset = xr.Dataset(coords={"event": ("event", np.arange(len(rows)), number)})
+    for name, (scale, _heading, words) in EVENT_QUANTITIES.items():
+        if rows and name not in rows[0]:
+            continue
+        values, errors = np.array([row[name] for row in rows]).reshape(-1, 2).T
+        units = _unit_attributes(scale, about)
+        dataset[name] = "event", values, {"long_name": words, **units}
+        of_error = {"long_name": f"error estimate of {words}", **units}
+        dataset[f"{name}_error"] = "event", errors, of_error
+    flags = {
+        "long_name": "what of the event the record leaves out",
+        "flag_values": np.arange(len(_CUT_MEANINGS), dtype=np.int8),
+        "flag_meanings": " ".join(_CUT_MEANINGS),
+    }
+    dataset["cut"] = "event", np.array([cut for _numbers, cut in found], dtype=np.int8), flags
+    return with_cf_encoding(
+        dataset.assign_attrs(
+            title="Catalogue of events",
+            Conventions="CF-1.11",
+            **provenance_attributes("rsfstudy.events"),
+        )
+    )
+
+
+def _unit_attributes(scale: str, about: Mapping[str, Mapping[Any, Any]]) -> dict[str, str]:
+    """Return the attributes ``units`` and ``scale`` of a quantity of an event.
+
+    Times, slips and stresses have the units of the variable from which they were read. A slip
+    rate is in units of slip over units of time. All other quantities are dimensionless.
+    """
+    if scale in _REFERENCE_VARIABLES:
+        source = about[_REFERENCE_VARIABLES[scale]]
+        return {key: str(source[key]) for key in ("units", "scale") if key in source}
+    if not scale or "scale" in about["slip"]:
+        return {"units": "1", **({"scale": scale} if scale else {})}
+    time, slip = (about[name].get("units") for name in ("time", "slip"))
+    return {"units": f"{slip} {time}-1"} if time and slip else {}
+
+
+# ---- of a record --------------------------------------------------------------------------------
+
+
+@error_boundary
+def events(
+    record: xr.Dataset | Record | str | Path | None = None,
+    *,
+    time: Any = None,
+    displacement: Any = None,
+    shear_stress: Any = None,
+    stiffness: Any = None,
+    sign: int | None = None,
+) -> xr.Dataset:
+    """Detect drops of shear stress in a laboratory record.
+
+    A drop is a fall of shear stress that the noise of the record does not explain. The mean stress
+    of a window is compared with the mean of the next window, at every sample. The window lengths
+    are 4, 8, 16 and more sampling intervals, up to a hundredth of the record. The noise is
+    estimated from the most frequent differences between the two means, because most differences
+    occur during loading. The noise may be correlated over times that are short compared with the
+    longest window, and drops may take up to 40 % of the record. The threshold is chosen so that
+    one of 10,000 records of Gaussian noise contains a false detection. If sampling intervals differ
+    by more than a factor of three, as in triggered bursts, the samples are first averaged over
+    equal intervals of time.
+
+    Three straight lines are then fitted to the samples around each drop: before, during and after
+    the drop. The intersections of the lines are the beginning of the event, where stress is
+    highest, and the end of the event, where stress is lowest.
+
+    A drop of size ``smallest_drop`` is missed once in 1,000 cases, provided that the longest window
+    separates the drop from other drops. If the noise is white and the record has at least 3,200
+    samples, ``smallest_drop`` is less than three standard deviations of the noise. If the noise is
+    correlated, ``smallest_drop`` is larger. Spikes of single samples are not Gaussian noise and may
+    cause false detections. A relaxation of stress within a window, as in a hold, counts as a drop.
+
+    Slip is computed as displacement minus shear stress divided by ``stiffness``. If ``stiffness``
+    is not passed, displacement must be the slip of the fault. The function accepts displacement as
+    slip if displacement moves faster during the drops than before and after them, by three standard
+    deviations of its noise and by a tenth. The displacement of a load point does not pass this
+    test. Displacement is read a few samples away from each drop, because noise of stress may have
+    shifted the times of the drop.
+
+    Parameters
+    ----------
+    record : xarray.Dataset, Record, str or Path, optional
+        Dataset with ``time``, ``shear_stress`` and, if measured, ``displacement``, with units. A
+        path names a CSV file with these columns, whose first line contains names and units
+        (``read_table``). The shear stress of a Record (``read_record``) is the product of friction
+        and normal stress, or friction if the record has no normal stress.
+    time, displacement, shear_stress : array_like
+        Arrays to use instead of ``record``. If an array has the attribute ``units``, the results
+        keep these units. Otherwise the results have no attribute ``units``.
+    stiffness : quantity, optional
+        Stiffness between the fault and the point where displacement is measured, in shear stress
+        over displacement: a string such as "0.05 MPa/um", or a number in the units of the record.
+        If displacement was measured at the load point, pass the stiffness of the rig. If
+        displacement is known to be the slip of the fault, pass ``inf``.
+    sign : {1, -1}, optional
+        Sign of shear stress in the direction of slip. Stress is multiplied by ``sign``, so that
+        stress falls during events. The default is -1 if all samples are negative, and 1 otherwise.
+
+    Returns
+    -------
+    xarray.Dataset
+        Variables along ``event``, in the units of the record: ``time`` (of the beginning),
+        ``duration``, ``interval``, ``stress_before``, ``stress_after``, ``static_stress_drop`` and
+        ``cut`` (1 if the record begins within the event, 2 if the record ends within the event).
+        If displacement is known, the dataset also has ``slip``, ``peak_slip_rate`` between
+        neighbouring samples, and ``dynamic_stress_drop``. Values that do not exceed the noise are
+        NaN. Each variable has a companion ``<name>_error``, the half width of a 95 % confidence
+        interval. The scalar ``noise`` is the standard deviation of the noise, and ``smallest_drop``
+        is the smallest drop that can be detected. The attribute ``sign_of_shear_stress`` contains
+        the sign that was used.
+
+    Raises
+    ------
+    InvalidValue
+        If the arrays differ in length, contain NaN or are too short, if time does not increase, or
+        if the stiffness is not positive.
+
+    Warns
+    -----
+    NoResultWarning
+        If displacement does not move faster during the drops. Then ``slip``, ``peak_slip_rate`` and
+        ``dynamic_stress_drop`` are NaN, and the attribute ``comment`` of ``slip`` gives the reason.
+        The function also warns if no drop is found although stress falls by more than ten times
+        ``smallest_drop``. The attribute ``comment`` of the dataset then contains both numbers.
+    """
+    given = {"time": time, "displacement": displacement, "shear_stress": shear_stress}
+    if isinstance(record, str | Path):
+        table = {n: of for n, of in read_table(record).items() if n in given}
+        record = xr.Dataset({n: (n, of.values, {"units": of.units}) for n, of in table.items()})
+    if isinstance(record, Record):
+        record = _record_to_dataset(record)
+    if record is not None:
+        if not hasattr(record, "data_vars"):
+            remedy = "Pass a Dataset, a Record, the path of a CSV file, or arrays by name."
+            raise InvalidValue("record", record, "is no record of stress", remedy=remedy)
+        given = {name: record.get(name) for name in given}
+    times, stress = (_check_samples(name, given[name]) for name in ("time", "shear_stress"))
+    moved = given["displacement"]
+    moves = None if moved is None else _check_samples("displacement", moved)
+    for name, samples in (("shear_stress", stress), ("displacement", moves)):
+        if samples is not None and len(samples) != len(times):
+            rule = f"must hold as many samples as time, which holds {len(times)}"
+            raise InvalidValue(name, len(samples), rule)
+    if not (np.diff(times) > 0.0).all():
+        late = int(np.argmax(np.diff(times) <= 0.0)) + 1
+        raise InvalidValue("time", times[late], f"must increase, and does not at sample {late}")
+    direction = _stress_sign(stress, sign)
+    stress = direction * stress
+    about = {name: dict(getattr(values, "attrs", {})) for name, values in given.items()}
+    if stiffness is not None:
+        if moves is None:
+            raise InvalidValue("stiffness", stiffness, "needs the displacement of the load point")
+        moves = moves - stress / _parse_stiffness(stiffness, about)
+    rows, detection, is_slip = read_drops(times, stress, moves, check_slip=stiffness is None)
+    for row in rows if not is_slip else ():
+        row[0].update(dict.fromkeys(_SLIP_QUANTITIES, (math.nan, math.nan)))
+    dataset = build_catalogue(rows, about | {"slip": about["displacement"]})
+    if rows and not is_slip:
+        why = "displacement moves no faster during the drops of stress than before and after"
+        dataset["slip"].attrs["comment"] = why
+        remedy = "Give stiffness='0.05 MPa/um', that of the rig, or math.inf if it is the fault's"
+        warnings.warn(
+            f"slip has no number: {why}. {remedy}", NoResultWarning, stacklevel=user_stacklevel()
+        )
+    units = {key: value for key, value in about["shear_stress"].items() if key == "units"}
+    dataset["noise"] = (
+        (),
+        detection.noise_sd,
+        {"long_name": "standard deviation of the noise", **units},
+    )
+    words = "smallest drop of shear stress that is missed once in 1,000 records"
+    dataset["smallest_drop"] = ((), detection.detectable_drop, {"long_name": words, **units})
+    dataset.attrs["sign_of_shear_stress"] = int(direction)
+    if not rows and (text := _warn_if_no_drop(detection)):
+        dataset.attrs["comment"] = text
+    return dataset
+
+
+def _parse_stiffness(stated: Any, about: Mapping[str, Mapping[Any, Any]]) -> float:
+    """Shear stress over displacement, in the units of the record."""
+    if isinstance(stated, str):
+        stress, length = (about[n].get("units") for n in ("shear_stress", "displacement"))
+        if not (stress and length):
+            remedy = "Give it as a number in the units of the record."
+            raise InvalidValue("stiffness", stated, "the record states no units", remedy=remedy)
+        ours = unit_factor("shear_stress", stress, "Pa") / unit_factor("displacement", length, "m")
+        return _parse_stiffness(convert_to_si("stiffness", stated, "Pa/m") / float(ours), about)
+    if not stated > 0.0:
+        raise InvalidValue("stiffness", stated, "must be positive")
+    return float(stated)
+
+
+def _check_samples(name: str, values: Any) -> np.ndarray:
+    """Samples of a record, checked."""
+    try:
+        samples = np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InvalidValue(name, values, "must be numbers") from error
+    if samples.ndim != 1 or len(samples) < MIN_SAMPLES:
+        rule = f"must be a list of {MIN_SAMPLES} samples at least, which tell the noise"
+        raise InvalidValue(name, samples.shape, rule)
+    if not np.isfinite(samples).all():
+        late = int(np.argmin(np.isfinite(samples)))
+        raise InvalidValue(name, samples[late], f"must be finite, and is not at sample {late}")
+    return samples
+
+
+def _record_to_dataset(record: Record) -> xr.Dataset:
+    """Return time, displacement and shear stress of a record as a dataset.
+
+    Shear stress is in MPa. If the record has no normal stress, friction is returned in place of
+    shear stress.
+    """
+    columns = record.columns
+    if "normal_stress" in columns:
+        stress, units = 1e-6 * columns["friction"] * columns["normal_stress"], "MPa"
+    else:
+        stress, units = columns["friction"], "1"
+    data = {
+        "time": ("sample", record.time, {"units": "s"}),
+        "displacement": ("sample", columns["displacement"], {"units": "um"}),
+        "shear_stress": ("sample", stress, {"units": units}),
+    }
+    return xr.Dataset(data)
+
+
+def _stress_sign(stress: np.ndarray, stated: int | None) -> float:
+    """Return the sign of shear stress in the direction of slip.
+
+    If the user does not pass a sign, the sign is -1 if all samples are negative, and 1 otherwise.
+    """
+    if stated is None:
+        return -1.0 if stress.max() < 0.0 else 1.0
+    if stated not in (-1, 1):
+        raise InvalidValue("sign", stated, "is unknown", choices=("1", "-1"))
+    return float(stated)
+
+
+def _warn_if_no_drop(detection: Detection) -> str:
+    """Warn if no drop is found although stress falls far more than the smallest drop.
+
+    Returns
+    -------
+    str
+        The text of the warning. The string is empty if no warning was issued.
+    """
+    if not detection.max_decrease > _SUSPICIOUS_VARIATION * detection.detectable_drop:
+        return ""
+    text = (
+        f"no drop was found, although stress falls by {detection.max_decrease:.4g} in all, "
+        f"{detection.max_decrease / detection.detectable_drop:.0f} times the smallest drop "
+        f"that can be detected ({detection.detectable_drop:.4g}): it falls for most of the record "
+        "or too slowly"
+    )
+    remedy = "Select a part of the record, or pass sign=-1 if shear stress is negative"
+    warnings.warn(f"{text}. {remedy}.", NoResultWarning, stacklevel=user_stacklevel())
+    return text

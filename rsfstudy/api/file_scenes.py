@@ -1,0 +1,67 @@
+"""The scene that a dataset is of: the one that it describes, or that of a cell that is selected."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider import (
+    SLOTS,
+    Scene,
+    UserLoading,
+    UserPart,
+    history_from_table,
+    normalise_field_value,
+    protocol,
+)
+from rsfstudy.storage import build_coordinates, build_scene, invalid_part_error, read_scene_fields
+from rsfstudy.study import Study
+
+
+def selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
+    """The number of the cell that is selected."""
+    ours = xr.Dataset(coords=build_coordinates(study))
+    places = []
+    for name in study.dimensions:
+        given = dataset[name].values.ravel() if name in dataset.coords else np.array([])
+        if given.size != 1:
+            remedy = f"Select a cell first, as in dataset.isel({name}=0)."
+            raise InvalidValue(name, given.tolist(), "leaves the cell open", remedy=remedy)
+        found = np.flatnonzero(ours[name].values == given[0])
+        if not found.size:
+            remedy = "Ask before you convert it to other units."
+            raise InvalidValue(name, given[0], "is not on that axis of the study", remedy=remedy)
+        places.append(int(found[0]))
+    return int(np.ravel_multi_index(places, study.shape))
+
+
+def described_scene(dataset: xr.Dataset) -> Scene:
+    """The scene that the attributes of a dataset describe."""
+    plain = read_scene_fields(dataset)
+    segments, loading = plain.pop("segments", ()), str(plain.get("loading"))
+    digest = plain.pop("samples", "")
+    own: dict[str, UserPart] = {
+        name: part for slot in SLOTS for name, part in slot.user_parts.items()
+    }
+    # protocols of one name differ: the segments tell which it was
+    if segments and (loading not in own or isinstance(own[loading], UserLoading)):
+        rebuilt = protocol(segments, loading)
+        own[normalise_field_value("loading", rebuilt)] = rebuilt
+    if digest:
+        told = dataset["history_samples"]
+        pressure, stress = (bool(told.attrs.get(n)) for n in ("of_pressure", "of_stress"))
+        sampled = history_from_table(told.values, stress, loading, of_pressure=pressure)
+        if sampled.digest != digest:
+            raise invalid_part_error("history_samples", f"are not those of the scene ({digest})")
+        own[normalise_field_value("loading", sampled)] = sampled
+    for slot in SLOTS:
+        name = plain.get(slot.name)
+        if isinstance(name, str) and name not in {*slot.choices, *own}:
+            remedy = (
+                "Make a scene with the class itself first, so that its name is known; commands are "
+                "told it by --study FILE."
+            )
+            rule = "is a user's own, and not known here"
+            raise InvalidValue(slot.name, name, rule, remedy=remedy)
+    return build_scene(plain, own, "scene")

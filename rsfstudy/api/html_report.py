@@ -1,0 +1,284 @@
+"""One page of HTML of all results in a directory, complete by itself."""
+
+from __future__ import annotations
+
+import base64
+import os
+import re
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path
+from string import Template
+from typing import Any
+from urllib.parse import quote
+
+import xarray as xr
+
+from rsfstudy.api import study_runs
+from rsfstudy.defaults import FIGURE_FORMATS, OUTPUT_DIRECTORY
+from rsfstudy.error_boundary import check_regular_file, error_boundary, format_exception
+from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, shorten
+from rsfstudy.execution import count_statuses, provenance_attributes
+from rsfstudy.formatting import format_overrides, pluralize
+from rsfstudy.quantities import HtmlMarkup, escape_html, html_table
+from rsfstudy.reporting import (
+    SummaryPiece,
+    Table,
+    claims_table,
+    count_pending,
+    describe_origin,
+    failures_table,
+    is_fit,
+    rerun_command,
+    summarise_verdicts,
+    summary_pieces,
+)
+from rsfstudy.status import Status
+from rsfstudy.storage import is_single_scene, output_directory, read_dataset, read_declaration
+
+_UNREADABLE = "cannot be read"
+#: What begins a page of ours, and a figure.
+_GENERATOR_TAG = b'<meta name="generator" content="rsfstudy">'
+_PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+
+
+@dataclass(frozen=True)
+class _ResultSection:
+    """One results file: what the summary tells, and what the page shows below."""
+
+    path: Path
+    title: str = ""
+    verdicts: str = ""
+    status: str = Status.OK.label
+    colour: str = "green"
+    html_parts: tuple[str, ...] = ()
+
+    @property
+    def anchor(self) -> str:
+        return re.sub(r"\W+", "-", self.path.name)
+
+
+@error_boundary
+def report(directory: str | Path = OUTPUT_DIRECTORY, output: str | Path | None = None) -> Path:
+    """Path of one page of HTML, which is written: it shows all results in a directory.
+
+    The page holds verdicts, figures, reductions, failed cells and where each file comes from. It
+    needs no other file and no network, and prints. A file that cannot be read is told on it.
+
+    Parameters
+    ----------
+    directory : path
+        With files of studies, fits and motions, as `run`, `fit` and `simulate` write them.
+    output : path, optional
+        The file to write; ``report.html`` in the directory, unless stated.
+
+    Raises
+    ------
+    InvalidValue
+        If the directory is none, or the page has another ending than ``.html``.
+    DataError
+        If the directory holds no results, or the page cannot be written.
+    """
+    return write_report(directory, output)[0]
+
+
+def write_report(
+    directory: str | Path, output: str | Path | None = None
+) -> tuple[Path, list[Path]]:
+    """Path of the page, which is written, and the files that could not be read."""
+    from rsfstudy.plots import write_image
+
+    place = output_directory(directory)
+    if place is None or not place.is_dir():
+        raise InvalidValue("directory", str(directory), "is no directory")
+    page = place / "report.html" if output is None else output_directory(output)
+    if page is None or page.suffix != ".html" or page.is_dir():
+        raise InvalidValue("output", str(output), "must be a file that ends in .html")
+    check_regular_file("output", page)
+    try:
+        if page.exists() and _GENERATOR_TAG not in page.read_bytes()[:1000]:
+            remedy = "Choose another output, or move it away first."
+            raise InvalidValue(
+                "output", str(page), "is there already, and no report", remedy=remedy
+            )
+        files = sorted(file for ending in ("nc", "zarr") for file in place.glob(f"[!.]*.{ending}"))
+        if not files:
+            raise DataError(f"{shorten(place)} holds no results, which end in .nc or .zarr.")
+        found = [_build_section(file, page.parent) for file in files]
+        write_image(_build_page(place, found).encode(), page)
+    except OSError as error:
+        raise DataError(f"{shorten(page)} cannot be written ({error})") from error
+    return page, [one.path for one in found if one.title == _UNREADABLE]
+
+
+def _build_page(directory: Path, found: list[_ResultSection]) -> str:
+    """The whole page."""
+    rows = [
+        {
+            "results": HtmlMarkup(f'<a href="#{one.anchor}">{_escape(one.path.stem)}</a>'),
+            "title": one.title,
+            "claims": one.verdicts or "-",
+            "status": one.status,
+        }
+        for one in found
+    ]
+    colours = [one.colour for one in found]
+    summary = Table(rows, wrappable={"title", "claims", "status"}, colours=colours)
+    made = provenance_attributes("rsfstudy report")
+    when, by = made["history"].split()[0], made["source"].partition(",")[0]
+    sections = (
+        f'<section id="{one.anchor}">\n<h2>{_escape(one.path.stem)}: {_escape(one.title)}</h2>\n'
+        + "\n".join(one.html_parts)
+        + "\n</section>"
+        for one in found
+    )
+    page = Template(resources.files(__package__).joinpath("report.html").read_text("utf-8"))
+    return page.substitute(
+        title=f"Results in {_escape(directory.resolve().name)}",
+        made=_escape(f"{pluralize(len(found), 'file')}, read by {by}, {when}"),
+        summary=f"<nav>{_piece_html(summary)}</nav>",
+        sections="\n".join(sections),
+    )
+
+
+def _build_section(path: Path, beside: Path) -> _ResultSection:
+    """What is told of a file, whatever it holds."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            found = _summarise_dataset(path, read_dataset(path))
+        except Exception as error:  # damaged files raise almost anything
+            why = str(error) if isinstance(error, RsfStudyError) else format_exception(error)
+            found = _ResultSection(
+                path, _UNREADABLE, "", _UNREADABLE, "red", (_paragraph(why, "red"),)
+            )
+    remarks = {str(one.message) for one in caught if issubclass(one.category, UserWarning)}
+    links = _links_html(path, beside)
+    return replace(found, html_parts=(*found.html_parts, *map(_paragraph, sorted(remarks)), links))
+
+
+def _summarise_dataset(path: Path, dataset: xr.Dataset) -> _ResultSection:
+    """What is told of a file that can be read."""
+    title = str(dataset.attrs.get("title", "answer for one scene"))
+    numbers = dataset_html(dataset)
+    # the accessor, which this module cannot import: it shows these tables
+    if is_single_scene(dataset):
+        figure = _figure_html(path, dataset.rsf.plot) if "slip" in dataset.variables else ""
+        status = Status[str(dataset.attrs["status"]).upper()]
+        colour = "green" if status is Status.OK else "yellow" if status.is_answer else "red"
+        return _ResultSection(
+            path, title, "", status.label.replace("_", " "), colour, (figure, numbers)
+        )
+    about = read_declaration(dataset)
+    parts = [_piece_html(about.summary)] if about.summary else []
+    if about.overrides:
+        parts.append(_paragraph(f"Not as declared: {format_overrides(about.overrides)}", "yellow"))
+    parts += [_figure_html(path, dataset.rsf.plot), numbers]
+    verdicts, wrong = summarise_verdicts(dataset, study_runs.check(dataset))
+    if undone := count_pending(dataset):
+        wrong.append(f"{undone} cells not computed")
+    failed, cells = failures_table(dataset)
+    if cells:
+        commands = "\n".join(rerun_command(dataset, path.name, cell) for cell in cells)
+        parts.append(f"<h3>Failures</h3>\n{_piece_html(failed)}<pre>{_escape(commands)}</pre>")
+    parts.append(f"<h3>Provenance</h3>\n{_piece_html(describe_origin(dataset))}")
+    found = _ResultSection(path, title, verdicts, html_parts=tuple(parts))
+    if wrong:
+        return replace(found, status=", ".join(wrong), colour="red")
+    counts = count_statuses(dataset)
+    if (len(counts) > 1 and is_fit(dataset)) or Status.OK.label not in counts:
+        ended = ", ".join(f"{count} {label}" for label, count in counts.items())
+        return replace(found, status=ended.replace("_", " "), colour="yellow")
+    return found
+
+
+def dataset_html(dataset: xr.Dataset) -> str:
+    """The numbers of a dataset in HTML, and the verdicts on those of a study."""
+    parts = list(map(_piece_html, summary_pieces(dataset)))
+    if is_single_scene(dataset):
+        parts.append(_piece_html(describe_origin(dataset)))
+    elif claimed := claims_table(study_runs.check(dataset)):
+        parts += ["<h3>Claims</h3>", _piece_html(claimed)]
+    return "\n".join(filter(None, parts))
+
+
+# ---- pieces of HTML ------------------------------------------------------------------------------
+
+
+def _escape(text: object) -> str:
+    """A text as HTML; control characters, which no browser shows, are spelt out."""
+    return escape_html(text)
+
+
+def _paragraph(text: str, colour: str = "") -> str:
+    return f'<p class="{colour}">{_escape(text)}</p>'
+
+
+def _piece_html(piece: SummaryPiece) -> str:
+    """A sentence, what is what, or a table, in a box of its own that scrolls where it is too wide;
+    nothing of what is empty.
+    """
+    if isinstance(piece, str):
+        return _paragraph(piece)
+    if not isinstance(piece, Table):
+        rows = (f"<dt>{_escape(n)}</dt><dd>{_escape(value)}</dd>" for n, value in piece.items())
+        return f"<dl>{''.join(rows)}</dl>" if piece else ""
+    rows_ = []
+    for row, colour in zip(piece.rows, piece.colours or [""] * len(piece.rows), strict=True):
+        whole = {head: "" if head in piece.wrappable else "whole" for head in row}
+        whole[list(row)[-1]] += f" {colour}"
+        texts = {head: c if isinstance(c, HtmlMarkup) else _escape(c) for head, c in row.items()}
+        rows_.append([HtmlMarkup(f'<span class="{whole[h]}">{t}</span>') for h, t in texts.items()])
+    caption = _paragraph(piece.caption) if piece.caption else ""
+    return (
+        f'{caption}<div class="wide">{html_table(list(piece.rows[0]), rows_)}</div>'
+        if rows_
+        else ""
+    )
+
+
+def _figure_html(path: Path, draw: Callable[[], Any]) -> str:
+    """The figure beside results, drawn anew where it is missing or older than they are."""
+    from rsfstudy.plots import render_figure, style_context
+
+    beside = path.with_suffix(".png")
+    image = b""
+    if beside.is_file() and beside.stat().st_mtime >= path.stat().st_mtime:
+        image = beside.read_bytes()
+    try:
+        if not image.startswith(_PNG_SIGNATURE):
+            with style_context(None):
+                image = render_figure(draw(), "png")
+    except Exception as error:  # of whatever kind, the numbers are there
+        return _paragraph(f"no figure: {error}", "yellow")
+    data = base64.b64encode(image).decode()
+    inches = _png_width_in_inches(image)
+    about = f'alt="{_escape(f"figure of {path.stem}")}" style="--inches: {inches:.3g}"'
+    return f'<figure><img {about} src="data:image/png;base64,{data}"></figure>'
+
+
+def _png_width_in_inches(image: bytes) -> float:
+    """Width of a PNG on paper, by which letters of all figures are of one size."""
+    at = image.find(b"pHYs") + 4
+    pixels, per_metre = (int.from_bytes(image[n : n + 4]) for n in (16, at))
+    return pixels / per_metre / 0.0254 if at > 3 and per_metre else 100.0
+
+
+def _links_html(path: Path, beside: Path) -> str:
+    """Links to the results and to what lies beside them, from where the page is."""
+    endings = [
+        path.suffix,
+        *(f".{form}" for form in FIGURE_FORMATS),
+        ".csv",
+        ".mat",
+        ".cells.sqlite",
+    ]
+    files = [file for ending in endings if (file := path.with_suffix(ending)).exists()]
+    linked = (
+        f'<a href="{quote(Path(os.path.relpath(file, beside)).as_posix())}">'
+        f"{_escape(file.name)}</a>"
+        for file in files
+    )
+    return f"<p>Files: {', '.join(linked)}</p>"

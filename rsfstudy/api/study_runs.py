@@ -1,0 +1,431 @@
+"""Functions for a study: run it, open its results, check and rerun them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+import xarray as xr
+
+from rsfstudy.api import export
+from rsfstudy.api.progress import compile_with_notice, show_progress
+from rsfstudy.defaults import CELL_TIME_LIMIT, OUTPUT_DIRECTORY
+from rsfstudy.error_boundary import error_boundary, user_stacklevel
+from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning
+from rsfstudy.execution import (
+    OutputOptions,
+    StudyRun,
+    Task,
+    Workers,
+    code_fingerprint,
+    compute_serially,
+    count_failures,
+    run_fingerprint,
+    serialize_task,
+)
+from rsfstudy.measures import Outcome
+from rsfstudy.motion import COMPILED, check_engine, user_stepper
+from rsfstudy.netcdf import with_cf_encoding
+from rsfstudy.quantities import html_table
+from rsfstudy.reporting import refusal_reasons, slow_norm_note
+from rsfstudy.slider import Scene, with_field_signature
+from rsfstudy.storage import (
+    Comparison,
+    check_is_study,
+    compare_results,
+    compare_same_lattice,
+    find_cell_number,
+    find_differences,
+    find_results,
+    is_single_scene,
+    output_directory,
+    read_dataset,
+    read_declaration,
+    read_provenance,
+    read_results,
+    rebuild_study,
+)
+from rsfstudy.study import Study, build_verdict_table, load_study, study_names
+
+if TYPE_CHECKING:
+    from rsfstudy.plots import Figure
+
+
+class Studies(dict[str, Study]):
+    """Studies by name; a notebook shows what each is about."""
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (name, study.title, f"{study.size:,}", ", ".join({c.id: c for c in study.claims}))
+            for name, study in self.items()
+        ]
+        return html_table(("study", "title", "cells", "claims"), rows)
+
+
+@error_boundary
+def studies() -> dict[str, Study]:
+    """The named studies, by name."""
+    return Studies({name: load_study(name) for name in study_names()})
+
+
+@error_boundary
+@with_field_signature()
+def run(
+    study: str | Path | Study,
+    *,
+    workers: int = 2,
+    client: Any = None,
+    output: str | Path | None = OUTPUT_DIRECTORY,
+    progress: bool = True,
+    fresh: bool = False,
+    rtol: float | None = None,
+    engine: str | None = None,
+    budget: int | None = None,
+    time_limit: float = CELL_TIME_LIMIT,
+    keep_going: bool = False,
+    despite_failures: bool = False,
+    format: str = "netcdf",
+    command: str = "rsfstudy.run",
+    **overrides: Any,
+) -> xr.Dataset:
+    """Run a study and return its dataset, which is written to ``output/NAME.nc`` too.
+
+    Parameters
+    ----------
+    study : str, Path or Study
+        A named study, the path of a file that declares one, or a study of your own.
+    workers : int
+        Worker processes of a Dask cluster made for this run; 0 computes in this process.
+    client : distributed.Client, optional
+        An existing Dask cluster to use instead.
+    output : path, optional
+        Directory for the results and the journal of finished cells; None writes nothing.
+    progress : bool
+        Show a progress bar, or lines where the standard error is no terminal.
+    fresh : bool
+        Forget the finished cells and compute all again.
+    rtol : float, optional
+        Accuracy of the cells.
+    engine : {"scipy", "python", "compiled"}, or a class, optional
+        What integrates motions; compiled, which needs Numba, is much faster.
+    budget : int, optional
+        Right-hand sides a cell may evaluate before it ends as `work_budget_spent`. Cells that have
+        an answer keep it where more is allowed.
+    time_limit : float
+        CPU time in s after which a worker gives up on a cell; for one that sleeps or waits, ten
+        times as much wall time. There is no limit in this process (``workers=0``).
+    keep_going : bool
+        Go on if the first cells all fail, instead of stopping early.
+    despite_failures : bool
+        Leave failed cells out of the reductions; the results say so.
+    format : {"netcdf", "zarr"}
+        One NetCDF file, or a Zarr store written in pieces, for lattices that do not fit in memory.
+    command : str
+        What to note in the history.
+    **overrides
+        Other axis values (``b_over_a=[2, 3]``), other fixed values of the scene or of the measure
+        (``stiffness_ratio=1.1``), or, for a fixed value, a list that makes it an axis.
+
+    Returns
+    -------
+    xarray.Dataset
+        Lattice, reductions and attributes.
+
+    Raises
+    ------
+    InvalidValue
+        For a wrong declaration or override, before anything is computed.
+    DataError, RunError
+        If results cannot be kept, or the run cannot start or finish.
+
+    Warns
+    -----
+    IncompleteWarning
+        Where cells failed: how many, and with which status; and where a reduction refused to draw
+        on its cells, with the reason.
+    UserWarning
+        Where answers for a rig are for an instability norm near the load point velocity.
+    """
+    declared = apply_overrides(study, overrides, rtol=rtol, engine=engine, budget=budget)
+    keeping = OutputOptions(
+        output=output_directory(output),
+        format=format,
+        fresh=fresh,
+        keep_going=keep_going,
+        despite_failures=despite_failures,
+        command=command,
+    )
+    with Workers(workers, client, time_limit) as where:
+        results = with_cf_encoding(prepare_run(declared, keeping, where, progress)())
+    told = [f"no {name}: {why}" for name, why in refusal_reasons(results).items()]
+    if failed := count_failures(results):
+        each = ", ".join(f"{label} {number}" for label, number in failed.items())
+        first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
+        told = [first, *told, "dataset.rsf.failures() lists them"]
+    if told:
+        warnings.warn("; ".join(told), IncompleteWarning, stacklevel=user_stacklevel())
+    if slow := slow_norm_note(results):
+        warnings.warn(slow, RsfStudyWarning, stacklevel=user_stacklevel())
+    return results
+
+
+def apply_overrides(
+    study: str | Path | Study, overrides: Mapping[str, Any], **accuracy: Any
+) -> Study:
+    """A study with other values and fields of its accuracy, those that are not None; checked."""
+    declared = study if isinstance(study, Study) else load_study(str(study))
+    changes = {name: value for name, value in accuracy.items() if value is not None}
+    if changes:
+        declared = replace(declared, accuracy=replace(declared.accuracy, **changes))
+    return declared.with_(**overrides) if overrides else declared
+
+
+def prepare_run(
+    study: Study, keeping: OutputOptions, workers: Workers, progress: bool = True
+) -> Callable[[], xr.Dataset]:
+    """A function that runs the study, once everything has been checked; `progress` shows how
+    far it has come.
+
+    Raises `InvalidValue` for anything wrong with the study or the options.
+    """
+    check_engine(study.accuracy.engine)
+    task = Task(
+        study.base,
+        study.measure,
+        study.accuracy,
+        workers.time_limit,
+        user_parts=tuple(study.user_parts.values()),
+        steppers=user_stepper(study.accuracy.engine),
+        code_fingerprint=code_fingerprint(study.accuracy.engine, study.user_classes),
+    )
+    if workers.cell_mapper() is not compute_serially:
+        serialize_task(task)  # raises before any work if it cannot be sent
+    ready = StudyRun(study, keeping, task, workers.count_concurrent_cells())
+
+    def run() -> xr.Dataset:
+        if study.accuracy.engine == COMPILED:
+            compile_with_notice(ready.plan.examples, study.measure.needs_time, progress)
+        with show_progress(study.name, progress) as show:
+            return ready(workers.cell_mapper(ready.worker_log_path), show)
+
+    return run
+
+
+@error_boundary
+def open(name: str | Path, output: str | Path = OUTPUT_DIRECTORY) -> xr.Dataset:
+    """Load the results of a named study, or a results file, into memory.
+
+    Raises
+    ------
+    DataError
+        If there is no such file, or it was not written by rsfstudy.
+    """
+    if not isinstance(name, str | Path):
+        raise InvalidValue("name", name, "must be the name of a study, or a path")
+    return read_results(find_results(name, output))
+
+
+def _load_results(dataset: xr.Dataset | str | Path) -> xr.Dataset:
+    """Results, as they are given or as their file holds them."""
+    if not isinstance(dataset, xr.Dataset):
+        return open(dataset)
+    check_is_study(dataset, "the dataset")
+    return dataset
+
+
+@partial(error_boundary, is_inner=True)
+def plot(
+    dataset: xr.Dataset | str | Path,
+    variable: str | None = None,
+    *,
+    style: Any = None,
+    own: Any = None,
+) -> Figure:
+    """The figure of a dataset (or of a named study's results, or of a file), as its study declares
+    it; a notebook shows it, and its `savefig` writes it.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset, str or Path
+    variable : str, optional
+        Draw this variable instead: as maps over two numeric axes, else as lines.
+    style : path, str, dict or list of those, optional
+        A style on top of the style of rsfstudy: a style sheet (a file that ends in
+        ``.mplstyle``), the name of a style in ``matplotlib.style.available``, or settings such as
+        ``{"font.size": 9, "figure.figsize": (3.5, 2.6)}``, which is one column of a journal in
+        inches. All colours and line styles come from ``axes.prop_cycle``. Unknown settings are
+        rejected.
+    own : function or module, optional
+        What draws it, where that is not part of rsfstudy: what ``Study(plot=...)`` was given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Yours to change: its ``axes`` are the panels, in the order of their letters, and
+        ``figure.axes[0].set_title("")`` and its like work as ever.
+
+    Raises
+    ------
+    InvalidValue
+        For a variable or a style that is none, and for a figure that does not fit.
+    """
+    from rsfstudy.plots import draw_figure
+
+    return draw_figure(_load_results(dataset), own, variable=variable, style=style)
+
+
+@error_boundary
+def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
+    """Compare a dataset (or a named study's results, or a file) with the claims of its study.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row a claim: published value, ours, tolerance and its reason, verdict, and ``moved``
+        where the verdict is not the expected one.
+    """
+    results = _load_results(dataset)
+    declared = read_declaration(results)
+    return build_verdict_table(results, list(declared.claims), declared.overrides)
+
+
+@error_boundary
+def rerun(
+    file: str | Path,
+    *,
+    study: str | Path | None = None,
+    workers: int = 2,
+    client: Any = None,
+    output: str | Path | None = None,
+    progress: bool = True,
+    time_limit: float = CELL_TIME_LIMIT,
+) -> pd.DataFrame:
+    """Compute the cells of a results file, or a motion, again from what the file says, and compare
+    the numbers.
+
+    Parameters
+    ----------
+    file : path
+        A results file, or that of a motion.
+    study : path, optional
+        The file that declares the study, where its measure is not part of rsfstudy; code is never
+        taken from a results file.
+    workers, client, output, progress, time_limit
+        As in `run`; by default nothing is written.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row a variable: how many values are identical, how many there are, the largest
+        difference, and how many differ by more than both error estimates. In its ``attrs``, under
+        ``differs``, what decides a number and is not as it was.
+
+    Raises
+    ------
+    InvalidValue
+        Where the study's measure or a reduction is not part of rsfstudy.
+    DataError, RunError
+        Where the file is damaged, or the run cannot finish.
+    """
+    theirs = read_dataset(find_results(file, OUTPUT_DIRECTORY))
+    if is_single_scene(theirs):
+        if study is not None:
+            load_study(str(study))  # for the parts of its scene
+        return export.rerun_motion(theirs)
+    declared = rebuild_study(theirs, study)
+    place = output_directory(output)
+    if place is not None:
+        for taken in place.glob(f"{declared.name}.*"):
+            rule = f"holds {taken.name}, which this would take the place of"
+            raise InvalidValue("output", str(output), rule, remedy="Name another directory.")
+    keeping = OutputOptions(
+        output=place,
+        fresh=True,
+        keep_going=True,
+        despite_failures="reduced_despite" in theirs.attrs,
+        command=f"rsfstudy.rerun {file}",
+    )
+    with Workers(workers, client, time_limit) as where:
+        ours = prepare_run(declared, keeping, where, progress)()
+    return compare_same_lattice(theirs, ours)
+
+
+@error_boundary
+def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> Comparison:
+    """Differences between two datasets (or named studies' results, or files): in declaration, in
+    what made them, and in numbers, cell by cell where both have the same place on every axis.
+
+    Parameters
+    ----------
+    first, second : xarray.Dataset, str or Path
+        Their lattices may differ.
+
+    Returns
+    -------
+    Comparison
+        Its ``numbers`` is a pandas.DataFrame, one row a variable, which tells in how many cells the
+        two differ by more than the sum of both error estimates; ``agrees`` is true where none do,
+        no status differs, and there is something to compare.
+
+    Raises
+    ------
+    InvalidValue
+        Where an axis of one has no counterpart in the other, not even a fixed value.
+    DataError
+        Where a file is missing or damaged.
+    """
+    return compare_results(_load_results(first), _load_results(second))
+
+
+@partial(error_boundary, passed=(Exception,))
+def recompute_cell(
+    file: str | Path, place: Mapping[str, Any], *, study: str | Path | None = None
+) -> tuple[Scene, Outcome]:
+    """Compute one cell of a results file alone, in this process; what it raises is not caught.
+
+    Parameters
+    ----------
+    file : path
+        A results file.
+    place : mapping of str to value
+        Where the cell is: the value, or label, on each axis; numbers may be text too.
+    study : path, optional
+        The file that declares the study, where its measure is not part of rsfstudy.
+
+    Returns
+    -------
+    Scene, Outcome
+
+    Raises
+    ------
+    InvalidValue
+        Where there is no such cell.
+
+    Warns
+    -----
+    UserWarning
+        Where something that decides its numbers has changed since the file was made.
+    """
+    declared, number, differs = _find_cell(file, place, study)
+    for name, (theirs, ours) in differs.items():
+        text = f"{name}: {theirs} then, {ours} now"
+        warnings.warn(text, RsfStudyWarning, stacklevel=user_stacklevel())
+    scene, changes = declared.cell(number)
+    return scene, declared.measure.with_(**changes)(scene, declared.accuracy)
+
+
+@partial(error_boundary, is_inner=True)
+def _find_cell(
+    file: str | Path, place: Mapping[str, Any], study: str | Path | None
+) -> tuple[Study, int, Mapping[str, tuple[Any, Any]]]:
+    """The study of a file, the number of a cell, and what else decided it and has changed."""
+    results = open(file)
+    number = find_cell_number(results, place)
+    declared = rebuild_study(results, study)
+    now = run_fingerprint(declared)
+    return declared, number, find_differences(read_provenance(results)["fingerprint"], now)

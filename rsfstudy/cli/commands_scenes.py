@@ -1,0 +1,171 @@
+"""What the commands `simulate` and `fit` do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import xarray as xr
+
+from rsfstudy import Rig, Scene, plot_motion, read_record
+from rsfstudy import fit as fit_record_fit
+from rsfstudy import simulate as simulated
+from rsfstudy.api import BEYOND_NORM_ATTRIBUTE
+from rsfstudy.cli import assignments, printing, table_layout
+from rsfstudy.cli.console import console
+from rsfstudy.cli.options import CommandOptions
+from rsfstudy.error_boundary import check_regular_file
+from rsfstudy.errors import InvalidValue
+from rsfstudy.execution import provenance_attributes
+from rsfstudy.fitting import LoadingStep, Record
+from rsfstudy.plots import save_figure
+from rsfstudy.reporting import (
+    Table,
+    describe_stability,
+    events_table,
+    is_fit,
+    is_motion,
+    summarise_motion,
+    summary_pieces,
+)
+from rsfstudy.rig import DISPLAY_BASE_UNITS
+from rsfstudy.status import Status
+from rsfstudy.storage import write_dataset
+
+#: Exit status where a motion passes the instability norm with neither mass nor damping.
+_UNPHYSICAL_EXIT_STATUS = 3
+#: Most steps of a record that are listed.
+_MAX_LISTED_STEPS = 24
+#: Options that `rsfstudy.fit` takes as they are.
+_FIT_OPTIONS = (
+    "stiffness", "slip_distance", "laws", "free", "together", "before", "after", "windows",
+    "noise", "loading", "averaging", "low_pass", "posterior", "budget", "engine",
+)  # fmt: skip
+
+
+def simulate(given: CommandOptions) -> int:
+    """Follow one motion, draw it and write it."""
+    _check_replaceable(given.output.with_suffix(".nc"), is_motion, "motion")
+    scene, laboratory = _scene_and_rig(given)
+    duration, accuracy = _parse_duration(given.duration, laboratory), ("rtol", "budget", "engine")
+    motion = simulated(scene, duration=duration, **given.select(*accuracy))
+    motion = motion.assign_attrs(provenance_attributes(given.command))
+    _write_motion(motion, laboratory, given)
+    if motion.attrs["status"] != Status.OK.label:
+        return printing.FAILED
+    return _UNPHYSICAL_EXIT_STATUS if BEYOND_NORM_ATTRIBUTE in motion.attrs else printing.OK
+
+
+def _scene_and_rig(given: CommandOptions) -> tuple[Scene, Rig | None]:
+    """The scene, and the rig if one is stated."""
+    fields, rig = assignments.parse_fields(given.settings), given.rig
+    if (velocity := rig.pop("load_velocity", None)) is not None:
+        fields["load_velocity"] = assignments.parse_number_or_text(velocity)
+    laboratory = assignments.parse_rig(rig) if rig else None
+    if given.protocol_file is not None:
+        fields["loading"] = assignments.loading_from_file(given.protocol_file, laboratory)
+    elif "loading" in fields:
+        fields["loading"] = assignments.parse_loading(fields["loading"], laboratory)
+    return (laboratory.scene(**fields) if laboratory else Scene(**fields)), laboratory
+
+
+def _parse_duration(text: str | None, laboratory: Rig | None) -> float | None:
+    """In D_c/V_*."""
+    time = None if text is None else assignments.parse_number_or_text(text)
+    if time is not None and laboratory is not None:
+        return laboratory.dimensionless(time, name="--duration")
+    if isinstance(time, str):
+        remedy = "Give a number in D_c/V_*, or state the rig too."
+        raise InvalidValue("--duration", time, "has units, and no rig is stated", remedy=remedy)
+    return time
+
+
+def _write_motion(motion: xr.Dataset, laboratory: Rig | None, given: CommandOptions) -> None:
+    """The picture, and the data beside it."""
+    said = f"{motion.attrs['status']} {motion.attrs['message']}".strip()
+    if not motion.sizes["time"]:
+        console.print(f"{said}\nnothing moved: there is nothing to draw or to keep")
+        return
+    data = given.output.with_suffix(".nc")
+    write_dataset(laboratory.in_units(motion, **DISPLAY_BASE_UNITS) if laboratory else motion, data)
+    printing.write_figure(plot_motion(motion, laboratory, against=given.against), given.output)
+    if not given.quiet:
+        found = [motion, motion.rsf.events()]
+        if laboratory:
+            found = [laboratory.in_units(of, **DISPLAY_BASE_UNITS) for of in found]
+        table_layout.print_piece(summarise_motion(found[0]))
+        table_layout.print_piece(describe_stability(motion.rsf.scene))
+        table_layout.print_piece(events_table(found[1]))
+    console.print(f"{said}\nwrote {given.output} and {data}")
+
+
+def fit(given: CommandOptions) -> int:
+    """Fit records, print the parameters, draw the fits and write them."""
+    data = given.output.with_suffix(".nc")
+    _check_replaceable(data, is_fit, "fit")
+    columns = assignments.parse_columns(given.columns)
+    stress = given.normal_stress
+    about = {"normal_stress": stress, "stiffness": given.stiffness}
+    records = [read_record(path, columns, **about) for path in given.records]
+    for record in records:
+        _print_steps(record)
+    dataset = fit_record_fit(
+        records,
+        steps=[_parse_step_number(text) for text in given.steps],
+        command=given.command,
+        **given.select(*_FIT_OPTIONS),
+        **assignments.parse_fields(given.settings),
+    )
+    dataset = write_dataset(dataset, data)
+    save_figure(dataset, given.output)
+    for piece in summary_pieces(dataset):
+        table_layout.print_piece(piece)
+    console.print(f"wrote {given.output} and {data}", soft_wrap=True)
+    return printing.exit_status(dataset)
+
+
+def _parse_step_number(text: str) -> int:
+    if not text.isdecimal():
+        raise InvalidValue("--step", text, "must be a whole number, or several: 1,2")
+    return int(text)
+
+
+def _print_steps(record: Record) -> None:
+    """Print the steps of a record."""
+    console.print(f"{record.name}: {len(record):,} rows, {len(record.loading_steps)} steps")
+    stressed = any(step.stress_ratio != 1.0 for step in record.loading_steps)
+    rows = [
+        {
+            "step": str(number),
+            "time (s)": f"{step.start:.6g}",
+            "lasts (s)": f"{step.end - step.start:.6g}",
+            "V0 (um/s)": f"{step.velocity_before:.6g}",
+            "V1 (um/s)": f"{step.velocity_after:.6g}",
+            **_format_normal_stresses(step, stressed),
+        }
+        for number, step in enumerate(record.loading_steps[:_MAX_LISTED_STEPS], start=1)
+    ]
+    table_layout.print_piece(Table(rows))
+    if (left := len(record.loading_steps) - _MAX_LISTED_STEPS) > 0:
+        console.print(f"and {left} more")
+
+
+def _format_normal_stresses(step: LoadingStep, listed: bool) -> dict[str, str]:
+    """Format the normal stresses of a step in MPa if ``listed`` is True."""
+    stresses = {"sigma0 (MPa)": step.stress_before, "sigma1 (MPa)": step.stress_after}
+    return {heading: f"{of * 1e-6:.6g}" for heading, of in stresses.items() if listed}
+
+
+def _check_replaceable(data: Path, is_one: Callable[[xr.Dataset], bool], kind: str) -> None:
+    """Raise ``InvalidValue`` if the output file exists and has different contents."""
+    check_regular_file("--output", data)
+    if not data.exists():
+        return
+    try:
+        with xr.open_dataset(data, engine="netcdf4") as there:
+            if is_one(there):
+                return
+    except (OSError, RuntimeError, ValueError):
+        pass  # whatever it is, it is none
+    remedy = "Choose another --output, or move it away first."
+    raise InvalidValue("--output", str(data), f"is there already, and no {kind}", remedy=remedy)

@@ -1,0 +1,29 @@
+"""Critical steps: the smallest step that makes a slider unstable.
+
+The package contains the measures ``CriticalStep`` and ``Triggered`` and their algorithms: the path
+that touches the stability boundary, the motion after a step, and a shooting method. It never
+computes limit cycles, and never reads or writes a file.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rsfstudy._lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from rsfstudy.critical_steps.critical_step import CriticalStep
+    from rsfstudy.critical_steps.triggered import Triggered
+else:
+    __getattr__, __dir__ = lazy_exports(
+        __name__,
+        {
+            "critical_steps.critical_step": ("CriticalStep",),
+            "critical_steps.triggered": ("Triggered",),
+        },
+    )
+
+__all__ = [
+    "CriticalStep",
+    "Triggered",
+]

@@ -1,0 +1,393 @@
+"""Critical step: the smallest step of the load that triggers instability.
+
+The step may be a change of load point velocity, load point displacement or normal stress. A step is
+critical if the peak slip rate of the motion that follows just reaches the instability norm. If the
+effect of inertia is small up to the norm, the end of this critical path is known: ln V equals the
+norm, and its rate is zero. The path is followed backwards in time, in which direction it attracts
+neighbouring paths, to the step at which it starts (see ``critical_path``). If inertia is important
+below the norm, the peak is followed forwards in time (see ``after_step``). In both cases, the
+result is accepted only if motions on both sides of the critical step confirm it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, ClassVar
+
+from scipy.optimize import toms748
+
+from rsfstudy.critical_steps import forward_motion
+from rsfstudy.critical_steps.path_solution import (
+    StepBoundary,
+    find_by_critical_path,
+    find_by_touching_cycle,
+)
+from rsfstudy.critical_steps.shooting import StepFamily
+from rsfstudy.critical_steps.step_types import DisplacementSteps, NormalStressSteps, RateSteps
+from rsfstudy.error_boundary import guard_methods
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measure_base import (
+    Measure,
+    Outcome,
+    check_single_step,
+    norm_below_loading_outcome,
+    slow_norm_warning,
+)
+from rsfstudy.motion import (
+    MIN_RTOL,
+    ROUNDING_ERROR,
+    Accuracy,
+    MotionStopped,
+    WorkMeter,
+    inertia_matters,
+)
+from rsfstudy.quantities import Output
+from rsfstudy.slider import Scene
+from rsfstudy.status import Status
+
+STEP_FAMILIES: Mapping[str, type[StepFamily]] = {
+    "load_velocity_ratio": RateSteps,
+    "displacement_step": DisplacementSteps,
+    "normal_stress_step": NormalStressSteps,
+}
+DIRECTIONS = ("up", "down")
+#: Aliases of the quantities in `STEP_FAMILIES`, which are names of scene fields.
+QUANTITY_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
+
+#: Accuracy of a boundary that is a limit cycle, whatever is asked for.
+_CYCLE_BOUNDARY_RTOL = 1e-8
+
+#: Widest bracket, over the size, that confirms a boundary.
+_MAX_CONFIRMING_WIDTH = 0.02
+
+#: Excess of a motion whose first peak is beyond a limit cycle that touches the norm.
+_FIRST_PEAK_EXCESS = 0.1
+
+#: A slip rate norm at which mass hardly acts.
+_MASSLESS_NORM = 1e-3
+
+
+@cache
+def _outputs_for(of: str) -> tuple[Output, ...]:
+    critical = STEP_FAMILIES[of].quantity
+    confirmed = (f"{critical}_stable", f"{critical}_unstable")
+    beside = (*confirmed, *STEP_FAMILIES[of].extra_outputs, "critical_stiffness")
+    return Output(critical, error=True), *map(Output, beside)
+
+
+@guard_methods
+@dataclass(frozen=True)
+class CriticalStep(Measure):
+    """Smallest step after which slip rate reaches the instability norm.
+
+    The norm is V T/(2 pi D_c). The critical step is a velocity ratio V_0/V_*, a displacement in
+    D_c, or a change of normal stress over sigma_*. The outputs include the sizes of two steps that
+    confirm the critical step: the slider settles after one of them, and becomes unstable after the
+    other. Under the slip law at constant normal stress, critical stiffness and an infinite norm,
+    the critical step is ``V_0/V_* = 1 + a/(b - a)``, or a displacement of ``D_c a/(b - a)``.
+
+    Parameters
+    ----------
+    of : {"load_velocity_ratio", "displacement_step", "normal_stress_step"}
+        Type of the step. The value of this field in the scene is ignored. "velocity_step" is an
+        alias of "load_velocity_ratio". After a step of displacement or of normal stress, the load
+        point is held (V_0 = 0) unless the scene specifies ``load_velocity_ratio``. Steps of normal
+        stress require a normal stress that is not constant. A decrease of normal stress can trigger
+        an instability (direction "down", and a negative number).
+    direction : {"up", "down"}
+        Steps that increase or decrease the load.
+
+    References
+    ----------
+    Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196; eqs. 10, 11 and 14 of
+    doi:10.1007/s11589-014-0098-4.
+    """
+
+    of: str = "load_velocity_ratio"
+    direction: str = "up"
+    name: ClassVar[str] = "critical_step"
+    typical_work = 4_000
+    needs_time: ClassVar[tuple[bool, ...]] = (False,)
+
+    def __post_init__(self) -> None:
+        if isinstance(self.of, str):
+            object.__setattr__(self, "of", QUANTITY_ALIASES.get(self.of, self.of))
+        if not isinstance(self.of, str) or self.of not in STEP_FAMILIES:
+            raise InvalidValue("of", self.of, "cannot be stepped", choices=STEP_FAMILIES)
+        if self.direction not in DIRECTIONS:
+            raise InvalidValue("direction", self.direction, "is unknown", choices=DIRECTIONS)
+
+    @property
+    def primary_output(self) -> str:
+        return STEP_FAMILIES[self.of].quantity
+
+    @property
+    def outputs(self) -> Sequence[Output]:
+        return _outputs_for(self.of)
+
+    @property
+    def solved_fields(self) -> tuple[str, ...]:
+        return (self.of,)
+
+    @property
+    def work_by_digits(self) -> Mapping[float, float]:
+        """Relative work by number of digits, as measured for velocity steps.
+
+        The study accuracy_cost measured these ratios.
+        """
+        return {3.0: 0.59, 5.0: 0.74, 7.0: 1.0, 8.0: 1.21, 9.0: 1.58, 10.0: 1.89}
+
+    def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+        """Return the scale of the numerical error, which is the size of the change."""
+        still = 1.0 if self.of == "load_velocity_ratio" else 0.0
+        return {self.primary_output: abs(values[self.primary_output] - still)}
+
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+        """Find the critical step, and confirm it with a motion on each side.
+
+        If the effect of inertia is small below the norm, the critical step follows from
+        ``critical_path``. If there is no such path, or if inertia is important, the critical step
+        is found from motions that are followed forwards in time.
+        """
+        check_single_step(scene)
+        if scene.starts_unsteady:
+            rule = "is no steady sliding, from which critical steps start"
+            remedy = "Ask whether the step of a scene triggers by the measure triggered."
+            raise InvalidValue("initial_state", scene.initial_state, rule, remedy=remedy)
+        sign = 1 if self.direction == "up" else -1
+        steps = STEP_FAMILIES[self.of](scene, sign)
+        if steps.max_size <= steps.min_size:
+            rate = 0.0 if self.of == "load_velocity_ratio" else steps.scene.load_velocity
+            return norm_below_loading_outcome(scene, rate)
+        below = (
+            not forward_motion.may_have_closed_orbits(scene)
+            or forward_motion.stiffness_ratio_after_step(scene) < 1.0
+        )
+        if (
+            below
+            and forward_motion.has_frictional_damping_only(scene)
+            and forward_motion.is_neutral(steps.scene_at(steps.max_size), 10.0 * accuracy.rtol)
+        ):
+            return Outcome(
+                Status.UNVERIFIED,
+                message="stiffness is critical to within the accuracy: ask for a smaller rtol",
+            )
+        if not scene.critical_stiffness:
+            # nothing grows: only the step itself can reach the norm
+            return self._search_upward(steps, accuracy, meter)
+        if not inertia_matters(scene, accuracy):
+            # a cycle attracts no path, and takes more care
+            rtols = accuracy.rtol, min(accuracy.rtol, _CYCLE_BOUNDARY_RTOL)
+            for find, rtol in zip(
+                (find_by_critical_path, find_by_touching_cycle), rtols, strict=True
+            ):
+                asked = accuracy if rtol == accuracy.rtol else accuracy.with_rtol(rtol)
+                boundary = find(steps, asked, meter)
+                if boundary is not None and not steps.inertia_shifts_size(
+                    boundary.size, asked.rtol
+                ):
+                    outcome = self._verify_boundary(steps, boundary, asked, meter)
+                    if outcome.status is Status.OK:
+                        return outcome
+            return self._search_upward(steps, accuracy, meter)
+        near = _massless_estimate(steps, meter)
+        if near is not None and steps.smaller_steps_decay(near):
+            bracket = _find_bracket(steps, near, accuracy, meter)
+            if bracket is not None:
+                return self._refine_bracket(steps, bracket, accuracy, meter)
+        return self._search_upward(steps, accuracy, meter)
+
+    def _verify_boundary(
+        self, steps: StepFamily, boundary: StepBoundary, accuracy: Accuracy, meter: WorkMeter
+    ) -> Outcome:
+        """Confirm a boundary by a motion on each side, as close to it as the motions can tell.
+
+        The width they confirm is the error of a boundary that motions found in the first place, and
+        of one that they do not confirm at once. A path is then none: where orbits grow that have
+        not reached the norm yet, a smaller step is critical.
+        """
+        first = boundary.relative_error if boundary.from_motions else 3.0 * boundary.relative_error
+        first = width = max(first, accuracy.rtol)
+        while width < _MAX_CONFIRMING_WIDTH:
+            inner, outer = boundary.size * (1.0 - width), boundary.size * (1.0 + width)
+            below, above = (_motion_excess(steps, size, accuracy, meter) for size in (inner, outer))
+            if below is not None and above is not None and above >= 0.0 > below:
+                at_once = width == first and not boundary.from_motions
+                relative = boundary.relative_error if at_once else width
+                error = steps.value_error(boundary.size, relative)
+                values = self._output_values(
+                    steps, boundary.size, error, steps.step_value(inner), steps.step_value(outer)
+                )
+                load = steps.scene_at(boundary.size).load_velocity
+                return Outcome(Status.OK, values, slow_norm_warning(steps.scene, load))
+            if not (boundary.from_motions or boundary.from_cycle):
+                break
+            if boundary.from_cycle and below is not None and below > _FIRST_PEAK_EXCESS:
+                break
+            width *= 10.0
+        return Outcome(
+            Status.UNVERIFIED,
+            self._output_values(steps),
+            "no bracket within 2 % confirms "
+            f"{self.primary_output} = {steps.step_value(boundary.size):.9g}",
+        )
+
+    def _output_values(
+        self,
+        steps: StepFamily,
+        size: float = math.nan,
+        error: float = math.nan,
+        stable: float = math.nan,
+        unstable: float = math.nan,
+    ) -> dict[str, float]:
+        of = self.primary_output
+        return {
+            of: steps.step_value(size),
+            f"{of}_error": error,
+            f"{of}_stable": stable,
+            f"{of}_unstable": unstable,
+            "critical_stiffness": steps.scene.critical_stiffness,
+            **steps.extra_values(size),
+        }
+
+    def _search_upward(self, steps: StepFamily, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+        """Find the critical step from motions after steps of increasing size.
+
+        The search continues until a motion is unstable, and is then refined.
+        """
+
+        smallest, largest = math.log(steps.min_size), math.log(steps.max_size)
+        spacing = (largest - smallest) / max(1, math.ceil((largest - smallest) / math.log(2.0)))
+        stable: float | None = None
+        unstable = smallest
+        while unstable <= largest + 1e-9:
+            try:
+                if forward_motion.reaches_norm(steps.scene_at(math.exp(unstable)), accuracy, meter):
+                    break
+            except MotionStopped as halt:
+                if halt.status is Status.WORK_BUDGET_SPENT or stable is None:
+                    raise
+                return self._no_critical_step_outcome(
+                    steps, math.exp(stable), meter, f", where {halt}"
+                )
+            stable, unstable = unstable, unstable + spacing
+        else:
+            return self._no_critical_step_outcome(steps, steps.max_size, meter)
+        if stable is None:
+            return Outcome(
+                Status.UNSTABLE_AT_ANY_STEP,
+                self._output_values(steps, unstable=steps.step_value(steps.min_size)),
+                f"already a step to {steps.step_value(steps.min_size):.6g} is unstable",
+            )
+        return self._refine_bracket(steps, (stable, unstable), accuracy, meter)
+
+    def _refine_bracket(
+        self, steps: StepFamily, bracket: tuple[float, float], accuracy: Accuracy, meter: WorkMeter
+    ) -> Outcome:
+        """Boundary between a stable and an unstable log size, where the excess of the motions
+        changes sign; the middle of what is left where a motion in between cannot go on.
+        """
+        stable, unstable = bracket
+        rtol = max(steps.size_tolerance(math.exp(unstable), accuracy.rtol), MIN_RTOL)
+        accuracy = accuracy.with_rtol(rtol)
+
+        def excess(log_size: float) -> float:
+            nonlocal stable, unstable
+            found = forward_motion.excess_over_norm(
+                steps.scene_at(math.exp(log_size)), accuracy, meter
+            )
+            if found >= 0.0:
+                unstable = min(unstable, log_size)
+            else:
+                stable = max(stable, log_size)
+            return found
+
+        try:
+            log_size = toms748(excess, *bracket, xtol=0.5 * accuracy.rtol, rtol=1e-15)
+        except MotionStopped as halt:
+            if halt.status is Status.WORK_BUDGET_SPENT:
+                raise
+            if unstable - stable > _MAX_CONFIRMING_WIDTH:
+                return self._no_critical_step_outcome(
+                    steps, math.exp(bracket[0]), meter, f", where {halt}"
+                )
+            log_size = 0.5 * (stable + unstable)
+        # the motions that found it would confirm their own errors: the verdicts come from others
+        size = math.exp(log_size)
+        error = max(
+            accuracy.rtol + steps.neutral_size_error(size, accuracy.rtol), unstable - stable
+        )
+        boundary = StepBoundary(size, error, from_motions=True)
+        return self._verify_boundary(steps, boundary, accuracy.refined(), meter)
+
+    def _no_critical_step_outcome(
+        self, steps: StepFamily, largest: float, meter: WorkMeter, reason: str = ""
+    ) -> Outcome:
+        """No step up to the largest reached the norm: because nothing is unstable, or because of
+        mass.
+        """
+        if steps.scene.has_mass and _massless_estimate(steps, meter) is not None:
+            return Outcome(
+                Status.NORM_UNREACHABLE,
+                self._output_values(steps, stable=steps.step_value(largest)),
+                f"mass keeps every slip rate below the norm {steps.scene.instability_norm:g}",
+            )
+        if steps.largest_step_reaches_norm and not steps.scene.has_mass and not reason:
+            value = steps.step_value(largest)
+            values = self._output_values(steps, largest, largest * ROUNDING_ERROR, value, value)
+            return Outcome(
+                Status.OK, values, "the jump of slip rate at the step itself is critical"
+            )
+        return Outcome(
+            Status.STABLE_FOR_ALL_STEPS,
+            self._output_values(steps, stable=steps.step_value(largest)),
+            f"stable for every step up to {steps.step_value(largest):.6g}{reason}",
+        )
+
+
+def _motion_excess(
+    steps: StepFamily, size: float, accuracy: Accuracy, meter: WorkMeter
+) -> float | None:
+    """Compute the excess of the motion after a step of a given size.
+
+    The result is None if the motion cannot continue.
+    """
+    try:
+        return forward_motion.excess_over_norm(steps.scene_at(size), accuracy, meter)
+    except MotionStopped as halt:
+        if halt.status is Status.WORK_BUDGET_SPENT:
+            raise
+        return None
+
+
+def _massless_estimate(steps: StepFamily, meter: WorkMeter) -> float | None:
+    """Compute the critical step for a norm at which inertia is negligible.
+
+    The result is an inexpensive approximation of the critical step.
+    """
+    norm = min(steps.scene.instability_norm, _MASSLESS_NORM)
+    massless = type(steps)(steps.scene.without_mass().with_(instability_norm=norm), steps.sign)
+    if massless.max_size <= massless.min_size or not massless.scene.critical_stiffness:
+        return None
+    return next(massless.find_path_sizes((1e-6,), meter), None)
+
+
+def _find_bracket(
+    steps: StepFamily, guess: float, accuracy: Accuracy, meter: WorkMeter
+) -> tuple[float, float] | None:
+    """Find a stable and an unstable logarithm of size around a guess.
+
+    The result is None if there are no such sizes within a factor of four.
+    """
+    middle = math.log(guess)
+    reached = forward_motion.reaches_norm(steps.scene_at(guess), accuracy, meter)
+    inner, reach = middle, 1e-4
+    while reach < 1.5:
+        outer = middle - reach if reached else min(middle + reach, math.log(steps.max_size))
+        if forward_motion.reaches_norm(steps.scene_at(math.exp(outer)), accuracy, meter) != reached:
+            return (outer, inner) if reached else (inner, outer)
+        inner, reach = outer, 5.0 * reach
+    return None

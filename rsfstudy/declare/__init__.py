@@ -1,1 +1,0 @@
-"""Declaration of studies, which runs nothing: axes over a scene, a measure, reductions, claims."""

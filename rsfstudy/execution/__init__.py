@@ -1,0 +1,71 @@
+"""Execution of studies: from a declaration to finished cells.
+
+The package plans batches of cells, computes them in this process or on Dask workers, survives lost
+workers, and resumes interrupted runs. Digests of the code and of the declaration decide if the
+cells of a journal are still valid (``provenance``). It never imports the command line and never
+decides how results are shown.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rsfstudy._lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from rsfstudy.execution.cells import Task, compute_serially, serialize_task
+    from rsfstudy.execution.clusters import connect_to_cluster
+    from rsfstudy.execution.plan import Plan, estimate_cost
+    from rsfstudy.execution.provenance import (
+        code_fingerprint,
+        provenance_attributes,
+        run_fingerprint,
+    )
+    from rsfstudy.execution.runner import (
+        OutputOptions,
+        ProgressCallback,
+        StudyRun,
+        count_failures,
+        count_statuses,
+    )
+    from rsfstudy.execution.workers import Workers
+else:
+    __getattr__, __dir__ = lazy_exports(
+        __name__,
+        {
+            "execution.cells": ("Task", "compute_serially", "serialize_task"),
+            "execution.clusters": ("connect_to_cluster",),
+            "execution.plan": ("Plan", "estimate_cost"),
+            "execution.provenance": (
+                "code_fingerprint",
+                "provenance_attributes",
+                "run_fingerprint",
+            ),
+            "execution.runner": (
+                "OutputOptions",
+                "ProgressCallback",
+                "StudyRun",
+                "count_failures",
+                "count_statuses",
+            ),
+            "execution.workers": ("Workers",),
+        },
+    )
+
+__all__ = [
+    "OutputOptions",
+    "Plan",
+    "ProgressCallback",
+    "StudyRun",
+    "Task",
+    "Workers",
+    "code_fingerprint",
+    "compute_serially",
+    "connect_to_cluster",
+    "count_failures",
+    "count_statuses",
+    "estimate_cost",
+    "provenance_attributes",
+    "run_fingerprint",
+    "serialize_task",
+]

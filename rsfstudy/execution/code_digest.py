@@ -1,0 +1,251 @@
+"""Digests of code: of the physics, from its sources, and of a user's own measure, parts and
+stepper, from the objects in memory, because their files may have changed since they were imported.
+A measure in the file of a named study is digested as a user's own is, because what else stands in
+that file decides no number.
+
+All are of compiled code, so that remarks, what docstrings say and the places of lines do not
+count. Of such classes the search follows every name that a function uses: the same code has
+the same digest in a study file, a script, a notebook or a worker, and any change of a function, a
+constant or a helper changes it. Modules that a function imports when it runs are not followed. The
+search ends at Python, installed packages and the rest of rsfstudy, which have versions.
+"""
+
+from __future__ import annotations
+
+import copy
+import functools
+import hashlib
+import inspect
+import io
+import pickle
+import site
+import sys
+import sysconfig
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from pathlib import Path
+from types import CellType, CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.study import STUDIES_PACKAGE as STUDIES
+
+_PACKAGE_NAME = Path(__file__).parent.parent.name
+_INSTALLATION_DIRECTORIES = tuple(
+    Path(path).resolve()
+    for path in {
+        *(sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")),
+        *site.getsitepackages(),
+        site.getusersitepackages(),
+    }
+)
+_PLAIN_TYPES = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
+#: What containers, and what wraps functions, are made of.
+_CONTAINER_PARTS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
+    (property, lambda value: (value.fget, value.fset)),
+    (functools.cached_property, lambda value: value.func),
+    (functools.partial, lambda value: (value.func, value.args, value.keywords)),
+    (classmethod | staticmethod, lambda value: value.__wrapped__),
+    (Mapping, lambda value: tuple(value.items())),
+    (list, tuple),
+)
+
+
+def digest_sources(sources: Mapping[str, bytes]) -> str:
+    """Digest of the code in files, given by their names."""
+    # a third of the time of parsing it to a tree that Python can see; 2 leaves docstrings out
+    compiled = (compile(text, name, "exec", optimize=2) for name, text in sources.items())
+    return _hash_texts(_CodeWalker().texts((*sources, *compiled), ()))
+
+
+def digest_with_measures(physics: str, measures: Iterable[type]) -> str:
+    """Digest of the physics and measures: that of the physics alone, unless one of them stands in
+    the file of a named study.
+    """
+    theirs = tuple(measure for measure in measures if _is_study_module(measure.__module__))
+    return _hash_texts((physics, *_CodeWalker().texts(theirs, ()))) if theirs else physics
+
+
+def digest_classes(*used: object) -> str:
+    """Digest of classes and of all they use, and of data such as protocols; "none" where all of
+    them are classes of rsfstudy.
+    """
+    own = tuple(
+        one if isinstance(one, type) else repr(one)
+        for one in used
+        if not isinstance(one, type) or _is_user_module(one.__module__)
+    )
+    return _hash_texts(_CodeWalker().texts(own, ())) if own else "none"
+
+
+def _hash_texts(parts: Iterable[str]) -> str:
+    sha256 = hashlib.sha256()
+    for part in parts:
+        sha256.update(part.encode(errors="surrogatepass") + b"\0")
+    return sha256.hexdigest()[:16]
+
+
+class _CodeWalker:
+    """Texts that differ wherever the code differs; each object is visited once."""
+
+    def __init__(self) -> None:
+        self._visited: dict[Hashable, Any] = {}
+
+    def texts(self, value: Any, names: Iterable[str]) -> Iterator[str]:
+        """The texts for a value, given the names that the code around it uses."""
+        if isinstance(value, _PLAIN_TYPES):
+            yield repr(value)
+        elif isinstance(value, ModuleType):
+            yield from self._module_texts(value, names)
+        elif isinstance(value, CodeType):
+            yield from self._code_texts(value)
+        elif isinstance(value, tuple):  # may be one object here and two elsewhere
+            for part in value:
+                yield from self.texts(part, names)
+        elif id(value) not in self._visited:
+            self._visited[id(value)] = value
+            yield from self._texts_of_new_object(value, names)
+
+    def _texts_of_new_object(self, value: Any, names: Iterable[str]) -> Iterator[str]:
+        if isinstance(value, FunctionType):
+            yield from self._function_texts(value)
+        elif isinstance(value, type):
+            yield from self._class_texts(value)
+        elif isinstance(value, set | frozenset):
+            yield from sorted(map(repr, value))
+        elif type(value) is np.ndarray and value.dtype.kind != "O":
+            yield f"{value.dtype} {value.shape} {value.tobytes().hex()}"
+        elif kept := next(
+            (parts for kind, parts in _CONTAINER_PARTS if isinstance(value, kind)), None
+        ):
+            yield from self.texts(kept(value), names)
+        elif hasattr(value, "__wrapped__"):  # a cached function
+            yield from self.texts(value.__wrapped__, names)
+        else:
+            yield from self._class_texts(type(value))
+            yield from self._state_texts(value, names)
+
+    def _module_texts(self, module: ModuleType, names: Iterable[str]) -> Iterator[str]:
+        """Only what is used of a module counts."""
+        if not _is_digested_module(module.__name__):
+            yield module.__name__
+            return
+        asked = (id(module), *names)
+        if asked not in self._visited:
+            self._visited[asked] = module
+            used = [name for name in names if name in vars(module)]
+            yield from self.texts(tuple(vars(module)[name] for name in used), names)
+
+    def _function_texts(self, function: FunctionType) -> Iterator[str]:
+        yield function.__qualname__
+        if not _is_digested_module(function.__module__):
+            return
+        yield from self._code_texts(function.__code__)
+        cells = [cell.cell_contents for cell in function.__closure__ or () if cell != CellType()]
+        names = tuple(_used_names(function.__code__))
+        yield from self.texts((function.__defaults__, function.__kwdefaults__, *cells), names)
+        for name in names:
+            if name in function.__globals__:
+                yield name
+                yield from self.texts(function.__globals__[name], names)
+
+    def _code_texts(self, code: CodeType) -> Iterator[str]:
+        yield from (code.co_name, code.co_code.hex(), *code.co_names, *code.co_varnames)
+        yield from self.texts(code.co_consts[_has_docstring_slot(code) :], ())
+
+    def _class_texts(self, kind: type) -> Iterator[str]:
+        yield kind.__qualname__
+        if not _is_digested_module(kind.__module__):
+            return
+        yield from self.texts(kind.__bases__, ())
+        for name, value in sorted(vars(kind).items()):
+            if not _is_generated(name, value):
+                yield name
+                yield from self.texts(value, ())
+
+    def _state_texts(self, value: Any, names: Iterable[str]) -> Iterator[str]:
+        if _is_digested_module(type(value).__module__):
+            yield from self.texts(_state_without_caches(value), names)
+            return
+        content = io.BytesIO()
+        try:
+            _PicklerWithoutCaches(content, protocol=4).dump(value)
+        except Exception:  # a lock or a file decides no number
+            yield type(value).__qualname__
+        else:
+            yield content.getvalue().hex()
+
+
+class _PicklerWithoutCaches(pickle.Pickler):
+    """Pickler that leaves out the cached properties of all objects.
+
+    Whether a property has been computed differs between processes, and decides no number.
+    """
+
+    def reducer_override(self, value: Any) -> Any:
+        state = _state_without_caches(value)
+        if isinstance(value, type) or len(state) == len(getattr(value, "__dict__", ())):
+            return NotImplemented
+        bare = copy.copy(value)
+        vars(bare).clear()
+        vars(bare).update(state)
+        return bare.__reduce_ex__(4)
+
+
+def _state_without_caches(value: Any) -> dict[str, Any]:
+    """Return the attributes of an object without its cached properties."""
+    return {
+        name: part
+        for name, part in getattr(value, "__dict__", {}).items()
+        if not any(
+            isinstance(vars(kind).get(name), functools.cached_property)
+            for kind in type(value).__mro__
+        )
+    }
+
+
+def _has_docstring_slot(code: CodeType) -> bool:
+    """True if the first constant is a docstring, or has its place."""
+    if sys.version_info >= (3, 13):
+        return bool(code.co_flags & inspect.CO_HAS_DOCSTRING)
+    return bool(code.co_flags & inspect.CO_NEWLOCALS) and not code.co_name.startswith("<")
+
+
+def _is_generated(name: str, value: Any) -> bool:
+    """True of what Python, dataclasses and msgspec make for a class, which decides no number."""
+    if name == "_abc_impl" or name.startswith("__annot"):
+        return True
+    made = getattr(getattr(value, "__code__", None), "co_qualname", "").startswith("__create_fn__")
+    return made or (name.startswith("__") and not callable(value))
+
+
+def _used_names(code: CodeType) -> Iterator[str]:
+    """Names a function uses, those of the functions within it included."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _used_names(constant)
+
+
+def _is_digested_module(name: str | None) -> bool:
+    """True if what is digested of a module is what is used of it."""
+    return _is_study_module(name) or _is_user_module(name)
+
+
+def _is_study_module(name: str | None) -> bool:
+    return (name or "").startswith(f"{STUDIES}.")
+
+
+def _is_user_module(name: str | None) -> bool:
+    """True if a module is neither Python's nor installed nor of rsfstudy."""
+    top = (name or "").partition(".")[0]
+    if not top or top == _PACKAGE_NAME or (top in sys.stdlib_module_names and top != "__main__"):
+        return False
+    return not _is_installed_file(getattr(sys.modules.get(top), "__file__", None))
+
+
+@functools.cache
+def _is_installed_file(file: str | None) -> bool:
+    return file is not None and any(
+        Path(file).resolve().is_relative_to(p) for p in _INSTALLATION_DIRECTORIES
+    )

@@ -1,1 +1,0 @@
-"""Finished cells and results files: written, checked and read back."""

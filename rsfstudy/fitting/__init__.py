@@ -1,0 +1,87 @@
+"""Fits of friction parameters to laboratory records.
+
+The package contains ``Record`` for measured data, the detection of load point steps and stress
+drops, models of the record, noise models, confidence intervals and the measure ``Fit``. It never
+reads a file: ``rsfstudy.rig`` does that, and ``rsfstudy.fit`` runs a fit.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rsfstudy._lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from rsfstudy.fitting.drop_detection import MIN_SAMPLES, Detection
+    from rsfstudy.fitting.drop_measurements import read_drops
+    from rsfstudy.fitting.filters import LOW_PASS_ORDERS, MEAN, TRAILING_MEAN, Filter
+    from rsfstudy.fitting.fit_measure import Fit
+    from rsfstudy.fitting.joint_model import split_window_number, strip_window_number, window_values
+    from rsfstudy.fitting.record import RECORD_COLUMNS, Record
+    from rsfstudy.fitting.stress_drops import EVENT_QUANTITIES, EventNumbers
+    from rsfstudy.fitting.validity import SIGNIFICANCE_LEVEL
+    from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
+    from rsfstudy.fitting.whiteness_test import LAG_COUNT
+    from rsfstudy.fitting.window import FitWindow
+    from rsfstudy.fitting.window_model import (
+        LOGARITHMIC_PARAMETERS,
+        PARAMETERS,
+        check_free_parameters,
+        parameters_of_law,
+        parameters_to_fields,
+        scene_to_parameters,
+    )
+else:
+    __getattr__, __dir__ = lazy_exports(
+        __name__,
+        {
+            "fitting.drop_detection": ("Detection", "MIN_SAMPLES"),
+            "fitting.drop_measurements": ("read_drops",),
+            "fitting.filters": ("Filter", "LOW_PASS_ORDERS", "MEAN", "TRAILING_MEAN"),
+            "fitting.fit_measure": ("Fit",),
+            "fitting.joint_model": ("split_window_number", "strip_window_number", "window_values"),
+            "fitting.record": ("RECORD_COLUMNS", "Record"),
+            "fitting.stress_drops": ("EVENT_QUANTITIES", "EventNumbers"),
+            "fitting.validity": ("SIGNIFICANCE_LEVEL",),
+            "fitting.velocity_steps": ("LoadingStep", "noise_variance"),
+            "fitting.whiteness_test": ("LAG_COUNT",),
+            "fitting.window": ("FitWindow",),
+            "fitting.window_model": (
+                "LOGARITHMIC_PARAMETERS",
+                "PARAMETERS",
+                "check_free_parameters",
+                "parameters_of_law",
+                "parameters_to_fields",
+                "scene_to_parameters",
+            ),
+        },
+    )
+
+__all__ = [
+    "Detection",
+    "EVENT_QUANTITIES",
+    "EventNumbers",
+    "Filter",
+    "Fit",
+    "FitWindow",
+    "LAG_COUNT",
+    "LOGARITHMIC_PARAMETERS",
+    "LOW_PASS_ORDERS",
+    "LoadingStep",
+    "MEAN",
+    "MIN_SAMPLES",
+    "PARAMETERS",
+    "RECORD_COLUMNS",
+    "Record",
+    "SIGNIFICANCE_LEVEL",
+    "TRAILING_MEAN",
+    "check_free_parameters",
+    "noise_variance",
+    "parameters_of_law",
+    "parameters_to_fields",
+    "read_drops",
+    "scene_to_parameters",
+    "split_window_number",
+    "strip_window_number",
+    "window_values",
+]

@@ -1,0 +1,116 @@
+"""Detection of filtered friction if the user did not specify a filter.
+
+A filter smooths the peak of a velocity step and correlates the noise. A running mean over m rows
+also causes notches in the spectrum of the noise. The function compares linearised models with and
+without these effects. If the criterion improves and a parameter changes noticeably, friction was
+probably filtered.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from rsfstudy.fitting import noise as noises
+from rsfstudy.fitting.averaging import apply_running_mean
+from rsfstudy.fitting.filters import LOW_PASS_ORDERS, Filter
+from rsfstudy.fitting.fit_solution import FitSolution, compute_aic
+
+#: Rows of the averages that are tested, improvement of the criterion that decides, and change of a
+#: parameter, in standard errors, that matters.
+_TESTED_WINDOW_ROWS, _MIN_AIC_GAIN, _MIN_PARAMETER_CHANGE = range(2, 21), 20.0, 0.5
+#: The same improvement for low-pass filters, which is larger because an inaccurate step time or
+#: stiffness has a similar effect.
+_MIN_LOW_PASS_GAIN = 60.0
+#: Corner frequencies of the low-pass filters that are tested, relative to the sampling rate.
+_TESTED_CORNER_FREQUENCIES = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.025, 0.015)
+#: Largest number of rows that are tested, and passes in which noise and parameters are found.
+_MAX_ROWS, _PASSES = 20_000, 2
+
+
+def find_filter(found: FitSolution, time: np.ndarray, noise: str) -> tuple[str, ...]:
+    """Test whether friction was filtered before it was recorded.
+
+    Running means are tested on all records. Low-pass filters are tested if the noise is correlated,
+    because a low-pass filter correlates white noise.
+
+    Parameters
+    ----------
+    found : FitSolution
+        Result of a fit without a filter.
+    time : ndarray, shape (rows,)
+        Times in s.
+    noise : str
+        Noise model (see ``noise.fitted``).
+
+    Returns
+    -------
+    tuple of str
+        The reason why the standard errors are not valid, with the filter that describes the record
+        best. Empty if no filter describes the record better than unfiltered friction.
+    """
+    windows = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) <= 0.0) + 1)
+    least = found.quantum / math.sqrt(12.0)
+    # a filter delays friction, as an error of the time of a step does
+    delays = found.by_loading[:, :0] if "step_time" in found.free else found.by_loading
+    columns = np.column_stack([found.jacobian, delays, found.model_friction])
+    free = len(found.coordinate_stderr)
+
+    def describe(kind: str, size: float) -> tuple[float, float]:
+        """Return the criterion and the largest change of a parameter, in standard errors."""
+        parts = [_filtered(kind, size, time[rows], columns[rows]) for rows in windows]
+        filtered = np.concatenate(parts)
+        left = found.residuals + columns[:, -1] - filtered[:, -1]
+        jacobian, kept = filtered[:, :-1], found.noise.kept_mask
+        averaging = size if kind == "mean" else 0.0
+        moved = np.zeros(jacobian.shape[1])
+        for _ in range(_PASSES):
+            guessed = left - jacobian @ moved
+            there = noises.guess_noise(noise, time, guessed, kept, least, averaging)[0]
+            whitened = there.whiten(np.column_stack([jacobian, left]))
+            moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
+        innovations = whitened[:, -1] - whitened[:, :-1] @ moved
+        criterion = compute_aic(innovations, there, len(moved), len(time))
+        return criterion, float(np.max(np.abs(moved[:free]) / found.coordinate_stderr))
+
+    if len(time) > _MAX_ROWS or not np.isfinite(columns).all():
+        return ()
+    # the noise of the fit may describe unfiltered friction better than this first estimate
+    plain = min(describe("", 0.0)[0], found.aic)
+    interval = float(np.median(np.diff(time[windows[0]])))
+    tried = [(*describe(kind, size), kind, size) for kind, size in _candidates(found, interval)]
+    best, change, kind, size = min(tried)
+    least_gain = _MIN_AIC_GAIN if kind == "mean" else _MIN_LOW_PASS_GAIN
+    if not (plain - best > least_gain and change > _MIN_PARAMETER_CHANGE):
+        return ()
+    if kind == "mean":
+        seems, remedy = f"averaged over about {size:.3g} s", "`averaging=` (`--averaging`)"
+    else:
+        seems, remedy = f"low-pass filtered at about {size:.3g} Hz", "`low_pass=` (`--low-pass`)"
+    return (
+        f"friction looks {seems}, which changes a parameter by {change:.1f} standard errors: "
+        f"pass {remedy}",
+    )
+
+
+def _candidates(found: FitSolution, interval: float) -> Iterator[tuple[str, float]]:
+    """Yield the kinds and sizes of the filters that are tested."""
+    for rows in _TESTED_WINDOW_ROWS:
+        yield "mean", rows * interval
+    if found.noise.order:
+        for kind in LOW_PASS_ORDERS:
+            for corner in _TESTED_CORNER_FREQUENCIES:
+                yield kind, corner / interval
+
+
+def _filtered(kind: str, size: float, time: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Return the filtered columns of a window, as an array of shape (rows, columns)."""
+    if not kind:
+        return columns
+    if kind == "mean":
+        return apply_running_mean(time, columns, size)
+    one = Filter(kind, size)
+    at = one.sample_times(time)
+    return np.column_stack([one.apply(time, np.interp(at, time, each)) for each in columns.T])

@@ -1,0 +1,259 @@
+"""Sizes and times of drops of shear stress, with errors.
+
+The stress around a drop is modelled by three connected lines: before, during and after the drop.
+The lines meet at the times at which the drop begins and ends. For each pair of times, the lines are
+fitted by least squares. The pair with the smallest sum of squares determines the drop, which is the
+difference between the highest and the lowest stress. The confidence intervals of the times contain
+all pairs whose sum of squares exceeds the minimum by less than a fixed multiple of the noise
+variance [1]_.
+
+References
+----------
+.. [1] Yao (1987), The Annals of Statistics 15, 1321-1328, for the time of a change in noise.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rsfstudy.fitting.drop_detection import Candidate
+
+#: Length of each side of the fit, in windows and in durations; fewest and most samples of a side.
+_SIDE_WINDOWS, _SIDE_DURATIONS, _MIN_SIDE_SAMPLES, _MAX_SIDE_SAMPLES = 3.0, 1.0, 16, 400
+#: Largest number of samples in a fit. Longer records are averaged.
+_MAX_FIT_SAMPLES = 300
+#: Windows beyond the candidate in which the drop may begin or end.
+_SEARCH_WINDOWS = 2.0
+#: Number of times in each grid for the beginning and the end, and number of grid refinements.
+_GRID_SIZE, _GRID_REFINEMENTS = 16, 3
+#: Largest slope of the lines before and after the drop, relative to the slope of the drop.
+_MAX_SLOPE_RATIO = 0.3
+#: Largest difference between the falls of stress on both sides, relative to the drop.
+_MAX_SIDE_FALL_RATIO = 0.5
+#: Excess of the sum of squares, in variances of the noise, at the ends of 95 % intervals: of the
+#: time of a sudden change (twice -ln 0.0253), and of a parameter.
+_TIME_INTERVAL_EXCESS, _SIZE_INTERVAL_EXCESS = 7.4, 3.84
+#: Standard errors in half of a 95 % interval.
+CI_STDERR_FACTOR = 1.96
+#: Error of a time between two samples, relative to the sampling interval.
+_SAMPLING_TIME_ERROR = 0.55
+#: Fewest samples next to a drop that show the stress before or after the drop.
+_MIN_END_SAMPLES = 3
+
+
+class Drop(NamedTuple):
+    """A fitted drop of stress. Errors are half widths of 95 % intervals.
+
+    Attributes
+    ----------
+    start, end : float
+        Times at which stress is highest and lowest.
+    stress_before, stress_after : float
+        Highest and lowest stress.
+    start_error, end_error, stress_before_error, stress_after_error, drop_error : float
+        Errors of the values above, and of the drop ``stress_before - stress_after``.
+    residual_sd : float
+        Standard deviation of the samples around the fitted lines.
+    starts_before_record, ends_after_record : bool
+        True if the record contains no stress before the drop, or no stress after it.
+    """
+
+    start: float
+    end: float
+    stress_before: float
+    stress_after: float
+    start_error: float
+    end_error: float
+    stress_before_error: float
+    stress_after_error: float
+    drop_error: float
+    residual_sd: float
+    starts_before_record: bool
+    ends_after_record: bool
+
+
+class _LineFits(NamedTuple):
+    """Least-squares fits of three connected lines, one for each pair of times.
+
+    Attributes
+    ----------
+    pairs : ndarray, shape (pairs, 2)
+        Times at which the lines meet.
+    coefficients : ndarray, shape (pairs, 4)
+        Coefficients (see ``_fit_lines``).
+    inverse_normal_matrix : ndarray, shape (pairs, 4, 4)
+        Inverse of the normal matrix.
+    residual_squares : ndarray, shape (pairs,)
+        Sum of squares of the residuals.
+    """
+
+    pairs: np.ndarray
+    coefficients: np.ndarray
+    inverse_normal_matrix: np.ndarray
+    residual_squares: np.ndarray
+
+    @property
+    def best_index(self) -> int:
+        """Index of the first pair with the smallest sum of squares.
+
+        Differences due to rounding errors are ignored.
+        """
+        return int(np.argmax(self.residual_squares <= self.residual_squares.min() * (1.0 + 1e-9)))
+
+
+def fit_drop(
+    time: np.ndarray,
+    stress: np.ndarray,
+    candidate: Candidate,
+    limits: tuple[float, float],
+    noise: float,
+) -> Drop:
+    """Fit three connected lines to the stress around a drop.
+
+    Parameters
+    ----------
+    time, stress : ndarray, shape (samples,)
+    candidate : Candidate
+    limits : (float, float)
+        End of the previous drop and beginning of the next drop.
+    noise : float
+        Standard deviation of the noise.
+
+    Returns
+    -------
+    Drop
+    """
+    rows = _rows_around(time, candidate, limits)
+    every = -(-len(rows) // _MAX_FIT_SAMPLES)
+    whole = rows[: len(rows) // every * every]
+    t, y = (of[whole].reshape(-1, every).mean(axis=1) for of in (time, stress))
+    origin, scale = float(t[0]), float(t[-1] - t[0])
+    t = (t - origin) / scale
+    begins, ends = ((at - origin) / scale for at in candidate[:2])
+    lines = _search_times(t, y, begins, ends, candidate.window / scale)
+    best = lines.best_index
+    left = float(lines.residual_squares[best]) / max(len(t) - 6, 1)
+    variance = max(left, 0.25 * noise**2 / every) * candidate.correlation_factor**2
+    excess = lines.residual_squares - lines.residual_squares[best]
+    late = np.abs(lines.pairs[excess <= _TIME_INTERVAL_EXCESS * variance] - lines.pairs[best]).max(
+        axis=0
+    )
+    sizes = lines.coefficients[:, 0] - lines.coefficients[:, 1]
+    spread = float(np.abs(sizes[excess <= _SIZE_INTERVAL_EXCESS * variance] - sizes[best]).max())
+    inverse = lines.inverse_normal_matrix[best]
+    variances = np.array([inverse[0, 0], inverse[1, 1], inverse[:2, :2].trace()])
+    variances[2] -= 2.0 * inverse[0, 1]
+    of_before, of_after, of_drop = CI_STDERR_FACTOR * np.sqrt(np.maximum(variance * variances, 0.0))
+    begins, t1 = t0, _ = lines.pairs[best].tolist()
+    (early, later), gaps = np.searchsorted(t, (t0, t1), "right"), np.diff(t)
+    last = len(gaps) - 1
+    gap0, gap1 = (float(gaps[min(max(at - 1, 0), last)]) for at in (early, later))
+    if not ((t > t0) & (t < t1)).any():  # the drop is between two samples
+        begins = float(t[max(early - 1, 0)]) + 0.5 * gap0
+    return Drop(
+        start=origin + scale * begins,
+        end=origin + scale * t1,
+        stress_before=float(lines.coefficients[best, 0]),
+        stress_after=float(lines.coefficients[best, 1]),
+        start_error=scale * (float(late[0]) + _SAMPLING_TIME_ERROR * gap0),
+        end_error=scale * (float(late[1]) + gap1),
+        stress_before_error=float(of_before + spread),
+        stress_after_error=float(of_after + spread),
+        drop_error=float(of_drop + spread),
+        residual_sd=float(np.sqrt(left * every)),
+        starts_before_record=bool(rows[0] == 0 and (t <= t0).sum() < _MIN_END_SAMPLES),
+        ends_after_record=bool(rows[-1] == len(time) - 1 and (t >= t1).sum() <= _MIN_END_SAMPLES),
+    )
+
+
+def _rows_around(time: np.ndarray, candidate: Candidate, limits: tuple[float, float]) -> np.ndarray:
+    """Return the rows around a drop, without the rows of neighbouring drops."""
+    begins, ends, window = candidate[:3]
+    reach = max(_SIDE_WINDOWS * window, _SIDE_DURATIONS * (ends - begins))
+    first = int(np.searchsorted(time, begins, "left"))
+    last = int(np.searchsorted(time, ends, "right"))
+    start = min(int(np.searchsorted(time, begins - reach)), first - _MIN_SIDE_SAMPLES)
+    stop = max(int(np.searchsorted(time, ends + reach)), last + _MIN_SIDE_SAMPLES)
+    start = max(start, first - _MAX_SIDE_SAMPLES, int(np.searchsorted(time, limits[0])), 0)
+    stop = min(
+        stop, last + _MAX_SIDE_SAMPLES, int(np.searchsorted(time, limits[1], "right")), len(time)
+    )
+    start, stop = min(start, max(first - 2, 0)), max(stop, min(last + 2, len(time)))
+    return np.arange(start, stop)
+
+
+def _search_times(
+    t: np.ndarray, y: np.ndarray, begins: float, ends: float, window: float
+) -> _LineFits:
+    """Search for the times at which the drop begins and ends.
+
+    The search evaluates a grid of pairs of times. The grid is refined around the best pair several
+    times.
+    """
+    reach = max(_SEARCH_WINDOWS * window, ends - begins)
+    halves = np.sort(np.concatenate([t, 0.5 * (t[1:] + t[:-1])]))
+    starts = halves[(halves >= begins - reach) & (halves < ends)]
+    stops = halves[(halves > begins) & (halves <= ends + reach)]
+    parts: list[_LineFits] = []
+    for level in range(_GRID_REFINEMENTS + 1):
+        pairs = np.array(
+            [(u, v) for u in _select_evenly(starts) for v in _select_evenly(stops) if u < v]
+        )
+        if len(pairs):
+            parts.append(_fit_lines(t, y, pairs))
+        found = parts[int(np.argmin([part.residual_squares.min() for part in parts]))]
+        best = found.pairs[found.best_index]
+        near = [_select_nearby(halves, at, ends - begins + 2.0 * reach, level) for at in best]
+        starts, stops = near
+    return _LineFits(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _select_evenly(times: np.ndarray) -> list[float]:
+    """Select an evenly spaced subset of the times."""
+    places = np.unique(np.linspace(0, len(times) - 1, _GRID_SIZE).round().astype(int))
+    return [float(times[place]) for place in places] if len(times) else []
+
+
+def _select_nearby(times: np.ndarray, centre: float, extent: float, level: int) -> np.ndarray:
+    """Select the times near the best time for the next level of the search.
+
+    The last levels contain the immediate neighbours of the best time.
+    """
+    reach = extent / _GRID_SIZE * (4.0 / _GRID_SIZE) ** level
+    place = int(np.searchsorted(times, centre))
+    around = times[max(place - _GRID_SIZE // 3, 0) : place + _GRID_SIZE // 3 + 1]
+    within = times[np.abs(times - centre) <= 2.0 * reach]
+    return within if level < _GRID_REFINEMENTS - 1 and len(within) > len(around) else around
+
+
+def _fit_lines(t: np.ndarray, y: np.ndarray, pairs: np.ndarray) -> _LineFits:
+    """Fit three connected lines for each pair of times.
+
+    The coefficients are the stress at both times, and the slopes before and after the drop. Some
+    pairs describe only a part of a longer drop, and are rejected. A pair is rejected if stress
+    outside the drop falls at more than 0.3 times the rate within the drop. It is also rejected if
+    the line on one side falls by half of the drop more than it would with the slope of the other
+    side.
+    """
+    t0, t1 = pairs[:, :1], pairs[:, 1:]
+    share = np.clip((t - t0) / (t1 - t0), 0.0, 1.0)
+    columns = np.stack([1.0 - share, share, np.minimum(t - t0, 0.0), np.maximum(t - t1, 0.0)], -1)
+    turned = columns.transpose(0, 2, 1)
+    normal = turned @ columns
+    # a small ridge term, because a slope is undetermined if one side has no samples
+    normal += 1e-9 * np.eye(4) * len(t)
+    inverse = np.linalg.inv(normal)
+    centre = y.mean()
+    values = (inverse @ (turned @ (y - centre))[:, :, None])[:, :, 0]
+    left = y - centre - (columns @ values[:, :, None])[:, :, 0]
+    squares = np.square(left).sum(axis=1)
+    drop, lasts = values[:, 0] - values[:, 1], (t1 - t0)[:, 0]
+    goes_on = (values[:, 2:].min(axis=1) < -_MAX_SLOPE_RATIO * drop / lasts) | (drop <= 0.0)
+    for own, other, beside in ((2, 3, pairs[:, 0] - t[0]), (3, 2, t[-1] - pairs[:, 1])):
+        fall = np.minimum(values[:, other], 0.0) - values[:, own]
+        goes_on |= fall * np.maximum(beside, 0.0) > _MAX_SIDE_FALL_RATIO * drop
+    values[:, :2] += centre
+    squares[goes_on] += 1e3 * (float(np.square(y - centre).sum()) + 1e-300)
+    return _LineFits(pairs, values, inverse, squares)

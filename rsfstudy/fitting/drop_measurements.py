@@ -1,0 +1,221 @@
+"""Properties of stress drops in a record: times, stresses, slip and slip rate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import norm
+
+from rsfstudy.fitting.drop_detection import (
+    DETECTION_MARGIN,
+    FALSE_DETECTION_PROBABILITY,
+    Detection,
+    find_resolution,
+    robust_sd,
+    window_mean_decreases,
+)
+from rsfstudy.fitting.drop_fit import CI_STDERR_FACTOR
+from rsfstudy.fitting.stress_drops import EventNumbers, FittedCandidate, find_drops
+
+#: Smallest excess of slip over the usual displacement: in standard deviations, and as a fraction.
+_MIN_EXCESS_SIGMAS, _MIN_EXCESS_FRACTION = 3.0, 0.1
+
+
+class DropIndices(NamedTuple):
+    """Location of a drop among the samples.
+
+    Attributes
+    ----------
+    start : int
+        Index of the first sample in the drop.
+    end : int
+        Index of the first sample after the drop.
+    window : int
+        Number of samples before and after the drop that are averaged.
+    """
+
+    start: int
+    end: int
+    window: int
+
+
+class DropReadings(NamedTuple):
+    """Stress drops in a record.
+
+    Attributes
+    ----------
+    rows : list of EventNumbers
+        Properties of each drop.
+    detection : Detection
+    is_slip : bool
+        False if displacement was checked and is not faster during the drops than around them.
+    """
+
+    rows: list[EventNumbers]
+    detection: Detection
+    is_slip: bool
+
+
+def read_drops(
+    times: np.ndarray, stress: np.ndarray, displacement: np.ndarray | None, *, check_slip: bool
+) -> DropReadings:
+    """Find the drops of stress in a record, and compute their properties.
+
+    Parameters
+    ----------
+    times, stress : ndarray, shape (samples,)
+    displacement : ndarray, shape (samples,), optional
+    check_slip : bool
+        If True, check that displacement is the slip of the fault.
+
+    Returns
+    -------
+    DropReadings
+    """
+    found, detection = find_drops(times, stress)
+    ends = [-math.inf, *(of.drop.end for of in found)]
+    begins = [*(of.drop.start for of in found[1:]), math.inf]
+    rooms = [*zip(ends, begins, strict=False)][: len(found)]
+    places = [locate_drop(times, *of) for of in zip(found, rooms, strict=True)]
+    each = zip(found, places, rooms, strict=True)
+    rows = [drop_properties(times, stress, displacement, *of) for of in each]
+    is_slip = (
+        displacement is None
+        or not check_slip
+        or displacement_follows_drops(times, displacement, places)
+    )
+    return DropReadings(rows, detection, is_slip)
+
+
+def displacement_follows_drops(
+    times: np.ndarray, displacement: np.ndarray, locations: Sequence[DropIndices]
+) -> bool:
+    """Return True if displacement is faster during drops than around them.
+
+    The displacement during each drop is compared with the displacement over the same duration
+    before and after the drop.
+    """
+    excess = usual = variance = 0.0
+    quantum = find_resolution(displacement)
+    noises = {
+        n: max(robust_sd(window_mean_decreases(displacement, n)), quantum)
+        for n in {place.window for place in locations}
+    }
+    for begin, end, window in locations:
+        far = end + window - begin
+        places = (begin - window - far, begin - window, end, end + far)
+        starts = np.clip(places, 0, len(displacement) - window)
+        lasts, slips = (
+            np.diff([of[at : at + window].mean() for at in starts]) for of in (times, displacement)
+        )
+        # the record may not extend far enough before or after a drop
+        ratios = (lasts[1] / np.where(lasts > 0.0, lasts, math.inf))[::2]
+        moved, ratio = float((ratios * slips[::2]).max()), float(ratios.max())
+        excess, usual = excess + float(slips[1]) - moved, usual + abs(moved)
+        variance += 0.5 * noises[window] ** 2 * (1.0 + (1.0 + ratio) ** 2 + ratio**2)
+    return bool(
+        excess > max(_MIN_EXCESS_SIGMAS * math.sqrt(variance), _MIN_EXCESS_FRACTION * usual)
+    )
+
+
+def locate_drop(
+    times: np.ndarray, found: FittedCandidate, limits: tuple[float, float]
+) -> DropIndices:
+    """Locate a drop among the samples.
+
+    The window is shortened if it would overlap with a neighbouring drop or extend beyond the
+    record.
+    """
+    drop, candidate = found
+    begin = int(np.searchsorted(times, drop.start, "right"))
+    end = max(int(np.searchsorted(times, drop.end, "left")), begin)
+    before = int(np.searchsorted(times, drop.start - candidate.window))
+    first, last = (int(np.searchsorted(times, at)) for at in limits)
+    window = min(begin - before, begin - first, last - end, len(times) - end)
+    window = max(min(window, len(times) // 4), 1)
+    return DropIndices(max(begin, window), min(end, len(times) - window), window)
+
+
+def drop_properties(
+    times: np.ndarray,
+    stress: np.ndarray,
+    displacement: np.ndarray | None,
+    found: FittedCandidate,
+    location: DropIndices,
+    limits: tuple[float, float],
+) -> EventNumbers:
+    """Compute the properties of one event and their errors.
+
+    Returns
+    -------
+    row : dict
+        Pairs of a value and its error, which is the half width of a 95 % interval.
+    cut : int
+        0 if the record contains the stress before and after the event. 1 is added if the record
+        begins during the event, and 2 if the record ends during the event.
+    """
+    drop = found.drop
+    row = {
+        "time": (drop.start, drop.start_error),
+        "duration": (
+            max(drop.end - drop.start, 0.0) or drop.end_error,
+            math.hypot(drop.start_error, drop.end_error),
+        ),
+        "stress_before": (drop.stress_before, drop.stress_before_error),
+        "stress_after": (drop.stress_after, drop.stress_after_error),
+        "static_stress_drop": (drop.stress_before - drop.stress_after, drop.drop_error),
+    }
+    cut = int(drop.starts_before_record) + 2 * int(drop.ends_after_record)
+    if displacement is not None:
+        row |= _slip_properties(times, stress, displacement, found, location, limits)
+    return row, cut
+
+
+def _slip_properties(
+    times: np.ndarray,
+    stress: np.ndarray,
+    displacement: np.ndarray,
+    found: FittedCandidate,
+    location: DropIndices,
+    limits: tuple[float, float],
+) -> dict[str, tuple[float, float]]:
+    """Compute slip, peak slip rate and dynamic stress drop of an event.
+
+    Returns
+    -------
+    dict
+        Pairs of a value and its error. The peak slip rate and the dynamic stress drop are NaN if
+        the slip rate does not exceed its noise.
+    """
+    (drop, candidate), (begin, end, window) = found, location
+    size = drop.stress_before - drop.stress_after
+    first, last = (int(np.searchsorted(times, at)) for at in limits)
+    # If the window is shifted by m samples, the difference of means decreases by m drop/window.
+    # The noise of this change has a standard deviation of sqrt(3 m/window) times the error. Noise
+    # shifts the drop further than this limit only once in 1,000.
+    off = math.ceil(3.0 * window * (DETECTION_MARGIN * candidate.difference_stderr / size) ** 2)
+    off = max(0, min(off, window, begin - window - first, last - end - window))
+    begin, end = begin - off, end + off
+    slips, rates = (
+        -window_mean_decreases(displacement, window),
+        np.diff(displacement) / np.diff(times),
+    )
+    fastest = begin - 1 + int(np.argmax(rates[begin - 1 : max(end, begin)]))
+    noise = robust_sd(rates)
+    slip = displacement[end : end + window].mean() - displacement[begin - window : begin].mean()
+    crept = abs(float(np.median(slips))) * (1.0 + 2.0 * off / window)
+    row = {"slip": (slip, CI_STDERR_FACTOR * robust_sd(slips) + crept)}
+    row["peak_slip_rate"] = row["dynamic_stress_drop"] = math.nan, math.nan
+    if rates[fastest] > noise * norm.isf(FALSE_DETECTION_PROBABILITY / len(rates)):
+        row["peak_slip_rate"] = rates[fastest], CI_STDERR_FACTOR * noise
+        # the stress at this time is between the values of the two samples
+        ends = stress[fastest : fastest + 2]
+        reading = 0.5 * float(np.ptp(ends)) + CI_STDERR_FACTOR * robust_sd(np.diff(stress))
+        row["dynamic_stress_drop"] = (
+            drop.stress_before - ends.mean(),
+            drop.stress_before_error + reading,
+        )
+    return row

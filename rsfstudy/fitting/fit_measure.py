@@ -1,0 +1,451 @@
+"""Fits of friction parameters to laboratory records, with standard errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from rsfstudy.error_boundary import guard_methods
+from rsfstudy.errors import InvalidValue
+from rsfstudy.fitting import posterior
+from rsfstudy.fitting.averaging_detection import find_filter
+from rsfstudy.fitting.filters import Filter
+from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
+from rsfstudy.fitting.intervals import confidence_interval
+from rsfstudy.fitting.joint_model import (
+    JointModel,
+    is_window_parameter,
+    number_parameters,
+    strip_window_number,
+)
+from rsfstudy.fitting.noise import WHITE, check_noise_name, ljung_box_p_value
+from rsfstudy.fitting.outputs import fit_outputs
+from rsfstudy.fitting.record import RECORD_COLUMNS, Record
+from rsfstudy.fitting.validity import (
+    MIN_NOISE_SD,
+    describe_asymmetry,
+    describe_load_point_noise,
+    describe_outliers,
+    describe_unidentified,
+    find_unidentified,
+    find_validity_problems,
+    is_rounding_too_coarse,
+)
+from rsfstudy.fitting.window import LOADING_KINDS, FitWindow, guess_parameters, stiffness_factors
+from rsfstudy.fitting.window_model import (
+    LAW_SPECIFIC_PARAMETERS,
+    check_free_parameters,
+    check_positive,
+    parameters_of_law,
+)
+from rsfstudy.measure_base import Measure, Outcome, OutputValue
+from rsfstudy.motion import Accuracy, WorkMeter
+from rsfstudy.quantities import Output, Quantity
+from rsfstudy.slider import Scene
+from rsfstudy.status import Status
+
+#: Accuracy of motions at which their differences tell derivatives.
+_DERIVATIVE_RTOL = 1e-9
+#: Standard errors that numerical errors are held to as to the parameter itself: at the default
+#: accuracy, 1e-7, of which a hundredfold is let pass, a hundredth of one is too much.
+_STDERR_SCALE = 1000.0
+#: Fields of a scene that follow from what is found.
+_SOLVED_FIELDS = (
+    *("a", "b_over_a", "b1_over_a", "b2_over_a", "length_ratio", "mu_star", "stiffness"),
+    *("stiffness_ratio", "reference_rate", "load_velocity_ratio"),
+)
+#: A direct effect over its lower bound below which it is at that bound.
+_LOWER_BOUND_FACTOR = 1.001
+
+
+@guard_methods
+@dataclass(frozen=True)
+class Fit(Measure):
+    """Fit of friction parameters to a laboratory record by least squares.
+
+    The least-squares fit accounts for the noise that is estimated from the residuals. The model is
+    the motion of the scene under the loading of the record, plus a trend in powers of load point
+    displacement from the step:
+
+        mu(t) = mu_* + a ln(V/V_0) + Theta + c_1 x + c_2 x^2 + ...,    dmu/dt = k (V_l - V)
+
+    Here V_l is the load point velocity, V_0 is the load point velocity before the step, and k is
+    stiffness over normal stress. Theta evolves by the friction law. The equation for dmu/dt applies
+    at constant normal stress and without inertia. Lengths are in um, times in s, and normal
+    stresses in Pa. Outputs along the rows have the shape (rows,), and ``covariance`` and
+    ``correlation`` have the shape (parameters, parameters).
+
+    For each parameter, ``<name>_stderr`` is the standard error, and ``<name>_low`` and
+    ``<name>_high`` are the ends of the 95 % confidence interval. ``<name>_error`` is the numerical
+    error. If the record does not constrain a parameter, the status is ``not_identified``, and the
+    message names the parameter. Its interval then extends to the bounds of the search, or is NaN if
+    there are no bounds.
+
+    Parameters
+    ----------
+    records : tuple of Record
+        Records that may be fitted.
+    free : tuple of str
+        Names of the free parameters (see ``analysis.fitting.model.PARAMETERS``). The other
+        parameters have the values of the scene.
+    slip_distance_guess : float
+        Slip distance D_c in um, the unit of slip of the scene. If D_c is free, this is its initial
+        value.
+    slip_distance_2_guess : float
+        Slip distance in um of the second state, if the law has two states.
+    record : str
+        Name of the record to fit. By default, the first record.
+    step : int
+        Number of the step to fit, from 1.
+    together : tuple of (str, int)
+        Names of records and numbers of steps for a joint fit, which replaces ``record`` and
+        ``step``. Each step has its own friction before the step, trend and step time, named
+        ``mu_star_1`` and so on.
+    before, after : float
+        Load point displacements in um to fit before and after the step. By default, the window
+        begins halfway between the previous step and this step. It ends at the next step, or at the
+        window of the next step in a joint fit.
+    part : float
+        Fraction of the displacement after the step to fit.
+    noise : str
+        Noise model: "white" for the usual formula of standard errors, "ar" for an autoregressive
+        process of automatic order, or "ar1", "ar2" and so on.
+    loading : {"steps", "recorded"}
+        Loading by steps with constant velocities between them, or recorded loading. Recorded
+        loading includes normal stress, unless the normal stress of the scene is constant.
+    machine_stiffness : float
+        Stiffness of the machine in Pa/um, which is divided by the normal stress before the step of
+        each window. If 0, the stiffness over normal stress of the scene is used in all windows.
+    filter : str
+        Filter applied to friction before it was recorded, such as "mean 1.0" (see
+        ``analysis.fitting.filters.Filter``). Empty if there is no filter.
+    posterior : int
+        Number of draws from the posterior (see ``analysis.fitting.posterior``).
+
+    References
+    ----------
+    Patterson and Thompson (1971), Biometrika 58, 545-554, for errors under correlated noise; Reinen
+    and Weeks (1993), J. Geophys. Res. 98, 15937-15950, and Marone (1998), Annu. Rev. Earth Planet.
+    Sci. 26, 643-696, for fits of velocity steps.
+    """
+
+    records: tuple[Record, ...]
+    free: tuple[str, ...] = ("a", "b", "slip_distance", "mu_star", "trend1")
+    slip_distance_guess: float = 10.0
+    slip_distance_2_guess: float = 100.0
+    record: str = ""
+    step: int = 1
+    together: tuple[tuple[str, int], ...] = ()
+    before: float = 0.0
+    after: float = 0.0
+    part: float = 1.0
+    noise: str = "ar"
+    loading: str = "steps"
+    filter: str = ""
+    posterior: int = 0
+    machine_stiffness: float = 0.0
+    name: ClassVar[str] = "fit"
+    typical_work = 250_000
+    dimensions = (
+        Quantity("parameter", "", "", "parameter that is fitted"),
+        Quantity("other_parameter", "", "", "parameter that is fitted"),
+        Quantity("row", "", "1", "row of the record"),
+        Quantity("record", "", "", "record that is fitted"),
+        Quantity("step", "", "1", "number of the step in the record"),
+        Quantity("before", "", "um", "load point displacement that is fitted before the step"),
+        Quantity("after", "", "um", "load point displacement that is fitted after the step"),
+        Quantity("part", "", "1", "part of what follows the step that is fitted"),
+        Quantity("noise", "", "", "model of the noise"),
+        Quantity("loading", "", "", "where the loading is taken from"),
+        Quantity("filter", "", "", "filter that friction passed before it was recorded"),
+    )
+
+    def __post_init__(self) -> None:
+        if not self.records:
+            raise InvalidValue("records", self.records, "must hold a record at least")
+        names = [record.name for record in self.records]
+        if len(set(names)) < len(names):
+            raise InvalidValue("records", names, "must have names that differ")
+        check_free_parameters(self.free)
+        for name, step in self._selected_steps:
+            if name not in names:
+                raise InvalidValue("record", name, "is unknown", choices=names)
+            if step < 1:
+                raise InvalidValue("step", step, "must be at least 1")
+        for name in ("before", "after"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise InvalidValue(name, getattr(self, name), "must be 0 or more, in um")
+        if not 0.0 < self.part <= 1.0:
+            raise InvalidValue("part", self.part, "must be above 0, and 1 at most")
+        check_positive(self, "slip_distance_guess", "slip_distance_2_guess")
+        if self.loading not in LOADING_KINDS:
+            raise InvalidValue("loading", self.loading, "is unknown", choices=LOADING_KINDS)
+        if "step_time" in self.free and self.loading == "recorded":
+            rule = "is that of a loading by steps"
+            raise InvalidValue("free", "step_time", rule, remedy="Leave it out.")
+        check_noise_name(self.noise)
+        Filter.parse(self.filter)
+        posterior.check_sampling(self.posterior)
+
+    @property
+    def solved_fields(self) -> tuple[str, ...]:
+        """Fields of the scene that the fit determines."""
+        return (*_SOLVED_FIELDS, *(name for name in ("alpha", "law_exponent") if name in self.free))
+
+    @property
+    def primary_output(self) -> str:
+        """Name of the first parameter that all laws have."""
+        return next(
+            (n for n in self.parameters if n not in LAW_SPECIFIC_PARAMETERS), self.parameters[0]
+        )
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the free parameters, numbered by window if necessary."""
+        return number_parameters(self.free, len(self._selected_steps))
+
+    @property
+    def _selected_steps(self) -> tuple[tuple[str, int], ...]:
+        """Names of the records and numbers of the steps to fit."""
+        return self.together or ((self.record or self.records[0].name, self.step),)
+
+    @cached_property
+    def _windows(self) -> tuple[FitWindow, ...]:
+        """Windows of the steps to fit."""
+        by_name = {record.name: record for record in self.records}
+        others = {name: {n for other, n in self.together if other == name} for name in by_name}
+        ends = self.before, self.after, self.part
+        return tuple(
+            FitWindow(by_name[name], n, *ends, others[name]) for name, n in self._selected_steps
+        )
+
+    @property
+    def outputs(self) -> Sequence[Output]:
+        """Parameters with their errors, properties of the fit, and rows."""
+        return fit_outputs(self.parameters, self.posterior > 0, len(self._selected_steps))
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """Meanings and units of results, dimensions and fields."""
+        draws = [Quantity("draw", "", "1", "number of the draw")] if self.posterior else []
+        return (*super().quantities, *draws)
+
+    @property
+    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        """Names of the parameters, and indices of rows and draws."""
+        names = np.array(self.parameters, dtype=object)
+        together = sum(map(len, self._first_rows))
+        rows = np.arange(together if self.together else max(map(len, self.records)))
+        draws = {"draw": np.arange(self.posterior)} if self.posterior else {}
+        return {"parameter": names, "other_parameter": names, "row": rows, **draws}
+
+    def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
+        """Return the scale of the numerical error of each parameter.
+
+        The scale is the sum of the absolute value of the parameter and a large multiple of its
+        standard error. Parameters that may be zero have an additional constant, because a record
+        may have no noise.
+        """
+        extent = abs(values["window_ends"] - values["window_begins"])
+        sizes = dict.fromkeys(("b", "b1", "b2"), values.get("a", scene.a))
+        sizes |= {"alpha": 1.0, "law_exponent": 1.0}
+        sizes |= {"step_time": extent / values["velocity_before"]}
+        sizes |= {f"trend{n}": scene.mu_star / extent**n for n in range(1, 6)}
+        return {
+            name: abs(values[name])
+            + _STDERR_SCALE * values[f"{name}_stderr"]
+            + sizes.get(strip_window_number(name), 0.0)
+            for name in self.parameters
+            if name in values
+        }
+
+    def describe(self) -> dict[str, Any]:
+        """Return a description of the measure, with hashes of the records."""
+        stated = {f.name: getattr(self, f.name) for f in fields(self)}
+        records = {record.name: record.digest for record in self.records}
+        return {"name": self.name, **stated, "free": list(self.free), "records": records}
+
+    @classmethod
+    def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
+        """Raise ``InvalidValue``, because a file contains only hashes of records."""
+        rule = "are fitted, and the file has no more than digests of them"
+        remedy = "Fit them again: show FILE tells the command."
+        raise InvalidValue("records", [*described["records"]], rule, remedy=remedy)
+
+    @cached_property
+    def _first_rows(self) -> dict[Record, int]:
+        """Records that are fitted, with the index of their first row in the result."""
+        records = [*dict.fromkeys(window.record for window in self._windows)]
+        return {record: sum(map(len, records[:n])) for n, record in enumerate(records)}
+
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+        """Fit the parameters and compute their errors and confidence intervals.
+
+        Parameters that the law does not have are omitted.
+        """
+        own = parameters_of_law(scene, self.free)
+        if own != self.free:
+            return self._insert_missing_parameters(
+                replace(self, free=own).compute(scene, accuracy, meter)
+            )
+        windows = self._windows
+        search, found = self.solve(scene, accuracy, meter)
+        model, place = search.model, windows[0].properties
+        part = model.models[0]
+        apart = float(np.median(np.diff(part.displacement[part.time >= windows[0].step.start])))
+        unidentified = find_unidentified(found, apart)
+        rows = [window.rows + self._first_rows[window.record] for window in windows]
+        values = self._collect_values(found, np.concatenate(rows), model)
+        values |= place
+        values["window_stiffness"] = found.values["stiffness"]
+        if len(windows) > 1:
+            stresses = enumerate(windows, start=1)
+            values |= {f"normal_stress_before_{n}": w.normal_stress for n, w in stresses}
+        ends = {
+            name: search.parameter_bounds(name)
+            if name in unidentified
+            else confidence_interval(search, found, name)
+            for name in self.parameters
+        }
+        for name, (low, high) in ends.items():
+            values[f"{name}_low"], values[f"{name}_high"] = low, high
+        if self.posterior:
+            values |= posterior.draw_parameters(search, found, self.posterior)
+        if unidentified:
+            is_least = (
+                "a" in found.free
+                and found.values["a"] < _LOWER_BOUND_FACTOR * search.parameter_bounds("a")[0]
+            )
+            text = describe_unidentified(found, unidentified, apart, is_a_at_bound=is_least)
+            return Outcome(Status.NOT_IDENTIFIED, values, text)
+        remarks = (
+            describe_outliers(found.outliers),
+            describe_load_point_noise(found, self.loading, place["load_point_noise"]),
+        )
+        reasons = (*self.find_validity_problems(search, found), *describe_asymmetry(found, ends))
+        status = Status.ERRORS_NOT_VALID if reasons else Status.OK
+        cuts = [cut for window in windows for cut in window.truncation_remarks]
+        return Outcome(status, values, "; ".join(filter(None, (*reasons, *cuts, *remarks))))
+
+    def solve(
+        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
+    ) -> tuple[FitProblem, FitSolution]:
+        """Fit the windows with a law that has all free parameters.
+
+        Returns
+        -------
+        search : FitProblem
+        found : FitSolution
+        """
+        smooth = accuracy.with_rtol(min(accuracy.rtol, _DERIVATIVE_RTOL))
+        windows = self._windows
+        per_um = self.machine_stiffness * self.slip_distance_guess
+        scenes = [w.with_machine_stiffness(scene, per_um) for w in windows]
+        of_each = zip(windows, scenes, strict=True)
+        parts = [w.create_model(one, self.free, self.loading, smooth, meter) for w, one in of_each]
+        parts = [replace(part, filter=Filter.parse(self.filter)) for part in parts]
+        if self.noise == WHITE:  # the usual formula
+            parts = [replace(part, shifted_loadings=()) for part in parts]
+        distances = self.slip_distance_guess, self.slip_distance_2_guess
+        first: dict[str, float] = {}
+        for number, (part, window) in enumerate(zip(parts, windows, strict=True), start=1):
+            guess = guess_parameters(part, window.step, self.free, distances)
+            first = guess | first
+            if len(windows) > 1:
+                first |= {f"{n}_{number}": v for n, v in guess.items() if is_window_parameter(n)}
+        one_machine = self.machine_stiffness > 0.0 or "stiffness" in self.free
+        model = JointModel(tuple(parts), stiffness_factors(windows) if one_machine else ())
+        search = FitProblem(model, first, self.parameters, self.noise)
+        return search, search.solve()
+
+    def find_validity_problems(self, problem: FitProblem, solution: FitSolution) -> tuple[str, ...]:
+        """Return the reasons why the standard errors of a fit are not valid.
+
+        Parameters
+        ----------
+        problem : FitProblem
+        solution : FitSolution
+
+        Returns
+        -------
+        tuple of str
+            Empty if the standard errors are valid.
+        """
+        reasons = find_validity_problems(solution, problem.model.friction)
+        # a recorded load point has noise that any average would reduce
+        is_recorded = self.loading == "recorded"
+        is_exact = solution.noise_sd < MIN_NOISE_SD
+        if (
+            self.filter
+            or is_recorded
+            or is_exact
+            or self.noise == WHITE
+            or is_rounding_too_coarse(solution)
+        ):
+            return reasons
+        return (*find_filter(solution, problem.model.time, self.noise), *reasons)
+
+    def _insert_missing_parameters(self, outcome: Outcome) -> Outcome:
+        """Insert NaN into the matrices for parameters that the law does not have."""
+        values = dict(outcome.values)
+        has = np.array([name in values for name in self.parameters])
+        before = np.cumsum(has)[~has]
+        for name, axes in (("covariance", (0, 1)), ("correlation", (0, 1)), ("posterior", (1,))):
+            for axis in axes if name in values else ():
+                values[name] = np.insert(values[name], before, math.nan, axis=axis)
+        return replace(outcome, values=values)
+
+    def _collect_values(
+        self, found: FitSolution, rows: np.ndarray, model: JointModel
+    ) -> dict[str, OutputValue]:
+        """Return the numbers and the rows of a fit."""
+        values: dict[str, OutputValue] = {}
+        for name in found.free:
+            values[name], values[f"{name}_error"] = found.values[name], found.numerical_errors[name]
+            values[f"{name}_stderr"] = found.stderr(name)
+        covariance = found.covariance * np.outer(
+            found.coordinate_derivatives, found.coordinate_derivatives
+        )
+        spread = np.sqrt(np.diag(covariance))
+        signs = np.array([float(n == "a") - (n in ("b", "b1", "b2")) for n in found.free])
+        with np.errstate(invalid="ignore"):
+            correlation = covariance / np.outer(spread, spread)
+            variance_of_rate = float(signs @ covariance @ signs)
+        b = sum(found.values.get(name, 0.0) for name in ("b", "b1", "b2"))
+        trend = model.trend(found.values)
+        variance = float(np.var(model.friction)) or math.nan
+        values |= {
+            "a_minus_b": found.values["a"] - b,
+            "a_minus_b_stderr": math.sqrt(max(variance_of_rate, 0.0)),
+            "noise_size": found.noise_sd,
+            "outliers": len(found.outliers),
+            "friction_quantum": found.quantum,
+            "noise_order": found.noise.order,
+            "effective_samples": found.noise.effective_sample_size,
+            "degrees_of_freedom": found.degrees_of_freedom,
+            "whiteness": ljung_box_p_value(found.whitened_residuals, found.noise.order),
+            "r_squared": 1.0 - float(np.var(found.residuals)) / variance,
+            "rows_fitted": len(rows),
+            "criterion": found.aic,
+            "covariance": covariance,
+            "correlation": correlation,
+        }
+        along = {
+            "fitted_friction": found.model_friction + trend,
+            "fitted_friction_stderr": found.curve_stderr,
+            "detrended_friction": found.model_friction,
+            "residual": found.residuals,
+            "innovation": found.all_whitened_residuals,
+        }
+        for name in (about.name for about in RECORD_COLUMNS[:3]):
+            whole = [record.columns[name] for record in self._first_rows]
+            along[f"record_{name}"] = np.concatenate(whole)
+        for name, column in along.items():
+            values[name] = along_rows = np.full(len(self.inner_coordinates["row"]), math.nan)
+            along_rows[slice(len(column)) if name.startswith("record_") else rows] = column
+        return values

@@ -1,0 +1,188 @@
+"""Errors of step times and velocities due to noise of load point displacement.
+
+The displacement is ``x_0 + V_0 t`` before the first step, and each segment that follows has its own
+velocity. The errors follow as in a fit of friction. The covariance matrix of the times and
+velocities is computed from the derivatives of displacement with respect to times, velocities and
+x_0, and from the noise of the residuals (see ``noise``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from rsfstudy.fitting import noise
+from rsfstudy.fitting.outliers import find_quantum
+from rsfstudy.fitting.record import Record
+from rsfstudy.fitting.velocity_steps import LoadingStep
+from rsfstudy.fitting.window_model import STEP_SHIFT_FRACTION
+
+#: Means of rows of which noise is told: an autoregressive process of them remembers long enough for
+#: a load point that wanders about its set point.
+_MAX_MEANS = 1000
+#: Part of the displacement of a record that noise exceeds.
+_MIN_RELATIVE_NOISE = 1e-7
+#: Ratio of the standard deviation of displacement residuals to the quantum below which rounding
+#: errors are not random; and the number of random phases that are drawn.
+_MIN_NOISE_PER_QUANTUM, _PHASE_DRAW_COUNT = 0.4, 200
+
+
+def shift_steps(record: Record, steps: Sequence[LoadingStep]) -> list[list[LoadingStep]]:
+    """Return copies of the steps that are shifted by their errors.
+
+    Each copy is shifted by a hundredth of one error. The errors are independent, and together they
+    have the covariance matrix of the times and velocities.
+
+    Parameters
+    ----------
+    record : Record
+    steps : sequence of LoadingStep
+        Successive steps of the record.
+
+    Returns
+    -------
+    list of list of Step
+        One copy of the steps for each independent error. The list is empty if the user specified
+        the steps, or if displacement has no noise.
+    """
+    if record.specified_steps is not None or not steps:
+        return []
+    speeds = np.array([steps[0].velocity_before, *(step.velocity_after for step in steps)])
+    moved = []
+    for late, faster in _step_errors(record, steps, speeds):
+        v = speeds + STEP_SHIFT_FRACTION * faster
+        shifts = zip(steps, STEP_SHIFT_FRACTION * late, v[:-1], v[1:], strict=True)
+        moved.append(
+            [
+                s._replace(
+                    start=s.start + t, end=s.end + t, velocity_before=one, velocity_after=two
+                )
+                for s, t, one, two in shifts
+            ]
+        )
+    return moved
+
+
+def integrate_displacement(loading: np.ndarray, time: np.ndarray, origin: float) -> np.ndarray:
+    """Integrate the load point velocity to obtain the displacement.
+
+    The integrated displacement has no noise, in contrast to the recorded displacement. Noise of a
+    regressor would bias the trend in generalised least squares, because the noise dominates at
+    short lags.
+
+    Parameters
+    ----------
+    loading : ndarray, shape (segments, 4)
+        Segments of constant velocity, as returned by ``loading_of``. The first segment also applies
+        to earlier times.
+    time : ndarray, shape (rows,)
+        Times in s.
+    origin : float
+        Time in s at which the displacement is zero.
+
+    Returns
+    -------
+    ndarray, shape (rows,)
+        Displacement in um.
+    """
+    begins, speeds = loading[:, 0], loading[:, 1]
+    knots = np.concatenate([[0.0], np.cumsum(np.diff(begins) * speeds[:-1])])
+
+    def moved(at: np.ndarray) -> np.ndarray:
+        piece = np.maximum(np.searchsorted(begins, at, side="right") - 1, 0)
+        return np.asarray(knots[piece] + speeds[piece] * (at - begins[piece]))
+
+    return np.asarray(moved(time) - moved(np.array([origin])))
+
+
+def _step_errors(
+    record: Record, steps: Sequence[LoadingStep], velocities: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Compute independent errors of the times and velocities of steps.
+
+    Returns
+    -------
+    list of (ndarray, ndarray)
+        Errors of the times, shape (steps,), and of the velocities, shape (steps + 1,).
+    """
+    found, time = record.loading_steps, record.time
+    begins = max((s.end for s in found if s.end < steps[0].start), default=time[0])
+    ends = min((s.start for s in found if s.start > steps[-1].end), default=time[-1])
+    rows = (time >= begins) & (time <= ends)
+    for step in steps:
+        rows &= (time <= step.start) | (time >= step.end)
+    t, x = time[rows] - begins, record.columns["displacement"][rows]
+    at = np.array([0.5 * (s.start + s.end) for s in steps]) - begins
+    knots, moves = np.array([0.0, *at, ends - begins]), np.flatnonzero(velocities)
+    late = -np.diff(velocities) * (t[:, None] > at)
+    lasts = np.clip(t[:, None], knots[:-1], knots[1:]) - knots[:-1]
+    columns = np.column_stack([late, lasts[:, moves], np.ones(len(t)), x - x[0]])
+    best = np.linalg.lstsq(columns[:, :-1], columns[:, -1])[0]
+    columns[:, -1] -= columns[:, :-1] @ best
+    if (
+        not np.std(columns[:, -1]) > _MIN_RELATIVE_NOISE * np.ptp(x)
+        or len(t) < 4 * columns.shape[1]
+    ):
+        return []
+    quantum = find_quantum(record.columns["displacement"])
+    if np.std(columns[:, -1]) < _MIN_NOISE_PER_QUANTUM * quantum:
+        exact = columns[:, :-1] @ best + x[0]
+        root = _rounding_covariance_root(columns[:, :-1], exact, np.searchsorted(at, t), quantum)
+    else:
+        root = _noise_covariance_root(t, columns)
+    # the detected steps differ from the least-squares solution for all rows
+    missed = best[:-1] - np.concatenate([np.zeros(len(at)), velocities[moves]])
+    root = np.column_stack([root, missed])
+    faster = np.zeros((len(velocities), root.shape[1]))
+    faster[moves] = root[len(at) :]
+    return [*zip(root[: len(at)].T, faster.T, strict=True)]
+
+
+def _noise_covariance_root(t: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Compute a root of the covariance matrix under noise of displacement.
+
+    Parameters
+    ----------
+    t : ndarray, shape (rows,)
+    columns : ndarray, shape (rows, parameters + 1)
+        Derivatives of displacement, followed by the residuals. The last derivative is with respect
+        to x_0.
+
+    Returns
+    -------
+    ndarray
+        A matrix A such that A A' is the covariance matrix of times and velocities.
+    """
+    every = -(-len(t) // _MAX_MEANS)
+    table = np.column_stack([t, columns])[: len(t) // every * every]
+    t, *rest = table.reshape(-1, every, table.shape[1]).mean(axis=1).T
+    jacobian, left = np.array(rest[:-1]).T, rest[-1]
+    told = noise.fit_noise(noise.AUTOREGRESSIVE, t, left, jacobian)
+    white = told.whiten(np.eye(len(t)))
+    size = np.linalg.norm(white @ left) / np.sqrt(len(t) - jacobian.shape[1])
+    # lines are those of least squares, with J^+ R J^+' for covariance, J^+ = (J'J)^-1 J'
+    acting = solve_triangular(white, np.linalg.pinv(jacobian).T, trans="T", lower=True)
+    return np.asarray(size * np.linalg.qr(acting)[1].T[:-1, :-1])
+
+
+def _rounding_covariance_root(
+    jacobian: np.ndarray, exact: np.ndarray, pieces: np.ndarray, quantum: float
+) -> np.ndarray:
+    """Compute a root of the covariance matrix if displacement is only rounded.
+
+    Rounding errors are not random within a record, because they repeat at a constant velocity.
+    However, their phase is arbitrary in each straight segment. The lines are therefore fitted to
+    rounding errors with random phases.
+
+    Returns
+    -------
+    ndarray
+        A matrix A such that A A' is the covariance matrix of times and velocities.
+    """
+    rng = np.random.default_rng(0)
+    phases = quantum * rng.random((_PHASE_DRAW_COUNT, pieces.max() + 1))[:, pieces]
+    errors = quantum * np.rint((exact + phases) / quantum) - exact - phases
+    moved = errors @ np.linalg.pinv(jacobian).T
+    return np.asarray(np.linalg.qr(moved / np.sqrt(_PHASE_DRAW_COUNT))[1].T[:-1])

@@ -1,0 +1,144 @@
+"""Posterior sampling of the parameters of a fit with emcee.
+
+The likelihood is the likelihood that the fit maximises, evaluated with the estimated noise. Priors
+are uniform between the bounds of the search. For slip distances and stiffness, the priors are
+uniform in the logarithm.
+
+References
+----------
+Foreman-Mackey et al. (2013), Publ. Astron. Soc. Pac. 125, 306-312.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.stats import multivariate_t
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.fitting.window_model import LOGARITHMIC_PARAMETERS
+from rsfstudy.motion import MotionStopped
+
+if TYPE_CHECKING:
+    from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
+
+#: Largest number of draws.
+_MAX_DRAWS = 1_000_000
+#: Steps between two looks at a chain, autocorrelation times that it must be long, and times that
+#: are left out at its beginning.
+_STEPS_PER_CHECK, _MIN_AUTOCORRELATION_TIMES, _BURN_IN_AUTOCORRELATION_TIMES = 100, 50.0, 5.0
+#: Degrees of freedom of proposals: their tails are longer than those of the likelihood.
+_PROPOSAL_DEGREES_OF_FREEDOM = 5.0
+
+
+def check_sampling(draws: int) -> None:
+    """Raise ``InvalidValue`` if sampling is impossible.
+
+    Sampling requires a valid number of draws and an installation of emcee.
+    """
+    if not isinstance(draws, int) or not 0 <= draws <= _MAX_DRAWS:
+        raise InvalidValue("posterior", draws, f"must be a whole number from 0 to {_MAX_DRAWS:,}")
+    if draws and importlib.util.find_spec("emcee") is None:
+        remedy = "pip install 'rsfstudy[posterior]'."
+        raise InvalidValue("posterior", draws, "needs emcee, which is missing", remedy=remedy)
+
+
+def sample_coordinates(
+    problem: FitProblem, solution: FitSolution, draws: int, seed: int = 0
+) -> tuple[np.ndarray, float]:
+    """Sample the posterior of the free parameters.
+
+    Half of the steps are stretch moves. The other half are proposals from the covariance matrix of
+    the fit. The chain continues until its length exceeds 50 autocorrelation times and the number of
+    independent samples exceeds the number of draws.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    solution : FitSolution
+        Result of the search, with a finite covariance matrix.
+    draws : int
+    seed : int
+
+    Returns
+    -------
+    draws : ndarray, shape (draws, parameters)
+        Draws of the coordinates of the free parameters.
+    autocorrelation_time : float
+        Longest autocorrelation time of the chain in steps.
+
+    Raises
+    ------
+    MotionStopped
+        If the work budget is exhausted before the chain is long enough.
+    """
+    import emcee
+
+    halts: list[MotionStopped] = []
+    errors = multivariate_t(
+        problem.coordinates(solution.values),
+        solution.covariance,
+        _PROPOSAL_DEGREES_OF_FREEDOM,
+        allow_singular=True,
+    )
+
+    def log_likelihood(x: np.ndarray) -> float:
+        if halts or not ((problem.lower_bounds <= x) & (x <= problem.upper_bounds)).all():
+            return -math.inf
+        try:
+            left = problem.residuals(problem.values(x), require_stable=True)
+        except MotionStopped as halt:
+            halts.append(halt)
+            return -math.inf
+        if not np.isfinite(left).all():
+            return -math.inf
+        return -0.5 * float(
+            np.square(solution.noise.whiten(left[:, None]) / solution.noise_sd).sum()
+        )
+
+    def proposed(x: np.ndarray, rng: np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:
+        drawn = errors.rvs(len(x), rng).reshape(x.shape)
+        return drawn, errors.logpdf(x) - errors.logpdf(drawn)
+
+    rng = np.random.RandomState(seed)
+    moves = [(emcee.moves.StretchMove(), 0.5), (emcee.moves.MHMove(proposed), 0.5)]
+    walkers = 2 * len(solution.free) + 2
+    sampler = emcee.EnsembleSampler(walkers, len(solution.free), log_likelihood, moves=moves)
+    begin = errors.rvs(walkers, rng).reshape(walkers, -1)
+    state = emcee.State(
+        np.clip(begin, problem.lower_bounds, problem.upper_bounds), random_state=rng.get_state()
+    )
+    while True:
+        state = sampler.run_mcmc(state, _STEPS_PER_CHECK)
+        if halts:
+            raise halts[0]
+        time = float(np.max(sampler.get_autocorr_time(tol=0)))
+        kept = (
+            sampler.iteration - math.ceil(_BURN_IN_AUTOCORRELATION_TIMES * time)
+            if math.isfinite(time)
+            else 0
+        )
+        if kept >= _MIN_AUTOCORRELATION_TIMES * time and kept * walkers >= draws * time:
+            chain = sampler.get_chain(discard=sampler.iteration - kept, flat=True)
+            return chain[np.linspace(0, len(chain) - 1, draws).round().astype(int)], time
+
+
+def draw_parameters(problem: FitProblem, solution: FitSolution, draws: int) -> dict[str, Any]:
+    """Sample the posterior, and return the draws as parameter values.
+
+    Returns
+    -------
+    dict
+        ``posterior`` contains the draws, with shape (draws, parameters), and
+        ``autocorrelation_time`` the autocorrelation time of the chain. Both are NaN if the standard
+        errors are infinite.
+    """
+    drawn, time = np.full((draws, len(solution.free)), math.nan), math.nan
+    if np.isfinite(solution.covariance).all():
+        drawn, time = sample_coordinates(problem, solution, draws)
+    logs = [name in LOGARITHMIC_PARAMETERS for name in solution.free]
+    drawn[:, logs] = np.exp(drawn[:, logs])
+    return {"posterior": drawn, "autocorrelation_time": time}

@@ -1,0 +1,327 @@
+"""Laboratory records for fits: time series, steps and loading history."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import xarray as xr
+from scipy.optimize import isotonic_regression
+
+from rsfstudy._deprecation import renamed_keywords, renamed_members
+from rsfstudy.error_boundary import guard_methods
+from rsfstudy.errors import InvalidValue
+from rsfstudy.fitting.stress_steps import find_stress_steps, merge_stress_steps, set_stress_levels
+from rsfstudy.fitting.velocity_steps import LoadingStep, detect_velocity_steps
+from rsfstudy.netcdf import with_cf_encoding
+from rsfstudy.quantities import Quantity, is_variable_name
+
+#: Its columns.
+RECORD_COLUMNS = (
+    Quantity("time", "$t$", "s", "time"),
+    Quantity("displacement", r"$\delta_0$", "um", "load point displacement"),
+    Quantity("friction", r"$\mu$", "1", "friction coefficient"),
+    Quantity("normal_stress", r"$\sigma$", "Pa", "normal stress"),
+)
+
+#: Columns of the table of its velocity steps, in the order of `Step`.
+_STEP_COLUMNS = (
+    Quantity("begins", "$t$", "s", "time at which the step begins"),
+    Quantity("ends", "$t$", "s", "time at which the step ends"),
+    Quantity("velocity_before", "$V_0$", "um s-1", "load point velocity before the step"),
+    Quantity("velocity_after", "$V_1$", "um s-1", "load point velocity after the step"),
+    Quantity("normal_stress_before", r"$\sigma$", "Pa", "normal stress before the step"),
+    Quantity("normal_stress_after", r"$\sigma$", "Pa", "normal stress after the step"),
+)
+
+#: Pieces of steady velocity that stand for a ramp: at their ends displacement is exact.
+_RAMP_SEGMENTS = 16
+
+
+@renamed_keywords
+@renamed_members
+@guard_methods
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A laboratory record of an experiment.
+
+    Attributes
+    ----------
+    columns : mapping of str to ndarray
+        ``time`` (s), load point ``displacement`` (um), ``friction``, and ``normal_stress`` (Pa) if
+        it was recorded. All columns have the same length.
+    name : str
+        Name of the record in results.
+    specified_steps : tuple of LoadingStep or None
+        Steps that the user specified. If None, steps are detected.
+
+    Raises
+    ------
+    InvalidValue
+        If a column is missing, has another length or contains values that are not finite, if time
+        does not increase, or if a step is invalid.
+    """
+
+    columns: dict[str, np.ndarray]
+    name: str = "record"
+    specified_steps: tuple[LoadingStep, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if not is_variable_name(self.name):
+            raise InvalidValue("name", self.name, "must be a Python identifier")
+        for about in RECORD_COLUMNS[:3]:
+            if about.name not in self.columns:
+                rule = f"has no {about.name}"
+                raise InvalidValue("record", [*self.columns], rule, remedy=f"Give {about.name}.")
+        for name, values in self.columns.items():
+            if values.shape != self.time.shape:
+                rule = f"holds {values.size} samples, and time {self.time.size}"
+                raise InvalidValue(name, values.shape, rule)
+            if not np.isfinite(values).all():
+                row = int(np.argmin(np.isfinite(values)))
+                remedy = "Leave such rows out of the record."
+                rule = f"must be a finite number, and is none in row {row + 1}"
+                raise InvalidValue(name, float(values[row]), rule, remedy=remedy)
+        late = np.diff(self.time) <= 0.0
+        if late.any():
+            row = int(np.argmax(late)) + 1
+            rule = f"must be later in each row than in the row before, and is not in row {row + 1}"
+            raise InvalidValue("time", float(self.time[row]), rule)
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times of the rows in s, shape (rows,)."""
+        return self.columns["time"]
+
+    @cached_property
+    def digest(self) -> str:
+        """Hash of the columns and the specified steps. Equal records have equal hashes."""
+        told = hashlib.sha256(repr((sorted(self.columns), self.specified_steps)).encode())
+        for name in sorted(self.columns):
+            told.update(np.ascontiguousarray(self.columns[name]).tobytes())
+        return told.hexdigest()[:16]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Record) and (self.name, self.digest) == (other.name, other.digest)
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def window(self, start: float, end: float) -> Record:
+        """Return the part of the record between two times in s."""
+        if not start < end:
+            raise InvalidValue("window", (start, end), "must end after it begins")
+        rows = (self.time >= start) & (self.time <= end)
+        if not rows.any():
+            rule = f"lies outside the record, {self.time[0]:g} to {self.time[-1]:g} s"
+            raise InvalidValue("window", (start, end), rule)
+        return replace(self, columns={n: v[rows] for n, v in self.columns.items()})
+
+    def with_steps(self, steps: Sequence[Sequence[float]]) -> Record:
+        """Return a copy of the record with the given steps.
+
+        The given steps replace the detected steps.
+
+        Parameters
+        ----------
+        steps : sequence of (float, float, float, float) or of six floats
+            For each step, the times in s at which the change begins and ends, and the load point
+            velocities in um/s before and after the step. If normal stress changes, also the normal
+            stresses in Pa before and after the step. By default, the normal stresses are taken from
+            the record.
+
+        Returns
+        -------
+        Record
+        """
+        return replace(self, specified_steps=tuple(map(_parse_step, steps)))
+
+    @cached_property
+    def loading_steps(self) -> tuple[LoadingStep, ...]:
+        """The steps that the user specified, or else the detected steps."""
+        stress, moved = self.columns.get("normal_stress"), self.columns["displacement"]
+        steps = (
+            self.specified_steps
+            if self.specified_steps is not None
+            else detect_velocity_steps(self.time, moved)
+        )
+        if stress is None:
+            return steps
+        changes = find_stress_steps(self.time, stress)
+        if self.specified_steps is None:
+            velocity = float(np.polyfit(self.time - self.time[0], moved, 1)[0])
+            steps = merge_stress_steps(steps, changes, velocity)
+        return set_stress_levels(steps, changes, self.time, stress)
+
+    def steps(self) -> xr.Dataset:
+        """Return a table of the steps of load point velocity and normal stress.
+
+        Returns
+        -------
+        xarray.Dataset
+            Along ``step``, numbered from 1: ``begins``, ``ends`` (s), ``velocity_before``,
+            ``velocity_after`` (um/s), and, if normal stress was recorded, ``normal_stress_before``
+            and ``normal_stress_after`` (Pa).
+        """
+        numbers = [step[: len(_STEP_COLUMNS)] for step in self.loading_steps]
+        rows = np.array(numbers, dtype=float).reshape(-1, len(_STEP_COLUMNS))
+        shown = _STEP_COLUMNS if "normal_stress" in self.columns else _STEP_COLUMNS[:4]
+        data = {about.name: ("step", rows[:, n], about.attributes) for n, about in enumerate(shown)}
+        number = {"long_name": "number of the step", "units": "1"}
+        steps = {"step": ("step", np.arange(1, len(rows) + 1), number)}
+        return with_cf_encoding(xr.Dataset(data, steps, self._attributes("Detected steps")))
+
+    def to_dataset(self) -> xr.Dataset:
+        """Convert the record to a dataset with the dimension ``time``."""
+        about = {column.name: column for column in RECORD_COLUMNS}
+        data = {
+            name: ("time", values, {"long_name": about[name].long_name, "units": about[name].units})
+            for name, values in self.columns.items()
+        }
+        return with_cf_encoding(xr.Dataset(data, attrs=self._attributes("Laboratory record")))
+
+    def _attributes(self, title: str) -> dict[str, str]:
+        """Return the global attributes of a dataset created from the record."""
+        return {"title": f"{title}: {self.name}", "Conventions": "CF-1.11"}
+
+
+def _parse_step(fields: Sequence[float]) -> LoadingStep:
+    """Validate the numbers of a step, and convert them to a ``Step``."""
+    if isinstance(fields, LoadingStep):  # from another record
+        return fields
+    rule = "is no step: begins, ends, velocity before and after, and, if it changes, "
+    rule += "normal stress before and after"
+    try:
+        numbers = [float(number) for number in fields]
+    except (TypeError, ValueError) as error:
+        raise InvalidValue("step", fields, rule) from error
+    if len(numbers) not in (4, 6) or not np.isfinite(numbers).all():
+        raise InvalidValue("step", fields, rule)
+    begins, ends, before, after, *stresses = numbers
+    first, second = stresses or (math.nan, math.nan)
+    step = LoadingStep(begins, ends, before, after, first, second)
+    if not begins <= ends or min(before, after) < 0.0 or min([1.0, *stresses]) <= 0.0:
+        raise InvalidValue("step", tuple(numbers), rule)
+    return step
+
+
+def loading_history(record: Record, start: float, end: float, *, from_rows: bool) -> np.ndarray:
+    """Return the loading history between two times.
+
+    Parameters
+    ----------
+    record : Record
+    start, end : float
+        Times in s. Before the first segment, the slider slides steadily at the load point velocity
+        before the first step.
+    from_rows : bool
+        If True, each row begins a segment, and the recorded displacement is replaced by the closest
+        displacement that never decreases. If False, the loading consists of steps, and load point
+        velocity and normal stress change at a constant rate during a step.
+
+    Returns
+    -------
+    ndarray, shape (segments, 4)
+        For each segment, its start in s, the load point velocity in um/s, the ratio of normal
+        stress to its initial value, and the rate of this ratio in 1/s.
+    """
+    steps = steps_between(record, start, end)
+    if from_rows:
+        part, first = record.window(start, end), steps[0] if steps else None
+        if first is None:
+            return _rowwise_loading(part, 0.0, math.nan)
+        sliding = part.time < first.start
+        stress = part.columns.get("normal_stress", np.array([]))[: int(sliding.sum())]
+        return _rowwise_loading(
+            part, first.velocity_before, float(stress.mean()) if stress.size else math.nan
+        )
+    return stepwise_loading(start, steps)
+
+
+def steps_between(record: Record, start: float, end: float) -> list[LoadingStep]:
+    """Return the steps of a record between two times."""
+    return [step for step in record.loading_steps if start < step.start and step.end < end]
+
+
+def stepwise_loading(start: float, steps: Sequence[LoadingStep]) -> np.ndarray:
+    """Return the loading history that consists of steps.
+
+    Parameters
+    ----------
+    start : float
+        Start of the first segment in s.
+    steps : sequence of LoadingStep
+
+    Returns
+    -------
+    ndarray, shape (segments, 4)
+        Segments as returned by ``loading_history``.
+    """
+    pieces, level = [(start, steps[0].velocity_before if steps else 0.0, 1.0, 0.0)], 1.0
+    for step in steps:
+        lasts, rises = step.end - step.start, level * (step.stress_ratio - 1.0)
+        for part, speed in _velocity_profile(step):
+            at = step.start + part * lasts
+            pieces.append((float(at), float(speed), level + part * rises, rises / lasts))
+        level += rises
+        pieces.append((step.end, step.velocity_after, level, 0.0))
+    return np.array(pieces)
+
+
+def _velocity_profile(step: LoadingStep) -> list[tuple[float, float]]:
+    """Return the velocities within a step.
+
+    Returns
+    -------
+    list of (float, float)
+        The start of each velocity, as a fraction of the duration of the step, and the velocity in
+        um/s.
+    """
+    lasts = step.end - step.start
+    if not lasts > 0.0:
+        return []
+    if step.velocity_profile:
+        return [(begins / lasts, speed) for begins, speed in step.velocity_profile]
+    count = _RAMP_SEGMENTS if step.changes_velocity else 1
+    parts = (np.arange(count) / count).tolist()
+    return [
+        (
+            p,
+            step.velocity_before
+            + (p + 0.5 / _RAMP_SEGMENTS) * (step.velocity_after - step.velocity_before),
+        )
+        for p in parts
+    ]
+
+
+def _rowwise_loading(record: Record, first_velocity: float, stress_before: float) -> np.ndarray:
+    """Return the loading history with one segment per row.
+
+    Parameters
+    ----------
+    record : Record
+    first_velocity : float
+        Load point velocity of the first segment in um/s.
+    stress_before : float
+        Normal stress in Pa before the first step, by which normal stress is divided. If NaN, the
+        normal stress of the first row is used.
+    """
+    lasts = np.diff(record.time)
+    moved = isotonic_regression(record.columns["displacement"]).x
+    table = np.zeros((len(record), 4))
+    table[:, 0], table[:, 2] = record.time, 1.0
+    table[:-1, 1] = np.diff(moved) / lasts
+    table[-1, 1], table[0, 1] = table[-2, 1], first_velocity
+    if "normal_stress" in record.columns:
+        stress = record.columns["normal_stress"]
+        table[:, 2] = stress / (stress_before if stress_before > 0.0 else stress[0])
+        table[0, 2] = 1.0  # the motion begins in steady sliding
+        table[:-1, 3] = np.diff(table[:, 2]) / lasts
+    return table

@@ -1,0 +1,103 @@
+"""Detection and fitting of drops of shear stress in a record."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rsfstudy.fitting.drop_detection import Candidate, Detection, detect_drops
+from rsfstudy.fitting.drop_fit import Drop, fit_drop
+
+#: Scale, heading in tables and description of each quantity of an event.
+EVENT_QUANTITIES = {
+    "time": ("D_c/V_*", "time", "time at which the event begins"),
+    "duration": ("D_c/V_*", "duration", "duration of the event"),
+    "interval": ("D_c/V_*", "interval", "time since the event before began"),
+    "peak_log10_slip_rate": ("", "lg V_max/V_*", "decimal logarithm of peak slip rate over V_star"),
+    "peak_slip_rate": ("V_*", "peak rate", "peak slip rate"),
+    "slip": ("D_c", "slip", "slip during the event"),
+    "stress_before": ("sigma_*", "", "highest shear stress before the event"),
+    "stress_after": ("sigma_*", "", "lowest shear stress after the event"),
+    "static_stress_drop": ("sigma_*", "static drop", "highest less lowest shear stress"),
+    "dynamic_stress_drop": (
+        "sigma_*",
+        "dynamic drop",
+        "highest shear stress less that at peak slip rate",
+    ),
+}
+#: Values of an event with their errors by name, and the flag for the missing part of the event.
+EventNumbers = tuple[dict[str, tuple[float, float]], int]
+#: Smallest fitted drop, in half widths of its 95 % interval.
+_MIN_RELATIVE_SIZE = 1.0
+
+
+class FittedCandidate(NamedTuple):
+    """A fitted drop, and the candidate from which it was fitted."""
+
+    drop: Drop
+    candidate: Candidate
+
+
+def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedCandidate], Detection]:
+    """Find and fit the drops of stress in a record.
+
+    If two fitted drops overlap, their candidates are merged and fitted again as one drop.
+
+    Parameters
+    ----------
+    time, stress : ndarray, shape (samples,)
+
+    Returns
+    -------
+    drops : list of FittedCandidate
+        Drops in order of time.
+    detection : Detection
+    """
+    detection = detect_drops(time, stress)
+    candidates = detection.candidates
+    while True:
+        found = _fit_candidates(time, stress, candidates, detection)
+        merged = _merge_overlapping(found)
+        if len(merged) == len(candidates):
+            break
+        candidates = merged
+    sure = [of for of in found if _drop_size(of.drop) > _MIN_RELATIVE_SIZE * of.drop.drop_error]
+    if sure:  # slow drops increase the noise estimate of long windows
+        residual = float(np.median([of.drop.residual_sd for of in sure]))
+        detection = detection._replace(noise_sd=min(detection.noise_sd, residual))
+    return sure, detection
+
+
+def _drop_size(drop: Drop) -> float:
+    return drop.stress_before - drop.stress_after
+
+
+def _fit_candidates(
+    time: np.ndarray, stress: np.ndarray, candidates: list[Candidate], detection: Detection
+) -> list[FittedCandidate]:
+    """Fit each candidate, limited to the interval between its neighbours."""
+    ends = [float(time[0]), *(one.end for one in candidates)]
+    begins = [*(one.start for one in candidates[1:]), float(time[-1])]
+    return [
+        FittedCandidate(fit_drop(time, stress, one, room, detection.noise_sd), one)
+        for one, room in zip(candidates, zip(ends, begins, strict=False), strict=False)
+    ]
+
+
+def _merge_overlapping(found: list[FittedCandidate]) -> list[Candidate]:
+    """Merge the candidates of overlapping drops."""
+    merged: list[Candidate] = []
+    reached = -np.inf
+    for drop, candidate in found:
+        if merged and drop.start < reached:
+            last = merged[-1]
+            window = max(last.window, candidate.window)
+            error = min(last.difference_stderr, candidate.difference_stderr)
+            correlation = max(last.correlation_factor, candidate.correlation_factor)
+            ends = max(last.end, candidate.end)
+            merged[-1] = Candidate(last.start, ends, window, error, correlation)
+        else:
+            merged.append(candidate)
+        reached = max(reached, drop.end)
+    return merged

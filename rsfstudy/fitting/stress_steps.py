@@ -1,0 +1,227 @@
+"""Detection of normal stress steps in a record.
+
+A step is a change from one constant level of normal stress to another. The mean normal stress of a
+window of rows is compared with the mean of the previous window of the same length. A step is
+detected if both means differ by at least 2 % and by far more than the typical difference. The
+typical difference includes the drift of the whole record and the noise, which may be correlated. A
+ramp between two levels is a step with a duration. A drift that extends beyond the beginning or the
+end of the record is not a step.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import find_objects, label
+
+from rsfstudy.fitting.velocity_steps import LoadingStep
+
+#: Least change of level, relative to the level before, and relative to the robust standard
+#: deviation of differences.
+MIN_RELATIVE_CHANGE, _MIN_CHANGE_SIGMAS = 0.02, 6.0
+#: Largest difference of levels over longer windows, as a fraction of the change. A larger
+#: difference indicates that the change is a part of a ramp.
+_MAX_LEVEL_DRIFT_FRACTION = 0.25
+#: Fraction of the smallest change down to which a change extends.
+_EXTENT_FRACTION = 0.4
+#: Most rows at once (of a longer record, means of several rows), parts of the record that are
+#: compared, and the fewest rows of a part.
+_MAX_ROWS, _PARTITION_COUNTS, _MIN_PART_ROWS = 20_000, (400, 100, 25), 8
+#: Shares of the change of level between which rows determine the line of a ramp, and fewest rows.
+_RAMP_FRACTIONS, _MIN_RAMP_ROWS = (0.1, 0.9), 3
+#: Standard deviation over the median of absolute deviations of Gaussian noise.
+_SD_PER_MAD = 1.4826
+
+
+class StressStep(NamedTuple):
+    """A change of normal stress.
+
+    Attributes
+    ----------
+    start, end : float
+        Times in s at which the change begins and ends. Normal stress changes at a constant rate
+        between these times.
+    stress_before, stress_after : float
+        Normal stresses in Pa before and after the change.
+    """
+
+    start: float
+    end: float
+    stress_before: float
+    stress_after: float
+
+
+def find_stress_steps(time: np.ndarray, stress: np.ndarray) -> list[StressStep]:
+    """Detect the steps of normal stress in a record.
+
+    Parameters
+    ----------
+    time, stress : ndarray, shape (rows,)
+        Times in s and normal stresses in Pa.
+
+    Returns
+    -------
+    list of StressStep
+        Steps in order of time, without changes of less than 2 %.
+    """
+    every = max(1, math.ceil(len(time) / _MAX_ROWS))
+    count = len(time) // every * every
+    t, s = (v[:count].reshape(-1, every).mean(axis=1) for v in (time, stress))
+    found: list[tuple[slice, StressStep]] = []
+    windows = sorted({max(len(t) // parts, _MIN_PART_ROWS) for parts in _PARTITION_COUNTS})
+    for window, longer in itertools.pairwise([*windows, 0]):
+        for rows in _find_changes(s, window):
+            if any(rows.start < other.stop and other.start < rows.stop for other, _ in found):
+                continue
+            before, after = _median_levels(s, rows, window, window)
+            lasting = _median_levels(s, rows, window, longer) if longer else (before, after)
+            change = abs(after - before)
+            goes_on = (
+                max(abs(before - lasting[0]), abs(after - lasting[1]))
+                > _MAX_LEVEL_DRIFT_FRACTION * change
+            )
+            if change > MIN_RELATIVE_CHANGE * abs(before) and not goes_on:
+                found.append((rows, _fit_ramp(t[rows], s[rows], before, after)))
+    return sorted(step for _rows, step in found)
+
+
+def _median_levels(stress: np.ndarray, rows: slice, window: int, reach: int) -> tuple[float, float]:
+    """Compute the median normal stress before and after a change.
+
+    Each median is taken over ``reach`` rows outside the change.
+    """
+    first, last = rows.start + window, rows.stop - window
+    before, after = stress[max(first - reach, 0) : first], stress[last : last + reach]
+    return float(np.median(before)), float(np.median(after))
+
+
+def _find_changes(stress: np.ndarray, window: int) -> list[slice]:
+    """Find changes of the mean of normal stress.
+
+    Returns
+    -------
+    list of slice
+        Rows of each change, with one window of nearly constant stress on either side.
+    """
+    if len(stress) < 4 * window:
+        return []
+    sums = np.concatenate([[0.0], np.cumsum(stress - stress.mean())])
+    change = sums[2 * window :] - 2.0 * sums[window:-window] + sums[: -2 * window]
+    change = change / window - np.median(change) / window
+    spread = _SD_PER_MAD * float(np.median(np.abs(change)))
+    least = max(MIN_RELATIVE_CHANGE * abs(float(np.mean(stress))), _MIN_CHANGE_SIGMAS * spread)
+    found: list[slice] = []
+    for signed in (change, -change):
+        joined: list[slice] = []
+        for (rows,) in find_objects(label(signed > _EXTENT_FRACTION * least)[0]):
+            if joined and rows.start < joined[-1].stop + window:  # noise interrupts a ramp
+                joined[-1] = slice(joined[-1].start, rows.stop)
+            elif signed[rows].max() > least:
+                joined.append(rows)
+        found += joined
+    # a change at an end of the record has no constant level on one side
+    inside = [rows for rows in found if rows.start > 0 and rows.stop < len(change)]
+    return [slice(rows.start, rows.stop - 1 + 2 * window) for rows in inside]
+
+
+def merge_stress_steps(
+    steps: Sequence[LoadingStep], stress_steps: Sequence[StressStep], velocity: float
+) -> tuple[LoadingStep, ...]:
+    """Merge steps of normal stress into the steps of load point velocity.
+
+    If normal stress changes during a step of load point velocity, the result is one step that
+    includes both changes.
+
+    Parameters
+    ----------
+    steps : sequence of LoadingStep
+        Steps of load point velocity.
+    stress_steps : sequence of StressStep
+    velocity : float
+        Load point velocity in um/s if there are no velocity steps.
+
+    Returns
+    -------
+    tuple of Step
+        Steps in order of time.
+    """
+    found = []
+    for step in steps:
+        during = [change for change in stress_steps if _steps_overlap(step, change)]
+        begins = min([step.start, *(change.start for change in during)])
+        ends = max([step.end, *(change.end for change in during)])
+        found.append(step._replace(start=begins, end=ends))
+    for change in stress_steps:
+        if not any(_steps_overlap(step, change) for step in steps):
+            earlier = [step.velocity_after for step in steps if step.end <= change.start]
+            speed = (earlier or [step.velocity_before for step in steps[:1]] or [velocity])[-1]
+            found.append(LoadingStep(change.start, change.end, speed, speed))
+    return tuple(sorted(found, key=lambda step: step.start))
+
+
+def set_stress_levels(
+    steps: Sequence[LoadingStep],
+    stress_steps: Sequence[StressStep],
+    time: np.ndarray,
+    stress: np.ndarray,
+) -> tuple[LoadingStep, ...]:
+    """Set the normal stresses of steps from the record.
+
+    Steps with given normal stresses are not changed.
+
+    Parameters
+    ----------
+    steps : sequence of LoadingStep
+    stress_steps : sequence of StressStep
+        Detected steps of normal stress. If there is no such step during a step of velocity, its
+        normal stresses before and after are equal.
+    time, stress : ndarray, shape (rows,)
+        Times in s and normal stresses in Pa.
+
+    Returns
+    -------
+    tuple of Step
+    """
+    ends = [-math.inf, *(step.end for step in steps)]
+    begins = [*(step.start for step in steps[1:]), math.inf]
+    found = []
+    for step, earlier, later in zip(steps, ends, begins, strict=False):
+        during = [change for change in stress_steps if _steps_overlap(step, change)]
+        if math.isnan(step.stress_before):
+            rows = stress[(time >= earlier) & (time <= later)]
+            level = float(np.median(rows)) if rows.size else math.nan
+            before, after = (
+                (during[0].stress_before, during[-1].stress_after) if during else (level, level)
+            )
+            step = step._replace(stress_before=before, stress_after=after)
+        if step.start == step.end and step.stress_ratio != 1.0:
+            # a change of normal stress lasts at least one sampling interval
+            row = int(np.clip(np.searchsorted(time, step.start, "right"), 1, len(time) - 1))
+            step = step._replace(start=float(time[row - 1]), end=float(time[row]))
+        found.append(step)
+    return tuple(found)
+
+
+def _steps_overlap(step: LoadingStep, change: StressStep) -> bool:
+    """Return True if normal stress changes during a step."""
+    near = change.end - change.start
+    return step.start - near <= change.end and change.start <= step.end + near
+
+
+def _fit_ramp(time: np.ndarray, stress: np.ndarray, before: float, after: float) -> StressStep:
+    """Locate the ramp between two levels by a linear fit."""
+    share = (stress - before) / (after - before)
+    middle = int(np.argmax(np.cumsum(0.5 - share)))  # the best boundary at half of the change
+    first = int(np.flatnonzero(share[: middle + 1] <= _RAMP_FRACTIONS[0]).max(initial=0))
+    reached = np.flatnonzero(share[middle:] >= _RAMP_FRACTIONS[1])
+    last = middle + int(reached[0]) if len(reached) else len(share) - 1
+    on_way = np.arange(first + 1, last)
+    if len(on_way) < _MIN_RAMP_ROWS:
+        return StressStep(float(time[first]), float(time[last]), before, after)
+    slope, offset = np.polyfit(time[on_way] - time[first], share[on_way], 1)
+    begins, ends = (time[first] + (x - offset) / slope for x in (0.0, 1.0))
+    return StressStep(float(max(begins, time[0])), float(min(ends, time[-1])), before, after)

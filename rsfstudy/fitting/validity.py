@@ -1,0 +1,252 @@
+"""Checks of the standard errors of a fit.
+
+If the standard errors are not valid, the status of the fit is ``errors_not_valid``, and its
+parameter values can still be used. Each check returns a reason as a string without a final full
+stop. The reason describes the violated condition and a remedy.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from rsfstudy.fitting.fit_solution import FitSolution
+from rsfstudy.fitting.joint_model import strip_window_number
+from rsfstudy.fitting.noise import ljung_box_p_value
+from rsfstudy.fitting.window_model import LOGARITHMIC_PARAMETERS
+from rsfstudy.formatting import pluralize
+
+#: Parameters that are slip distances.
+SLIP_DISTANCES = ("slip_distance", "slip_distance_2")
+#: Significance level of the test for autocorrelated whitened residuals.
+SIGNIFICANCE_LEVEL = 0.01
+#: Standard deviation of friction below which residuals are numerical, not statistical.
+MIN_NOISE_SD = 1e-7
+#: Largest ratio of the residual standard deviation to that of an ordinary least-squares fit.
+_MAX_RESIDUAL_RATIO = 2.0
+#: Standard deviation of the noise, over the quantum of friction, below which rounding errors depend
+#: on friction; and the largest fraction of rows that may be outliers.
+_MIN_NOISE_PER_QUANTUM, _MAX_OUTLIER_FRACTION = 0.4, 0.05
+#: Fewest rows within a slip distance for which confidence intervals are reliable.
+_MIN_ROWS_PER_SLIP_DISTANCE = 1.5
+#: Largest ratio of the two sides of a 95 % interval, in the logarithm of a parameter.
+_MAX_INTERVAL_ASYMMETRY = 3.0
+#: Largest number of outliers that a message names.
+_MAX_LISTED_OUTLIERS = 10
+
+
+def find_validity_problems(solution: FitSolution, friction: np.ndarray) -> tuple[str, ...]:
+    """Return the reasons why the standard errors of a fit are not valid.
+
+    Parameters
+    ----------
+    solution : FitSolution
+    friction : ndarray, shape (rows,)
+        Recorded friction.
+
+    Returns
+    -------
+    tuple of str
+        Empty if the standard errors are valid.
+    """
+    if solution.noise_sd < MIN_NOISE_SD:
+        return ()
+    return (
+        *_check_misfit(solution, friction),
+        *_check_rounding(solution),
+        *_check_outlier_count(solution),
+        *_check_autocorrelation(solution),
+    )
+
+
+def describe_asymmetry(
+    found: FitSolution, ends: Mapping[str, tuple[float, float]]
+) -> tuple[str, ...]:
+    """Return the parameters whose 95 % intervals are too asymmetric for standard errors.
+
+    If the record constrains a parameter from one side only, such as the stiffness of a very stiff
+    machine, the standard errors of all correlated parameters are too small.
+
+    Parameters
+    ----------
+    found : FitSolution
+    ends : mapping of str to (float, float)
+        Ends of the 95 % intervals, from the likelihood.
+
+    Returns
+    -------
+    tuple of str
+        Reasons why the standard errors are not valid.
+    """
+    reasons = []
+    for name in (
+        n
+        for n in found.free
+        if strip_window_number(n) in LOGARITHMIC_PARAMETERS and min(ends[n]) > 0.0
+    ):
+        below, above = (abs(math.log(end / found.values[name])) for end in ends[name])
+        if max(below, above) > _MAX_INTERVAL_ASYMMETRY * min(below, above):
+            low, high = ends[name]
+            reasons.append(
+                f"the 95 % interval of {name} is asymmetric ({low:.3g} to {high:.3g}), so standard "
+                f"errors do not describe it: specify {name} instead of fitting it, or sample faster"
+            )
+    return tuple(reasons)
+
+
+def describe_outliers(outliers: np.ndarray) -> str:
+    """Return a remark that lists the outliers.
+
+    Parameters
+    ----------
+    outliers : ndarray of int
+        Indices of rows in the window. The remark numbers the rows from 1.
+
+    Returns
+    -------
+    str
+        Empty if there are no outliers.
+    """
+    if not len(outliers):
+        return ""
+    names = ", ".join(str(row + 1) for row in outliers[:_MAX_LISTED_OUTLIERS].tolist())
+    more = " and more" * (len(outliers) > _MAX_LISTED_OUTLIERS)
+    count = pluralize(len(outliers), "outlier")
+    verb = "was" if len(outliers) == 1 else "were"
+    return f"{count} {verb} left out: rows {names}{more} of the window"
+
+
+def _check_misfit(found: FitSolution, friction: np.ndarray) -> Iterator[str]:
+    """Yield a reason if the residuals are too large."""
+    size = float(np.sqrt(np.mean(found.noise.drop_outliers(found.residuals) ** 2)))
+    if not size < np.std(friction):
+        yield (
+            "the fit explains the record no better than its mean does (R2 is not positive): "
+            "check the step, the stiffness and the law"
+        )
+    elif size > _MAX_RESIDUAL_RATIO * found.ols_residual_rms:
+        yield (
+            f"the residuals ({size:.2g}) are {size / found.ols_residual_rms:.1f} times as large "
+            "as those of an ordinary least-squares fit, so part of the response is taken for "
+            "noise: check the time of the step, the trend and the law"
+        )
+
+
+def _check_rounding(found: FitSolution) -> Iterator[str]:
+    """Yield a reason if the rounding of friction exceeds the noise."""
+    if is_rounding_too_coarse(found):
+        yield (
+            f"friction is rounded to {found.quantum:.2g}, more than 2.5 times the noise, so "
+            "rounding errors are not random: export the record with more digits"
+        )
+
+
+def is_rounding_too_coarse(solution: FitSolution) -> bool:
+    """Return True if the rounding of friction is too coarse.
+
+    Rounding errors are random only if the standard deviation of the noise exceeds 0.4 times the
+    quantum of friction.
+    """
+    variance = (
+        solution.noise_sd * float(solution.noise.level_sds.min())
+    ) ** 2 - solution.quantum**2 / 12.0
+    return variance < (_MIN_NOISE_PER_QUANTUM * solution.quantum) ** 2
+
+
+def _check_outlier_count(found: FitSolution) -> Iterator[str]:
+    """Yield a reason if too many rows are outliers."""
+    count, rows = len(found.outliers), len(found.residuals)
+    if count > _MAX_OUTLIER_FRACTION * rows:
+        yield f"{count} of {rows} rows are outliers: remove them from the record, or check the law"
+
+
+def _check_autocorrelation(found: FitSolution) -> Iterator[str]:
+    """Yield a reason if the whitened residuals are autocorrelated."""
+    p_value = ljung_box_p_value(found.whitened_residuals, found.noise.order)
+    if p_value < SIGNIFICANCE_LEVEL:
+        yield (
+            f"the whitened residuals are still autocorrelated (p = {p_value:.2g}): "
+            "the law, the trend or the noise model does not describe the record"
+        )
+
+
+def describe_load_point_noise(solution: FitSolution, loading: str, noise: float) -> str:
+    """Return a remark on the noise of the load point.
+
+    Returns
+    -------
+    str
+        Empty if the noise of the load point has little effect on the parameters.
+    """
+    if loading == "steps":
+        moved = np.diag(solution.covariance) > 2.0 * np.diag(solution.noise_covariance)
+        pairs = zip(solution.free, moved.tolist(), strict=True)
+        names = ", ".join(n for n, most in pairs if most and strip_window_number(n) != "step_time")
+        remedy = "" if "step_time" in solution.free else ": looked for, step_time lessens it"
+        text = f"noise of load point displacement makes most of the error of {names}{remedy}"
+        return text if names else ""
+    if "slip_distance" not in solution.free:
+        return ""
+    # of second order: ln V of a stiff slider follows the load point by k x/a
+    shift = 0.5 * (solution.values["stiffness"] * noise / solution.values["a"]) ** 2
+    if shift < solution.stderr("slip_distance") / solution.values["slip_distance"]:
+        return ""
+    return (
+        f"noise of the recorded load point, {noise:.2g} um, moves slip_distance by some "
+        f"{100.0 * shift:.2g} %, more than its standard error: see loading='steps'"
+    )
+
+
+def find_unidentified(solution: FitSolution, row_spacing: float) -> tuple[str, ...]:
+    """Return the parameters that the record does not constrain.
+
+    A slip distance is also unconstrained if the record has too few rows per slip distance.
+
+    Parameters
+    ----------
+    solution : FitSolution
+    row_spacing : float
+        Load point displacement in um between rows after the step.
+
+    Returns
+    -------
+    tuple of str
+    """
+    sparse = [
+        n
+        for n in SLIP_DISTANCES
+        if solution.values.get(n, math.inf) < _MIN_ROWS_PER_SLIP_DISTANCE * row_spacing
+    ]
+    return tuple(n for n in solution.free if n in (*solution.unidentified, *sparse))
+
+
+def describe_unidentified(
+    solution: FitSolution, names: tuple[str, ...], row_spacing: float, *, is_a_at_bound: bool
+) -> str:
+    """Return the message for parameters that the record does not constrain.
+
+    Parameters
+    ----------
+    solution : FitSolution
+    names : tuple of str
+        Names of these parameters.
+    row_spacing : float
+        Load point displacement in um between rows after the step.
+    is_a_at_bound : bool
+        True if the direct effect is at its lower bound.
+
+    Returns
+    -------
+    str
+    """
+    text = f"the record does not constrain {', '.join(names)}"
+    if sparse := set(names) - set(solution.unidentified):
+        rows = min(solution.values[name] for name in sparse) / row_spacing
+        text += f"; the record has {rows:.1f} rows per slip distance, and "
+        text += f"{_MIN_ROWS_PER_SLIP_DISTANCE:g} are needed: sample faster after the step"
+    if "a" in names and is_a_at_bound:
+        text += "; friction does not change at the step as velocity does: "
+        text += "see whether columns (time and displacement, say) are exchanged"
+    return text

@@ -1,0 +1,349 @@
+"""Window of a record around a step, its loading, and initial parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from rsfstudy.fitting.linear_portion import find_linear_start
+from rsfstudy.fitting.load_point_errors import integrate_displacement, shift_steps
+from rsfstudy.fitting.record import Record, loading_history, steps_between, stepwise_loading
+from rsfstudy.fitting.stress_steps import MIN_RELATIVE_CHANGE
+from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
+from rsfstudy.fitting.window_model import WindowModel, scene_to_parameters
+from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
+from rsfstudy.slider import Scene
+from rsfstudy.status import Status
+
+#: Part of the way back to the step before that a window begins at, and rows for each parameter.
+_BACKWARD_FRACTION, _ROWS_PER_PARAMETER = 0.5, 3
+#: Part of the time before the first step by which loading may come late.
+_MAX_DELAY_FRACTION = 0.2
+#: Smallest fraction of a requested extent for which no remark is made.
+_MIN_EXTENT_FRACTION = 0.98
+LOADING_KINDS = ("steps", "recorded")
+#: Rows of the running median by which noise of normal stress is reduced, the quantile of departures
+#: that is compared, and the standard deviations of noise by which it may exceed the limit.
+_MEDIAN_ROWS, _DEPARTURE_QUANTILE, _MAX_NOISE_SIGMAS = 5, 0.99, 2.0
+#: Logarithm of the ratio of velocities below which the initial a and b are not read from the step.
+_MIN_LOG_VELOCITY_RATIO = 0.02
+
+
+@dataclass(frozen=True)
+class FitWindow:
+    """Part of a record around a step that is fitted.
+
+    Attributes
+    ----------
+    record : Record
+    step_number : int
+        Number of the step, from 1.
+    displacement_before, displacement_after : float
+        Load point displacements in um before and after the step. If ``displacement_before`` is 0,
+        the window begins halfway between the previous step and this step. If ``displacement_after``
+        is 0, the window ends at the next step.
+    fraction : float
+        Fraction of the displacement after the step that is included.
+    other_steps : collection of int
+        Numbers of other steps of the record that are fitted too. Their windows do not overlap.
+    """
+
+    record: Record
+    step_number: int
+    displacement_before: float = 0.0
+    displacement_after: float = 0.0
+    fraction: float = 1.0
+    other_steps: Collection[int] = ()
+
+    @property
+    def step(self) -> LoadingStep:
+        """The step.
+
+        Raises
+        ------
+        MotionStopped
+            If the record has fewer steps.
+        """
+        found = self.record.loading_steps
+        if self.step_number > len(found):
+            text = f"{self.record.name} has {len(found)} steps"
+            raise MotionStopped(Status.NO_STEP, text)
+        return found[self.step_number - 1]
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Indices of the rows of the record in the window."""
+        time = self.record.time
+        return np.flatnonzero((time >= self._start_time(self.step)) & (time <= self._end_time()))
+
+    @property
+    def normal_stress(self) -> float:
+        """Mean normal stress in Pa in the window before the step.
+
+        The mean is NaN if normal stress was not recorded.
+        """
+        time, stress = self.record.time, self.record.columns.get("normal_stress")
+        if stress is None:
+            return math.nan
+        first, last = np.searchsorted(time, (self._start_time(self.step), self.step.start))
+        return float(stress[min(first, len(time) - 1) : max(first + 1, last)].mean())
+
+    @property
+    def properties(self) -> dict[str, float]:
+        """Properties of the window: velocities, ends, normal stress and noise."""
+        record, rows = self.record, self.rows
+        moved, time = record.columns["displacement"][rows], record.time[rows]
+        return {
+            "load_point_noise": math.sqrt(noise_variance(time, moved)),
+            "velocity_before": self.step.velocity_before,
+            "velocity_after": self.step.velocity_after,
+            "window_begins": moved[0],
+            "window_ends": moved[-1],
+            "normal_stress_before": self.normal_stress,
+        }
+
+    def with_machine_stiffness(self, scene: Scene, machine_stiffness: float) -> Scene:
+        """Return a scene with the stiffness of a machine.
+
+        The stiffness of the scene is the stiffness of the machine divided by the normal stress
+        before the step.
+
+        Parameters
+        ----------
+        scene : Scene
+        machine_stiffness : float
+            Stress in Pa for a displacement of one slip distance. If 0, the scene is returned
+            unchanged.
+        """
+        if not machine_stiffness:
+            return scene
+        return scene.with_(stiffness=machine_stiffness / self.normal_stress)
+
+    def _end_time(self) -> float:
+        """Return the time in s at which the window ends."""
+        record, step = self.record, self.step
+        # a hold is fitted with the sliding that ends it
+        later = [
+            s
+            for s in record.loading_steps
+            if s.start > step.end and (step.velocity_after or s.velocity_before)
+        ]
+        last = later[0].start if later else record.time[-1]
+        if later and record.loading_steps.index(later[0]) + 1 in self.other_steps:
+            last = record.time[record.time < self._start_time(later[0])][-1]
+        moved = record.columns["displacement"]
+        at = np.interp(step.start, record.time, moved)
+
+        def reached(distance: float) -> float:
+            """Return the time at which the load point reaches a distance from the step.
+
+            If the load point does not reach the distance, return the last time.
+            """
+            beyond = (moved > at + distance) & (record.time > step.start)
+            return float(record.time[np.argmax(beyond)] if beyond.any() else last)
+
+        if self.displacement_after:
+            last = min(last, reached(self.displacement_after))
+        if self.fraction < 1.0:
+            last = reached(self.fraction * (np.interp(last, record.time, moved) - at))
+        return float(last)
+
+    def _start_time(self, step: LoadingStep) -> float:
+        """Return the time in s at which the window of a step begins."""
+        return find_linear_start(self.record, self._earliest_start_time(step), step.start)
+
+    @property
+    def truncation_remarks(self) -> list[str]:
+        """Remarks on parts of the requested window that are not included."""
+        record, step, moved = self.record, self.step, self.record.columns["displacement"]
+        nominal, begins, at, ends = np.interp(
+            [self._earliest_start_time(step), self._start_time(step), step.start, self._end_time()],
+            record.time,
+            moved,
+        )
+        found, later = (
+            [],
+            "next step" if self._end_time() < record.time[-1] else "end of the record",
+        )
+        if begins > nominal:
+            found.append(
+                f"the window begins {at - begins:.4g} um before the step, not {at - nominal:.4g}: "
+                "friction is not a straight line before"
+            )
+        elif at - begins < _MIN_EXTENT_FRACTION * self.displacement_before:
+            found.append(
+                f"before= is cut from {self.displacement_before:.4g} to {at - begins:.4g} um: "
+                "the step before, or the beginning of the record, is nearer than twice that"
+            )
+        if self.fraction == 1.0 and ends - at < _MIN_EXTENT_FRACTION * self.displacement_after:
+            cut = f"after= is cut from {self.displacement_after:.4g} to {ends - at:.4g} um"
+            found.append(f"{cut} by the {later}")
+        return found
+
+    def _earliest_start_time(self, step: LoadingStep) -> float:
+        """Return the earliest time in s at which the window of a step may begin.
+
+        The window begins later if friction before the step is not linear.
+        """
+        record = self.record
+        earlier = [s.end for s in record.loading_steps if s.end < step.start]
+        first = max(earlier, default=record.time[0])
+        begins = step.start - (_BACKWARD_FRACTION if earlier else 1.0) * (step.start - first)
+        if self.displacement_before:
+            moved = record.columns["displacement"]
+            at = np.interp(step.start, record.time, moved)
+            begins = max(begins, record.time[np.argmax(moved >= at - self.displacement_before)])
+        return float(begins)
+
+    def create_model(
+        self,
+        scene: Scene,
+        free: Collection[str],
+        loading: str,
+        accuracy: Accuracy,
+        meter: WorkMeter,
+    ) -> WindowModel:
+        """Create the model of the window. Displacement is relative to the step.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene with the friction law and the fixed parameters.
+        free : collection of str
+            Names of the free parameters.
+        loading : {"steps", "recorded"}
+            Loading by steps, or by the recorded rows.
+        accuracy : Accuracy
+        meter : WorkMeter
+            Counter of the work of the motions.
+
+        Returns
+        -------
+        WindowModel
+
+        Raises
+        ------
+        MotionStopped
+            If the window has too few rows or begins in a hold, if mean friction before the step is
+            not positive, or if normal stress varies by more than the loading of the model.
+        """
+        record, step, rows = self.record, self.step, self.rows
+        time = record.time[rows]
+        friction = record.columns["friction"][rows]
+        if len(rows) < _ROWS_PER_PARAMETER * len(free) or not step.start < self._end_time():
+            text = f"the window holds {len(rows)} rows, too few for {len(free)} parameters"
+            raise MotionStopped(Status.NOT_APPLICABLE, text)
+        before = friction[time < step.start]
+        if before.size and not before.mean() > 0.0:
+            text = (
+                f"mean friction before the step is {before.mean():.3g}, and must be positive. If "
+                "shear stress has the opposite sign, reverse it with a scale of -1 behind its "
+                "heading: --columns 'friction=HEADING * -1' (columns=)"
+            )
+            raise MotionStopped(Status.NOT_APPLICABLE, text)
+        begins, ends = self._start_time(step), self._end_time()
+        pieces = loading_history(record, begins, ends, from_rows=loading == "recorded")
+        if scene.parts.normal_stress.name == "constant":
+            pieces[:, 2:] = 1.0, 0.0  # what was recorded is noise
+        moves = self._shifted_loadings(begins, ends) if loading == "steps" else []
+        if "step_time" in free:
+            for each in (pieces, *moves):
+                each[0, 0] -= _MAX_DELAY_FRACTION * (step.start - begins)
+        if not pieces[0, 1] > 0.0:
+            text = "the window begins in a hold: a fit begins with steady sliding"
+            raise MotionStopped(Status.NOT_APPLICABLE, text)
+        self._check_normal_stress(rows, pieces)
+        steady = stepwise_loading(begins, steps_between(record, begins, ends))
+        moved = integrate_displacement(steady, time, step.start)
+        return WindowModel(scene, time, moved, friction, pieces, accuracy, meter, moves)
+
+    def _shifted_loadings(self, begins: float, ends: float) -> list[np.ndarray]:
+        """Return loading histories with steps that are shifted by their errors."""
+        steps = steps_between(self.record, begins, ends)
+        others = [step for step in steps if not step.changes_velocity]
+        moved = shift_steps(self.record, [step for step in steps if step.changes_velocity])
+        return [stepwise_loading(begins, sorted([*each, *others])) for each in moved]
+
+    def _check_normal_stress(self, rows: np.ndarray, pieces: np.ndarray) -> None:
+        """Raise ``MotionStopped`` if recorded normal stress differs from the model loading."""
+        record = self.record
+        if "normal_stress" not in record.columns:
+            return
+        time, before = record.time[rows], self.normal_stress
+        stress = record.columns["normal_stress"][rows] / before
+        piece = np.maximum(np.searchsorted(pieces[:, 0], time, side="right") - 1, 0)
+        modelled = pieces[piece, 2] + pieces[piece, 3] * (time - pieces[piece, 0])
+        apart = np.abs(median_filter(stress - modelled, _MEDIAN_ROWS, mode="nearest"))
+        noise = math.sqrt(noise_variance(time, stress))
+        varies = float(np.quantile(apart, _DEPARTURE_QUANTILE)) - _MAX_NOISE_SIGMAS * noise
+        if varies > MIN_RELATIVE_CHANGE:
+            stress *= before * 1e-6
+            text = (
+                f"normal stress varies from {stress.min():.4g} to {stress.max():.4g} MPa within "
+                f"the window, and is {before * 1e-6:.4g} MPa before the step; the model accounts "
+                f"for changes of {100.0 * MIN_RELATIVE_CHANGE:g} % at most. Shorten the window "
+                "with --before and --after (before=, after=), or model the normal stress: --set "
+                "normal_stress=imposed (normal_stress=) for its steps, with --loading recorded "
+                "(loading=) row by row; alpha is then free or stated"
+            )
+            raise MotionStopped(Status.NOT_APPLICABLE, text)
+
+
+def stiffness_factors(windows: Sequence[FitWindow]) -> tuple[float, ...]:
+    """Compute the ratio of stiffness to normal stress in each window.
+
+    All windows belong to one machine, and the ratios are relative to the first window.
+
+    Returns
+    -------
+    tuple of float
+        Empty if the normal stress of a window is unknown.
+    """
+    stresses = np.array([window.normal_stress for window in windows])
+    known = bool(np.isfinite(stresses).all() and stresses.all())
+    return tuple((stresses[0] / stresses).tolist()) if known else ()
+
+
+def guess_parameters(
+    model: WindowModel, step: LoadingStep, free: Sequence[str], slip_distances: tuple[float, float]
+) -> dict[str, float]:
+    """Estimate the initial parameters directly from a record.
+
+    Parameters that cannot be estimated keep the values of the scene. Let mu_0 be friction before a
+    step by a factor r, mu_p its extreme after the step, and mu_1 friction at the end. The estimates
+    are ``a = (mu_p - mu_0)/ln r`` and ``b = (mu_p - mu_1)/ln r``.
+
+    Parameters
+    ----------
+    model : WindowModel
+    step : LoadingStep
+    free : sequence of str
+        Names of the free parameters. The other parameters have the values of the scene.
+    slip_distances : (float, float)
+        Slip distances in um of the first and the second state. The first slip distance is the unit
+        of slip in the scene.
+
+    Returns
+    -------
+    dict
+    """
+    scene, friction = model.scene, model.friction
+    before, later = friction[model.time < step.start], friction[model.time >= step.end]
+    values = scene_to_parameters(scene, *slip_distances)
+    if "mu_star" in free and len(before):
+        values["mu_star"] = float(np.mean(before))
+    if step.velocity_after > 0.0 and len(before):
+        ratio = math.log(step.velocity_after / step.velocity_before)
+    else:
+        ratio = 0.0
+    if abs(ratio) > _MIN_LOG_VELOCITY_RATIO:
+        peak = later.max() if ratio > 0.0 else later.min()
+        read_a = max((peak - values["mu_star"]) / ratio, 1e-3)
+        read_b = (peak - float(np.mean(later[-max(len(later) // 10, 1) :]))) / ratio
+        seen = {"a": read_a, "b": read_b, "b1": 0.7 * read_b, "b2": 0.3 * read_b}
+        values |= {name: v for name, v in seen.items() if name in free and name in values}
+    return dict.fromkeys(free, 0.0) | values

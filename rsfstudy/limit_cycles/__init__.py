@@ -1,0 +1,27 @@
+"""Limit cycles: periodic stick-slip at a constant load point velocity.
+
+The package contains the measure ``LimitCycle`` and its algorithms: detection of cycles along a
+motion, the return map, and the search for the periodic orbit. It never computes the response to a
+single step, and never reads or writes a file.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rsfstudy._lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from rsfstudy.limit_cycles.limit_cycle import SLIP_MODES, LimitCycle
+else:
+    __getattr__, __dir__ = lazy_exports(
+        __name__,
+        {
+            "limit_cycles.limit_cycle": ("LimitCycle", "SLIP_MODES"),
+        },
+    )
+
+__all__ = [
+    "LimitCycle",
+    "SLIP_MODES",
+]

@@ -1,0 +1,386 @@
+"""Convergence of a motion to its limit cycle.
+
+If a scene has one state, the spring stress at a rise of V through V_0 determines the motion that
+follows. The map from one rise to the next has one dimension less than the motion, because a
+perturbation along the motion only shifts the time. Two successive cycles therefore determine the
+derivative of the map. If the cycles converge slowly, the motion leaps to the fixed point that this
+derivative implies.
+
+The section of a motion at a rise of V through V_0 is s = (f, Psi), the spring stress and the state.
+The image P(s) holds the section one cycle later, followed by the headline numbers of that cycle.
+The derivative P' has a column b for f and a column c for Psi. Spring stress is highest at a
+section, so the motion passes the section in the direction (0, dPsi/dt). If the motion starts a time
+dt later, the cycle is shorter by dt, and nothing else changes. Therefore c is -1/(dPsi/dt) in the
+row of the recurrence interval, and 0 in all other rows. If the sections of two cycles differ by
+(df, dPsi) and their images by dP, the other column is
+
+    b = (dP - c dPsi)/df.
+
+The first two rows of P' are the derivative A of the next section. Column c of A is zero, so A has
+rank one, and its nonzero eigenvalue is its trace. Therefore A**2 = (tr A) A, and the vector from s
+to the fixed point is
+
+    (1 - A)^-1 (P(s) - s) = P(s) - s + A (P(s) - s)/(1 - tr A).
+
+If a scene has several states, the motion is followed cycle by cycle. The cycles are then compared
+to find the number of cycles after which the motion repeats, if it does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from operator import sub
+
+import numpy as np
+
+from rsfstudy.limit_cycles.cycles import (
+    LN10,
+    PRIMARY_OUTPUT_COUNT,
+    Cycle,
+    iterate_cycles,
+    more_events_remedy,
+)
+from rsfstudy.limit_cycles.return_map import CLOSURE_TOLERANCE, Orbit, ReturnMap, section_at
+from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
+from rsfstudy.slider import Scene, critical_stiffness
+from rsfstudy.status import Status
+
+#: Part of their distance to the limit that cycles keep each time: above the first they are leapt
+#: ahead of, above the second they approach none.
+_MIN_CONTRACTION_TO_LEAP, _MAX_CONTRACTION = 0.03, 0.98
+#: Longest leap, as a part of the swing of ln V.
+_MAX_LEAP_FRACTION = 0.1
+#: Most cycles of a period that is looked for.
+MAX_PERIOD = 16
+#: Accuracy at which cycles are closed, where no better one is asked for: differences lose digits.
+_MAX_CLOSING_RTOL = 1e-7
+#: Cycles after which a motion is first looked at.
+_MIN_CYCLES_TO_TEST = 8
+#: Size of a multiplier from which an orbit repels beyond doubt, and how far off its like a cycle is
+#: that repeats none, over how far ln V swings.
+_REPELLING_MULTIPLIER, _MAX_RECURRENCE_MISFIT = 1.01, 0.02
+#: Part by which stiffness differs from the critical one where swings take for ever to grow or to
+#: die out.
+_CRITICAL_STIFFNESS_TOLERANCE = 1e-5
+
+
+class CycleSearch:
+    """Convergence to the limit cycle of a scene with one state.
+
+    Parameters
+    ----------
+    scene : Scene
+    accuracy : Accuracy
+    meter : WorkMeter
+        Counter of the work of the motion.
+
+    Attributes
+    ----------
+    cycles : list of Cycle
+        Cycles so far. The last one is the limit cycle after ``run`` has returned True.
+    """
+
+    def __init__(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> None:
+        self._scene, self._accuracy, self._meter = scene, accuracy, meter
+        self._return_map = ReturnMap(scene, accuracy, meter)
+        self._noise = accuracy.local_tolerance * scene.a
+        self._work = 0
+        self.cycles: list[Cycle] = []
+        #: The columns b and c of P', derivatives of the image by spring stress and by state; and
+        #: whether they are known.
+        self._derivatives, self._has_derivatives = 2 * ([0.0] * (2 + PRIMARY_OUTPUT_COUNT),), False
+        #: The section s where the last cycle begins, its image P(s), and dP, by how much that
+        #: differs from the image before.
+        self._section, self._image = (0.0, 0.0), [0.0] * (2 + PRIMARY_OUTPUT_COUNT)
+        self._image_change = self._image
+        #: What is left from s to the fixed point, and P' times that: what it changes of the image.
+        self._correction, self._image_correction = self._section, self._image
+        #: What was left to go along the map where the motion leapt last.
+        self._distance_at_leap = np.inf
+
+    def run(self, max_events: int) -> bool:
+        """Follow cycles until the motion reaches the limit cycle.
+
+        Returns
+        -------
+        bool
+            False if the motion settles to steady sliding.
+
+        Raises
+        ------
+        MotionStopped
+            With ``work_budget_spent`` if no cycle repeats within ``events`` cycles.
+        """
+        start = None
+        while True:
+            spent = self._meter.evaluations
+            for cycle in iterate_cycles(self._scene, self._accuracy, self._meter, start):
+                if cycle is None:
+                    return False
+                self._work, spent = self._meter.evaluations - spent, self._meter.evaluations
+                self.cycles.append(cycle)
+                self._update_derivatives()
+                if self._has_converged():
+                    return True
+                if len(self.cycles) >= max_events:
+                    remedy = self._critical_stiffness_text or more_events_remedy(max_events)
+                    text = f"no cycle repeats within {max_events} events; {remedy}"
+                    raise MotionStopped(Status.WORK_BUDGET_SPENT, text)
+                if self._should_leap():
+                    self._distance_at_leap = abs(
+                        cycle.end_point.spring_stress - cycle.start_point.spring_stress
+                    )
+                    start = self._return_map.point_at(
+                        section_at(cycle.start_point) + np.array(self._correction)
+                    )
+                    break
+
+    @property
+    def _critical_stiffness_text(self) -> str:
+        """Explanation if the stiffness is critical; otherwise an empty string."""
+        critical = critical_stiffness(self._scene, self._scene.log_load_velocity)
+        off = abs(self._scene.stiffness / critical - 1.0) if critical else math.inf
+        if off > _CRITICAL_STIFFNESS_TOLERANCE:
+            return ""
+        return f"stiffness is critical to {off:.0e}: swings take for ever to grow or to die out"
+
+    @property
+    def orbit(self) -> Orbit:
+        """The last cycle and its correction to the limit cycle."""
+        last, slopes = self.cycles[-1:], np.array(self._derivatives).T
+        return Orbit(tuple(last), (slopes,), np.array(self._correction), self._accuracy, self._work)
+
+    @property
+    def _contraction_ratio(self) -> float:
+        """Trace of the derivative A of the map.
+
+        The trace is the ratio of successive distances to the limit cycle. The other eigenvalue of A
+        is zero, because the motion forgets one direction.
+        """
+        return self._derivatives[0][0] + self._derivatives[1][1]
+
+    def _update_derivatives(self) -> None:
+        """Update the derivatives and the distance to the fixed point.
+
+        The derivatives follow from the last two cycles, unless numerical errors dominate their
+        difference. The module docstring contains the formulas.
+        """
+        last = self.cycles[-1]
+        begin, end = last.start_point, last.end_point
+        start = begin.spring_stress, begin.psi
+        image = [end.spring_stress, end.psi, *last.primary_outputs()]
+        changes = list(map(sub, image, self._image))
+        if len(self.cycles) > 1:
+            by_stress, by_state = map(sub, start, self._section)
+            if abs(by_stress) > (1000.0 if self._has_derivatives else 1.0) * self._noise:
+                self._has_derivatives = True
+                # the motion passes a section without a change of spring stress
+                (_none, way), passed = self._return_map.motion_direction(begin)
+                along = [change / way for change in passed]
+                pairs = zip(changes, along, strict=True)
+                self._derivatives = [(x - by_state * y) / by_stress for x, y in pairs], along
+        self._section, self._image, self._image_change = start, image, changes
+        off, kept = (
+            list(map(sub, image, start)),
+            1.0 - min(self._contraction_ratio, _MAX_CONTRACTION),
+        )
+        returned = self._predict_image_change(off)
+        self._correction = off[0] + returned[0] / kept, off[1] + returned[1] / kept
+        self._image_correction = self._predict_image_change(self._correction)
+
+    def _predict_image_change(self, move: Sequence[float]) -> list[float]:
+        """Compute the change of the image due to a change of the section."""
+        by_stress, by_state = move
+        return [x * by_stress + y * by_state for x, y in zip(*self._derivatives, strict=True)]
+
+    def _has_converged(self) -> bool:
+        """Return True if all further cycles would be the same.
+
+        The cycles repeat if the derivatives imply so, or if the last two cycles agree.
+        """
+        allowed = [0.3 * self._accuracy.rtol * abs(number) for number in self._image[2:]]
+        if (
+            self._has_derivatives
+            and self._contraction_ratio < _MAX_CONTRACTION
+            and _are_within_tolerance(self._image_correction[2:], allowed)
+        ):
+            return True
+        if len(self.cycles) < 2 or self.cycles[-2].end_point != self.cycles[-1].start_point:
+            return False
+        if self._alternates():
+            return True
+        left = min(max(self._contraction_ratio, 0.0), _MAX_CONTRACTION)
+        left = max(1.0, left / (1.0 - left))
+        return _are_within_tolerance([change * left for change in self._image_change[2:]], allowed)
+
+    def _alternates(self) -> bool:
+        """Return True if the last two cycles alternate around the limit cycle.
+
+        Only numerical errors cause such an alternation. In a plane, trajectories cannot cross, so
+        exact cycles approach the limit cycle from one side.
+        """
+        before, last = (
+            cycle.end_point.spring_stress - cycle.start_point.spring_stress
+            for cycle in self.cycles[-2:]
+        )
+        near = (
+            CLOSURE_TOLERANCE
+            * self._accuracy.rtol
+            * self._scene.a
+            * self.cycles[-1].log_slip_rate_range
+        )
+        return before * last <= 0.0 and abs(last) <= near
+
+    def _should_leap(self) -> bool:
+        """Return True if the motion should leap to the fixed point.
+
+        The motion does not leap if the next cycle would come as close, or if the fixed point is far
+        away, because the motion may then settle to steady sliding. It does not leap again if the
+        last leap did not reduce the distance, because leaps may repeat in a loop.
+        """
+        cycle = self.cycles[-1]
+        left = abs(cycle.end_point.spring_stress - cycle.start_point.spring_stress)
+        if not 10.0 * self._noise <= left < 0.5 * self._distance_at_leap:
+            return False
+        if not _MIN_CONTRACTION_TO_LEAP < self._contraction_ratio < _MAX_CONTRACTION:
+            return False
+        slowest, fastest = self._image_correction[-2:]
+        return LN10 * abs(fastest - slowest) < _MAX_LEAP_FRACTION * cycle.log_slip_rate_range
+
+
+def _are_within_tolerance(changes: Sequence[float], tolerances: Sequence[float]) -> bool:
+    """Return True if no change exceeds its tolerance."""
+    return all(abs(change) <= most for change, most in zip(changes, tolerances, strict=True))
+
+
+@dataclass(frozen=True)
+class EventSequence:
+    """Cycles of a motion, and the orbit that the motion approaches.
+
+    Attributes
+    ----------
+    cycles : list of Cycle
+        Cycles of the motion (the events of ``measures.limit_cycle``).
+    orbit : Orbit or None
+        Periodic orbit that the motion approaches. None if no orbit was found.
+    may_still_converge : bool
+        True if the motion may still approach a periodic orbit, as far as its cycles show.
+    """
+
+    cycles: list[Cycle]
+    orbit: Orbit | None
+    may_still_converge: bool
+
+
+def follow_to_orbit(
+    scene: Scene, accuracy: Accuracy, meter: WorkMeter, max_events: int, *, follow_all: bool = False
+) -> EventSequence | None:
+    """Follow a motion until it approaches an attracting periodic orbit.
+
+    Parameters
+    ----------
+    scene : Scene
+    accuracy : Accuracy
+    meter : WorkMeter
+    max_events : int
+        Largest number of cycles.
+    follow_all : bool
+        If True, follow all ``max_events`` cycles even if an orbit is found earlier.
+
+    Returns
+    -------
+    Course or None
+        None if the motion settles to steady sliding.
+    """
+    seen, orbit, repels = list[Cycle](), None, False
+    fine = accuracy.with_rtol(min(accuracy.rtol, _MAX_CLOSING_RTOL))
+    look = min(_MIN_CYCLES_TO_TEST, max_events)
+    for cycle in iterate_cycles(scene, accuracy, meter, None):
+        if cycle is None:
+            return None
+        seen.append(cycle)
+        if len(seen) == look and not orbit:
+            look = min(2 * look, max_events)
+            found, off = None, math.inf
+            for counted in _compared_states(scene):
+                period, off = find_recurrence(scene, seen, counted)
+                if off < _MAX_RECURRENCE_MISFIT:
+                    by = ReturnMap(scene, fine, meter, counted=counted)
+                    found = by.find_orbit(
+                        section_at(cycle.end_point), period, cycle.log_slip_rate_range
+                    )
+                    break
+            repels = off >= _MAX_RECURRENCE_MISFIT or (
+                found is not None and abs(found.multipliers[0]) > _REPELLING_MULTIPLIER
+            )
+            orbit = found if found is not None and found.is_attracting else None
+        if len(seen) == max_events or (orbit and not follow_all):
+            break
+    return EventSequence(seen, orbit, may_still_converge=not repels or _may_still_converge(seen))
+
+
+def _may_still_converge(cycles: Sequence[Cycle]) -> bool:
+    """Return True if a motion may still approach a periodic orbit.
+
+    A motion with few cycles may still do so. A motion with many cycles may do so if the range of ln
+    V or a state increases, or decreases, from each cycle to the next.
+    """
+    if len(cycles) < _MIN_CYCLES_TO_TEST:
+        return True
+    latest = [
+        (cycle.log_slip_rate_range, *cycle.end_point.psis) for cycle in cycles[len(cycles) // 2 :]
+    ]
+    changes = np.diff(latest, axis=0)
+    return bool(((changes > 0.0).all(axis=0) | (changes < 0.0).all(axis=0)).any())
+
+
+def _compared_states(scene: Scene) -> tuple[tuple[int, ...], ...]:
+    """Return the sets of states that are compared to detect a repeating cycle.
+
+    The first set contains all states that count for the distance from steady sliding. The second
+    set contains the states of the law only, because a slow unknown of the fluid may approach its
+    cycle long after the law has.
+    """
+    of_law = tuple(range(scene.parts.law.state_count))
+    return tuple(dict.fromkeys((scene.functions.friction.distance_indices, of_law)))
+
+
+def find_recurrence(
+    scene: Scene, cycles: Sequence[Cycle], compared_states: Sequence[int] | None = None
+) -> tuple[int, float]:
+    """Find the number of cycles after which a motion nearly repeats itself.
+
+    The states at the ends of cycles i and i + n are compared over the second half of the motion.
+    The difference for n cycles is the largest ``|Psi(i + n) - Psi(i)|`` of any state, divided by
+    ``a`` times the range of ln V.
+
+    Parameters
+    ----------
+    scene : Scene
+    cycles : sequence of Cycle
+    compared_states : sequence of int, optional
+        Indices of the states to compare. By default, all states are compared except those that a
+        part lists in ``excluded_from_distance``.
+
+    Returns
+    -------
+    period : int
+        The smallest n whose difference is at most twice the smallest difference.
+    off : float
+        The difference after ``period`` cycles, or infinity if there are too few cycles.
+    """
+    if len(cycles) < 4:
+        return 1, math.inf
+    places = list(
+        scene.functions.friction.distance_indices if compared_states is None else compared_states
+    )
+    states = np.array([cycle.end_point.psis for cycle in cycles])[:, places]
+    latest, scale = states[len(states) // 2 :], scene.a * cycles[-1].log_slip_rate_range
+    longest = min(MAX_PERIOD, len(latest) // 2)
+    off = np.array(
+        [np.abs(latest[count:] - latest[:-count]).max() for count in range(1, longest + 1)]
+    )
+    period = int(np.argmax(off <= 2.0 * off.min())) + 1
+    return period, float(off[period - 1]) / scale

@@ -1,0 +1,250 @@
+"""Stick-slip cycles of a motion, assembled from its events.
+
+A cycle extends from one maximum of spring stress, at which V rises through V_0, to the next.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from itertools import pairwise
+from operator import attrgetter
+from typing import NamedTuple
+
+import numpy as np
+
+from rsfstudy.measure_base import settles_to_steady_sliding
+from rsfstudy.motion import (
+    Accuracy,
+    Event,
+    EventKind,
+    EventSpecification,
+    Recording,
+    WorkMeter,
+    approach_to_steady_state,
+    fall,
+    integrate_events,
+    maximum,
+    minimum,
+    pack_row,
+    rise,
+    to_recorded_units,
+    truncate_table,
+)
+from rsfstudy.slider import RUPTURE_REGIME, Point, Scene
+
+LN10 = math.log(10.0)
+#: How many headline numbers a cycle has.
+PRIMARY_OUTPUT_COUNT = 5
+#: Kinds of events, of which names take as long to look up as all else that an event asks for.
+_START, _RISE, _FALL = EventKind.START, EventKind.RISE, EventKind.FALL
+_SEGMENT, _SETTLED = EventKind.SEGMENT, EventKind.SETTLED
+_get_log_slip_rate, _get_spring_stress = attrgetter("log_slip_rate"), attrgetter("spring_stress")
+
+#: Swings of ln V below this are steady sliding; those that shrink this often may be on their way to
+#: it.
+MIN_LOG_SLIP_RATE_RANGE, _MIN_SHRINKING_CYCLES = 1e-3, 30
+#: Part of the farthest distance from steady sliding at which a motion has settled to it.
+_STEADY_FRACTION = 1e-6
+
+
+class Cycle(NamedTuple):
+    """One stick-slip cycle.
+
+    Times are in D_c/V_*, stresses in sigma_*, and slip rates in V_*.
+
+    Attributes
+    ----------
+    recurrence_interval : float
+        Time from one maximum of spring stress to the next.
+    max_spring_stress, min_spring_stress, spring_stress_at_peak : float
+        Deviation of spring stress at its maximum, at its minimum, and at the peak slip rate.
+    friction_at_peak : float
+        Friction coefficient at the peak slip rate.
+    min_log_slip_rate, max_log_slip_rate : float
+        Extremes of ln(V/V_*).
+    arrest_point, slowest_point : Point
+        Point below V_0 at which friction balances the spring again after the rupture, and point
+        with the lowest slip rate.
+    start_point, end_point : Point
+        Maxima of spring stress at which the cycle begins and ends.
+    """
+
+    recurrence_interval: float
+    max_spring_stress: float
+    min_spring_stress: float
+    spring_stress_at_peak: float
+    friction_at_peak: float
+    min_log_slip_rate: float
+    max_log_slip_rate: float
+    arrest_point: Point
+    slowest_point: Point
+    start_point: Point
+    end_point: Point
+
+    @property
+    def log_slip_rate_range(self) -> float:
+        """Range of ln V."""
+        return self.max_log_slip_rate - self.min_log_slip_rate
+
+    def primary_outputs(self) -> tuple[float, ...]:
+        """Return the headline numbers in the order of their names.
+
+        Stress drops are measured from the spring stress at the beginning of the event, because the
+        next event may begin at a different stress.
+
+        Returns
+        -------
+        tuple of float
+            Recurrence interval (D_c/V_*), static and dynamic stress drops (sigma_*), and the
+            decimal logarithms of the extremes of V/V_*. The static drop extends to the lowest
+            spring stress, and the dynamic drop to the spring stress at the peak slip rate.
+        """
+        highest = self.start_point.spring_stress
+        drops = highest - self.min_spring_stress, highest - self.spring_stress_at_peak
+        return (
+            self.recurrence_interval,
+            *drops,
+            self.min_log_slip_rate / LN10,
+            self.max_log_slip_rate / LN10,
+        )
+
+
+def iterate_cycles(
+    scene: Scene,
+    accuracy: Accuracy,
+    meter: WorkMeter,
+    start: Point | None,
+    recording: Recording | None = None,
+) -> Iterator[Cycle | None]:
+    """Iterate over the cycles of a motion.
+
+    Parameters
+    ----------
+    scene : Scene
+    accuracy : Accuracy
+    meter : WorkMeter
+    start : Point or None
+        Point at which the motion starts. If None, the motion starts with the step of the scene, and
+        everything before the first maximum of spring stress is skipped.
+    recording : Recording, optional
+
+    Yields
+    ------
+    Cycle or None
+        The next cycle. None is the last item, and means that the motion has settled to steady
+        sliding.
+    """
+    begin, begun, fallen, seen = None, 0.0, start is None, list[Event]()
+    ahead = 0 if start else scene.parts.loading.reported_segment_count
+    swings, asked = list[float](), _event_specifications(scene.log_load_velocity)
+    motion = integrate_events(
+        scene, accuracy, meter, asked, start=start, with_time=True, recording=recording
+    )
+    for event in motion:
+        kind = event.kind
+        if kind is _SEGMENT:
+            begin, fallen, seen, ahead = None, True, [], ahead - 1
+        if ahead:
+            continue
+        if kind is _SETTLED and settles_to_steady_sliding(scene):
+            yield None
+            return
+        if kind is _START and start is not None:
+            begin = event.point
+        fallen = fallen or kind is _FALL
+        seen.append(event)
+        if kind is not _RISE or not fallen:
+            continue
+        if begin is not None:
+            cycle = _assemble_cycle(begin, begun, seen)
+            swings.append(cycle.log_slip_rate_range)
+            if (
+                swings[-1] < MIN_LOG_SLIP_RATE_RANGE or _amplitudes_vanish(swings)
+            ) and settles_to_steady_sliding(scene):
+                yield None
+                return
+            yield cycle
+        begin, begun, fallen, seen = event.point, event.time, False, []
+
+
+def more_events_remedy(events: int, name: str = "events") -> str:
+    """Return the advice to wait for more events, for use in a message."""
+    return f"--set {name}={2 * events} ({name}=) waits for more"
+
+
+def cycle_record(scene: Scene, cycles: Sequence[Cycle], recording: Recording | None) -> np.ndarray:
+    """Return the record of successive cycles, one row per sample.
+
+    If nothing was recorded, the record holds the ends of the cycles. The slip of the cycles is the
+    displacement of the load point minus the extension of the spring: ``V_0 T - (f_end -
+    f_begin)/K`` (see ``Recording.seen`` for the columns).
+    """
+    begin, end = cycles[0].start_point, cycles[-1].end_point
+    passed = math.fsum(cycle.recurrence_interval for cycle in cycles)
+    slip = (
+        scene.load_velocity * passed - (end.spring_stress - begin.spring_stress) / scene.stiffness
+    )
+    last = to_recorded_units(scene, np.array(pack_row(passed, slip, end, 0)))
+    if recording is None:
+        return np.stack([to_recorded_units(scene, np.array(pack_row(0.0, 0.0, begin, 0))), last])
+    # the last step goes beyond the end
+    return truncate_table(recording.table(scene), last)
+
+
+@lru_cache(maxsize=256)
+def _event_specifications(log_load_rate: float) -> tuple[EventSpecification, ...]:
+    """Return the event specifications that delimit the cycles at ln(V_0/V_*)."""
+    return (
+        maximum("log_slip_rate", may_defer=True),
+        minimum("log_slip_rate", may_defer=True),
+        rise("log_slip_rate", log_load_rate),
+        fall("log_slip_rate", log_load_rate, may_defer=True),
+        approach_to_steady_state(_STEADY_FRACTION),
+    )
+
+
+def _amplitudes_vanish(ranges: list[float]) -> bool:
+    """Return True if shrinking swings of ln V approach zero.
+
+    The last three swings, with differences d_1 and d_2, are extrapolated geometrically. Their
+    remaining decrease is d_2**2/(d_1 - d_2). Near the onset of stick-slip, the swings shrink slowly
+    towards a finite limit instead.
+    """
+    if len(ranges) <= _MIN_SHRINKING_CYCLES or not all(
+        y < x for x, y in pairwise(ranges[-_MIN_SHRINKING_CYCLES:])
+    ):
+        return False
+    previous, latest = ranges[-3] - ranges[-2], ranges[-2] - ranges[-1]
+    still_to_come = latest * latest / (previous - latest) if previous > latest else math.inf
+    return ranges[-1] - still_to_come < 0.1 * ranges[-1]
+
+
+def _assemble_cycle(start_point: Point, start_time: float, events: Sequence[Event]) -> Cycle:
+    """Assemble the cycle that ends with the last event."""
+    points, end = [event.point for event in events], events[-1]
+    fastest, rested = max(points, key=_get_log_slip_rate), min(points, key=_get_log_slip_rate)
+    return Cycle(
+        recurrence_interval=end.time - start_time,
+        max_spring_stress=end.point.spring_stress,
+        min_spring_stress=min(map(_get_spring_stress, points)),
+        spring_stress_at_peak=fastest.spring_stress,
+        friction_at_peak=fastest.friction_coefficient,
+        min_log_slip_rate=rested.log_slip_rate,
+        max_log_slip_rate=fastest.log_slip_rate,
+        arrest_point=_find_arrest_point(events) or rested,
+        slowest_point=rested,
+        start_point=start_point,
+        end_point=end.point,
+    )
+
+
+def _find_arrest_point(events: Sequence[Event]) -> Point | None:
+    """Return the first point after the rupture at which friction balances the spring."""
+    fallen = False
+    for event in events:
+        fallen = fallen or event.kind is _FALL
+        if fallen and event.regime != RUPTURE_REGIME:
+            return event.point
+    return None

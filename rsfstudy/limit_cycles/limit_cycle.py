@@ -1,0 +1,348 @@
+"""Stick-slip limit cycle: recurrence interval, stress drops and slip rates.
+
+A cycle extends from one maximum of spring stress, at which V rises through V_0, to the next. Spring
+stress and states at one maximum determine their values at the next maximum. This return map has a
+fixed point, the limit cycle. The motion is followed with a low accuracy until it approaches the
+limit cycle. The cycle is then closed in all unknowns, first with the requested accuracy and then
+with smaller tolerances. The first event after the step is never taken as the limit cycle. If an
+error estimate exceeds the requested error more than a hundredfold, the status is ``unverified``.
+
+If the law or the fluid has several states, the motion may repeat only after 2, 4 or more events, or
+never. The results then describe the event with the highest slip rate, and are not averages. The
+recorded orbit covers the whole period.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from rsfstudy.error_boundary import guard_methods
+from rsfstudy.errors import InvalidValue
+from rsfstudy.limit_cycles.cycle_search import CycleSearch, EventSequence, follow_to_orbit
+from rsfstudy.limit_cycles.cycles import LN10, Cycle, cycle_record, more_events_remedy
+from rsfstudy.limit_cycles.return_map import Orbit, ReturnMap
+from rsfstudy.measure_base import Outcome, RecordingMeasure, check_steady_loading, phase_outputs
+from rsfstudy.motion import (
+    MAX_ERROR_RATIO,
+    MOTION_VARIABLES,
+    Accuracy,
+    MotionStopped,
+    WorkMeter,
+    estimate_error,
+    sample_along_path,
+)
+from rsfstudy.parts import Segment
+from rsfstudy.quantities import Output
+from rsfstudy.slider import Scene, growth_rates
+from rsfstudy.status import Status
+
+#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
+_COINCIDENCE_FLOOR = 0.06
+#: Displacement in D_c that sets off a motion where the scene has no step.
+PERTURBATION_DISPLACEMENT = 0.1
+#: Points of an orbit that are no more than its ends, of which no recording has to be made.
+_END_POINT_COUNT = 2
+#: Relative accuracy with which a limit cycle is looked for, before it is followed as asked.
+_SEARCH_RTOL = 1e-4
+
+_PRIMARY_OUTPUTS = (
+    "recurrence_interval",
+    "static_stress_drop",
+    "dynamic_stress_drop",
+    "min_log10_slip_rate",
+    "max_log10_slip_rate",
+)
+#: Place of the peak slip rate among them.
+PEAK_INDEX = 4
+
+#: How many events a motion takes to repeat itself.
+PERIOD_OUTPUT = Output(
+    "period_events", "", "1", "number of events after which a motion repeats itself"
+)
+#: What a slider does in the end: it slides steadily, which it comes to without or with oscillation,
+#: or it cycles, with a slower or a faster peak than what `LimitCycle` says.
+SLIP_MODES = ("steady", "damped_oscillation", "slow_slip", "stick_slip")
+_STEADY_CODE, _DAMPED_OSCILLATION_CODE, _SLOW_SLIP_CODE, _STICK_SLIP_CODE = map(
+    float, range(len(SLIP_MODES))
+)
+_OUTPUTS = (
+    *(Output(name, error=True) for name in _PRIMARY_OUTPUTS),
+    Output("slip_per_event"),
+    Output(
+        "healing_exponent",
+        "",
+        "1",
+        "exponent of theta in slip rate, from arrest to the slowest; only where there is one theta",
+    ),
+    Output("residual_friction"),
+    Output(
+        "drop_asymmetry",
+        "",
+        "1",
+        "stress drop while slip accelerates over that while it decelerates",
+    ),
+    PERIOD_OUTPUT,
+    Output("events_until_repeat", "", "1", "number of the cycle that repeated the one before"),
+    Output("work_per_cycle", "", "1", "right-hand sides of the accepted cycle"),
+    Output(
+        "slip_mode",
+        "",
+        "",
+        "what the slider does in the end, by its peak slip rate",
+        flags=SLIP_MODES,
+    ),
+    *phase_outputs(*MOTION_VARIABLES),
+)
+
+
+@guard_methods
+@dataclass(frozen=True)
+class LimitCycle(RecordingMeasure):
+    """Limit cycle of stick-slip under a steady load point velocity.
+
+    If a motion with several states repeats only after ``period_events`` events, the results
+    describe the event with the highest slip rate, from one maximum of spring stress to the next. If
+    the motion never repeats, the status is ``not_periodic``, and the message reports the range of
+    the events.
+
+    ``slip_mode`` is stick-slip if the peak slip rate reaches a limit, and slow slip otherwise. With
+    radiation damping, the limit is a sigma_*/eta, at which the radiated stress responds to slip
+    rate as strongly as the direct effect. Without radiation damping, the limit is the instability
+    norm. If a motion settles and the slowest-decaying eigenvalues of steady sliding are a complex
+    pair, ``slip_mode`` is damped oscillation. Otherwise a motion that settles is steady.
+
+    The status is ``no_limit_cycle`` only if small perturbations of steady sliding decay. If the
+    growth rate of small perturbations is zero within its error, the status is ``unverified``.
+
+    Parameters
+    ----------
+    phases : int
+        Number of points of the orbit along ``phase``, distributed over its slow part and its
+        rupture.
+    events : int
+        Largest number of events to wait for a cycle that repeats.
+    """
+
+    phases: int = 400
+    events: int = 300
+    name: ClassVar[str] = "limit_cycle"
+    primary_output = "recurrence_interval"
+    typical_work = 9_000
+    outputs = _OUTPUTS
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.events, bool) or not self.events >= 1 or self.events % 1:
+            raise InvalidValue("events", self.events, "must be a whole number from 1")
+
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+        """Compute the limit cycle of a scene.
+
+        The motion is followed until an event repeats. The cycle is then recomputed with smaller
+        tolerances, to estimate the error and to record the orbit.
+        """
+        check_steady_loading(scene)
+        if scene.log_load_velocity == -math.inf:
+            return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
+        if not scene.is_perturbed:
+            # steady sliding left alone never leaves its steady state, stable or not
+            scene = scene.with_segment(Segment(1.0, PERTURBATION_DISPLACEMENT))
+        if scene.state_count > 1:
+            return self._find_multi_state_cycle(scene, accuracy, meter)
+        loose = max(accuracy.rtol, _SEARCH_RTOL)
+        for rtol in dict.fromkeys((loose, accuracy.rtol)):
+            approach = CycleSearch(scene, accuracy.with_rtol(rtol), meter)
+            try:
+                found = approach.run(self.events)
+            except MotionStopped:
+                # what cannot go on loosely, or does not repeat so within its events, may as asked
+                if rtol == accuracy.rtol or meter.evaluations > meter.budget:
+                    raise
+                continue
+            if found:
+                outcome = self._close_orbit(
+                    scene, accuracy, meter, approach.orbit, len(approach.cycles)
+                )
+                if outcome.status is not Status.UNVERIFIED:
+                    return outcome
+        return outcome if found else no_cycle_outcome(scene)
+
+    def _find_multi_state_cycle(
+        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
+    ) -> Outcome:
+        """Compute the limit cycle of a scene with several states.
+
+        The motion is followed with a low accuracy until it approaches a periodic orbit. The orbit
+        is then closed, starting from its largest event.
+        """
+        motion = follow_to_orbit(
+            scene, accuracy.with_rtol(max(accuracy.rtol, _SEARCH_RTOL)), meter, self.events
+        )
+        if motion is None:
+            return no_cycle_outcome(scene)
+        if motion.orbit is None:
+            return aperiodic_outcome(scene, motion, more_events_remedy(self.events))
+        return self._close_orbit(
+            scene, accuracy, meter, motion.orbit.from_largest_event, len(motion.cycles)
+        )
+
+    def _close_orbit(
+        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter, orbit: Orbit, events: int
+    ) -> Outcome:
+        """Close a known cycle with the requested accuracy.
+
+        The cycle is closed again with smaller tolerances, to estimate the error and to record the
+        orbit.
+        """
+        one = ReturnMap(scene, accuracy, meter).refine(orbit)
+        fine = ReturnMap(scene, accuracy.refined(), meter, recorded=self.phases > _END_POINT_COUNT)
+        again = one and fine.refine(one)
+        if one is None or again is None:
+            why = "with other tolerances the cycle does not close: ask for a smaller rtol"
+            return Outcome(Status.UNVERIFIED, message=why)
+        errors = estimate_cycle_errors(accuracy, one, again)
+        values = dict(zip(_PRIMARY_OUTPUTS, one.primary_outputs.tolist(), strict=True))
+        values |= {f"{n}_error": e for n, e in zip(_PRIMARY_OUTPUTS, errors.tolist(), strict=True)}
+        cycle = one.cycles[0]
+        carried = (
+            cycle.end_point.spring_stress - cycle.start_point.spring_stress
+        ) / scene.stiffness
+        values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"]
+        values["slip_per_event"] -= carried if one.period > 1 else 0.0
+        values |= _cycle_properties(scene, cycle)
+        values["slip_mode"] = _classify_slip_mode(
+            scene, LN10 * float(one.primary_outputs[PEAK_INDEX])
+        )
+        values["period_events"] = float(one.period)
+        values["events_until_repeat"] = float(events)
+        values["work_per_cycle"] = one.evaluations / one.period
+        status, why = check_errors(accuracy, one, errors)
+        why = why or _period_message(one)
+        path = cycle_record(scene, again.cycles, again.recording)
+        return Outcome(
+            status, values | sample_along_path(path, self.phases, engine=accuracy.engine), why
+        )
+
+
+def _period_message(orbit: Orbit) -> str:
+    """Return a message if a motion repeats only after several events."""
+    if orbit.period == 1:
+        return ""
+    period = math.fsum(cycle.recurrence_interval for cycle in orbit.cycles)
+    return (
+        f"the motion repeats itself after {orbit.period} events, in {period:.6g} D_c/V_*: "
+        "the numbers are those of the event with the fastest peak, up to the next maximum of "
+        "spring stress"
+    )
+
+
+STEADY_SLIDING_OUTCOME = Outcome(
+    Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding"
+)
+
+
+def no_cycle_outcome(scene: Scene) -> Outcome:
+    """Return the outcome of a motion that settles to steady sliding."""
+    try:
+        last = growth_rates(scene, scene.log_load_velocity)[0]
+    except ValueError:  # there is none in closed form
+        return STEADY_SLIDING_OUTCOME
+    return replace(
+        STEADY_SLIDING_OUTCOME,
+        values={"slip_mode": _DAMPED_OSCILLATION_CODE if last.imag else _STEADY_CODE},
+    )
+
+
+def _classify_slip_mode(scene: Scene, log_peak: float) -> float:
+    """Return slow slip or stick-slip, depending on the peak of ln V."""
+    damping = scene.parts.dynamics.radiated_stress_slope(0.0)
+    limit = math.log(scene.a / damping) if damping else scene.log_instability_rate
+    return _STICK_SLIP_CODE if log_peak >= limit else _SLOW_SLIP_CODE
+
+
+def aperiodic_outcome(scene: Scene, sequence: EventSequence, remedy: str) -> Outcome:
+    """Return the outcome of a motion that has not reached a periodic orbit.
+
+    The status depends on whether the motion may still reach a periodic orbit.
+    """
+    latest = sequence.cycles[len(sequence.cycles) // 2 :]
+    peaks = [cycle.max_log_slip_rate / LN10 for cycle in latest]
+    intervals = [cycle.recurrence_interval for cycle in latest]
+    text = (
+        f"the last {len(latest)} of {len(sequence.cycles)} events peak at 10^{min(peaks):.4g} to "
+        f"10^{max(peaks):.4g} V_* and come after {min(intervals):.5g} to {max(intervals):.5g} "
+        "D_c/V_*"
+    )
+    if sequence.may_still_converge:
+        why = f"no cycle repeats yet: {text}; {remedy}"
+        return Outcome(Status.WORK_BUDGET_SPENT, message=why)
+    return Outcome(Status.NOT_PERIODIC, message=text)
+
+
+def check_errors(
+    accuracy: Accuracy, orbit: Orbit, errors: np.ndarray, outputs: slice = slice(None)
+) -> tuple[Status, str]:
+    """Return the status that follows from the errors of the headline numbers.
+
+    Returns
+    -------
+    status : Status
+        OK, or ``unverified`` if an error is too large.
+    message : str
+    """
+    worst = float((errors / _error_scales(orbit))[outputs].max())
+    if worst <= MAX_ERROR_RATIO * accuracy.rtol:
+        return Status.OK, ""
+    why = f"the cycle is known to {worst:.1e} only, where {accuracy.rtol:g} was asked for"
+    return Status.UNVERIFIED, f"{why}: ask for another rtol"
+
+
+def _error_scales(orbit: Orbit) -> list[float]:
+    """Return the scales of the errors of the headline numbers.
+
+    The scale of a logarithm of slip rate is at least half of the range of the logarithms, because
+    the logarithm is zero at V_*.
+    """
+    *others, slowest, fastest = orbit.primary_outputs.tolist()
+    half = 0.5 * (fastest - slowest)
+    return [*map(abs, others), max(abs(slowest), half), max(abs(fastest), half)]
+
+
+def estimate_cycle_errors(accuracy: Accuracy, orbit: Orbit, refined_orbit: Orbit) -> np.ndarray:
+    """Estimate the errors of the headline numbers.
+
+    The estimate includes the difference between two runs, and the corrections for the closure
+    error, which both runs share.
+    """
+    chance, scales = _COINCIDENCE_FLOOR * accuracy.rtol, _error_scales(orbit)
+    pairs = zip(
+        orbit.primary_outputs.tolist(), refined_orbit.primary_outputs.tolist(), scales, strict=True
+    )
+    errors = [estimate_error(number, refined, chance, scale) for number, refined, scale in pairs]
+    return np.asarray(np.abs(orbit.output_corrections) + np.array(errors))
+
+
+def _cycle_properties(scene: Scene, cycle: Cycle) -> dict[str, float]:
+    """Return additional properties of a cycle."""
+    return {
+        "healing_exponent": _healing_exponent(scene, cycle),
+        "residual_friction": cycle.friction_at_peak,
+        "drop_asymmetry": (cycle.max_spring_stress - cycle.spring_stress_at_peak)
+        / (cycle.spring_stress_at_peak - cycle.min_spring_stress),
+    }
+
+
+def _healing_exponent(scene: Scene, cycle: Cycle) -> float:
+    """Return d ln(theta)/d ln(V), where Theta = b ln(theta/theta_*).
+
+    The result is NaN if the law has no such theta.
+    """
+    slowed = cycle.slowest_point.log_slip_rate - cycle.arrest_point.log_slip_rate
+    law = scene.parts.law
+    if law.state_count > 1 or not law.has_logarithmic_state or not abs(slowed) > 1.0:
+        return math.nan
+    return (cycle.slowest_point.state - cycle.arrest_point.state) / (scene.b * slowed)

@@ -1,0 +1,461 @@
+"""Periodic orbits, computed as fixed points of a return map.
+
+A cycle (an event of ``measures.limit_cycle``) extends from one rise of V through V_0 to the next. V
+is known at such a rise, so spring stress and the states determine the motion. With inertia, the
+spring stress also includes the stress that accelerates the slider. The motion is therefore a map of
+spring stress and states from one section to the next, and an orbit of n cycles is a fixed point of
+the n-th power of this map. The eigenvalues of its derivative are the Floquet multipliers, the
+factors by which small perturbations grow during one orbit. The orbit repels if the absolute value
+of a multiplier exceeds 1. At a multiplier of -1, an orbit with twice the number of cycles branches
+off.
+
+If the effect of inertia is small, perturbations have one direction fewer than the section has
+unknowns. The motion forgets a perturbation along itself. This direction is a change of the states
+at constant spring stress, because spring stress is highest at a section.
+
+Sections are arrays (f, Psi_1, ...) of shape (1 + states,), which contain spring stress over sigma_*
+and the states. If P is the map of n cycles, an orbit solves P(s) - s = 0. The equation is solved by
+Newton's method. The Jacobian dP - 1 is computed by finite differences of order four, and updated
+after each step by Broyden's method.
+
+References
+----------
+Broyden (1965), Math. Comp. 19, 577-593.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+from scipy.linalg.lapack import dgesv
+
+from rsfstudy.limit_cycles.cycles import (
+    MIN_LOG_SLIP_RATE_RANGE,
+    PRIMARY_OUTPUT_COUNT,
+    Cycle,
+    iterate_cycles,
+)
+from rsfstudy.motion import (
+    Accuracy,
+    MotionStopped,
+    Recording,
+    WorkMeter,
+    check_start,
+    inertia_weight,
+    switch_thresholds,
+    unevaluated_point,
+    with_slip_rate,
+)
+from rsfstudy.slider import Numbers, Point, Scene, equations_without_mass
+from rsfstudy.status import Status
+
+#: Step of the differences that give the derivative of the map, over how far ln V swings: its slopes
+#: bend over a hundredth of a swing.
+DIFFERENCE_STEP = 1e-4
+_DIFFERENCE_WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
+#: How far off an orbit is looked for, over how far ln V swings, and most steps to it.
+_MAX_ORBIT_DISTANCE, _MAX_ITERATIONS = 0.1, 12
+#: How nearly its cycles must close an orbit, in the accuracy asked for: what they do not is
+#: corrected to first order.
+CLOSURE_TOLERANCE = 0.3
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """Closed orbit of one or several cycles.
+
+    Attributes
+    ----------
+    cycles : tuple of Cycle
+        Successive cycles.
+    derivatives : tuple of ndarray
+        For each cycle, the derivatives of the section at its end and of its headline numbers with
+        respect to the section at its beginning, of shape (1 + states + numbers, 1 + states).
+    section_correction : ndarray
+        Vector from the section at which the cycles begin to the section of the closed orbit.
+    accuracy : Accuracy
+        Accuracy with which the cycles were computed.
+    evaluations : int
+        Number of right-hand-side evaluations.
+    recording : Recording or None
+        Recording along the cycles, which may extend beyond their end.
+    """
+
+    cycles: tuple[Cycle, ...]
+    derivatives: tuple[np.ndarray, ...]
+    section_correction: np.ndarray
+    accuracy: Accuracy
+    evaluations: int
+    recording: Recording | None = None
+
+    @property
+    def period(self) -> int:
+        """Number of cycles in the orbit."""
+        return len(self.cycles)
+
+    @property
+    def start_section(self) -> np.ndarray:
+        """Section at which the orbit begins."""
+        return np.asarray(section_at(self.cycles[0].start_point) + self.section_correction)
+
+    @cached_property
+    def output_corrections(self) -> np.ndarray:
+        """Corrections of the numbers of the first cycle for the closure error."""
+        return np.asarray(
+            self.derivatives[0][len(self.section_correction) :] @ self.section_correction
+        )
+
+    @cached_property
+    def primary_outputs(self) -> np.ndarray:
+        """Headline numbers of the first cycle, corrected for the closure error."""
+        return np.asarray(np.array(self.cycles[0].primary_outputs()) + self.output_corrections)
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """Complex Floquet multipliers in order of decreasing absolute value."""
+        found = np.linalg.eigvals(chain_derivatives(self.derivatives)).astype(complex)
+        return np.asarray(found[np.argsort(-np.abs(found), kind="stable")])
+
+    @property
+    def is_attracting(self) -> bool:
+        """True if the orbit attracts nearby motions."""
+        return bool(abs(self.multipliers[0]) < 1.0)
+
+    @property
+    def from_largest_event(self) -> Orbit:
+        """The same orbit, starting with the cycle that has the highest slip rate."""
+        at = max(range(self.period), key=lambda place: self.cycles[place].max_log_slip_rate)
+        if not at:
+            return self
+        return replace(
+            self,
+            cycles=self.cycles[at:] + self.cycles[:at],
+            derivatives=self.derivatives[at:] + self.derivatives[:at],
+            section_correction=chain_derivatives(self.derivatives[:at]) @ self.section_correction,
+        )
+
+
+def section_at(point: Point) -> np.ndarray:
+    """Return the section at a point: spring stress and states."""
+    return np.array((point.spring_stress, *point.psis))
+
+
+def cycle_image(cycle: Cycle) -> np.ndarray:
+    """Return the section at the end of a cycle, followed by its headline numbers."""
+    return np.array(
+        (cycle.end_point.spring_stress, *cycle.end_point.psis, *cycle.primary_outputs())
+    )
+
+
+def chain_derivatives(slopes: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the derivative of the section over several successive cycles.
+
+    Returns
+    -------
+    ndarray, shape (1 + states, 1 + states)
+        Product of the derivatives of the cycles.
+    """
+    size = slopes[0].shape[1]
+    together = slopes[0][:size]
+    for each in slopes[1:]:
+        together = each[:size] @ together
+    return together
+
+
+_identity_matrix = lru_cache(np.eye)
+
+
+class ReturnMap:
+    """Map of spring stress and states from one rise of V through V_0 to the next.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with a moving load point.
+    accuracy : Accuracy
+    meter : WorkMeter
+        Counter of the work of the motions.
+    recorded : bool
+        If True, record the motions along an orbit. Otherwise only the ends of the cycles are kept.
+    counted : sequence of int, optional
+        Indices of the states that count for the distance between two sections. By default, all
+        states count except those that a part lists in ``excluded_from_distance``.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        accuracy: Accuracy,
+        meter: WorkMeter,
+        *,
+        recorded: bool = False,
+        counted: Sequence[int] | None = None,
+    ) -> None:
+        self.scene, self.accuracy, self._meter = scene, accuracy, meter
+        self._with_recording = recorded
+        places = scene.functions.friction.distance_indices if counted is None else counted
+        #: Places in a section of the unknowns that count for the distance.
+        self._compared_unknowns = [0, *(1 + place for place in places)]
+
+    def point_at(self, section: np.ndarray) -> Point:
+        """Return the point of the slider at a section.
+
+        The point lies on the slow manifold, or at V_0 if inertia is important there.
+
+        Raises
+        ------
+        MotionStopped
+            If the spring stress is incompatible with friction of forward slip.
+        """
+        spring_stress, *psis = section.tolist()
+        scene, states = self.scene, tuple(psis)
+        x, friction, _shift = scene.functions.balance_function(spring_stress, states, scene.numbers)
+        point = unevaluated_point(scene, spring_stress, states, x, friction)
+        check_start(self.scene, point)
+        return (
+            with_slip_rate(self.scene, point, self.scene.log_load_velocity)
+            if self._inertia_matters_at(point)
+            else point
+        )
+
+    def _inertia_matters_at(self, point: Point) -> bool:
+        """Return True if the effect of inertia exceeds that on the slow manifold."""
+        if not self.scene.has_mass:
+            return False
+        inertial_stress = point.spring_stress - point.frictional_stress
+        given = switch_thresholds(self.scene, self.accuracy)
+        return inertia_weight(point.log_slip_rate, inertial_stress, given) >= 1.0
+
+    def follow_cycles(
+        self, start: np.ndarray, count: int, recording: Recording | None = None
+    ) -> list[Cycle]:
+        """Follow a number of cycles from a section.
+
+        Returns
+        -------
+        list of Cycle
+            The list is shorter than ``count`` if the motion settles, stays close to unstable
+            steady sliding, which is a fixed point of the map but not a cycle, or cannot continue.
+        """
+        seen = list[Cycle]()
+        try:
+            moving = iterate_cycles(
+                self.scene, self.accuracy, self._meter, self.point_at(start), recording
+            )
+            for cycle in moving:
+                if cycle is None or cycle.log_slip_rate_range < MIN_LOG_SLIP_RATE_RANGE:
+                    break
+                seen.append(cycle)
+                if len(seen) == count:
+                    break
+        except MotionStopped as halt:
+            if halt.status is Status.WORK_BUDGET_SPENT:
+                raise
+        return seen
+
+    def compute_image(self, start: np.ndarray) -> np.ndarray | None:
+        """Return the section one cycle later, and the numbers of the cycle.
+
+        Returns
+        -------
+        ndarray, shape (1 + states + numbers,), or None
+            None if the motion does not complete a cycle.
+        """
+        seen = self.follow_cycles(start, 1)
+        return cycle_image(seen[0]) if seen else None
+
+    def compute_derivatives(
+        self, start: np.ndarray, count: int, scale: float
+    ) -> tuple[np.ndarray, ...]:
+        """Compute the derivatives of successive cycles by finite differences.
+
+        Parameters
+        ----------
+        start : ndarray
+            Section at which the first cycle begins.
+        count : int
+            Number of cycles.
+        scale : float
+            Magnitude of the states, which determines the step of the differences.
+
+        Returns
+        -------
+        tuple of ndarray
+            The tuple is shorter than ``count`` if the motion does not complete all cycles.
+        """
+        found, step = (
+            list[np.ndarray](),
+            DIFFERENCE_STEP * math.sqrt(self.accuracy.refinement) * scale,
+        )
+        current: np.ndarray | None = start
+        for number in range(count):
+            slopes = None if current is None else self._differentiate_cycle(current, step)
+            if current is None or slopes is None:
+                break
+            found.append(slopes)
+            after = self.compute_image(current) if number < count - 1 else None
+            current = None if after is None else after[: len(current)]
+        return tuple(found)
+
+    def motion_direction(self, point: Point) -> tuple[Numbers, Numbers]:
+        """Return the direction of the motion at a section, and its effect.
+
+        A displacement of the start along the motion changes only the time of the cycle, if the
+        effect of inertia is small.
+
+        Returns
+        -------
+        way : tuple of float
+            Rates of change of the section.
+        passed : tuple of float
+            Corresponding change of the section and of the numbers of the cycle.
+        """
+        scene, states = self.scene, len(point.psis)
+        spring_stress = point.frictional_stress + scene.dynamics.radiated_stress(
+            scene.log_load_velocity
+        )
+        rates = equations_without_mass(scene, clock=True).evaluate_rates(
+            (spring_stress, *point.psis, 0.0)
+        )
+        rest = (0.0,) * (PRIMARY_OUTPUT_COUNT - 1)
+        return (0.0, *rates[1:-1]), (*(0.0,) * (1 + states), -rates[-1], *rest)
+
+    def _differentiate_cycle(self, start: np.ndarray, step: float) -> np.ndarray | None:
+        """Compute the derivatives of one cycle by differences of order four.
+
+        The derivative along the motion follows from the rates of the motion.
+        """
+        point = self.point_at(start)
+        way, passed = self.motion_direction(point)
+        directions = np.linalg.qr(np.column_stack([way, np.eye(len(start))]))[0]
+        columns = list[np.ndarray]()
+        for unit in directions.T:
+            if not columns and not self._inertia_matters_at(point):
+                columns.append(np.array(passed) / (unit @ way))
+                continue
+            slope = np.zeros(len(start) + PRIMARY_OUTPUT_COUNT)
+            for number, weight in _DIFFERENCE_WEIGHTS:
+                ahead = self.compute_image(start + number * step * unit)
+                behind = self.compute_image(start - number * step * unit)
+                if ahead is None or behind is None:
+                    return None
+                slope += weight * (ahead - behind) / step
+            columns.append(slope)
+        return np.asarray(np.column_stack(columns) @ directions.T)
+
+    def find_orbit(
+        self,
+        start: np.ndarray,
+        count: int,
+        log_slip_rate_range: float,
+        max_distance: float = _MAX_ORBIT_DISTANCE,
+    ) -> Orbit | None:
+        """Find a periodic orbit close to a section.
+
+        Parameters
+        ----------
+        start : ndarray
+            Section at which the search starts.
+        count : int
+            Number of cycles of the orbit. The orbit that is found may repeat after a divisor of
+            this number.
+        log_slip_rate_range : float
+            Range of ln V.
+        max_distance : float
+            Largest distance of the orbit from ``start``, relative to ``a`` times the range of ln V.
+
+        Returns
+        -------
+        Orbit or None
+            None if no orbit is found.
+        """
+        scale = self.scene.a * log_slip_rate_range
+        slopes = self.compute_derivatives(start, count, scale)
+        found = (
+            self._close_orbit(start, slopes, scale, max_distance) if len(slopes) == count else None
+        )
+        if found is None:
+            return None
+        count = self._cycles_until_repeat(found.cycles, scale)
+        if np.abs(found.start_section - start).max() > 10.0 * self.accuracy.rtol * scale:
+            slopes = self.compute_derivatives(found.start_section, count, scale)
+        if len(slopes) < count:
+            return None
+        return replace(found, cycles=found.cycles[:count], derivatives=slopes[:count])
+
+    def refine(self, orbit: Orbit) -> Orbit | None:
+        """Compute a known orbit at the accuracy of this map.
+
+        Returns
+        -------
+        Orbit or None
+            None if the orbit does not close.
+        """
+        if orbit.accuracy == self.accuracy:
+            return orbit
+        return self._close_orbit(
+            orbit.start_section,
+            orbit.derivatives,
+            self.scene.a * orbit.cycles[0].log_slip_rate_range,
+            _MAX_ORBIT_DISTANCE,
+        )
+
+    def _close_orbit(
+        self, start: np.ndarray, slopes: Sequence[np.ndarray], scale: float, max_distance: float
+    ) -> Orbit | None:
+        """Solve for an orbit with as many cycles as there are derivatives.
+
+        The equation ``J move = -(P(s) - s)`` is solved by Newton's method with Broyden's updates.
+        If ``off`` is the value of P(s) - s after a move, J changes by ``off move^T/(move . move)``.
+
+        Returns
+        -------
+        Orbit or None
+            None if there is no orbit within ``max_distance`` of the section.
+        """
+        at, enough, last = start, CLOSURE_TOLERANCE * self.accuracy.rtol * scale, math.inf
+        jacobian, move = chain_derivatives(slopes) - _identity_matrix(len(start)), None
+        for _ in range(_MAX_ITERATIONS):
+            spent, recording = (
+                self._meter.evaluations,
+                Recording() if self._with_recording else None,
+            )
+            seen = self.follow_cycles(at, len(slopes), recording)
+            if len(seen) < len(slopes):
+                return None
+            off = section_at(seen[-1].end_point) - at
+            if move is not None:
+                jacobian += off[:, None] * move / (move @ move)
+            move = -dgesv(jacobian, off)[2]
+            size = self._scaled_norm(move, at, scale)
+            # as close as asked for, or as errors of the motion let it come
+            if size <= enough or 0.5 * last <= size <= 100.0 * enough:
+                work = self._meter.evaluations - spent
+                return Orbit(tuple(seen), tuple(slopes), move, self.accuracy, work, recording)
+            at, last = at + move, size
+            if not np.abs((at - start)[self._compared_unknowns]).max() <= max_distance * scale:
+                return None
+        return None
+
+    def _scaled_norm(self, move: np.ndarray, at: np.ndarray, scale: float) -> float:
+        """Return the largest component of a change of a section.
+
+        The unknowns of a fluid may have large values. If such a value exceeds the scale of the
+        states, the change is divided by the ratio of the value to the scale.
+        """
+        changes, first = np.abs(move), 1 + self.scene.parts.law.state_count
+        changes[first:] /= np.maximum(1.0, np.abs(at[first:]) / scale)
+        return float(changes.max())
+
+    def _cycles_until_repeat(self, cycles: Sequence[Cycle], scale: float) -> int:
+        """Return the number of cycles after which an orbit repeats itself."""
+        begin = section_at(cycles[0].start_point)
+        for count in range(1, len(cycles)):
+            apart = self._scaled_norm(section_at(cycles[count - 1].end_point) - begin, begin, scale)
+            if len(cycles) % count == 0 and apart < 1e-4 * scale:
+                return count
+        return len(cycles)

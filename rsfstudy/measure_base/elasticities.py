@@ -1,0 +1,328 @@
+"""Elasticities: relative sensitivities of a result to the scene parameters."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from rsfstudy.error_boundary import guard_methods
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measure_base.measure import Measure, Outcome, OutputValue
+from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
+from rsfstudy.quantities import Output, Quantity
+from rsfstudy.slider import FIELD_TYPES, Scene
+from rsfstudy.status import Status
+
+#: Fields of a scene that hold numbers.
+NUMERIC_SCENE_FIELDS = tuple(
+    name for name, kind in FIELD_TYPES.items() if kind in (float, float | None)
+)
+#: What a rig has, and a scene has not; and how elasticities by that follow.
+_RIG_QUANTITIES = ("b", "slip_distance", "normal_stress", "sigma_star", "reference_velocity")
+_RIG_ELASTICITIES_REMEDY = (
+    "b at constant a is b_over_a; of a time in s, D_c is 1 + stiffness - reference_rate, normal "
+    "stress is -stiffness, and V_* is reference_rate - 1."
+)
+#: Longest step of ln p, of which the formula spans four.
+_MAX_LOG_STEP = 0.05
+#: Places of the levels of a derivative, in steps; and weights of their fourth difference.
+_STENCIL, _FOURTH_DIFFERENCE_WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0, -4.0, 6.0, -4.0, 1.0)
+#: Part of the correction from the second to the fourth order that counts as an error; at most 0.14
+#: of it is left in random scenes, by the longest steps.
+_CORRECTION_ERROR_FRACTION = 0.25
+#: Parts of a step that are tried where there is no number on one side of it, or an error of more
+#: than a part of the slope; and right-hand sides that a measurement takes then at most, over those
+#: of the number itself.
+_STEP_FRACTIONS, _MAX_RELATIVE_ERROR, _MAX_EVALUATION_RATIO = (
+    (1.0, 0.125, 0.125**2, 0.125**3),
+    0.1,
+    4,
+)
+#: How many numbers a scene usually has that are not zero.
+_TYPICAL_PARAMETER_COUNT = 8
+
+
+class _LogValue(NamedTuple):
+    """Value and error of ln|y|. The error is the error of y divided by |y|."""
+
+    value: float
+    error: float
+
+
+@guard_methods
+@dataclass(frozen=True)
+class Elasticities(Measure):
+    """Elasticities d ln|y|/d ln p of the headline y of a measure.
+
+    Each elasticity is a partial derivative with respect to a scene parameter p. All other
+    parameters remain fixed. If y is proportional to p squared, for example, the elasticity is 2.
+    The elasticities and their errors are dimensionless and have the shape (parameters,).
+
+    The derivatives are fourth-order central differences with points at ln p = -2h, -h, h and 2h,
+    relative to the scene. The measure is therefore evaluated four times per parameter, and once for
+    the scene. The step h = (e/2)^(1/3) depends on the relative error estimate e of y. The error
+    estimate of an elasticity is the sum of three terms. The first term, 1.5 e/h, accounts for the
+    errors of y. The second term is a quarter of the difference between the fourth-order and the
+    second-order formula. The third term is a bound computed from the fourth difference.
+
+    If y has no value on one side, for example near a stability boundary, up to three shorter steps
+    are tried. Each of these steps is an eighth of the previous step. If the scene is exactly at a
+    boundary, such as the critical stiffness, the derivative is a one-sided difference.
+
+    Parameters
+    ----------
+    measure : Measure
+        A measure whose headline is a single number.
+    parameters : sequence of str
+        Scene parameters, along the dimension ``parameter``. By default, all parameters that the
+        measure does not solve for. The elasticity is NaN if the scene does not have the parameter,
+        or if the parameter is zero.
+    """
+
+    measure: Measure
+    parameters: tuple[str, ...] = ()
+    name: ClassVar[str] = "elasticities"
+    needs_time: ClassVar[tuple[bool, ...]] = (False, True)
+    dimensions: ClassVar[Sequence[Quantity]] = (
+        Quantity("parameter", "", "", "number of the scene that is changed"),
+    )
+
+    def __post_init__(self) -> None:
+        if (
+            not isinstance(self.measure, Measure)
+            or self.measure.variables[self.measure.primary_output]
+        ):
+            rule = "must be a measure whose headline is one number"
+            raise InvalidValue("measure", self.measure, rule)
+        object.__setattr__(self, "parameters", tuple(self.parameters) or self._available_parameters)
+        for name in self.parameters:
+            if name not in self._available_parameters:
+                rule = f"is no number of a scene that {self.measure.name} leaves as it is"
+                choices, remedy = (
+                    ((), _RIG_ELASTICITIES_REMEDY)
+                    if name in _RIG_QUANTITIES
+                    else (self._available_parameters, "")
+                )
+                raise InvalidValue("parameters", name, rule, choices=choices, remedy=remedy)
+
+    @cached_property
+    def _available_parameters(self) -> tuple[str, ...]:
+        return tuple(
+            name for name in NUMERIC_SCENE_FIELDS if name not in self.measure.solved_fields
+        )
+
+    @property
+    def primary_output(self) -> str:
+        return self.measure.primary_output
+
+    @property
+    def outputs(self) -> Sequence[Output]:
+        given = {about.name: about for about in self.measure.outputs}
+        headline = given.get(self.primary_output, Output(self.primary_output))
+        text = f"d ln|y|/d ln p of {self.primary_output.replace('_', ' ')}"
+        return (
+            replace(headline, error=True),
+            Output("elasticity", "", "1", text, dims=("parameter",), error=True),
+        )
+
+    @property
+    def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        return {"parameter": np.array(self.parameters, dtype=object)}
+
+    @property
+    def solved_fields(self) -> tuple[str, ...]:
+        return self.measure.solved_fields
+
+    @property
+    def typical_work(self) -> int:
+        return self.measure.typical_work * (
+            4 * min(_TYPICAL_PARAMETER_COUNT, len(self.parameters)) + 1
+        )
+
+    @property
+    def work_by_digits(self) -> Mapping[float, float]:
+        return self.measure.work_by_digits
+
+    def describe(self) -> dict[str, Any]:
+        """Return a description of the measure as plain data."""
+        return {
+            "name": self.name,
+            "measure": self.measure.describe(),
+            "parameters": list(self.parameters),
+        }
+
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+        """Compute the headline and its elasticities."""
+        outcome = self.measure.run_nested(scene, accuracy, meter)
+        if outcome.status is not Status.OK:
+            return Outcome(outcome.status, message=outcome.message)
+        names = self.primary_output, f"{self.primary_output}_error"
+        values: dict[str, OutputValue] = {name: outcome.values.get(name, 0.0) for name in names}
+        here = self._log_value(outcome)
+        if here is None:
+            why = f"{self.primary_output} is zero, which has no logarithm"
+            return Outcome(Status.NOT_APPLICABLE, values, why)
+        most = min(accuracy.budget, _MAX_EVALUATION_RATIO * (outcome.rhs_evaluations or 1))
+        accuracies = accuracy, *3 * (replace(accuracy, budget=most),)
+        step = min(_MAX_LOG_STEP, (0.5 * here.error) ** (1.0 / 3.0))
+        found = np.full((len(self.parameters), 2), np.nan)
+        lacking, stated = [], scene.as_dict()
+        for place, name in enumerate(self.parameters):
+            if not stated.get(name):
+                continue
+            found[place] = self._differentiate(scene, name, here, step, accuracies, meter)
+            if np.isnan(found[place, 0]):
+                lacking.append(name)
+        values = {**values, "elasticity": found[:, 0], "elasticity_error": found[:, 1]}
+        why = f"no number on either side of {', '.join(lacking)}" if lacking else ""
+        return Outcome(Status.OK, values, why)
+
+    def _differentiate(
+        self,
+        scene: Scene,
+        name: str,
+        centre: _LogValue,
+        step: float,
+        accuracies: Sequence[Accuracy],
+        meter: WorkMeter,
+    ) -> tuple[float, float]:
+        """Compute the derivative with respect to one parameter, and its error.
+
+        If the headline has no value on one side, or if the error is large, the derivative is
+        recomputed with shorter steps.
+
+        Parameters
+        ----------
+        scene : Scene
+        name : str
+            Name of the parameter.
+        centre : _Level
+            Value at the scene.
+        step : float
+            Longest step of ln p.
+        accuracies : sequence of Accuracy
+            Accuracy for each step.
+        meter : WorkMeter
+
+        Returns
+        -------
+        slope, error : float
+        """
+        found: list[tuple[bool, float, float]] = []
+        for part, accuracy in zip(_STEP_FRACTIONS, accuracies, strict=True):
+            size = part * step
+            try:
+                sides = [
+                    self._evaluate_at(scene, name, by * size, accuracy, meter) for by in _STENCIL
+                ]
+            except MotionStopped:
+                if not found:
+                    raise
+                break  # beside the end of answers some take long
+            slope, error, of_levels = _central_difference(centre, sides, size)
+            if found and not all(sides):  # the longer step leaves out eight times as much
+                error += 2.0 * abs(slope - found[-1][2])
+            found.append((not all(sides), error, slope))
+            told = error < max(2.0 * of_levels, _MAX_RELATIVE_ERROR * abs(slope))
+            if not any(sides) or (all(sides) and told):
+                break
+        _one_sided, error, slope = found[-1] if found[-1][0] else min(found)
+        return slope, error
+
+    def _evaluate_at(
+        self, scene: Scene, name: str, log_change: float, accuracy: Accuracy, meter: WorkMeter
+    ) -> _LogValue | None:
+        """Compute ln|y| after a change of ln p.
+
+        Returns
+        -------
+        _Level or None
+            None if the measure has no numerical result there.
+
+        Raises
+        ------
+        MotionStopped
+            If the measure fails.
+        """
+        try:
+            beside = scene.with_(**{name: getattr(scene, name) * math.exp(log_change)})
+        except InvalidValue:
+            return None
+        outcome = self.measure.run_nested(beside, accuracy, meter)
+        if not outcome.status.is_answer:
+            where = f"at {name} = {getattr(beside, name):.9g}"
+            raise MotionStopped(outcome.status, f"{where}: {outcome.message}")
+        return self._log_value(outcome)
+
+    def _log_value(self, outcome: Outcome) -> _LogValue | None:
+        """Return ln|y| and its error, including rounding errors.
+
+        Returns
+        -------
+        _Level or None
+            None if the outcome has no headline, or if the headline is zero.
+        """
+        y = float(outcome.values[self.primary_output]) if outcome.status is Status.OK else 0.0
+        if not y:
+            return None
+        value, error = (
+            math.log(abs(y)),
+            float(outcome.values.get(f"{self.primary_output}_error", 0.0)),
+        )
+        return _LogValue(value, error / abs(y) + 4.0 * sys.float_info.epsilon * (1.0 + abs(value)))
+
+
+def _central_difference(
+    centre: _LogValue, neighbours: Sequence[_LogValue | None], step: float
+) -> tuple[float, float, float]:
+    """Compute the derivative of ln|y| with respect to ln p.
+
+    Parameters
+    ----------
+    centre : _Level
+        Value at the scene.
+    neighbours : sequence of _Level or None
+        Values at ``_STENCIL``, or None for missing values.
+    step : float
+        Step of ln p.
+
+    Returns
+    -------
+    slope, error, of_levels : float
+        The derivative, its error, and the contribution of the errors of y to this error. All are
+        NaN if the values on both sides are missing.
+    """
+    far_below, below, above, far_above = neighbours
+    if far_below and below and above and far_above:
+        near = (above.value - below.value) / (2.0 * step)
+        far = (far_above.value - far_below.value) / (4.0 * step)
+        of_levels = (above.error + below.error) / 1.5 + (far_above.error + far_below.error) / 12.0
+        of_levels /= step
+        correction = (near - far) / 3.0
+        levels = far_below, below, centre, above, far_above
+        fourth = abs(
+            sum(
+                w * level.value for w, level in zip(_FOURTH_DIFFERENCE_WEIGHTS, levels, strict=True)
+            )
+        )
+        # the fifth derivative is at most the fourth one over the span of the levels
+        left = _CORRECTION_ERROR_FRACTION * abs(correction) + fourth / (12.0 * step)
+        return near + correction, left + of_levels, of_levels
+    if below and above:
+        slope = (above.value - below.value) / (2.0 * step)
+        bend = abs(above.value - 2.0 * centre.value + below.value) / step
+        of_levels = (above.error + below.error) / (2.0 * step)
+        return slope, max(step**2, bend) + of_levels, of_levels
+    for beside, sign in ((below, -1.0), (above, 1.0)):
+        if beside:
+            slope = sign * (beside.value - centre.value) / step
+            # how it curves is not known: twice as much as a logarithm of that slope
+            of_levels = (beside.error + centre.error) / step
+            return slope, step * max(1.0, slope**2) + of_levels, of_levels
+    return math.nan, math.nan, math.nan

@@ -1,0 +1,407 @@
+"""Runs the loop of motions, and makes events of the tables that it fills."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import lru_cache, partial
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from rsfstudy._deprecation import renamed_members
+from rsfstudy.motion import layout, workspace
+from rsfstudy.motion.engine_factory import compiled_engine, create_stepper
+from rsfstudy.motion.engines import COMPILED
+from rsfstudy.motion.events import Event, EventKind, EventSpecification
+from rsfstudy.motion.inplace import in_place_functions
+from rsfstudy.motion.loop import advance
+from rsfstudy.motion.meter import (
+    MIN_LOCAL_TOLERANCE,
+    STEP_LIMIT_TOLERANCE,
+    MotionStopped,
+    WorkMeter,
+)
+from rsfstudy.motion.recording import (
+    FIRST_STATE_COLUMN,
+    SAMPLES_PER_STEP,
+    STRESS_COLUMNS,
+    Recording,
+)
+from rsfstudy.motion.regime_switching import NO_SWITCHING, SwitchThresholds, termination_error
+from rsfstudy.motion.step_events import BEFORE_JUMP, NO_EVENT, find_jump_side
+from rsfstudy.parts import SEGMENT_STRESS_FALL
+from rsfstudy.slider import (
+    Equations,
+    Numbers,
+    Point,
+    Scene,
+    cached_per_scene,
+    equations_between_ruptures,
+    equations_in_rupture,
+)
+from rsfstudy.status import Status
+
+#: Rows of the tables of events and of recordings that one call may fill.
+_MIN_EVENT_ROWS, _RECORDING_ROWS = 64, 4096
+_KIND_CODES = {
+    kind: layout.__dict__[kind.name] for kind in EventKind if kind.name in layout.__dict__
+}
+#: Columns of a point, by the names of its numbers; what is asked of none reads the first.
+_QUANTITY_COLUMNS = {name: column for column, name in enumerate(Point._fields[:-1])} | {"": 0}
+#: What is told beside what was asked for: the codes of these count from the end.
+_UNREQUESTED_EVENTS = [
+    (k, None)
+    for k in (
+        EventKind.SEGMENT,
+        EventKind.SAMPLED,
+        EventKind.END,
+        EventKind.REGIME,
+        EventKind.START,
+    )
+]
+#: Makes a named tuple of a tuple, in half the time that its name takes.
+_new_named_tuple = tuple.__new__
+_STEP_TOO_SHORT_TEXT = "a step would be shorter than the spacing of numbers around the clock"
+_NO_RECORDING = layout.RECORD_NEVER, np.empty(0), np.empty((0, FIRST_STATE_COLUMN))
+_NO_KINKS = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
+
+
+class PythonBackend:
+    """The loop as it stands, and its arguments; `compiled.machine.NumbaBackend` is the other
+    machine that runs it.
+    """
+
+    def initial_values(self, fields: tuple[tuple[str, float], ...]) -> dict[str, float]:
+        """Initial state of motions that have these numbers in their state, and others 0."""
+        return {**dict.fromkeys(layout.MOTION.names or (), 0), **dict(fields)}
+
+    def create_state(
+        self, initial: dict[str, float], called_with: tuple[float, ...]
+    ) -> PythonMotionState:
+        """The state of a motion: its `memory`, and its `counters`."""
+        called = zip(layout.CALL_FIELDS, called_with, strict=True)
+        return PythonMotionState(**{**initial, **dict(called)})
+
+    def function_table(self, systems: tuple[Equations, ...]) -> np.ndarray:
+        """The table of functions of the regimes."""
+        rows = np.zeros((2, layout.FUNCTIONS_PER_REGIME), dtype=object)
+        for row, system in zip(rows, systems, strict=False):
+            row[:] = in_place_functions(system)
+        rows[layout.FAST_REGIME, -1] = rows[layout.SLOW_REGIME, -1]
+        return rows
+
+    def as_arguments(self, *arrays: np.ndarray) -> Sequence[memoryview]:
+        """Arrays as the loop takes them."""
+        return [memoryview(array) for array in arrays]  # type: ignore[arg-type]
+
+    def as_parameters(self, p: Sequence[float]) -> Any:
+        """The numbers of a scene as the loop takes them."""
+        return list(p)
+
+    def loop_function(self) -> Any:
+        """The loop."""
+        return advance
+
+
+@partial(renamed_members, writable=True)
+class PythonMotionState(SimpleNamespace):
+    """The state of a motion in plain Python."""
+
+    @property
+    def memory(self) -> list[PythonMotionState]:
+        """The state as the loop takes it."""
+        return [self]
+
+    def counters(self) -> tuple[int, ...]:
+        """Right-hand sides by regime, steps, events, rows, and Jacobians."""
+        return (
+            *(self.evaluations_slow, self.evaluations_fast, self.steps),
+            *(self.event_rows, self.recorded_rows, self.jacobians),
+        )
+
+    def get_field(self, name: str) -> float:
+        """One of its fields."""
+        return float(getattr(self, name))
+
+
+class MotionDriver:
+    """Runs motions by the same equations, which may differ in their numbers and beginnings.
+
+    Parameters
+    ----------
+    slow : Equations
+        The equations, or those between ruptures.
+    fast : Equations, optional
+        Those in ruptures.
+    engine : str
+    fields : float
+        Fields of the state of a motion (`layout.MOTION`) in which such motions differ from others.
+    """
+
+    def __init__(
+        self,
+        slow: Equations,
+        fast: Equations | None = None,
+        *,
+        engine: str,
+        **fields: float,
+    ) -> None:
+        self._equations: tuple[Equations, ...] = (slow,) if fast is None else (slow, fast)
+        self._backend = compiled_engine().NumbaBackend() if engine == COMPILED else PythonBackend()
+        self._states, unknowns = (
+            slow.state_count,
+            [len(system.unknowns) for system in self._equations],
+        )
+        self._unknowns = max(unknowns)
+        scales = np.array([scale for system in self._equations for scale in system.scales])
+        self._scales_and_functions = (
+            *self._backend.as_arguments(scales),
+            self._backend.function_table(self._equations),
+        )
+        self._p = self._backend.as_parameters(slow.parameters)
+        self._regimes = [system.regime for system in self._equations]
+        fields |= {
+            "pending_start": layout.START_CODE,
+            "clock_is_path_length": not slow.is_rigid,
+            "slip_is_clock": slow.is_rigid,
+            "unknowns": unknowns[0],
+            "states": slow.state_count,
+            "unknowns_fast": sum(unknowns[1:]),
+            "has_mass": fast is not None,
+        }
+        self._initial_values = self._backend.initial_values(tuple(fields.items()))
+
+    def run(
+        self,
+        start: Point | Numbers,
+        meter: WorkMeter,
+        specs: Sequence[EventSpecification],
+        tolerance: float,
+        *,
+        start_times: tuple[float, float, float] = (math.inf, 0.0, 0.0),
+        backward: bool = False,
+        p: Numbers | None = None,
+        thresholds: SwitchThresholds = NO_SWITCHING,
+        budget: float = math.inf,
+        recording: Recording | None = None,
+        kinks: tuple[np.ndarray, int] = _NO_KINKS,
+        initial_imposed_stress: float | None = None,
+    ) -> Iterator[Event]:
+        """Events of a motion, a table of them by each call of the loop.
+
+        Parameters
+        ----------
+        start : Point or tuple of float
+            Where it begins: a point, whose regime is found, or the unknowns.
+        meter : WorkMeter
+            Charged with the work.
+        specs : sequence of EventSpecification
+        tolerance : float
+            Local error per step.
+        start_times : tuple of float
+            How long it lasts, and time and slip where it begins.
+        backward : bool
+            Run against the clock of the equations.
+        p : tuple of float, optional
+            Other numbers than those of the equations.
+        thresholds : SwitchThresholds
+            When to change between the regimes.
+        budget : float
+            Right-hand sides it may spend, if fewer than the meter leaves.
+        recording : Recording, optional
+        kinks : tuple of ndarray and int
+            Those of the loading, and how many of the last ones are reported.
+        initial_imposed_stress : float, optional
+            Where the load point moves to and fro, shear stress that this adds when the last unknown
+            is zero: while steps are taken, stresses are without what it adds, told with it.
+
+        Raises
+        ------
+        MotionStopped
+            Where it cannot go on.
+        """
+        machine, states, systems, numbers = self._backend, self._states, self._equations, self._p
+        before, turns = numbers, len(kinks[0])
+        if isinstance(start, Point):
+            start = (
+                start
+                if initial_imposed_stress is None
+                else _shift_stresses(start, initial_imposed_stress - start.psis[-1])
+            )
+            y, last, stress = np.empty(2 * self._unknowns), _pack_point(start), start.spring_stress
+        else:  # behind the unknowns is room for as many
+            y, last, stress = np.array((*start, *start)), np.empty(layout.FIRST_STATE + states), 0.0
+        if p is not None or turns:  # numbers that are those of this motion alone
+            before = numbers = machine.as_parameters(systems[0].parameters if p is None else p)
+            if turns:
+                before = machine.as_parameters(numbers)
+            systems = tuple(system._replace(parameters=numbers) for system in systems)
+        tolerance = max(tolerance, MIN_LOCAL_TOLERANCE)
+        records, samples, rows = _recording_tables(recording, systems[0], states)
+        state = machine.create_state(
+            self._initial_values,
+            (
+                *(*start_times, stress, tolerance),
+                # what limits a step must differ between two tolerances whose results tell errors
+                (tolerance / STEP_LIMIT_TOLERANCE) ** 0.125,
+                -1.0 if backward else 1.0,
+                int(min(budget, meter.budget - meter.evaluations)),
+                *(records, turns, kinks[1]),
+            ),
+        )
+        asked, meanings = _pack_specifications(tuple(specs))
+        stepper = create_stepper(meter.engine, systems, meter.methods)
+        columns = layout.EVENT_POINT + layout.FIRST_STATE + states
+        events = np.empty((max(_MIN_EVENT_ROWS, 2 * len(specs) + 4), columns))
+        block = np.empty(workspace.workspace_size(self._unknowns, states, len(specs)))
+        arguments = (
+            *machine.as_arguments(y, last, block),
+            (*self._scales_and_functions, tuple(thresholds), numbers, before),
+            *machine.as_arguments(asked.copy(), kinks[0], samples, events, rows),
+            stepper,
+        )
+        regimes, psis = self._regimes, layout.EVENT_POINT + layout.FIRST_STATE
+        run, end, known = machine.loop_function(), layout.PAUSED, (0, 0, 0, 0)
+        while end == layout.PAUSED:
+            end = run(state.memory, *arguments)
+            slow, fast, steps, happened, recorded, jacobians = state.counters()
+            known, settled = (slow, fast, steps, jacobians), known
+            others = meter.charge_difference(regimes, settled, known)
+            if recording is not None and recorded:
+                kept = rows[:recorded].copy(order="F")  # columns are what is asked for
+                if initial_imposed_stress is not None:
+                    kept[:, STRESS_COLUMNS] += kept[:, -1:] - initial_imposed_stress
+                recording.append(kept, regimes)
+            for line in events[:happened].tolist():
+                code, regime, clock, time, slip, spent = line[: layout.EVENT_POINT]
+                point = _new_named_tuple(
+                    Point, (*line[layout.EVENT_POINT : psis], tuple(line[psis:]))
+                )
+                if initial_imposed_stress is not None:
+                    point = _shift_stresses(point, point.psis[-1] - initial_imposed_stress)
+                kind, spec = meanings[int(code)]
+                name, work = regimes[int(regime)], others + int(spent)
+                yield _new_named_tuple(Event, (kind, spec, time, slip, point, name, work, clock))
+            meter.check_budget()
+        if end != layout.MOTION_ENDED:
+            raise _stop_error(end, state, regimes, stepper)
+
+
+def _shift_stresses(point: Point, by: float) -> Point:
+    return point._replace(
+        spring_stress=point.spring_stress + by, frictional_stress=point.frictional_stress + by
+    )
+
+
+def events_along(
+    equations: Equations,
+    state: Numbers,
+    tolerance: float,
+    meter: WorkMeter,
+    specs: Sequence[EventSpecification] = (),
+    *,
+    backward: bool = False,
+    recording: Recording | None = None,
+) -> Iterator[Event]:
+    """Events along one system of equations from a state; against its clock if `backward`.
+
+    A rigid slider has slip for its clock: a recording that asks for values has them at slips.
+    """
+    runner = MotionDriver(equations, engine=meter.engine)
+    return runner.run(state, meter, specs, tolerance, backward=backward, recording=recording)
+
+
+@cached_per_scene
+def driver_of(scene: Scene, engine: str, *, with_time: bool) -> MotionDriver:
+    """What runs the motions of a scene."""
+    return MotionDriver(
+        equations_between_ruptures(scene, clock=with_time),
+        equations_in_rupture(scene, clock=with_time) if scene.has_mass else None,
+        engine=engine,
+        unknowns_behind_fluid=len(scene.parts.fluid.unknowns)
+        if scene.parts.loading.unknowns
+        else 0,
+        may_reverse=scene.parts.law.regularised,
+        starts_at_point=1,
+        may_terminate=1,
+        has_clock=with_time,
+    )
+
+
+def _recording_tables(
+    recording: Recording | None, system: Equations, states: int
+) -> tuple[int, np.ndarray, np.ndarray]:
+    """Whether a chain of segments records, and when; the times or clocks at which to; and the table
+    that the loop fills.
+    """
+    if recording is None:
+        return _NO_RECORDING
+    if recording.sample_times is None:
+        return (
+            layout.RECORD_WITHIN_STEPS,
+            np.empty(0),
+            np.empty((_RECORDING_ROWS, FIRST_STATE_COLUMN + states)),
+        )
+    samples = recording.remaining_times()
+    rows = np.empty((len(samples) + 2 * SAMPLES_PER_STEP, FIRST_STATE_COLUMN + states))
+    return layout.RECORD_AT_CLOCKS if system.is_rigid else layout.RECORD_AT_TIMES, samples, rows
+
+
+def events_at_jump(
+    before: Point,
+    p_before: Numbers,
+    after: Point,
+    p_after: Numbers,
+    specs: Sequence[EventSpecification],
+) -> Iterator[tuple[EventSpecification, Point]]:
+    """Events that are watched for and happen where a motion jumps from a point to another, with the
+    numbers of the scene at both; and at which of them.
+    """
+    last, first = _pack_point(before).tolist(), _pack_point(after).tolist()
+    table = (
+        _pack_specifications(tuple(specs))[0]
+        .reshape(-1, len(layout.SPECIFICATION_COLUMNS))
+        .tolist()
+    )
+    for spec, row in zip(specs, table, strict=True):
+        where = find_jump_side(row, last, p_before, first, p_after)
+        if where != NO_EVENT:
+            yield spec, before if where == BEFORE_JUMP else after
+
+
+@lru_cache(maxsize=256)
+def _pack_specifications(
+    specs: tuple[EventSpecification, ...],
+) -> tuple[np.ndarray, list[tuple[EventKind, EventSpecification | None]]]:
+    """The table of event specifications, and what codes of events mean."""
+    meanings = [*((spec.kind, spec) for spec in specs), *_UNREQUESTED_EVENTS]
+    asked = np.zeros((len(specs), len(layout.SPECIFICATION_COLUMNS)))
+    for row, spec in zip(asked, specs, strict=True):
+        row[layout.SPEC_KIND], row[layout.SPEC_QUANTITY] = (
+            _KIND_CODES[spec.kind],
+            _QUANTITY_COLUMNS[spec.quantity],
+        )
+        row[layout.SPEC_LEVEL], row[layout.SPEC_TERMINAL] = spec.level, spec.terminal
+        row[layout.SPEC_MAY_DEFER] = spec.may_defer
+    return asked.ravel(), meanings
+
+
+def _pack_point(point: Point) -> np.ndarray:
+    """A point as the loop has it."""
+    return np.array((*point[:-1], *point.psis))
+
+
+def _stop_error(end: int, state: Any, regimes: Sequence[str], stepper: Any) -> MotionStopped:
+    """Why a motion cannot go on."""
+    if end == layout.TERMINATED:
+        return termination_error(
+            int(state.get_field("termination")), state.get_field("final_normal_stress")
+        )
+    why = "step without length, or a state that is not finite"
+    if end == layout.NO_STEP_POSSIBLE:
+        why = stepper.failure if stepper else _STEP_TOO_SHORT_TEXT
+    return MotionStopped(
+        Status.INTEGRATION_FAILED, f"{regimes[int(state.get_field('regime'))]}: {why}"
+    )

@@ -1,0 +1,234 @@
+"""When to change between the slow manifold and the full equations, and where motions end.
+
+Most are plain functions of floats, which every engine calls.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.meter import MotionStopped
+from rsfstudy.slider import LARGEST_LOG_SLIP_RATE, STOPPED_LOG_SLIP_RATE, Scene, cached_per_scene
+from rsfstudy.status import Status
+
+#: Normal stress over sigma_* at which the fault counts as open, and as locked.
+MIN_NORMAL_STRESS, MAX_NORMAL_STRESS = 1e-9, 1e6
+#: Normal stress that stands for none, in logarithms.
+SMALLEST_POSITIVE_STRESS = 1e-300
+#: ln(V/V_*) beyond which slip without mass counts as unbounded: 10^120 V_*.
+MAX_LOG_SLIP_RATE_WITHOUT_INERTIA = 120.0 * math.log(10.0)
+#: How a motion goes on, or why it cannot.
+CONTINUES, NORMAL_STRESS_VANISHED, NORMAL_STRESS_UNBOUNDED, SLIP_STOPPED, SLIP_RATE_UNBOUNDED = (
+    range(5)
+)
+
+
+class SwitchThresholds(NamedTuple):
+    """The numbers that decide when to change.
+
+    Attributes
+    ----------
+    max_norm : float
+        Slip rate norm w at which to leave the slow manifold, which is a series in (K/a) w**2.
+    max_correction : float
+        Change of ln V by inertia up to which the slow manifold may be used.
+    max_remaining_slip : float
+        Slip in D_c that may remain when the full equations hand back.
+    stiffness_over_a : float
+        K/a.
+    a : float
+        Direct effect.
+    inertial_time : float
+        T V_*/(2 pi D_c).
+    """
+
+    max_norm: float
+    max_correction: float
+    max_remaining_slip: float
+    stiffness_over_a: float
+    a: float
+    inertial_time: float
+
+
+#: The limits of a motion without mass, which reads none.
+NO_SWITCHING = SwitchThresholds(*[math.nan] * len(SwitchThresholds._fields))
+
+
+@cached_per_scene
+def switch_thresholds(scene: Scene, accuracy: Accuracy) -> SwitchThresholds:
+    """The limits of a scene at an accuracy."""
+    if not scene.has_mass:
+        return NO_SWITCHING
+    softness = scene.stiffness / scene.a
+    return SwitchThresholds(
+        math.sqrt(accuracy.max_inertia_weight / softness),
+        accuracy.max_inertia_correction,
+        accuracy.max_remaining_slip,
+        softness,
+        scene.a,
+        scene.inertial_time,
+    )
+
+
+def inertia_matters(scene: Scene, accuracy: Accuracy) -> bool:
+    """True if mass matters up to the instability norm, beyond what the slow manifold holds of
+    it.
+    """
+    return scene.has_mass and slow_manifold_error(scene) > 0.1 * accuracy.rtol
+
+
+def slow_manifold_error(scene: Scene) -> float:
+    """Relative error of a boundary computed on the slow manifold up to the norm w of a scene:
+    ``3 [(K/a) w**2]**2``.
+
+    Mass moves a boundary in proportion to (K/a) w**2, by up to 0.8 of it where the norm is a slip
+    rate of a few V_*; the slow manifold leaves up to 0.9 of its square (the tests measure it).
+    """
+    return 3.0 * (scene.stiffness / scene.a * scene.instability_norm**2) ** 2
+
+
+def slip_rate_norm(log_slip_rate: float, thresholds: SwitchThresholds) -> float:
+    """w = V T/(2 pi D_c)."""
+    return thresholds.inertial_time * math.exp(min(log_slip_rate, LARGEST_LOG_SLIP_RATE))
+
+
+def inertia_weight(
+    log_slip_rate: float, inertial_stress: float, thresholds: SwitchThresholds
+) -> float:
+    """Weight of mass where friction differs from spring stress by `inertial_stress`: 1 where
+    the slow manifold has to be left.
+    """
+    correction = abs(inertial_stress) / thresholds.a / thresholds.max_correction
+    return max(slip_rate_norm(log_slip_rate, thresholds) / thresholds.max_norm, correction)
+
+
+def slip_during_transition(
+    log_slip_rate: float, log_slip_rate_after: float, thresholds: SwitchThresholds
+) -> float:
+    """Slip in D_c, times the change of ln V, while slip rate goes to its value
+    `log_slip_rate_after` a step; left out, the state would miss the evolution of that slip.
+    """
+    norm = max(
+        slip_rate_norm(log_slip_rate, thresholds), slip_rate_norm(log_slip_rate_after, thresholds)
+    )
+    return thresholds.stiffness_over_a * norm**2 * abs(log_slip_rate_after - log_slip_rate)
+
+
+def starts_on_manifold(
+    log_slip_rate: float,
+    manifold_log_slip_rate: float,
+    inertial_stress: float,
+    thresholds: SwitchThresholds,
+) -> bool:
+    """True if a motion begins on the slow manifold, from ln(V/V_*), where that has ln(V/V_*)
+    `manifold_log_slip_rate`, and friction differs from spring stress by `inertial_stress` there.
+    """
+    rate = slip_rate_norm(log_slip_rate, thresholds) / thresholds.max_norm
+    slow = max(inertia_weight(manifold_log_slip_rate, inertial_stress, thresholds), rate) < 1.0
+    return (
+        slow
+        and slip_during_transition(log_slip_rate, manifold_log_slip_rate, thresholds)
+        <= thresholds.max_remaining_slip
+    )
+
+
+def may_switch_back(log_slip_rate: float, thresholds: SwitchThresholds) -> bool:
+    """True if ln(V/V_*) alone lets the full equations hand back: the slow manifold must not hand
+    straight back in its turn.
+    """
+    return slip_rate_norm(log_slip_rate, thresholds) < 0.5 * thresholds.max_norm
+
+
+def should_switch_back(
+    log_slip_rate: float,
+    growth: float,
+    manifold_log_slip_rate: float,
+    inertial_stress: float,
+    thresholds: SwitchThresholds,
+) -> bool:
+    """True if the full equations have done their work at ln(V/V_*) and its growth, where the slow
+    manifold has ln(V/V_*) `manifold_log_slip_rate`, and friction differs from spring stress by
+    `inertial_stress`.
+
+    The slip rate still has to go from ln V = x to the slow manifold's x_s, over a slip of about
+    (K/2a) w**2 min(1, |x - x_s|) D_c at the faster of the two; the state may change that much
+    unnoticed; and see `may_switch_back`.
+
+    A rise to a slow manifold that falls, where friction exceeds spring stress, has its peak below
+    that: they meet after a slip of several (K/a) w**2 D_c. It is followed up to there. So is a
+    fall to one that rises: its trough is above where that is now, by several times the change of
+    ln V by which that trails, which is what is missing over a.
+    """
+    norm = max(
+        slip_rate_norm(log_slip_rate, thresholds),
+        slip_rate_norm(manifold_log_slip_rate, thresholds),
+    )
+    has_peak = (
+        inertial_stress < 0.0
+        and thresholds.stiffness_over_a * norm**2 > thresholds.max_remaining_slip
+    )
+    has_trough = inertial_stress > 0.1 * thresholds.max_remaining_slip * thresholds.a
+    if (growth > 0.0 and (log_slip_rate > manifold_log_slip_rate + 1.0 or has_peak)) or (
+        growth < 0.0 and has_trough
+    ):
+        return False
+    remaining = (
+        0.5
+        * thresholds.stiffness_over_a
+        * norm**2
+        * min(1.0, abs(log_slip_rate - manifold_log_slip_rate))
+    )
+    settled = (
+        max(
+            norm / thresholds.max_norm,
+            inertia_weight(manifold_log_slip_rate, inertial_stress, thresholds),
+        )
+        < 0.5
+    )
+    return settled and remaining < thresholds.max_remaining_slip
+
+
+def find_termination(log_slip_rate: float, normal_stress: float, load_velocity: float) -> int:
+    """Termination status of a motion: `CONTINUES`, unless normal stress vanishes, normal stress or
+    slip rate grow without bound, or slip stops.
+
+    Shear stress may reverse in the overshoot of a rupture; the equations go through that unharmed.
+    """
+    if normal_stress <= MIN_NORMAL_STRESS:
+        return NORMAL_STRESS_VANISHED
+    if normal_stress >= MAX_NORMAL_STRESS:
+        return NORMAL_STRESS_UNBOUNDED
+    if log_slip_rate <= STOPPED_LOG_SLIP_RATE and load_velocity == 0.0:
+        return SLIP_STOPPED
+    if log_slip_rate >= MAX_LOG_SLIP_RATE_WITHOUT_INERTIA:
+        return SLIP_RATE_UNBOUNDED
+    return CONTINUES
+
+
+def termination_margin(log_slip_rate: float, normal_stress: float, load_velocity: float) -> float:
+    """Margin of ln V and of the logarithm of normal stress to where a motion ends: positive where
+    it goes on.
+    """
+    stress = math.log(max(normal_stress, SMALLEST_POSITIVE_STRESS))
+    left = min(
+        stress - math.log(MIN_NORMAL_STRESS),
+        math.log(MAX_NORMAL_STRESS) - stress,
+        MAX_LOG_SLIP_RATE_WITHOUT_INERTIA - log_slip_rate,
+    )
+    return min(left, log_slip_rate - STOPPED_LOG_SLIP_RATE) if load_velocity == 0.0 else left
+
+
+def termination_error(termination: int, normal_stress: float) -> MotionStopped:
+    """The end of a motion, by its termination status (see `find_termination`)."""
+    if termination == NORMAL_STRESS_VANISHED:
+        return MotionStopped(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
+    if termination == NORMAL_STRESS_UNBOUNDED:
+        text = f"normal stress grew to {normal_stress:.3g} sigma_* and goes on"
+        return MotionStopped(Status.LOCKED, text)
+    if termination == SLIP_STOPPED:
+        return MotionStopped(Status.SLIP_STOPPED, "the slip rate fell below 10^-290 V_*")
+    bound = "inertia=True (a rig's period=, mass=) or radiation_damping= (shear_modulus=) bounds it"
+    text = f"slip rate grew beyond 10^120 V_* without mass: {bound}"
+    return MotionStopped(Status.SLIP_RATE_UNBOUNDED, text)

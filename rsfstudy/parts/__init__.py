@@ -1,0 +1,114 @@
+"""Base classes of user-defined parts of a slider, and their parameter layout.
+
+Derive a state evolution law from ``Law`` or ``LawOfStates``, a normal stress condition from
+``NormalStress``, a pore fluid from ``Fluid``, the dynamics from ``Dynamics`` and a loading from
+``Loading``, and declare its fields with ``number`` and ``flag``. The constants such as ``LAW`` are
+the indices of the parameters in the tuple ``p`` that the functions of parts receive. This package
+only exports names of ``rsfstudy.slider``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rsfstudy._lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.dynamics import Dynamics
+    from rsfstudy.slider.fluid import Fluid
+    from rsfstudy.slider.laws import Law, LawBase
+    from rsfstudy.slider.loading import Loading, Segment
+    from rsfstudy.slider.normal_stress import NormalStress
+    from rsfstudy.slider.parameter_layout import (
+        BOUNDARY_PRESSURE_RATE,
+        DYNAMICS,
+        FLUID,
+        IMPOSED_NORMAL_STRESS,
+        LAW,
+        LOAD_VELOCITY,
+        LOADING,
+        LOG_LOAD_VELOCITY,
+        MU_STAR,
+        NORMAL_STRESS,
+        SEGMENT_END,
+        SEGMENT_LOG_VELOCITY,
+        SEGMENT_START,
+        SEGMENT_STRESS_FALL,
+        SEGMENT_STRESS_RATE,
+        SEGMENT_VELOCITY,
+        STIFFNESS,
+        STRESS_DEPENDENCE,
+        A,
+        B,
+    )
+    from rsfstudy.slider.parts import Part, flag, number
+    from rsfstudy.slider.scene_view import SceneView
+else:
+    __getattr__, __dir__ = lazy_exports(
+        __name__,
+        {
+            "slider.dynamics": ("Dynamics",),
+            "slider.fluid": ("Fluid",),
+            "slider.laws": ("Law", "LawBase"),
+            "slider.loading": ("Loading", "Segment"),
+            "slider.normal_stress": ("NormalStress",),
+            "slider.parameter_layout": (
+                "A",
+                "B",
+                "BOUNDARY_PRESSURE_RATE",
+                "DYNAMICS",
+                "FLUID",
+                "IMPOSED_NORMAL_STRESS",
+                "LAW",
+                "LOADING",
+                "LOAD_VELOCITY",
+                "LOG_LOAD_VELOCITY",
+                "MU_STAR",
+                "NORMAL_STRESS",
+                "SEGMENT_END",
+                "SEGMENT_LOG_VELOCITY",
+                "SEGMENT_START",
+                "SEGMENT_STRESS_FALL",
+                "SEGMENT_STRESS_RATE",
+                "SEGMENT_VELOCITY",
+                "STIFFNESS",
+                "STRESS_DEPENDENCE",
+            ),
+            "slider.parts": ("Part", "flag", "number"),
+            "slider.scene_view": ("SceneView",),
+        },
+    )
+
+__all__ = [
+    "A",
+    "B",
+    "BOUNDARY_PRESSURE_RATE",
+    "DYNAMICS",
+    "Dynamics",
+    "FLUID",
+    "Fluid",
+    "IMPOSED_NORMAL_STRESS",
+    "LAW",
+    "LOADING",
+    "LOAD_VELOCITY",
+    "LOG_LOAD_VELOCITY",
+    "Law",
+    "LawBase",
+    "Loading",
+    "MU_STAR",
+    "NORMAL_STRESS",
+    "NormalStress",
+    "Part",
+    "SEGMENT_END",
+    "SEGMENT_LOG_VELOCITY",
+    "SEGMENT_START",
+    "SEGMENT_STRESS_FALL",
+    "SEGMENT_STRESS_RATE",
+    "SEGMENT_VELOCITY",
+    "STIFFNESS",
+    "STRESS_DEPENDENCE",
+    "SceneView",
+    "Segment",
+    "flag",
+    "number",
+]

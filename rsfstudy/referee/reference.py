@@ -1,0 +1,168 @@
+"""Answers of rsfstudy to problems."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+
+from rsfstudy.errors import RsfStudyError
+from rsfstudy.measures import CriticalStep, LimitCycle, Measure
+from rsfstudy.motion import (
+    FIRST_STATE_COLUMN,
+    MOTION_VARIABLES,
+    Accuracy,
+    EventKind,
+    MotionStopped,
+    Recording,
+    WorkMeter,
+    integrate_events,
+    maximum,
+)
+from rsfstudy.referee.problem_files import BenchmarkProblem
+from rsfstudy.slider import critical_stiffness, growth_rates
+from rsfstudy.status import Status
+
+AnswerTable = dict[str, np.ndarray]
+#: What answers may cost.
+WORK_BUDGET = 5_000_000
+
+
+def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+    """Columns of the answer in SI units, by name.
+
+    Raises
+    ------
+    RsfStudyError
+        Where the motion ends before all is told, or a number that is asked for does not exist, or
+        is not found.
+    """
+    found = {"series": _answer_series, "peaks": _answer_peaks, "numbers": _answer_numbers}[
+        problem.report
+    ]
+    try:
+        told = found(problem, accuracy)
+    except MotionStopped as halt:
+        raise RsfStudyError(f"{problem.title}: {halt.status.label} ({halt})") from halt
+    return {name: told[name] for name in problem.columns}
+
+
+def compute_normal_stress(problem: BenchmarkProblem) -> np.ndarray:
+    """Effective normal stress in Pa at the times of a series, to which friction refers."""
+    asked = replace(problem, quantities=["normal_stress"])
+    return compute_answer(asked, Accuracy(1e-11, WORK_BUDGET))["normal_stress"]
+
+
+def _answer_series(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+    scene, rig = problem.scene, problem.rig
+    at = np.array(problem.times) * rig.dimensionless("1 s")
+    recording, meter = (
+        Recording(sample_times=at),
+        WorkMeter(accuracy.budget, engine=accuracy.engine),
+    )
+    moving = integrate_events(
+        scene,
+        accuracy,
+        meter,
+        recording=recording,
+        until=float(at[-1]),
+        resume_from=problem.initial_event,
+    )
+    for _ in moving:
+        pass
+    seen = recording.table(scene)
+    told = dict(zip(MOTION_VARIABLES, seen.T, strict=False))
+    sigma, b = rig.normal_stress, np.array(problem.b)
+    states = seen[:, FIRST_STATE_COLUMN : FIRST_STATE_COLUMN + len(b)]
+    taken = states.sum(axis=1) - told["state_variable"]
+    states = states - np.outer(taken, np.abs(b) / np.abs(b).sum())
+    thetas = (np.array(problem.theta_star) * np.exp(states / b)).T
+    return {
+        "time": np.array(problem.times),
+        "friction": told["frictional_stress"] / told["normal_stress_ratio"],
+        "slip_rate": rig.reference_velocity * 10.0 ** told["log10_slip_rate"],
+        "theta": thetas[0],
+        "theta_1": thetas[0],
+        "theta_2": thetas[-1],
+        "slip": rig.slip_distance * told["slip"],
+        "normal_stress": sigma * told["normal_stress_ratio"],
+        "pore_pressure": sigma * seen[:, -1],
+    }
+
+
+def _answer_peaks(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+    rig, meter = problem.rig, WorkMeter(accuracy.budget, engine=accuracy.engine)
+    watched = integrate_events(
+        problem.scene,
+        accuracy,
+        meter,
+        [maximum("log_slip_rate")],
+        with_time=True,
+        resume_from=problem.initial_event,
+    )
+    peaks = list(islice((e for e in watched if e.kind is EventKind.MAXIMUM), problem.count))
+    return {
+        "event": np.arange(1.0, problem.count + 1.0),
+        "time": np.array([e.time for e in peaks]) / rig.dimensionless("1 s"),
+        "slip_rate": rig.reference_velocity * np.exp([e.point.log_slip_rate for e in peaks]),
+    }
+
+
+def _answer_numbers(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+    told: dict[str, float] = {}
+    for names, find in _NUMBER_FUNCTIONS.items():
+        if {*names} & {*problem.quantities}:
+            told |= zip(names, find(problem, accuracy), strict=True)
+    return {name: np.array([value]) for name, value in told.items()}
+
+
+def _run_measure(
+    problem: BenchmarkProblem, accuracy: Accuracy, measure: Measure
+) -> Mapping[str, float]:
+    found = measure(problem.scene, accuracy)
+    if found.status is not Status.OK:
+        raise RsfStudyError(f"{measure.name}: {found.status.label} ({found.message})")
+    return found.values
+
+
+def _linear_stability(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float, ...]:
+    scene, rig = problem.scene, problem.rig
+    growth = growth_rates(scene, scene.log_load_velocity)[0] * scene.load_velocity
+    stiffness = critical_stiffness(scene, scene.log_load_velocity)
+    scale, rate = rig.normal_stress / rig.slip_distance, rig.dimensionless("1 s")
+    return stiffness * scale, growth.real * rate, abs(growth.imag) * rate
+
+
+def _critical_velocity(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float]:
+    found = _run_measure(problem, accuracy, CriticalStep())
+    return (problem.rig.reference_velocity * found["critical_velocity_ratio"],)
+
+
+def _critical_displacement(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float]:
+    found = _run_measure(problem, accuracy, CriticalStep(of="displacement_step"))
+    return (problem.rig.slip_distance * found["critical_displacement"],)
+
+
+def _limit_cycle(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float, ...]:
+    rig, found = problem.rig, _run_measure(problem, accuracy, LimitCycle(phases=2))
+    drops = (rig.normal_stress * found[f"{name}_stress_drop"] for name in ("static", "dynamic"))
+    rates = (rig.reference_velocity * 10.0 ** found[f"{m}_log10_slip_rate"] for m in ("max", "min"))
+    return found["recurrence_interval"] / rig.dimensionless("1 s"), *drops, *rates
+
+
+_NUMBER_FUNCTIONS: Mapping[
+    tuple[str, ...], Callable[[BenchmarkProblem, Accuracy], tuple[float, ...]]
+] = {
+    ("critical_stiffness", "growth_rate", "angular_frequency"): _linear_stability,
+    ("critical_velocity",): _critical_velocity,
+    ("critical_displacement",): _critical_displacement,
+    (
+        "recurrence_interval",
+        "static_stress_drop",
+        "dynamic_stress_drop",
+        "peak_slip_rate",
+        "slowest_slip_rate",
+    ): _limit_cycle,
+}

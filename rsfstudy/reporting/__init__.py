@@ -1,0 +1,124 @@
+"""Tables and summaries of results, for the command line and the HTML report.
+
+Functions take a results dataset and return tables of plain text: reductions, claims, failed cells,
+fits, and the origin of a file. The package never computes results and never prints.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rsfstudy._lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from rsfstudy.reporting.fit_tables import (
+        all_answered,
+        fit_table,
+        fitted_rig,
+        fitted_scene,
+        is_fit,
+        sample_parameters,
+    )
+    from rsfstudy.reporting.summaries import (
+        SummaryPiece,
+        describe_origin,
+        describe_stability,
+        events_table,
+        is_motion,
+        summarise_motion,
+        summary_pieces,
+    )
+    from rsfstudy.reporting.tables import (
+        Table,
+        cells_frame,
+        claims_table,
+        contents_table,
+        count_pending,
+        count_verdicts,
+        describe_fields,
+        failures_table,
+        format_number,
+        format_status_counts,
+        missing_result_reasons,
+        reduction_tables,
+        refusal_reasons,
+        rerun_command,
+        slow_norm_note,
+        summarise_in_lines,
+        summarise_verdicts,
+    )
+else:
+    __getattr__, __dir__ = lazy_exports(
+        __name__,
+        {
+            "reporting.fit_tables": (
+                "all_answered",
+                "fit_table",
+                "fitted_rig",
+                "fitted_scene",
+                "is_fit",
+                "sample_parameters",
+            ),
+            "reporting.summaries": (
+                "SummaryPiece",
+                "describe_origin",
+                "describe_stability",
+                "events_table",
+                "is_motion",
+                "summarise_motion",
+                "summary_pieces",
+            ),
+            "reporting.tables": (
+                "Table",
+                "cells_frame",
+                "claims_table",
+                "contents_table",
+                "count_pending",
+                "count_verdicts",
+                "describe_fields",
+                "failures_table",
+                "format_number",
+                "format_status_counts",
+                "missing_result_reasons",
+                "reduction_tables",
+                "refusal_reasons",
+                "rerun_command",
+                "slow_norm_note",
+                "summarise_in_lines",
+                "summarise_verdicts",
+            ),
+        },
+    )
+
+__all__ = [
+    "SummaryPiece",
+    "Table",
+    "all_answered",
+    "cells_frame",
+    "claims_table",
+    "contents_table",
+    "count_pending",
+    "count_verdicts",
+    "describe_fields",
+    "describe_origin",
+    "describe_stability",
+    "events_table",
+    "failures_table",
+    "fit_table",
+    "fitted_rig",
+    "fitted_scene",
+    "format_number",
+    "format_status_counts",
+    "is_fit",
+    "is_motion",
+    "missing_result_reasons",
+    "reduction_tables",
+    "refusal_reasons",
+    "rerun_command",
+    "sample_parameters",
+    "slow_norm_note",
+    "summarise_in_lines",
+    "summarise_motion",
+    "summarise_verdicts",
+    "summary_pieces",
+]

@@ -1,0 +1,409 @@
+"""Tables of results, as texts: what commands print, and what a report shows."""
+
+from __future__ import annotations
+
+import math
+import re
+import shlex
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from rsfstudy.execution import count_failures, count_statuses
+from rsfstudy.formatting import (
+    format_fields,
+    format_list,
+    format_value,
+    pluralize,
+    read_flag_meanings,
+)
+from rsfstudy.measure_base import SLOW_NORM_PREFIX
+from rsfstudy.quantities import units_or_scale
+from rsfstudy.rig import (
+    AXIS_NAME,
+    DIMENSIONLESS_PREFIX,
+    DISPLAY_UNITS,
+    RIG_QUANTITIES,
+    convert_to_display_units,
+    drop_ratio_from_name,
+    multiply_exactly,
+    unit_factor,
+)
+from rsfstudy.status import STATUS_LABELS, Status
+from rsfstudy.storage import find_primary_output, read_declaration, read_provenance, thin_dimensions
+from rsfstudy.study import NOT_APPLICABLE, VERDICTS, format_claim_row
+from rsfstudy.vocabulary import coverage_content_type, find_quantity
+
+#: Most cells of a lattice that are shown, unless few more are all; and most that failed.
+MAX_CELLS, _MAX_CELLS_SHOWN_ENTIRELY, _MAX_FAILURES = 24, 36, 20
+#: Quantities that are set at one point beyond which fewer cells are shown.
+_FIELDS_BEFORE_THINNING = 4
+#: Digits of a float.
+_MAX_DIGITS = 15
+#: What is told of a slope, by the ends of names: headings and formats.
+_SLOPE_COLUMNS = {
+    "stderr": ("standard error", ".2g"),
+    "misfit": ("largest misfit", ".2g"),
+    "points": ("points", ".0f"),
+    "error": ("numerical error", ".2g"),
+}
+#: Variables of columns, each with what makes a text of a value, by the headings.
+TableColumns = dict[str, tuple[str, Callable[[Any], str]]]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of texts under headings.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Each a row, by the headings.
+    caption : str
+        What it shows.
+    wrappable : collection of str
+        Headings of columns whose texts may be broken between words; no other is.
+    colours : sequence of str
+        Colour of the last cell of each row.
+    """
+
+    rows: Sequence[Mapping[str, str]]
+    caption: str = ""
+    wrappable: Collection[str] = ()
+    colours: Sequence[str] = ()
+
+
+def format_number(value: float, form: str = ".8g") -> str:
+    """A number, or a dash where there is none."""
+    return "-" if np.isnan(value) else format(value, form)
+
+
+def format_to_error(value: float, error: float) -> str:
+    """A number to two digits of its error; to eight where it has none, or is all error."""
+    if not 0.0 < error < abs(value):
+        return format_number(value)
+    digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2
+    return format(value, f".{min(digits, _MAX_DIGITS)}g")
+
+
+def answer_table(dataset: xr.Dataset) -> Table:
+    """The numbers of an answer for one scene, each with its units and its error estimate; words for
+    codes.
+    """
+    rows = []
+    for name, values in dataset.data_vars.items():
+        if values.dims or str(name).removesuffix("_error") in set(dataset) - {name}:
+            continue
+        value, error = values.item(), float(dataset.get(f"{name}_error", np.nan))
+        units, flags = format_units(values), read_flag_meanings(values.attrs)
+        text = flags.get(value, format_to_error(value, error))
+        row = {
+            "number": str(name),
+            "value": text if units == "1" or text == "-" else f"{text} {units}",
+            "error": format_number(error, ".1e"),
+            "what": str(values.attrs.get("long_name", "")),
+        }
+        rows.append(row)
+    return Table(rows, wrappable={"what"})
+
+
+def format_units(values: xr.DataArray) -> str:
+    """The units of values, or what those without units are measured in; "1" for numbers."""
+    units = re.sub(r" (s|[num]?m)-1\b", r"/\1", units_or_scale(values.attrs) or "1")
+    return re.sub(r" \((\w+)\)-1| (\(.*?\))-1", r"/\1\2", units)
+
+
+def format_axis_name(along: xr.DataArray) -> str:
+    """The name of an axis, and its units where it is that of a rig."""
+    name, units = str(along.name), along.attrs.get("units", "1")
+    return name if units in ("1", find_quantity(name).units) else f"{name} ({units})"
+
+
+def format_status_counts(dataset: xr.Dataset) -> str:
+    """How many cells ended how, with what that means where none is ok, and their work."""
+    work, counts = int(dataset["rhs_evaluations"].sum()), count_statuses(dataset)
+    nothing = Status.OK.label not in counts
+    told = ", ".join(
+        f"{count} {label}" + f" ({Status[label.upper()].meaning})" * nothing
+        for label, count in counts.items()
+    )
+    return f"{told}; {work:,} right-hand sides"
+
+
+def describe_fields(
+    what: str, fields: Mapping[str, Any], rig: Mapping[str, float], varied: Collection[str] = ()
+) -> dict[str, str]:
+    """Fields of a scene that have a value, under the heading stated, those that are 0, and what the
+    rig states, but for what is varied; nothing of what there is none of.
+    """
+    fields = {n: v for n, v in fields.items() if n not in varied}
+    units = {n: RIG_QUANTITIES[n].units for n in rig if AXIS_NAME.get(n, n) not in varied}
+    shown = {n: DISPLAY_UNITS.get(si, si) for n, si in units.items()}
+    sizes = {
+        n: multiply_exactly(rig[n], 1 / unit_factor(n, shown[n], si)) for n, si in units.items()
+    }
+    told = {
+        what: format_fields({n: v for n, v in fields.items() if v}),
+        "0 or absent": ", ".join(n for n, v in fields.items() if not v and v is not None),
+        "laboratory": format_fields({n: f"{v:g} {shown[n]}" for n, v in sizes.items()}),
+    }
+    norm, period = fields.get("instability_norm"), fields.get("period")
+    if norm and period and {"slip_distance", "reference_velocity"} <= set(sizes):
+        rate = norm * math.tau * sizes["slip_distance"] / period
+        if rate > sizes["reference_velocity"]:  # else it is no norm that tells anything
+            told["unstable from"] = f"a slip rate of {rate:.4g} um/s on"
+    return {name: text for name, text in told.items() if text}
+
+
+def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
+    """What the results of a study are of, and where they come from, by what each is."""
+    attrs, about = dataset.attrs, read_provenance(dataset)
+    dims, declared = dataset["status"].dims, read_declaration(dataset)
+    varied = {
+        str(n).removeprefix(DIMENSIONLESS_PREFIX)
+        for n, along in dataset.coords.items()
+        if along.dims
+    }
+    reduced = attrs.get("reduced_despite")
+    versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
+    return {
+        "lattice": " x ".join(f"{dataset.sizes[d]} {d}" for d in dims),
+        **describe_fields("fixed", declared.base, declared.laboratory or {}, varied),
+        "cells": f"{attrs['completeness']}; {format_status_counts(dataset)}",
+        **({"reductions": reduced} if reduced else {}),
+        "made by": f"{about['command']}, {about['time']}",
+        "with": f"{versions}; git {about['git']}; {about['machine']}",
+    }
+
+
+def build_rows(
+    dataset: xr.Dataset, dims: Iterable[Hashable], columns: TableColumns
+) -> list[dict[str, str]]:
+    """A row for each point of some dimensions: where it is, then columns of variables."""
+    dims, found = list(map(str, dims)), []
+    for at in np.ndindex(*(dataset.sizes[d] for d in dims)):
+        one = dataset.isel(dict(zip(dims, at, strict=True)))
+        row = {format_axis_name(one[d]): format_value(one[d].item()) for d in dims}
+        found.append(row | {head: form(one[n].item()) for head, (n, form) in columns.items()})
+    return found
+
+
+def headline_table(dataset: xr.Dataset) -> Table:
+    """The headline along the axes, with what is set at points that only have numbers, its error
+    estimate and how each cell ended; no row where there is none.
+    """
+    name = find_primary_output(dataset)
+    if name is None:
+        return Table([])
+    dataset = convert_to_display_units(dataset)
+    name = name if name in dataset else drop_ratio_from_name(name)
+    dims = dataset["status"].dims
+    drawn = [n for n in _sampled_fields(dataset) if n in dataset.coords]
+    columns = TableColumns({format_axis_name(dataset[n]): (n, format_value) for n in drawn})
+    columns[name] = name, format_number
+    if f"{name}_error" in dataset:
+        columns["error"] = f"{name}_error", partial(format_number, form=".1e")
+    size, fewer = dataset["status"].size, 1 + len(drawn) // _FIELDS_BEFORE_THINNING
+    most = size if size <= _MAX_CELLS_SHOWN_ENTIRELY // fewer else MAX_CELLS // fewer
+    at = thin_dimensions({str(d): dataset.sizes[d] for d in dims}, most)
+    few = dataset[[*(n for n, _form in columns.values()), "status"]].isel(at).load()
+    if (few["status"] != int(Status.OK)).any():
+        columns["status"] = "status", STATUS_LABELS.__getitem__
+    units, shown = format_units(dataset[name]), few["status"].size
+    caption = str(dataset[name].attrs.get("long_name", name)) + f", in {units}" * (units != "1")
+    if shown < size:
+        full = dataset.sizes
+        every = [f"{n} of {full[d]} {d}" for d, n in few.sizes.items() if n < full[d]]
+        which = f"{shown} of {size:,} cells, {', '.join(every)}, from first to last"
+        caption += f" ({which}; rsfstudy export --csv writes all)"
+    return Table(build_rows(few, dims, columns), caption)
+
+
+def _sampled_fields(dataset: xr.Dataset) -> list[str]:
+    """What is set along axes whose points only have numbers: samples, and cases."""
+    axes = [axis["values"] for axis in read_declaration(dataset).axes]
+    columns = [
+        v for v in axes if isinstance(v, Mapping) and isinstance(next(iter(v.values())), list)
+    ]
+    return [name for column in columns for name in column]
+
+
+def summarise_in_lines(dataset: xr.Dataset) -> list[str]:
+    """The headline and the slopes in a line each, and how cells ended in another."""
+    lines, converted = [], convert_to_display_units(dataset)
+    if (name := find_primary_output(dataset)) is not None:
+        values = converted[name if name in converted else drop_ratio_from_name(name)]
+        told, units = np.unique(values.values[np.isfinite(values.values)]), format_units(values)
+        ends = " to ".join(map(format_value, dict.fromkeys((*told[:1], *told[-1:]))))
+        text = f"{ends}{f' {units}' * (units != '1')}" if ends else "no number"
+        lines.append(f"{values.name}: {text}")
+    for slope in _slope_names(converted):
+        slopes, units = converted[slope].values.ravel().tolist(), format_units(converted[slope])
+        lines.append(f"{slope}: {format_list(slopes, ', ')}{f' {units}' * (units != '1')}")
+    return [*lines, format_status_counts(dataset)]
+
+
+def reduction_tables(dataset: xr.Dataset) -> Iterator[Table]:
+    """Slopes and their like, those with a standard error, with one row for each point of their
+    dimensions; and, where integrators were compared, the cheapest for each number of digits.
+    """
+    converted = convert_to_display_units(dataset)
+    for slope in _slope_names(converted):
+        yield _slope_table(converted, slope)
+    columns: TableColumns = {
+        "cheapest": ("cheapest_integrator", str),
+        "its work": ("cheapest_work", "{:,.0f}".format),
+        "work of the default": ("cheapest_default_work", "{:,.0f}".format),
+        "rtol to ask for": ("cheapest_default_request", lambda digits: f"{10.0**-digits:.1g}"),
+    }
+    if {name for name, _form in columns.values()} <= set(dataset.data_vars):
+        dims = dataset["cheapest_work"].dims
+        yield Table(build_rows(dataset, dims, columns), wrappable={"problem", "cheapest"})
+
+
+def refusal_reasons(dataset: xr.Dataset) -> dict[str, str]:
+    """Why reductions refuse to draw on cells, by their names."""
+    named = [str(reduction["name"]) for reduction in read_declaration(dataset).reductions]
+    named.sort(key=len, reverse=True)  # a name may begin with another
+    found: dict[str, str] = {}
+    for result, values in dataset.data_vars.items():
+        name = next((n for n in named if f"{result}_".startswith(f"{n}_")), "")
+        if name and "refused" in values.attrs:
+            found.setdefault(name, str(values.attrs["refused"]))
+    return found
+
+
+def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
+    """Why reductions have no results, by their names."""
+    found, there = refusal_reasons(dataset), tuple(map(str, dataset.data_vars))
+    for stated_as in read_declaration(dataset).reductions:
+        about: Mapping[str, Any] = {**stated_as}
+        if not any(name.startswith(about["name"]) for name in there):
+            least, most = map(format_value, about.get("within") or ("", ""))
+            on = format_axis_name(dataset[about["on"]]) if most else ""
+            span = f", with {least} <= {on} <= {most}" if most else ""
+            found[about["name"]] = f"among these cells are none, or too few, to draw on{span}"
+    return found
+
+
+def slow_norm_note(dataset: xr.Dataset) -> str:
+    """How many answers of a study of a rig are for a norm near the load point velocity, and what
+    the first of them says; empty where there are none.
+    """
+    if read_declaration(dataset).laboratory is None:
+        return ""
+    ok = dataset["message"].values[dataset["status"].values == int(Status.OK)]
+    near = [text for text in ok.tolist() if text.startswith(SLOW_NORM_PREFIX)]
+    return f"{len(near)} of {pluralize(len(ok), 'answer')}: {near[0]}" if near else ""
+
+
+def _slope_names(dataset: xr.Dataset) -> list[str]:
+    """Names of the reductions that have a standard error."""
+    named = [reduction["name"] for reduction in read_declaration(dataset).reductions]
+    return [name for name in named if {name, f"{name}_stderr"} <= set(dataset.data_vars)]
+
+
+def _slope_table(dataset: xr.Dataset, name: str) -> Table:
+    dims, words = dataset[name].dims, dataset[name].attrs.get("comment", name)
+    units = format_units(dataset[name])
+    columns: TableColumns = {f"{name} ({units})" if units != "1" else name: (name, format_value)}
+    for end, (heading, form) in _SLOPE_COLUMNS.items():
+        if (beside := f"{name}_{end}") in dataset:
+            if end != "points" and (own := format_units(dataset[beside])) != units:
+                heading += f" ({own})"
+            columns[heading] = beside, f"{{:{form}}}".format
+    return Table(
+        build_rows(dataset, dims, columns), words, {format_axis_name(dataset[d]) for d in dims}
+    )
+
+
+def claims_table(frame: pd.DataFrame) -> Table | str:
+    """Claims and their verdicts, as `rsfstudy.check` gives them, of one study or of several; a
+    sentence where none applies.
+    """
+    rows = frame.to_dict("records")
+    if not any(row["verdict"] != NOT_APPLICABLE for row in rows):
+        return f"{pluralize(len(rows), 'claim')} not checked: {count_verdicts(frame)}" * bool(rows)
+    colours = [
+        "red" if row["moved"] else "green" if row["verdict"] == "reproduced" else "yellow"
+        for row in rows
+    ]
+    return Table(
+        [format_claim_row(row) for row in rows],
+        wrappable={"claim", "tolerance, and why"},
+        colours=colours,
+    )
+
+
+def count_verdicts(found: pd.DataFrame) -> str:
+    """How many claims have which verdict; where none applies, why."""
+    given = list(found["verdict"])
+    if set(given) == {NOT_APPLICABLE}:
+        return "other values or units have no published numbers"
+    return ", ".join(f"{given.count(v)} {v}" for v in VERDICTS if v in given)
+
+
+def summarise_verdicts(dataset: xr.Dataset, found: pd.DataFrame) -> tuple[str, list[str]]:
+    """How many claims have which verdict, and what went wrong, in words."""
+    wrong = [f"{count} {label}" for label, count in count_failures(dataset).items()]
+    wrong += [f"{claim} moved" for claim in dict.fromkeys(found["id"][found["moved"]])]
+    return count_verdicts(found), wrong
+
+
+def cells_frame(dataset: xr.Dataset, where: xr.DataArray, axes: Sequence[str]) -> pd.DataFrame:
+    """Some cells, one row each: their places on axes, how each ended, and the message."""
+    at = where.values
+    columns = {name: dataset[name].broadcast_like(where).values[at] for name in axes}
+    columns["status"] = [STATUS_LABELS[code] for code in dataset["status"].values[at].tolist()]
+    return pd.DataFrame(columns | {"message": dataset["message"].values[at]})
+
+
+def failures_table(dataset: xr.Dataset) -> tuple[Table, list[dict[Any, Any]]]:
+    """The first cells that failed, and the place of each on the axes."""
+    status = dataset["status"]
+    failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
+    found = cells_frame(dataset, failed, list(map(str, failed.dims)))
+    first = found[:_MAX_FAILURES]
+    places: list[dict[Any, Any]] = first[list(failed.dims)].to_dict("records")
+    rows = [
+        {"cell": format_fields(place), "status": label, "message": message}
+        for place, label, message in zip(places, first["status"], first["message"], strict=True)
+    ]
+    caption = f"{pluralize(len(found), 'cell')} failed"
+    if len(found) > len(rows):
+        caption += f", of which the first {len(rows)}"
+    return Table(rows, caption, wrappable={"cell", "message"}), places
+
+
+def rerun_command(dataset: xr.Dataset, file: str, place: Mapping[str, Any]) -> str:
+    """The command that computes one cell alone."""
+    words = ["rsfstudy", "rerun", file]
+    declared_in = read_provenance(dataset)["declared_in"]
+    if declared_in:
+        words += ["--study", declared_in]
+    for name, value in place.items():
+        words += ["--cell", f"{name}={value}"]
+    return shlex.join(words)
+
+
+def count_pending(dataset: xr.Dataset) -> int:
+    """Number of cells that are not computed yet."""
+    return int((dataset["status"] == int(Status.PENDING)).sum())
+
+
+def contents_table(dataset: xr.Dataset) -> Table:
+    """The results that a file holds, what they are and along what."""
+    rows = [
+        {
+            "it holds": str(name),  # what a notebook added may have no words
+            "what": f"{v.attrs.get('long_name', '')} ({', '.join(map(str, v.dims))})".strip(),
+        }
+        for name, v in dataset.data_vars.items()
+        if coverage_content_type(str(name)) == "modelResult"
+    ]
+    return Table(rows, wrappable={"what"})

@@ -1,0 +1,38 @@
+"""Responses of a slider to perturbations: small ones, steps, holds and ramps.
+
+The package contains the measures ``LinearStability``, ``VelocityStep``, ``Healing``,
+``StepResponse`` and ``RigidResponse``. It never searches for stability boundaries or limit cycles,
+and never reads or writes a file.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rsfstudy._lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from rsfstudy.responses.healing import Healing
+    from rsfstudy.responses.linear_stability import LinearStability
+    from rsfstudy.responses.rigid_response import RigidResponse
+    from rsfstudy.responses.step_response import StepResponse
+    from rsfstudy.responses.velocity_step import VelocityStep
+else:
+    __getattr__, __dir__ = lazy_exports(
+        __name__,
+        {
+            "responses.healing": ("Healing",),
+            "responses.linear_stability": ("LinearStability",),
+            "responses.rigid_response": ("RigidResponse",),
+            "responses.step_response": ("StepResponse",),
+            "responses.velocity_step": ("VelocityStep",),
+        },
+    )
+
+__all__ = [
+    "Healing",
+    "LinearStability",
+    "RigidResponse",
+    "StepResponse",
+    "VelocityStep",
+]

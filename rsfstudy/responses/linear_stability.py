@@ -1,0 +1,226 @@
+"""Linear stability of steady sliding.
+
+The critical stiffness is computed from the friction relation, from the growth of perturbations of
+the assembled equations, and in closed form.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.optimize import brentq
+
+from rsfstudy.error_boundary import guard_methods
+from rsfstudy.measure_base import Measure, Outcome
+from rsfstudy.motion import Accuracy, WorkMeter
+from rsfstudy.quantities import Output
+from rsfstudy.slider import (
+    Equations,
+    Scene,
+    SteadySliding,
+    critical_stiffness,
+    critical_stiffness_closed_form,
+    critical_stiffnesses,
+    equations_by_displacement,
+    equations_by_inertial_time,
+    normal_stress_at,
+    steady_friction_excess,
+    steady_sliding,
+)
+from rsfstudy.status import Status
+
+#: Step of the central differences in units of the scale of an unknown: rounding and truncation
+#: balance there.
+_RELATIVE_DIFFERENCE_STEP = 1e-4
+#: Slip rate norm from which growth is found from the full equations; below, double precision does
+#: not see mass in them, and the slow manifold, of second order in mass, is exact enough.
+_MIN_INERTIAL_NORM = 1e-3
+#: Rise of the critical stiffness by mass beyond which no spring counts as stiff enough.
+_MAX_STIFFNESS_RISE = 1e6
+
+_OUTPUTS = (
+    Output("critical_stiffness", error=True),
+    Output("critical_stiffness_from_growth"),
+    Output("critical_stiffness_explicit"),
+    Output("relative_critical_stiffness"),
+    Output(
+        "rise_by_dynamics",
+        long_name="fraction by which mass raises, or radiation lowers, the critical stiffness",
+    ),
+    Output("steady_friction"),
+    Output("steady_normal_stress", "", "1", "steady-state normal stress", "sigma_*"),
+)
+
+
+@guard_methods
+@dataclass(frozen=True)
+class LinearStability(Measure):
+    """Critical stiffness of steady sliding at the load point velocity of the scene.
+
+    The critical stiffness is computed in three ways, which verify each other. The first result
+    follows from the friction relation. The second result is the stiffness at which small
+    perturbations of the assembled equations neither grow nor decay. The third result is the
+    quasi-static closed form, corrected for inertia and radiation damping.
+
+    Let s be slip over D_c. A perturbation of slip that grows as exp(p s) changes frictional stress
+    by G(p) times the perturbation. The growth rate p satisfies ``K (1 + w**2 p**2) + eta V p + G(p)
+    = 0`` with the stiffness K over sigma_*/D_c and w = V T/(2 pi D_c). K is critical if p is
+    imaginary (see ``rsfstudy.slider.stability``). Under the slip and the slowness law, the critical
+    stiffness of quasi-static and drained motion at V_* is ``K = (b - a)/[1 - (mu_* - alpha)
+    cot(phi)]``. If normal stress is constant, the term with cot(phi) is absent.
+
+    Stiffnesses are relative to sigma_*/D_c, and stresses are relative to sigma_*. The relative
+    critical stiffness is the ratio of the critical stiffness to its value at V_*.
+
+    References
+    ----------
+    Ruina (1983), J. Geophys. Res. 88, 10359-10370; eqs. 7 and 8 of doi:10.1007/s11589-014-0098-4.
+    """
+
+    name: ClassVar[str] = "linear_stability"
+    primary_output = "critical_stiffness"
+    typical_work = 100
+    outputs = _OUTPUTS
+    needs_time: ClassVar[tuple[bool, ...]] = ()
+
+    @property
+    def solved_fields(self) -> tuple[str, ...]:
+        return ("stiffness_ratio",)
+
+    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+        """Compute the critical stiffness from friction and from growth rates.
+
+        The error estimate is the difference between both results.
+        """
+        scene = scene.under_steady_loading
+        load = scene.log_load_velocity
+        if load == -math.inf:
+            return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
+        steady = steady_sliding(scene, load)
+        if steady is None:
+            return Outcome(
+                Status.NO_STEADY_STATE,
+                {"steady_friction": scene.mu_star + steady_friction_excess(scene, load)},
+                "phi < atan(mu_ss): the slider locks while stress rises, and runs while it falls",
+            )
+        sigma_ss = normal_stress_at(scene, steady.frictional_stress)
+        mu_ss = (scene.mu_star + steady.frictional_stress) / sigma_ss
+        values = {"steady_friction": mu_ss, "steady_normal_stress": sigma_ss}
+        massless = critical_stiffness(scene, load, quasi_static=True)
+        critical = critical_stiffness(scene, load)
+        if critical <= 0.0:
+            return Outcome(
+                Status.STABLE_AT_ANY_STIFFNESS,
+                values,
+                "without rate weakening every perturbation decays"
+                if massless <= 0.0
+                else f"at eta V = {scene.dynamics.radiated_stress_slope(load):.3g} sigma_* "
+                "radiation damps every perturbation",
+            )
+        if massless == math.inf:
+            why = "with this friction a perturbation grows without mass or damping too"
+            return Outcome(Status.UNSTABLE_AT_ANY_STIFFNESS, values, why)
+        at_reference = scene.critical_stiffness
+        relative = critical / at_reference if at_reference else math.inf
+        rise = critical / massless - 1.0 if massless else math.inf
+        if rise > _MAX_STIFFNESS_RISE:
+            norm = scene.dynamics.slip_rate_norm(scene, load)
+            return Outcome(
+                Status.UNSTABLE_AT_ANY_STIFFNESS,
+                values,
+                f"at V T/(2 pi D_c) = {norm:.3g} the direct effect cannot damp the spring",
+            )
+        by_growth = _stiffness_at_zero_growth(scene, steady, critical, meter)
+        if math.isnan(by_growth):
+            why = f"growth of the equations does not end at a stiffness of {critical:.9g}"
+            return Outcome(Status.UNVERIFIED, values, why)
+        return Outcome(
+            Status.OK,
+            {
+                "critical_stiffness": critical,
+                "critical_stiffness_error": abs(by_growth - critical) + 1e-15 * critical,
+                "critical_stiffness_from_growth": by_growth,
+                "critical_stiffness_explicit": _closed_form_stiffness(scene) * (1.0 + rise),
+                "relative_critical_stiffness": relative,
+                "rise_by_dynamics": rise,
+                **values,
+            },
+        )
+
+
+def _closed_form_stiffness(scene: Scene) -> float:
+    """Compute the critical stiffness from the published formula.
+
+    Returns
+    -------
+    float
+        NaN if the formula does not apply to the scene.
+    """
+    law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
+    others = law.steady_states or law.depends_on_stress or scene.parts.fluid.effects
+    if coupling is None or others or scene.imposed_normal_stress:
+        return math.nan
+    return critical_stiffness_closed_form(
+        scene.log_load_velocity, scene.mu_star, scene.a, scene.b, *coupling
+    )
+
+
+def _stiffness_at_zero_growth(
+    scene: Scene, steady: SteadySliding, guess: float, meter: WorkMeter
+) -> float:
+    """Find the stiffness at which the largest growth rate is zero.
+
+    Returns
+    -------
+    float
+        NaN if perturbations do not grow below this stiffness, or do not decay above it.
+    """
+    with_mass = scene.dynamics.slip_rate_norm(scene, steady.log_slip_rate) > _MIN_INERTIAL_NORM
+
+    def growth_at(stiffness: float) -> float:
+        changed = scene.with_(stiffness=stiffness)
+        if with_mass:
+            equations = equations_by_inertial_time(changed)
+            stress = steady.spring_stress
+            state = (stress, steady.log_slip_rate, stress, *steady.psis[1:])
+        else:
+            equations = equations_by_displacement(changed)
+            state = (steady.spring_stress, *steady.psis)
+        meter.charge(equations.regime, 2 * len(state))
+        return max_growth_rate(compute_jacobian(equations, state))
+
+    # softer than at the root before it, several states may be stable again
+    before = [k for k in critical_stiffnesses(scene, steady.log_slip_rate) if k < guess]
+    softer = max(0.5 * guess, math.sqrt(guess * before[-1]) if before else 0.0)
+    if not growth_at(softer) > 0.0 > growth_at(2.0 * guess):
+        return math.nan
+    return float(brentq(growth_at, softer, 2.0 * guess, xtol=1e-15 * guess, rtol=1e-14))
+
+
+def max_growth_rate(jacobian: np.ndarray) -> float:
+    """Return the growth rate of the fastest-growing perturbation.
+
+    The unit is the inverse of the independent variable of the equations.
+    """
+    return float(np.linalg.eigvals(jacobian).real.max())
+
+
+def compute_jacobian(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
+    """Compute the Jacobian of the rates by central differences.
+
+    Rows are rates, and columns are unknowns.
+    """
+    columns = []
+    for number, scale in enumerate(equations.scales):
+        step = _RELATIVE_DIFFERENCE_STEP * scale
+        ahead, behind = (
+            equations.evaluate_rates(
+                tuple(x + sign * step * (i == number) for i, x in enumerate(state))
+            )
+            for sign in (1.0, -1.0)
+        )
+        columns.append([(u - v) / (2.0 * step) for u, v in zip(ahead, behind, strict=True)])
+    return np.array(columns).T

@@ -1,0 +1,340 @@
+"""Records of a laboratory from text files, from xlook's binary files, and from arrays."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from rsfstudy.error_boundary import check_regular_file, error_boundary
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.fitting import RECORD_COLUMNS, Record
+from rsfstudy.rig.quantities import is_friction_stiffness
+from rsfstudy.rig.table_files import (
+    HEADING_PATTERN,
+    Column,
+    ColumnSpec,
+    check_heading_lengths,
+    parse_column_spec,
+    pick_columns,
+    read_table,
+)
+from rsfstudy.rig.units import convert_to_si, unit_factor
+
+#: SI units of what a record may hold, and what turns them into those of `Record`.
+_COLUMN_UNITS = {
+    "time": ("s", 1.0),
+    "displacement": ("m", 1e6),
+    "slip": ("m", 1e6),
+    "friction": ("1", 1.0),
+    "shear_stress": ("Pa", 1.0),
+    "normal_stress": ("Pa", 1.0),
+}
+#: The usual units.
+_USUAL_UNITS = {"time": "s", "displacement": "um", "slip": "um"}
+#: How headings of the usual files begin.
+_HEADING_PATTERNS = {
+    "time": r"t(ime)?\b|time",
+    "displacement": r"(load.*)?disp|lp(\b|_?disp)|l\.?p\.? disp|load.?point",
+    "slip": r"(fault.*)?slip",
+    "friction": r"fric|mu\b|coeff",
+    "shear_stress": r"shear|tau",
+    "normal_stress": r"(eff\w*[ _])?norm|sigma",
+}
+#: Layout of xlook's files: bytes before the headers of columns and of each, how many there are, and
+#: where columns begin.
+_XLOOK_HEADER_BYTES, _XLOOK_COLUMN_HEADER_BYTES, _XLOOK_MAX_COLUMNS = 36, 84, 32
+_XLOOK_DATA_START = _XLOOK_HEADER_BYTES + _XLOOK_COLUMN_HEADER_BYTES * _XLOOK_MAX_COLUMNS
+
+
+@error_boundary
+def read_record(
+    source: Any,
+    columns: Mapping[str, Any] | None = None,
+    *,
+    normal_stress: Any = None,
+    stiffness: Any = None,
+    name: str = "",
+) -> Record:
+    """A record of an experiment, for `rsfstudy.fit`.
+
+    Parameters
+    ----------
+    source : str, Path, mapping or pandas.DataFrame
+        A text or CSV file, a binary file of xlook, or arrays by name: ``time``, ``displacement`` of
+        the load point, ``friction`` or ``shear_stress``, and ``normal_stress`` where it was
+        recorded. Plain arrays are in s, um, and MPa, and times of `numpy.datetime64` or
+        `numpy.timedelta64` are known as such; with units in their names, as in ``LP disp
+        (um)``, they are read as a file with such a header.
+    columns : mapping of str to str or (heading, units), optional
+        Heading in the file, and units, of each: ``{"time": "t (s)", "friction": "mu"}``, or ``("t",
+        "s")``. Without it headings are known by how they begin, and state their units, as in
+        ``Displ (um)``. Columns of xlook's files are named by their heading or number. Where numbers
+        are raw, a scale and an offset follow: ``"LP (um) * 0.1 + 5"``, or ``("LP", "um", 0.1, 5)``.
+    normal_stress : quantity, optional
+        By which shear stress is divided where no normal stress was recorded ("20 MPa").
+    stiffness : quantity, optional
+        Stiffness of the machine ("0.05 MPa/um"), or over normal stress ("2e-3 1/um", a plain number
+        is in 1/um). It is needed if the record has ``slip``, from which elastic shortening of the
+        machine was subtracted, instead of ``displacement``. The displacement of the load point is
+        then slip plus shear stress over stiffness. Pass the same stiffness to `rsfstudy.fit`.
+    name : str
+        What it is called in results; by default as the file is, or "record".
+
+    Returns
+    -------
+    Record
+        ``columns`` (arrays in s, um, 1 and Pa), ``steps()`` of the load point, ``window(begins,
+        ends)``, ``with_steps(...)`` to state steps, and ``to_dataset()``.
+
+    Raises
+    ------
+    DataError
+        Where there is no such file.
+    InvalidValue
+        For missing columns or units, a field that is no number, with its line and column, a clock
+        that stands still or runs back, and normal stress that is not positive.
+
+    Examples
+    --------
+    >>> record = rsfstudy.read_record("run.csv", normal_stress="20 MPa")
+    >>> record.steps().to_dataframe()
+    """
+    for key in columns or ():
+        _check_column_name(key)
+    if isinstance(source, str | Path):
+        check_regular_file("record", source)
+        if not Path(source).exists():
+            raise DataError(f"there is no file {source}")
+        binary = _is_binary(Path(source))
+        found = (
+            _read_xlook_columns(Path(source), columns)
+            if binary
+            else _read_text_columns(Path(source), columns)
+        )
+    elif isinstance(source, Mapping | pd.DataFrame):
+        found = _read_array_columns(source, columns)
+    else:
+        remedy = "Give the path of a file, a mapping of arrays, or a DataFrame."
+        raise InvalidValue("record", source, "is no record", remedy=remedy)
+    values = {}
+    for key, column in found.items():
+        _check_column_name(key)
+        column.check_values(key, ~np.isfinite(column.values), "must be a finite number")
+        values[key] = column.values * _unit_factor(key, column.units)
+    return _build_record(values, normal_stress, stiffness, name or _record_name(source))
+
+
+def _check_column_name(key: str) -> None:
+    if key not in _COLUMN_UNITS:
+        raise InvalidValue("column", key, "is unknown", choices=_COLUMN_UNITS)
+
+
+def _record_name(source: Any) -> str:
+    """That of a file, as an identifier."""
+    stem = Path(source).stem if isinstance(source, str | Path) else "record"
+    text = re.sub(r"\W", "_", stem, flags=re.ASCII)
+    return text if text.isidentifier() else f"record_{text}"
+
+
+def _unit_factor(key: str, units: str) -> float:
+    """What turns a column into units of `Record`; without units it is in those of laboratories."""
+    si, ours = _COLUMN_UNITS[key]
+    if not units:
+        return {"Pa": 1e6}.get(si, 1.0)
+    if si == "1" and units in ("1", "-"):
+        return 1.0
+    return float(unit_factor(key, units, si)) * ours
+
+
+def _compute_load_point_displacement(values: dict[str, np.ndarray], stiffness: Any) -> np.ndarray:
+    """Compute load point displacement in um from slip, friction and stiffness.
+
+    Load point displacement is slip plus shear stress divided by stiffness. If the stiffness is
+    divided by normal stress, friction replaces shear stress.
+    """
+    if stiffness is None:
+        remedy = "Give the stiffness that the correction used: read_record(..., stiffness="
+        remedy += "'0.05 MPa/um'), or --stiffness."
+        rule = "needs a stiffness: the load point moves by slip plus shear stress over stiffness"
+        raise InvalidValue("slip", "given without displacement", rule, remedy=remedy)
+    friction, stress = values["friction"], values.get("normal_stress")
+    is_number = isinstance(stiffness, int | float)
+    over_stress = is_number or is_friction_stiffness(stiffness)
+    if is_number:
+        per_um = float(stiffness)
+    else:
+        per_um = convert_to_si("stiffness", stiffness, "1/m" if over_stress else "Pa/m") * 1e-6
+    if not per_um > 0.0:
+        raise InvalidValue("stiffness", stiffness, "must be positive")
+    if over_stress:
+        return np.asarray(values["slip"] + friction / per_um)
+    if stress is None:
+        remedy = "Give --normal-stress (normal_stress=), or stiffness in 1/um."
+        raise InvalidValue("stiffness", stiffness, "needs a normal stress", remedy=remedy)
+    return np.asarray(values["slip"] + friction * stress / per_um)
+
+
+def _build_record(
+    values: dict[str, np.ndarray], normal_stress: Any, stiffness: Any, name: str
+) -> Record:
+    if normal_stress is not None and "normal_stress" not in values:
+        stated = convert_to_si("normal_stress", normal_stress, "Pa")
+        values["normal_stress"] = np.full(len(values["time"]), stated)
+    if "friction" not in values:
+        if "shear_stress" not in values:
+            rule = "tells no friction: it needs friction, or shear_stress"
+            raise InvalidValue("record", [*values], rule)
+        stress = values.get("normal_stress")
+        if stress is None:
+            remedy = "Give --normal-stress (normal_stress=), as in '20 MPa'."
+            raise InvalidValue("record", [*values], "tells no normal stress", remedy=remedy)
+        if not (stress > 0.0).all():
+            row = int(np.argmax(~(stress > 0.0)))
+            rule = f"must be positive, and is not in row {row + 1}"
+            raise InvalidValue("normal_stress", float(stress[row]), rule)
+        values["friction"] = values["shear_stress"] / stress
+    if "displacement" not in values and "slip" in values:
+        values["displacement"] = _compute_load_point_displacement(values, stiffness)
+    return Record({q.name: values[q.name] for q in RECORD_COLUMNS if q.name in values}, name)
+
+
+def _read_text_columns(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
+    """Columns of a text file, by headings that are known or named."""
+
+    def select(headings: list[str], place: str) -> dict[str, ColumnSpec]:
+        told = _complete_column_selection(columns or {}, headings, place)
+        return {key: _parse_column(key, of, headings) for key, of in told.items()}
+
+    return read_table(path, select)
+
+
+def _read_array_columns(source: Any, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
+    """Columns of arrays by name, or by headings where they, or `columns`, state units."""
+    headings = [*map(str, source)]
+    check_heading_lengths(headings, "record")
+    if columns is None and not any("(" in key or "[" in key for key in headings):
+        return pick_columns(source, {key: (key,) for key in headings})
+    told = _complete_column_selection(columns or {}, headings, "record")
+    return pick_columns(source, {key: _parse_column(key, of, headings) for key, of in told.items()})
+
+
+def _complete_column_selection(
+    columns: Mapping[str, Any], headings: list[str], place: str
+) -> dict[str, Any]:
+    """Columns that are named, and those of the others that a record needs whose headings are of the
+    usual ones.
+    """
+    lacking = {"time", "displacement", "slip"} - set(columns)
+    if not {"friction", "shear_stress"} & set(columns):
+        lacking |= {"friction", "shear_stress", "normal_stress"} - set(columns)
+    wanted = dict(columns)
+    for key in _HEADING_PATTERNS:
+        if key in lacking and not (key == "shear_stress" and "friction" in wanted):
+            wanted |= _find_usual_heading(key, headings, place)
+    if "displacement" in wanted and "slip" not in columns:
+        wanted.pop("slip", None)
+    if "time" not in wanted or not {"displacement", "slip"} & set(wanted):
+        remedy = (
+            "Say which is which: --columns 'time=t (s),displacement=lp (um),friction=mu', or "
+            "columns={'time': 't (s)', 'displacement': 'lp (um)', 'friction': 'mu'}."
+        )
+        rule = "does not name time and displacement (or slip)"
+        raise InvalidValue("header", ", ".join(headings)[:200], rule, remedy=remedy).with_location(
+            place
+        )
+    return wanted
+
+
+def _find_usual_heading(key: str, headings: list[str], place: str) -> dict[str, str]:
+    """The column with the usual heading, if there is one: with the very name, or the only one that
+    begins as usual, and is measured in units of its kind.
+    """
+    parts = {text: match for text in headings if (match := HEADING_PATTERN.fullmatch(text))}
+    meant = [
+        text for text, m in parts.items() if re.match(_HEADING_PATTERNS[key], m[1], re.IGNORECASE)
+    ]
+    meant = [text for text in meant if _has_compatible_units(key, parts[text][2] or "")] or meant
+    meant = [text for text in meant if parts[text][1] == key] or meant
+    if len(meant) > 1:
+        remedy = f"Say which, as in --columns '{key}={meant[-1]}' (columns={{'{key}': ...}})."
+        rule = "may be any of several columns"
+        raise InvalidValue("column", key, rule, choices=meant, remedy=remedy).with_location(place)
+    return {key: meant[0]} if meant else {}
+
+
+def _has_compatible_units(key: str, units: str) -> bool:
+    """Whether units, where they are stated, are of the kind of a column."""
+    try:
+        return _unit_factor(key, units) > 0.0
+    except InvalidValue:
+        return False
+
+
+def _parse_column(key: str, told: Any, headings: Sequence[str]) -> ColumnSpec:
+    """A column that is named, which states its units: only those of friction go without saying."""
+    found = parse_column_spec(told, headings)
+    if not found.units and key != "friction" and isinstance(told, str):
+        whole = f"{found.heading} ({_USUAL_UNITS.get(key, 'MPa')})"
+        remedy = f"Write them in the file, as in {whole}, or here: --columns '{key}={whole},...' "
+        remedy += f"(columns={{'{key}': '{whole}', ...}})."
+        raise InvalidValue("heading", told, "states no units", remedy=remedy)
+    return found
+
+
+def _is_binary(path: Path) -> bool:
+    """Return True if the beginning of a file contains a null byte."""
+    try:
+        with path.open("rb") as file:
+            return b"\0" in file.read(_XLOOK_DATA_START)
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def _read_xlook_columns(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
+    """Columns of a binary file of xlook: big-endian, headers of 84 bytes, then float32 one column
+    after the other. Its first column is the time that each sample takes.
+    """
+    data = path.read_bytes()
+    if len(data) < _XLOOK_DATA_START:
+        raise DataError(f"{path}: ends within the headers of an xlook file")
+    used = int.from_bytes(data[24:28], "big")
+    if not 0 < used <= _XLOOK_MAX_COLUMNS:
+        raise DataError(f"{path}: states {used} columns, which no xlook file has")
+    headings, begin, found = [], _XLOOK_DATA_START, {}
+    for number in range(used):
+        header = data[
+            _XLOOK_HEADER_BYTES + _XLOOK_COLUMN_HEADER_BYTES * number : _XLOOK_HEADER_BYTES
+            + _XLOOK_COLUMN_HEADER_BYTES * (number + 1)
+        ]
+        heading, units = (
+            part.split(b"\0")[0].decode("ascii", "replace").strip()
+            for part in (header[:13], header[13:26])
+        )
+        count = int.from_bytes(header[80:84], "big")
+        if begin + 4 * count > len(data):
+            raise DataError(f"{path}: ends within column {number + 1}, {heading!r}")
+        values = np.frombuffer(data, ">f4", count, begin).astype(float)
+        headings.append((heading, units, values))
+        begin += 4 * count
+    if columns is None:
+        names = ", ".join(f"{n}: {h} ({u})" for n, (h, u, _v) in enumerate(headings, start=1))
+        remedy = f"Name them by --columns (columns=). It holds {names}."
+        raise InvalidValue("columns", None, "are needed for a file of xlook", remedy=remedy)
+    known = [heading for heading, _units, _values in headings]
+    for key, told in columns.items():
+        heading, units, scale, offset = _parse_column(key, told, known)
+        places = [n for n, h in enumerate(known, 1) if heading in (str(n), h)]
+        if len(places) != 1:
+            raise InvalidValue("column", heading, f"heads {len(places)} columns", choices=known)
+        values = headings[places[0] - 1][2] * scale + offset
+        found[key] = Column(np.cumsum(values) if key == "time" else values, units, places[0])
+    shortest = min(len(column.values) for column in found.values())
+    if any(len(column.values) - shortest > 1 for column in found.values()):
+        rule = "have lengths that differ by more than one"
+        raise InvalidValue("columns", [*found], rule).with_location(str(path))
+    return {key: column._replace(values=column.values[:shortest]) for key, column in found.items()}

@@ -1,0 +1,267 @@
+"""Lattices over rigs: the fields of scenes that each cell has by axes in units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.axes import Axis, Row, group_rows_by_kind
+from rsfstudy.errors import InvalidValue
+from rsfstudy.rig.quantities import (
+    AXIS_NAME,
+    DISPLAY_UNITS,
+    RATIO_FIELD,
+    REQUIRED_QUANTITIES,
+    RIG_NAME,
+    SCENE_QUANTITIES,
+    SI_UNITS,
+    check_consistency,
+    derive_scene_fields,
+    is_friction_stiffness,
+    is_scaled_field,
+    to_si_checked,
+)
+from rsfstudy.rig.rig import Rig, compute_instability_norm
+from rsfstudy.rig.scales import DIMENSIONLESS_PREFIX, rig_scales
+from rsfstudy.rig.unit_axes import factor_to_si, make_axis
+from rsfstudy.rig.units import multiply_exactly
+from rsfstudy.slider import Scene
+
+
+@dataclass(frozen=True)
+class RigScenes:
+    """The cells of a study of a rig: axes in units, turned into fields of scenes.
+
+    What the base scene has in units of its rig (all but ratios) stays what it is in SI units where
+    an axis varies a scale.
+
+    Parameters
+    ----------
+    rig : Rig
+        What is fixed.
+    base : Scene
+        A scene of it.
+    axes : sequence of Axis
+
+    Raises
+    ------
+    InvalidValue
+        For a scene that is not of that rig, and for axes that leave out what it states.
+    """
+
+    rig: Rig
+    base: Scene
+    axes: Sequence[Axis]
+
+    def __post_init__(self) -> None:
+        theirs = self.base.as_dict()
+        for name, value in derive_scene_fields(self.rig.as_dict()).items():
+            if name != "inertia" and not _is_close(theirs.get(name), value):
+                rule = f"is not that of the rig, {value:g}"
+                remedy = "Make the base of its study with rig.scene(...)."
+                raise InvalidValue(name, theirs.get(name), rule, remedy=remedy)
+        for along in self.axes:
+            for row in along.rows:
+                lacks = [name for name in self.rig.axis_fields if name not in row]
+                if lacks and not {AXIS_NAME.get(name, name) for name in REQUIRED_QUANTITIES} & set(
+                    lacks
+                ):
+                    rule = f"does not state {lacks[0]}, which the rig of the study does"
+                    raise InvalidValue(along.dimension, dict(row), rule, remedy="State it.")
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the fields that axes state in units, by the names that they have there."""
+        return {name: units for along in self.axes for name, units in along.units.items()}
+
+    def rig_quantities(self, row: Row) -> dict[str, Any]:
+        """The quantities of the rig in SI units, where axes have these values or arrays."""
+        found, units = dict(self.rig.as_dict()), self.units
+        for name in RIG_NAME:
+            if name in units and row.get(name) is not None:
+                found[RIG_NAME[name]] = multiply_exactly(row[name], factor_to_si(name, units[name]))
+        in_friction = is_friction_stiffness(f"1 {units.get('stiffness', '')}")
+        if row.get("stiffness") is not None and in_friction:
+            found["stiffness"] = found["stiffness"] * found["normal_stress"]
+        check_consistency(found)
+        return found
+
+    def scene_fields(self, row: Row) -> dict[str, Any]:
+        """The fields of scenes that differ from the base, where axes have these values.
+
+        Parameters
+        ----------
+        row : mapping of str to value, or to ndarray of float
+        """
+        units, rig = self.units, self.rig_quantities(row)
+        here, found = scale_factors(rig), {}
+        if set(RIG_NAME) & set(units) & set(row):
+            found = self._fields_constant_in_si(here) | derive_scene_fields(rig)
+            if "period" in self.rig.as_dict() and not self.base.has_mass:
+                found.pop("inertia", None)  # it was left out
+        for name, value in row.items():
+            field = RATIO_FIELD.get(name, name)
+            if name not in units:
+                found[name] = value
+            elif name not in RIG_NAME:
+                scale = SCENE_QUANTITIES[field].scale
+                in_si = multiply_exactly(value, factor_to_si(name, units[name]))
+                found[field] = in_si / (here[scale] if scale else 1.0)
+        return found
+
+    def _fields_constant_in_si(self, here: Mapping[str, Any]) -> dict[str, Any]:
+        """Fields of the base that stay what they are in SI units."""
+        base = scale_factors(self.rig.as_dict())
+        held = {
+            name: value * (base[SCENE_QUANTITIES[name].scale] / here[SCENE_QUANTITIES[name].scale])
+            for name, value in self.base.as_dict().items()
+            if is_scaled_field(name) and isinstance(value, float) and value != 0.0
+        }
+        if "radiation_damping" in held:  # eta is held: its stress goes with V_*
+            held["radiation_damping"] = held["radiation_damping"] * (here["V_*"] / base["V_*"])
+        return held
+
+    def scale_coordinates(self) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+        """Dimensionless fields and scales, over the dimensions that they depend on.
+
+        Returns
+        -------
+        dict
+            By name, dimensions and values; a field that bears the name of an axis in units is
+            called ``dimensionless_...`` here.
+        """
+        # of an axis of one point a second one tells what depends on it
+        alone = {axis.dimension for axis in self.axes if len(axis) == 1 and axis.is_single_field}
+        along = [_with_second_point(a) if a.dimension in alone else a for a in self.axes if a.units]
+        shape = tuple(len(axis) for axis in along)
+        found: dict[str, np.ndarray] = {}
+        for rows in group_rows_by_kind(along):
+            numbers: dict[str, Any] = {}
+            for place, axis in enumerate(along):
+                shaped = [-1 if p == place else 1 for p in range(len(along))]
+                for name, value in axis.rows[rows[place][0]].items():
+                    if isinstance(value, float):
+                        column = [axis.rows[n][name] for n in rows[place].tolist()]
+                        numbers[name] = np.array(column).reshape(shaped)
+            for name, values in self._scale_fields(numbers).items():
+                whole = found.setdefault(name, np.full(shape, np.nan))
+                whole[np.ix_(*rows)] = values
+        squeezed = {
+            name: _drop_constant_dimensions(along, values) for name, values in found.items()
+        }
+        return {
+            name: (dims, values[tuple(slice(1 if d in alone else None) for d in dims)])
+            for name, (dims, values) in squeezed.items()
+        }
+
+    def _scale_fields(self, row: Mapping[str, Any]) -> dict[str, Any]:
+        units, rig = self.units, self.rig_quantities(row)
+        scales_ = {AXIS_NAME.get(name, name): rig[name] for name in REQUIRED_QUANTITIES}
+        found = {name: value for name, value in scales_.items() if name not in units}
+        for name, value in self.scene_fields(row).items():
+            if isinstance(value, bool | str) or (name in row and name not in units):
+                continue
+            if name not in units:
+                found[name] = value
+            elif SCENE_QUANTITIES[name].scale:
+                found[DIMENSIONLESS_PREFIX + name] = value
+        return found
+
+
+def _is_close(theirs: Any, value: Any) -> bool:
+    # both were made of the same numbers, by hand perhaps: what rounding leaves is far below
+    return isinstance(theirs, float) and math.isclose(theirs, value, rel_tol=1e-9)
+
+
+def axes_on_rig(rig: Rig, axes: Sequence[Axis]) -> tuple[list[Axis], dict[str, float]]:
+    """Convert dimensionless axes to the units of a rig.
+
+    Parameters
+    ----------
+    rig : Rig
+    axes : sequence of Axis
+
+    Returns
+    -------
+    axes : list of Axis
+    sizes : dict of str to float
+        Factor by which the values of each field were multiplied.
+    """
+    sizes_of = scale_factors(rig.as_dict())
+    converted: list[Axis] = []
+    every: dict[str, float] = {}
+    for along in axes:
+        scales = {n: SCENE_QUANTITIES[n].scale for n in along.fields if is_scaled_field(n)}
+        units = {
+            n: DISPLAY_UNITS.get(SI_UNITS[scale], SI_UNITS[scale]) for n, scale in scales.items()
+        }
+        sizes = {
+            n: multiply_exactly(sizes_of[s], 1 / factor_to_si(n, units[n]))
+            for n, s in scales.items()
+        }
+        every |= sizes
+        rows = [
+            {n: v * sizes[n] if n in sizes and v is not None else v for n, v in row.items()}
+            for row in along.rows
+        ]
+        converted.append(along.with_rows(rows, units, along.sampling_info))
+    return converted, every
+
+
+def with_rig_value(rig: Rig, base: Scene, name: str, value: Any) -> tuple[Rig, Scene]:
+    """Return a rig and its scene with another value of one quantity.
+
+    Parameters
+    ----------
+    rig : Rig
+    base : Scene
+        A scene of the rig.
+    name : str
+        Name of the quantity, as on an axis in units.
+    value : object
+        Value of the quantity, as on such an axis.
+
+    Returns
+    -------
+    Rig, Scene
+    """
+    if name == "instability_norm":
+        return rig, base.with_(instability_norm=compute_instability_norm(rig, value, base))
+    axis = make_axis(name, [value])
+    changed = base.with_(**RigScenes(rig, base, [axis]).scene_fields(axis.rows[0]))
+    if name in RIG_NAME:
+        quantity = RIG_NAME[name]
+        rig = replace(rig, **{quantity: to_si_checked(quantity, value, rig.normal_stress)})
+    return rig, changed
+
+
+def scale_factors(rig: Mapping[str, Any]) -> dict[str, Any]:
+    """Value of 1 in SI units, by what quantities are measured in."""
+    return {name: scale.factor for name, scale in rig_scales(rig).items()}
+
+
+def _with_second_point(axis: Axis) -> Axis:
+    """An axis of one point, with another near it."""
+    (row,) = axis.rows
+    near = {
+        name: 1.01 * value if isinstance(value, float) else value for name, value in row.items()
+    }
+    return axis.with_rows([row, near], axis.units)
+
+
+def _drop_constant_dimensions(
+    along: Sequence[Axis], values: np.ndarray
+) -> tuple[tuple[str, ...], np.ndarray]:
+    """Values without the dimensions along which they are the same."""
+    kept: list[str] = []
+    for place, axis in reversed(list(enumerate(along))):
+        first = values.take([0], axis=place)
+        if np.array_equal(np.broadcast_to(first, values.shape), values, equal_nan=True):
+            values = values.take(0, axis=place)
+        else:
+            kept.insert(0, axis.dimension)
+    return tuple(kept), values

@@ -1,0 +1,333 @@
+"""Tables of numbers with units, from CSV files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rsfstudy._deprecation import renamed_members, renamed_names
+from rsfstudy.error_boundary import check_regular_file, error_boundary
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.quantities import parse_heading
+from rsfstudy.rig.units import parse_number
+
+__getattr__ = renamed_names(__name__)
+
+#: What numbers without surprises are made of.
+_PLAIN_TABLE_CHARACTERS = frozenset("0123456789+-.eE \t\r\n")
+_HEADER_EXAMPLE = "velocity (um/s), distance (um), a (1)"
+_NUMBER_PATTERN = r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
+#: A heading with the scale and the offset of what is below it.
+_SCALED_COLUMN_PATTERN = re.compile(
+    rf"(.*\S)\s*\*\s*(-?){_NUMBER_PATTERN}(?:([-+]){_NUMBER_PATTERN})?"
+)
+#: A heading, with its units in brackets or without.
+HEADING_PATTERN = re.compile(r"\s*([^(\[]+?)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
+#: Most characters of a heading; the patterns take quadratic time on longer texts.
+_MAX_HEADING_LENGTH = 200
+
+
+class ColumnSpec(NamedTuple):
+    """A column that is wanted of a file: its heading, its units, and what raw numbers are
+    multiplied by and then added to.
+    """
+
+    heading: str
+    units: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+#: A function of the headings and of their place, which chooses columns.
+ColumnChooser = Callable[[list[str], str], dict[str, ColumnSpec]]
+
+
+def check_heading_length(heading: str) -> None:
+    """Raise ``InvalidValue`` if a heading is too long to be parsed."""
+    if len(heading) > _MAX_HEADING_LENGTH:
+        rule = f"must have at most {_MAX_HEADING_LENGTH} characters (it has {len(heading):,})"
+        raise InvalidValue("heading", heading, rule, remedy=f"Write it as in {_HEADER_EXAMPLE}.")
+
+
+def check_heading_lengths(headings: Iterable[str], place: str) -> None:
+    """Check the length of all headings of a file.
+
+    Errors report ``place`` and the number of the column.
+    """
+    for column, heading in enumerate(headings, start=1):
+        try:
+            check_heading_length(heading)
+        except InvalidValue as error:
+            raise error.with_location(f"{place}, column {column}") from error
+
+
+def _listed(told: Any) -> ColumnSpec:
+    """Return the choice of a column that is a list of its heading, units, scale and offset."""
+    rule = "must be a heading, or a list of a heading, its units, a scale and an offset"
+    remedy = "Write ('Time (s)', 's', 0.001), for example."
+    wrong = InvalidValue("column", told, rule, remedy=remedy)
+    told = told.tolist() if isinstance(told, np.ndarray) else told
+    if not isinstance(told, Sequence) or not 1 <= len(told) <= len(ColumnSpec._fields):
+        raise wrong
+    heading, units, *numbers = (*told, "")[: max(2, len(told))]
+    # columns of an xlook file have numbers
+    if not isinstance(heading, str | int) or not isinstance(units, str):
+        raise wrong
+    check_heading_length(str(heading))
+    try:
+        return ColumnSpec(str(heading), units, *map(float, numbers))
+    except (TypeError, ValueError, OverflowError) as error:
+        raise wrong from error
+
+
+def parse_column_spec(told: Any, headings: Collection[str]) -> ColumnSpec:
+    """Parse the choice of a column.
+
+    Parameters
+    ----------
+    told : str or sequence
+        Heading, units, scale and offset; or a text such as ``lp (um) * 0.1 + 5``, with or without
+        units in brackets, whether or not the heading in the file contains them.
+    headings : collection of str
+        The headings of the file.
+
+    Raises
+    ------
+    InvalidValue
+        If the choice is neither, or if the heading is too long.
+    """
+    if not isinstance(told, str):
+        return _listed(told)
+    check_heading_length(told)
+    raw = None if told in headings else _SCALED_COLUMN_PATTERN.fullmatch(told)
+    scale, offset = 1.0, 0.0
+    if raw:
+        told, scale = raw[1], float(raw[2] + raw[3])
+        offset = float((raw[4] or "") + (raw[5] or "0"))
+    match = HEADING_PATTERN.fullmatch(told)
+    units = (match[2] or "").strip() if match else ""
+    heading = told if told in headings or not match else match[1]
+    return ColumnSpec(heading, units, scale, offset)
+
+
+@renamed_members
+class Column(NamedTuple):
+    """A column of a table.
+
+    Attributes
+    ----------
+    values : ndarray
+        Its numbers; NaN where a field is empty.
+    units : str
+        What they are measured in.
+    column_number : int
+        Its place in the file, from 1.
+    line_numbers : ndarray
+        The line of the file that each number stands in.
+    path : str
+        The file.
+    """
+
+    values: np.ndarray
+    units: str
+    column_number: int = 0
+    line_numbers: np.ndarray = np.empty(0, dtype=int)
+    path: str = ""
+
+    def location(self, row: int) -> str:
+        """Where a number stands."""
+        if not self.path:
+            return f"sample {row + 1}"
+        return f"{self.path}, line {self.line_numbers[row]}, column {self.column_number}"
+
+    def check_values(self, name: str, wrong: np.ndarray, rule: str) -> None:
+        """Raise `InvalidValue` for the first number that is wrong, with its place."""
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise InvalidValue(name, float(self.values[row]), rule).with_location(
+                self.location(row)
+            )
+
+
+def pick_columns(source: Any, columns: Mapping[str, Any]) -> dict[str, Column]:
+    """Columns of arrays, of variables or of a DataFrame, by name; units of variables are those that
+    their attributes state.
+
+    Parameters
+    ----------
+    source : mapping of str to array, xarray.Dataset or pandas.DataFrame
+    columns : mapping of str to str, tuple or ColumnSpec
+        What is wanted, as `parse_column_spec` takes it.
+    """
+    variables = source.variables if hasattr(source, "data_vars") else source
+    names = dict.fromkeys(map(str, variables))  # keeps the order, and is fast to search
+    found = {}
+    for key, told in columns.items():
+        heading, units, scale, offset = parse_column_spec(told, names)
+        if heading not in names:
+            raise InvalidValue("column", heading, "is not in the record", choices=names)
+        values, of_times = _to_floats(key, source[heading])
+        if values.ndim != 1:
+            raise InvalidValue(key, values.shape, "must lie along one dimension")
+        units = of_times or units or str(getattr(source[heading], "attrs", {}).get("units", ""))
+        found[key] = Column(values * scale + offset, units)
+    return found
+
+
+def _to_floats(key: str, values: Any) -> tuple[np.ndarray, str]:
+    """Numbers of an array, NaN where it is masked, and their units if its type tells them: those of
+    times are s, from the first of dates on.
+    """
+    kind = getattr(getattr(values, "dtype", None), "kind", "")
+    if kind == "c":
+        raise InvalidValue(key, values.dtype.name, "must be real numbers")
+    if kind not in ("m", "M"):
+        try:
+            return np.ma.asarray(values, dtype=float).filled(math.nan), ""
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InvalidValue(key, values, "must be a list of numbers") from error
+    times = np.asarray(values, dtype=f"{'datetime' if kind == 'M' else 'timedelta'}64[ns]")
+    first = times[:1] if times.ndim else times
+    return (times - first if kind == "M" else times) / np.timedelta64(1, "s"), "s"
+
+
+@error_boundary
+def read_table(
+    path: str | Path, columns: Mapping[str, Any] | ColumnChooser | None = None
+) -> dict[str, Column]:
+    """Columns of a CSV file, or of a text with tabs, by their names: numbers, units, and where each
+    stands.
+
+    Parameters
+    ----------
+    path : str or Path
+    columns : mapping of str to (str, str) or str, optional
+        Name, heading in the file and units of each column that is wanted, as in ``{"time":
+        ("t", "s")}`` or ``{"time": "t (s)"}``. Without it the first line names all columns with
+        their units, as in ``velocity (um/s), distance (um)``. Or a function that gives each
+        `ColumnSpec`, of the headings and of the place where they stand.
+
+    Raises
+    ------
+    DataError
+        Where there is no such file of text.
+    InvalidValue
+        For a header that does not name the columns, or a field that is no number, with its line
+        and column.
+    """
+    check_regular_file("table", path)
+    try:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
+            between = _detect_delimiter(file.readline())
+            file.seek(0)
+            text = file.read()
+        read = csv.reader(io.StringIO(text), delimiter=between, skipinitialspace=between == " ")
+        line, header = next(((n, row) for n, row in enumerate(read, start=1) if any(row)), (1, []))
+        headings = [name.strip() for name in header]
+        values, lines = _read_plain_table(text, between, line, len(header))
+        if values is None:
+            rows = [(n, row) for n, row in enumerate(read, start=line + 1) if any(row)]
+    except (OSError, UnicodeError, csv.Error) as error:
+        raise DataError(f"{path}: cannot be read as CSV ({error})") from error
+    check_heading_lengths(headings, f"{path}, line {line}")
+    if not header:
+        remedy = f"Its first line reads, for instance, {_HEADER_EXAMPLE}."
+        raise InvalidValue("table", str(path), "has no header", remedy=remedy)
+    if values is None:
+        lines = np.array([n for n, _row in rows], dtype=int)
+        for n, row in rows:
+            if len(row) != len(header):
+                rule = f"has {len(row)} fields, and the header {len(header)}"
+                remedy = "Numbers have a decimal point." if len(row) > len(header) else ""
+                wrong = InvalidValue("line", between.join(row), rule, remedy=remedy)
+                raise wrong.with_location(f"{path}, line {n}")
+    wanted: Any
+    if isinstance(columns, Mapping):
+        wanted = {name: parse_column_spec(told, headings) for name, told in columns.items()}
+    else:
+        wanted = (columns or _columns_from_header)(headings, f"{path}, line {line}")
+    if not isinstance(wanted, Mapping):
+        rule = "must be a mapping, or a function that returns one"
+        raise InvalidValue("columns", columns, rule)
+    found = {}
+    places, counts = {h: n for n, h in enumerate(headings)}, Counter(headings)
+    for name, (heading, units, scale, offset) in wanted.items():
+        if counts[heading] != 1:
+            rule = f"heads {counts[heading]} columns, and must head one"
+            raise InvalidValue("column", heading, rule, choices=headings).with_location(
+                f"{path}, line {line}"
+            )
+        place = places[heading]
+        column = Column(np.empty(0), units, place + 1, lines, str(path))
+        below = (
+            [_parse_field(name, row[place], column, n) for n, (_line, row) in enumerate(rows)]
+            if values is None
+            else values[:, place]
+        )
+        found[name] = column._replace(values=np.array(below, dtype=float) * scale + offset)
+    return found
+
+
+def _read_plain_table(
+    text: str, between: str, line: int, width: int
+) -> tuple[np.ndarray | None, np.ndarray]:
+    """Numbers of a plain table behind the line of its header, and their lines; None where a field
+    is no finite number, or where they stand is to be looked for line by line.
+    """
+    body = "".join(text.split("\n", line)[line:])
+    lines = line + 1 + np.arange(body.count("\n") + (not body.endswith("\n")))
+    if between == " " or not body.strip() or not set(body) <= _PLAIN_TABLE_CHARACTERS | {between}:
+        return None, lines
+    try:
+        found = np.loadtxt(io.StringIO(body), delimiter=between, comments=None, ndmin=2)
+    except ValueError:
+        return None, lines
+    plain = found.shape == (len(lines), width) and bool(np.isfinite(found).all())
+    return (found if plain else None), lines
+
+
+def _detect_delimiter(header: str) -> str:
+    """What stands between columns: tabs, semicolons, commas, or blanks."""
+    return next(
+        (mark for mark in "\t;," if mark in header), " " if not {"(", "["} & {*header} else ","
+    )
+
+
+def _columns_from_header(headings: list[str], place: str) -> dict[str, ColumnSpec]:
+    """All columns by their names, by a header that states them with their units."""
+    found: dict[str, ColumnSpec] = {}
+    for n, heading in enumerate(headings, start=1):
+        stated = parse_heading(heading)
+        if stated is None:
+            remedy = f"Write the header as in {_HEADER_EXAMPLE}."
+            rule = "names no column with its units"
+            raise InvalidValue("header", heading, rule, remedy=remedy).with_location(
+                f"{place}, column {n}"
+            )
+        name, units = stated
+        if name in found:
+            raise InvalidValue("column", name, "stands twice in the header").with_location(place)
+        found[name] = ColumnSpec(heading, units)
+    return found
+
+
+def _parse_field(name: str, text: str, column: Column, row: int) -> float:
+    if not text.strip():
+        return math.nan
+    found = parse_number(text)
+    if found is None:
+        alone = "Write digits alone, as in 1.5e-3; units stand in the header."
+        remedy = "Write a decimal point." if "," in text else alone
+        wrong = InvalidValue(name, text, "is no number", remedy=remedy)
+        raise wrong.with_location(column.location(row))
+    if not math.isfinite(found):
+        raise InvalidValue(name, text.strip(), "must be finite").with_location(column.location(row))
+    return found

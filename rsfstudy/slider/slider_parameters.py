@@ -1,0 +1,77 @@
+"""The numbers that every slider has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.parts import POSITIVE, Part, number
+from rsfstudy.slider.scene_view import SceneView
+
+
+@dataclass(frozen=True, kw_only=True)
+class SliderParameters(Part):
+    """The numbers that every slider has."""
+
+    a: float = number(0.0145, "$a$", "1", "direct effect parameter", rule=POSITIVE)
+    mu_star: float = number(
+        0.76,
+        r"$\mu_*$",
+        "1",
+        "steady-state friction coefficient at the reference rate",
+        rule=POSITIVE,
+    )
+    stiffness_ratio: float | None = number(
+        None,
+        r"$k/k_{cr}(V_*)$",
+        "1",
+        "stiffness over critical stiffness at V_star without radiation damping",
+        rule=POSITIVE,
+    )
+    stiffness: float | None = number(
+        None, r"$k D_c/\sigma_*$", "1", "stiffness", "sigma_*/D_c", rule=POSITIVE
+    )
+    period: float = number(5.0, "$T$", "s", "period of free oscillation", rule=POSITIVE)
+    reference_rate: float = number(
+        1.17e-8, "$V_*/D_c$", "s-1", "reference slip rate over slip distance", rule=POSITIVE
+    )
+    instability_norm: float = number(
+        5e-4, r"$VT/(2\pi D_c)$", "1", "slip rate norm that counts as unstable", rule=POSITIVE
+    )
+
+    initial_stress: float = number(
+        0.0,
+        r"$(\tau_0-\tau_*)/\sigma_*$",
+        "1",
+        "shear stress at the beginning, above that of steady sliding at V_star",
+        "sigma_*",
+    )
+    initial_state: float = number(
+        0.0, r"$\Theta_0$", "1", "state variable at the beginning; 0 in steady sliding at V_star"
+    )
+
+    name = "slider"
+
+    def check(self, scene: SceneView) -> None:
+        """Stress and a state to begin with."""
+        if self.initial_stress <= -self.mu_star:
+            rule = f"must exceed -mu_star = {-self.mu_star:g}: shear stress is that of forward slip"
+            raise self.field_error("initial_stress", rule)
+        if self.initial_state and scene.parts.law.state_count > 1:
+            rule = f"has no meaning for {scene.parts.law.name}, whose states share it"
+            remedy = "Leave it out, and come to it by a protocol."
+            raise self.field_error("initial_state", rule, remedy)
+
+
+#: The fields of which one sets the spring.
+STIFFNESS_FIELDS = ("stiffness_ratio", "stiffness")
+
+
+def with_stiffness_default(values: dict[str, Any]) -> dict[str, Any]:
+    """The numbers of a slider with one field for its spring."""
+    given = [name for name in STIFFNESS_FIELDS if name in values]
+    if len(given) == 2:
+        rule = f"give stiffness or stiffness_ratio (here {values['stiffness_ratio']:g}), not both"
+        raise InvalidValue("stiffness", values["stiffness"], rule)
+    return values if given else {**values, "stiffness_ratio": 1.0}

@@ -1,0 +1,190 @@
+"""Steady sliding, from the friction relation of a scene alone.
+
+At a steady ln(V/V_*) = x the states Psi_i rest where their law says, -b x + shift(g) for most, so
+that frictional stress g solves
+
+    strength(g) = a x + sum of Psi_i.
+
+Nothing here depends on which parts the scene has.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from scipy.optimize import brentq
+
+from rsfstudy.slider.caching import cached_per_scene
+from rsfstudy.slider.equations import compute_steady_states, friction_relation
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.scene_view import SceneView
+
+#: Deviation of frictional stress, over sigma_*, beyond which none counts as steady.
+_MAX_STEADY_STRESS = 1e9
+#: ln(V/V_*) below which steady sliding is not followed.
+_MIN_LOG_SLIP_RATE = -1e6
+
+
+@dataclass(frozen=True)
+class SteadySliding:
+    """Steady sliding at ln(V/V_*) = `log_slip_rate`.
+
+    Attributes
+    ----------
+    log_slip_rate : float
+    frictional_stress, spring_stress : float
+        Deviations of frictional stress and of spring stress from tau_*, over sigma_*.
+    psis : tuple of float
+        States freed of stress.
+    """
+
+    log_slip_rate: float
+    frictional_stress: float
+    spring_stress: float
+    psis: Numbers
+
+
+@cached_per_scene
+def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | None:
+    """Steady sliding of a scene at ln(V/V_*), found once; None where no stress is as weak or as
+    strong.
+
+    Frictional stress g solves ``strength(g) = a ln(V/V_*) + sum of Psi_i``, and spring stress is
+    that and what waves radiate.
+
+    Parameters
+    ----------
+    scene : Scene
+    log_slip_rate : float
+        ln(V/V_*).
+    """
+    friction = stress_for_friction(scene, steady_friction_excess(scene, log_slip_rate))
+    if friction is None:
+        return None
+    spring_stress = friction + scene.dynamics.radiated_stress(log_slip_rate)
+    shift = friction_relation(scene)(friction)[2]
+    return SteadySliding(
+        log_slip_rate, friction, spring_stress, compute_steady_states(scene, log_slip_rate, shift)
+    )
+
+
+def steady_friction_excess(scene: SceneView, log_slip_rate: float) -> float:
+    """Steady friction coefficient at a slip rate, less mu_*.
+
+    ``mu_ss - mu_* = (a - b) ln(V/V_*)`` by most laws.
+
+    Parameters
+    ----------
+    scene : Scene
+    log_slip_rate : float
+        ln(V/V_*).
+
+    References
+    ----------
+    Ruina (1983), J. Geophys. Res. 88, 10359-10370.
+    """
+    psi = scene.functions.friction.state_sum(compute_steady_states(scene, log_slip_rate, 0.0))
+    return float(scene.a * log_slip_rate + psi)
+
+
+def stress_for_friction(scene: SceneView, excess: float) -> float | None:
+    """Deviation of frictional stress from tau_*, over sigma_*, at which the friction coefficient is
+    mu_* + `excess`; None where it never is.
+
+    ``(mu_* + g)/s(g) = mu_* + excess``, s being the normal stress ratio; where normal stress
+    follows shear stress there is none below phi = atan(mu_ss), eq. 9 of
+    doi:10.1007/s11589-014-0098-4.
+
+    Parameters
+    ----------
+    scene : Scene
+    excess : float
+        Friction coefficient less mu_*.
+    """
+    relation = friction_relation(scene)
+
+    def residual(friction: float) -> float:
+        value, _slope, shift, _shift_slope = relation(friction)
+        return value - shift - excess
+
+    return _find_root(residual, excess, _min_frictional_stress(scene))
+
+
+def stress_after_jump(scene: SceneView, excess: float, psis: Numbers = ()) -> float | None:
+    """Deviation of frictional stress from tau_*, over sigma_*, just after a sudden change; None
+    where there is none.
+
+    The states freed of stress stay as they are, so that ``strength(g) = excess`` with ``excess = a
+    ln(V/V_*) + sum of Psi_i`` (eqs. 12 and 13 of doi:10.1007/s11589-014-0098-4).
+
+    Parameters
+    ----------
+    scene : Scene
+    excess : float
+        What strength becomes, over sigma_*.
+    psis : tuple of float, optional
+        States freed of stress, by which pore pressure is told; else that of steady sliding.
+    """
+    relation = friction_relation(scene, psis)
+    return _find_root(
+        lambda friction: relation(friction)[0] - excess, excess, _min_frictional_stress(scene)
+    )
+
+
+def _min_frictional_stress(scene: SceneView) -> float:
+    """Deviation of frictional stress above which slip is forward and normal stress positive."""
+    weakest = scene.parts.normal_stress.min_frictional_stress(scene)
+    # where slip may reverse, strength grows with stress of either sign
+    return max(weakest, -scene.mu_star) if scene.parts.law.regularised else weakest
+
+
+def _find_root(missing: Callable[[float], float], near: float, lowest: float) -> float | None:
+    """Zero of a growing function, above `lowest`; None where there is none."""
+    low = near if near > lowest else 0.5 * lowest
+    high, stride = low, 1e-3 + abs(low)
+    at = missing(low)
+    if at == 0.0:
+        return float(low)
+    while at > 0.0:
+        high = low
+        low = (
+            max(low - stride, lowest + 0.5 * (low - lowest))
+            if math.isfinite(lowest)
+            else (low - stride)
+        )
+        stride *= 2.0
+        if stride > _MAX_STEADY_STRESS or low == high:
+            return None
+        at = missing(low)
+    if high == low:
+        while missing(high) <= 0.0:
+            if high > _MAX_STEADY_STRESS:
+                return None
+            low, high = high, high + stride
+            stride *= 2.0
+    return float(brentq(missing, low, high, xtol=1e-22, rtol=8.9e-16, maxiter=500))
+
+
+def min_steady_log_slip_rate(scene: SceneView) -> float:
+    """Smallest ln(V/V_*) with steady sliding: where stress would grow without bound; ``-inf`` where
+    there is none.
+
+    Of a driving stress at the angle phi, without an effect of normal stress on the law, it is where
+    ``mu_ss = tan(phi)``, eq. 9 of doi:10.1007/s11589-014-0098-4.
+    """
+    value, _slope, shift, _shift_slope = friction_relation(scene)(_MAX_STEADY_STRESS)
+    strongest = value - shift
+    if strongest > 1e6:
+        return -math.inf
+    if scene.parts.law.steady_states is None:
+        return strongest / (scene.a - scene.b) if scene.b > scene.a else -math.inf
+    slower = -1.0
+    while steady_friction_excess(scene, slower) <= strongest:
+        slower *= 2.0
+        if slower < _MIN_LOG_SLIP_RATE:
+            return -math.inf
+    return float(
+        brentq(lambda x: steady_friction_excess(scene, x) - strongest, slower, 0.0, xtol=1e-12)
+    )

@@ -1,0 +1,140 @@
+"""Results files: the journal of finished cells, datasets, schema, comparison.
+
+The package writes results completely or not at all, checks files when it reads them, rebuilds a
+study from the declaration in its file, and compares two files. Add a file format here. It never
+computes a cell.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rsfstudy._lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from rsfstudy.storage.comparison import (
+        Comparison,
+        compare_motions,
+        compare_results,
+        compare_same_lattice,
+        find_cell_number,
+    )
+    from rsfstudy.storage.journal import (
+        CellColumns,
+        CellRow,
+        CellTimings,
+        Journal,
+        OutputPacking,
+        find_differences,
+        read_timings,
+    )
+    from rsfstudy.storage.lattice import assemble_dataset, build_coordinates, thin_dimensions
+    from rsfstudy.storage.loadings import read_loadings
+    from rsfstudy.storage.rebuild import (
+        find_primary_output,
+        has_user_code,
+        load_user_figure,
+        rebuild_study,
+        study_from_declaration,
+    )
+    from rsfstudy.storage.result_paths import find_results, output_directory
+    from rsfstudy.storage.schema import (
+        build_axis,
+        build_scene,
+        check_is_study,
+        invalid_part_error,
+        is_single_scene,
+        read_declaration,
+        read_json_attribute,
+        read_provenance,
+        read_scene_fields,
+    )
+    from rsfstudy.storage.store import clean_attributes, read_dataset, read_results, write_dataset
+    from rsfstudy.storage.zarr_store import check_not_existing, check_zarr_installed, write_store
+else:
+    __getattr__, __dir__ = lazy_exports(
+        __name__,
+        {
+            "storage.comparison": (
+                "Comparison",
+                "compare_motions",
+                "compare_results",
+                "compare_same_lattice",
+                "find_cell_number",
+            ),
+            "storage.journal": (
+                "CellColumns",
+                "CellRow",
+                "CellTimings",
+                "Journal",
+                "OutputPacking",
+                "find_differences",
+                "read_timings",
+            ),
+            "storage.lattice": ("assemble_dataset", "build_coordinates", "thin_dimensions"),
+            "storage.loadings": ("read_loadings",),
+            "storage.rebuild": (
+                "find_primary_output",
+                "has_user_code",
+                "load_user_figure",
+                "rebuild_study",
+                "study_from_declaration",
+            ),
+            "storage.result_paths": ("find_results", "output_directory"),
+            "storage.schema": (
+                "build_axis",
+                "build_scene",
+                "check_is_study",
+                "invalid_part_error",
+                "is_single_scene",
+                "read_declaration",
+                "read_json_attribute",
+                "read_provenance",
+                "read_scene_fields",
+            ),
+            "storage.store": ("clean_attributes", "read_dataset", "read_results", "write_dataset"),
+            "storage.zarr_store": ("check_not_existing", "check_zarr_installed", "write_store"),
+        },
+    )
+
+__all__ = [
+    "CellColumns",
+    "CellRow",
+    "CellTimings",
+    "Comparison",
+    "Journal",
+    "OutputPacking",
+    "assemble_dataset",
+    "build_axis",
+    "build_coordinates",
+    "build_scene",
+    "check_is_study",
+    "check_not_existing",
+    "check_zarr_installed",
+    "clean_attributes",
+    "compare_motions",
+    "compare_results",
+    "compare_same_lattice",
+    "find_cell_number",
+    "find_differences",
+    "find_primary_output",
+    "find_results",
+    "has_user_code",
+    "invalid_part_error",
+    "is_single_scene",
+    "load_user_figure",
+    "output_directory",
+    "read_dataset",
+    "read_declaration",
+    "read_json_attribute",
+    "read_loadings",
+    "read_provenance",
+    "read_results",
+    "read_scene_fields",
+    "read_timings",
+    "rebuild_study",
+    "study_from_declaration",
+    "thin_dimensions",
+    "write_dataset",
+    "write_store",
+]

@@ -1,0 +1,349 @@
+"""Compares results datasets: how the numbers of one lattice agree; two files side by side, whatever
+their lattices, with their declarations and what made them; and a cell by its place on the axes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from rsfstudy.error_boundary import guard_methods
+from rsfstudy.errors import InvalidValue
+from rsfstudy.formatting import format_list
+from rsfstudy.status import STATUS_LABELS, Status
+from rsfstudy.storage.journal import find_differences
+from rsfstudy.storage.rebuild import find_primary_output
+from rsfstudy.storage.schema import read_provenance
+from rsfstudy.vocabulary import TIMING_VARIABLES
+
+_AGREEMENT_COLUMNS = ["variable", "values", "identical", "largest_difference", "beyond_errors"]
+#: Of a fingerprint, what the declaration states too.
+_DECLARED_FINGERPRINT_KEYS = {"study", "measure", "rtol", "budget", "methods", "engine"}
+
+ValuePair = tuple[Any, Any]
+
+
+# ---- one lattice --------------------------------------------------------------------------------
+
+
+def compare_same_lattice(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
+    """Agreement of two datasets of one study, variable by variable, in the cells that both have.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``variable``, ``values``, ``identical``, ``largest_difference`` and ``beyond_errors``, how
+        many differ by more than the sum of both error estimates, NaN where there are none; in
+        ``attrs["differs"]`` what decides a number and differs between them. Measured times, which
+        no two runs share, are left out.
+    """
+    both = _finished_cells(theirs) & _finished_cells(ours)
+    rows = []
+    for name, values in theirs.data_vars.items():
+        if name in TIMING_VARIABLES:
+            continue
+        if set(both.dims) <= set(values.dims):
+            known = both.broadcast_like(values).transpose(*values.dims).values
+            rows.append(_variable_agreement(name, theirs, ours, known))
+        elif bool(both.all()):  # else it may be reduced from cells missing in one of them
+            rows.append(_variable_agreement(name, theirs, ours))
+    return _agreement_table(
+        rows, *(read_provenance(dataset)["fingerprint"] for dataset in (theirs, ours))
+    )
+
+
+def compare_motions(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
+    """How two motions of one scene agree, as `compare_same_lattice` tells it of studies."""
+    rows = [
+        _variable_agreement(n, theirs, ours)
+        for n, values in theirs.variables.items()
+        if values.dims
+    ]
+    made = ({"source": str(d.attrs.get("source", "unknown"))} for d in (theirs, ours))
+    return _agreement_table(rows, *made)
+
+
+def _agreement_table(
+    rows: Sequence[dict[str, Any]], theirs: Mapping[str, Any], ours: Mapping[str, Any]
+) -> pd.DataFrame:
+    frame = pd.DataFrame(rows, columns=_AGREEMENT_COLUMNS)
+    frame.attrs["differs"] = find_differences(theirs, ours)
+    return frame
+
+
+def _finished_cells(dataset: xr.Dataset) -> xr.DataArray:
+    return dataset["status"] != int(Status.PENDING)
+
+
+def _variable_agreement(
+    name: Hashable, theirs: xr.Dataset, ours: xr.Dataset, known: Any = ...
+) -> dict[str, Any]:
+    """Agreement of a variable where it is known to both. Variables agree nowhere that differ in
+    shape, or of which one alone holds real numbers.
+    """
+    a, b = theirs[name], ours.get(name)
+    found: dict[str, Any] = {"variable": name, "values": a.size, "identical": 0}
+    if b is None or a.shape != b.shape or (a.dtype.kind == "f") != (b.dtype.kind == "f"):
+        return found
+    x, y = a.values[known], b.values[known]
+    if a.dtype.kind != "f":
+        return found | {"values": x.size, "identical": int(np.sum(x == y))}
+    gap = np.abs(x - y)
+    same = (x == y) | (np.isnan(x) & np.isnan(y))
+    found |= {"values": x.size, "identical": int(same.sum())}
+    found["largest_difference"] = float(np.max(gap[~same], initial=0.0))
+    errors = [d[f"{name}_error"] for d in (theirs, ours) if f"{name}_error" in d]
+    if [error.shape for error in errors] == [a.shape, a.shape]:
+        allowed = errors[0].values[known] + errors[1].values[known]
+        # a number that one of them lacks, or whose error is unknown, is beyond any estimate
+        found["beyond_errors"] = int((~same & ~(gap <= allowed)).sum())
+    elif "flag_values" in a.attrs:  # codes have no errors
+        found["beyond_errors"] = int((~same).sum())
+    return found
+
+
+# ---- side by side -------------------------------------------------------------------------------
+
+
+@guard_methods
+@dataclass(frozen=True)
+class Comparison:
+    """Differences between two results datasets.
+
+    Attributes
+    ----------
+    declaration : mapping of str to (object, object)
+        Parts of the declarations that differ, by their paths; None where one has no such part.
+    origin : mapping of str to (object, object)
+        Versions and machines that differ.
+    points : mapping of str to (list, list)
+        Points that only the first has, and only the second, of axes that differ.
+    cells : tuple of int
+        Finished cells that both have, that only the first has, and only the second.
+    statuses : pandas.DataFrame
+        One row for each cell that both have and that ended otherwise: its place on each axis,
+        ``first`` and ``second``.
+    numbers : pandas.DataFrame
+        One row a variable that both have, over the cells that both have: ``variable``, ``values``,
+        ``identical``, ``largest_difference``, and ``beyond_errors``, how many differ by more than
+        the sum of both error estimates (NaN where there are none; a headline without an estimate
+        counts as exact).
+    left_out : mapping of str to str
+        Variables that are not compared, and why.
+    """
+
+    declaration: Mapping[str, ValuePair]
+    origin: Mapping[str, ValuePair]
+    points: Mapping[str, tuple[list[Any], list[Any]]]
+    cells: tuple[int, int, int]
+    statuses: pd.DataFrame
+    numbers: pd.DataFrame
+    left_out: Mapping[str, str]
+
+    @property
+    def beyond_errors(self) -> list[str]:
+        """Variables with numbers that differ by more than both error estimates allow."""
+        return list(self.numbers["variable"][self.numbers["beyond_errors"] > 0])
+
+    @property
+    def agrees(self) -> bool:
+        """True where both have cells in common, which ended alike, with the same numbers within
+        their error estimates.
+        """
+        return self.cells[0] > 0 and self.statuses.empty and not self.beyond_errors
+
+
+def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
+    """Compare two results datasets, cell by cell where both have the same place on every axis.
+
+    Raises
+    ------
+    InvalidValue
+        Where an axis of one has no counterpart in the other, not even a fixed value; and where its
+        points have the same names in both and hold other values, as samples drawn anew do.
+    """
+    both = [_with_axes_of(one, other) for one, other in ((first, second), (second, first))]
+    dims = [str(d) for d in both[0]["status"].dims]
+    labelled = [dataset.assign_coords(_alignment_labels(dataset)) for dataset in both]
+    left_out = _uncompared_variables(labelled)
+    kept = [dataset.drop_vars(left_out, errors="ignore") for dataset in labelled]
+    shared = [one.transpose(*dims, ...) for one in xr.align(*kept, join="inner")]
+    _check_same_points(*shared)
+    indexes = [[dataset.indexes[d] for dataset in labelled] for d in dims]
+    points = {
+        d: (a.difference(b, sort=False).tolist(), b.difference(a, sort=False).tolist())
+        for d, (a, b) in zip(dims, indexes, strict=True)
+        if set(a) != set(b)
+    }
+    known = _finished_cells(shared[0]) & _finished_cells(shared[1])
+    alone = [int(_finished_cells(dataset).sum() - known.sum()) for dataset in both]
+    return Comparison(
+        declaration=find_differences(
+            *(dict(_flatten(json.loads(d.attrs["declaration"]))) for d in both)
+        ),
+        origin=find_differences(*(_read_origin(dataset) for dataset in both)),
+        points=points,
+        cells=(int(known.sum()), alone[0], alone[1]),
+        statuses=_compare_statuses(shared, known),
+        numbers=_compare_numbers(shared),
+        left_out=left_out,
+    )
+
+
+def _with_axes_of(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
+    """A dataset with all axes of another: one that it lacks has its fixed value for only point."""
+    cells = set(dataset["status"].dims)
+    for dimension in other["status"].dims:
+        if dimension in cells:
+            continue
+        if dimension not in dataset.coords or dataset[dimension].ndim:
+            rule = "is an axis of one of the two, and the other does not say where on it it is"
+            raise InvalidValue("axis", str(dimension), rule)
+        measured = [n for n, values in dataset.data_vars.items() if cells <= set(values.dims)]
+        wider = dataset[measured].expand_dims(dimension)
+        dataset = dataset.drop_vars([dimension, *measured]).merge(wider)
+    return dataset
+
+
+def _alignment_labels(dataset: xr.Dataset) -> dict[str, Any]:
+    """Points of the dimensions to align by: rounding moves no point of an axis from another."""
+    labels = {}
+    for name in map(str, dataset.dims):
+        values = dataset[name]
+        rounded = values.values
+        if values.dtype.kind == "f":
+            rounded = np.array([float(f"{value:.12g}") for value in values.values.tolist()])
+            if len(np.unique(rounded)) < len(rounded):
+                rounded = values.values
+        labels[name] = (name, rounded, values.attrs)
+    return labels
+
+
+def _check_same_points(first: xr.Dataset, second: xr.Dataset) -> None:
+    """Refuse points of one name that hold other values of a field in the two, beyond rounding."""
+    for name, one in first.coords.items():
+        if not one.dims or name in one.dims or name not in second.coords:
+            continue
+        x, y = one.values, second[name].values
+        if x.shape == y.shape and x.dtype.kind == y.dtype.kind == "f":
+            same = np.allclose(x, y, rtol=1e-11, atol=0.0, equal_nan=True)
+        else:
+            same = np.array_equal(x, y)
+        if not same:
+            rule = f"has other values of {name} in the two, for points of the same names"
+            remedy = "They are results for other cells, and have no number in common."
+            raise InvalidValue("axis", ", ".join(map(str, one.dims)), rule, remedy=remedy)
+
+
+def _uncompared_variables(both: Sequence[xr.Dataset]) -> dict[str, str]:
+    """Variables that cannot be compared, or would compare other things than numbers of cells."""
+    first, second = both
+    unequal = {
+        str(d) for d in first["status"].dims if set(first.indexes[d]) != set(second.indexes[d])
+    }
+    why = {str(n): "only the first has them" for n in first.data_vars if n not in second}
+    why |= {str(n): "only the second has them" for n in second.data_vars if n not in first}
+    for name in map(str, first.data_vars):
+        if name in why:
+            continue
+        if set(first[name].dims) != set(second[name].dims):
+            why[name] = "they lie along other axes"
+        elif not unequal <= set(first[name].dims):
+            why[name] = "they draw on cells that only one has"
+    return why
+
+
+def _compare_numbers(shared: Sequence[xr.Dataset]) -> pd.DataFrame:
+    """Agreement of the numbers; a headline without an error estimate is held to be exact."""
+    frame = compare_same_lattice(*shared)
+    about = find_primary_output(shared[0])
+    exact = (frame["variable"] == about) & frame["beyond_errors"].isna()
+    frame.loc[exact, "beyond_errors"] = (frame["values"] - frame["identical"])[exact]
+    return frame
+
+
+def _compare_statuses(shared: Sequence[xr.Dataset], known: xr.DataArray) -> pd.DataFrame:
+    """The cells that ended otherwise, by their places on the axes."""
+    first, second = (one["status"].reset_coords(drop=True) for one in shared)
+    both = xr.Dataset({"first": first, "second": second, "known": known}).reset_coords(drop=True)
+    frame = both.to_dataframe(dim_order=[*map(str, first.dims)]).reset_index()
+    ended = frame[frame["known"] & (frame["first"] != frame["second"])].drop(columns="known")
+    return ended.replace({"first": STATUS_LABELS, "second": STATUS_LABELS}).reset_index(drop=True)
+
+
+def _flatten(part: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """The parts of a declaration by their paths; lists of plain values are parts as they are."""
+    if isinstance(part, dict) and part:
+        for name, value in part.items():
+            yield from _flatten(value, f"{path}.{name}" if path else name)
+    elif isinstance(part, list) and any(isinstance(value, dict) for value in part):
+        for number, value in enumerate(part):
+            named = value.get("dimension") if isinstance(value, dict) else None
+            yield from _flatten(value, f"{path}[{named or number}]")
+    else:
+        yield path, part
+
+
+def _read_origin(dataset: xr.Dataset) -> dict[str, Any]:
+    """Versions, code and machine that made a dataset."""
+    about: Mapping[str, Any] = read_provenance(dataset)
+    decided = {n: v for n, v in about["fingerprint"].items() if n not in _DECLARED_FINGERPRINT_KEYS}
+    others = {n: v for n, v in about.items() if isinstance(v, str)}
+    for name in ("time", "command", "declared_in"):
+        others.pop(name, None)
+    return {**about["versions"], **decided, **others}
+
+
+# ---- one cell -----------------------------------------------------------------------------------
+
+
+def find_cell_number(dataset: xr.Dataset, place: Mapping[str, Any]) -> int:
+    """The number of the cell at a place, in row-major order.
+
+    Raises
+    ------
+    InvalidValue
+        Where the place names no dimension, leaves one out, or is not on its axis.
+    """
+    status = dataset["status"]
+    for name in place:
+        if name not in status.dims:
+            raise InvalidValue("cell", name, "is no axis", choices=[str(d) for d in status.dims])
+    index = []
+    for dimension in map(str, status.dims):
+        values = dataset[dimension].values
+        if dimension not in place:
+            if values.size > 1:
+                rule = f"leaves {dimension} open"
+                remedy = (
+                    f"Name one value of each axis (--cell is repeated). {dimension} has "
+                    f"{format_list(values.tolist(), ', ')}."
+                )
+                raise InvalidValue("cell", dict(place), rule, remedy=remedy)
+            index.append(0)
+            continue
+        number = _find_on_axis(values, place[dimension])
+        if number is None:
+            rule = "is not on its axis"
+            raise InvalidValue(dimension, place[dimension], rule, choices=map(str, values))
+        index.append(number)
+    return int(np.ravel_multi_index(index, status.shape))
+
+
+def _find_on_axis(values: np.ndarray, wanted: Any) -> int | None:
+    """Index of a value on an axis: an equal label, or the nearest number if it is close enough."""
+    if values.dtype.kind in "iuf":
+        try:
+            number = float({"true": 1.0, "false": 0.0}.get(str(wanted).lower(), wanted))
+        except (TypeError, ValueError):
+            return None
+        nearest = int(np.argmin(np.abs(values - number)))
+        return nearest if np.isclose(values[nearest], number, rtol=1e-5, atol=0.0) else None
+    places = np.flatnonzero(values.astype(object).astype(str) == str(wanted))
+    return int(places[0]) if places.size else None

@@ -1,0 +1,109 @@
+"""Digest of the contents of a dataset, stored in its NetCDF file.
+
+The digest covers the numbers, the strings and the declaration of the dataset. A second digest,
+at the end of the file, covers all bytes. The second digest is lost if the file is truncated or
+if another program saves the file, whereas the digest of the contents is an attribute and is
+preserved. HDF5 stores checksums of small attributes, names and shapes. HDF5 does not store
+checksums of the data, nor of attributes larger than 4 kB, such as a long declaration.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.errors import DataError, shorten
+from rsfstudy.quantities import units_or_scale
+
+#: The attribute of the file that holds the digest.
+DIGEST_ATTRIBUTE = "content_digest"
+#: Attributes of the file that decide how rsfstudy interprets its numbers.
+_DIGESTED_ATTRIBUTES = ("declaration", "provenance", "scene", "end", "laboratory")
+
+
+def compute_content_digest(dataset: xr.Dataset) -> str:
+    """Compute the digests of all variables and of the declaration, as a JSON string."""
+    return json.dumps(_compute_digests(dataset))
+
+
+def check_content(dataset: xr.Dataset, path: str) -> None:
+    """Check the contents of a dataset against its digest.
+
+    Datasets without a digest are not checked. The function compares only attributes and variables
+    that the digest lists. A variable is compared only if its dimensions, shape and units are
+    unchanged. Other programs may therefore add, remove, select or convert variables.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset that was loaded from the file.
+    path : str
+        Path of the file, for the error message.
+
+    Raises
+    ------
+    DataError
+        If a number, a string or the declaration does not match the digest.
+    """
+    if DIGEST_ATTRIBUTE not in dataset.attrs:
+        return
+    listed, found = _parse_digest(dataset.attrs[DIGEST_ATTRIBUTE]), _compute_digests(dataset)
+    if not listed:
+        raise _damaged_error(path, DIGEST_ATTRIBUTE)
+    for name in [name for name in found if name in listed]:
+        (form, _, digest), (form_now, _, digest_now) = (
+            each[name].rpartition(" ") for each in (listed, found)
+        )
+        if form == form_now and digest != digest_now:
+            raise _damaged_error(path, name)
+
+
+def _damaged_error(path: str, name: str) -> DataError:
+    return DataError(
+        f"{path} is damaged, or was edited: {shorten(name)} is not what was written. Run the study "
+        f"again. If you changed it on purpose, delete the attribute {DIGEST_ATTRIBUTE} and save "
+        "the file again."
+    )
+
+
+def _compute_digests(dataset: xr.Dataset) -> dict[str, str]:
+    """Compute one digest for each variable and each attribute.
+
+    The digest of a variable is preceded by its sizes, units and scale.
+    """
+    texts = {
+        name: str(dataset.attrs[name]) for name in _DIGESTED_ATTRIBUTES if name in dataset.attrs
+    }
+    found = {
+        f"attribute {name}": f"text {_hash_bytes(text.encode())}" for name, text in texts.items()
+    }
+    for name, values in dataset.variables.items():
+        form = f"{dict(values.sizes)} {units_or_scale(values.attrs)}"
+        found[str(name)] = f"{form} {_hash_bytes(_to_bytes(values.values))}"
+    return found
+
+
+def _hash_bytes(content: bytes) -> str:
+    return hashlib.blake2b(content, digest_size=8).hexdigest()
+
+
+def _to_bytes(values: np.ndarray) -> bytes:
+    """Convert an array to bytes that do not depend on the storage format of the file."""
+    if values.dtype.kind in "OUTS":
+        return json.dumps([str(text) for text in values.flat]).encode()
+    numbers = np.asarray(values, dtype="<f8")
+    return np.where(np.isnan(numbers), np.nan, numbers).tobytes()
+
+
+def _parse_digest(text: object) -> Mapping[str, str]:
+    """Parse a digest. Return an empty mapping if the string is not a valid digest."""
+    try:
+        listed = json.loads(str(text))
+    except (ValueError, RecursionError):
+        return {}
+    is_digest = isinstance(listed, dict) and all(isinstance(x, str) for x in listed.values())
+    return listed if is_digest else {}

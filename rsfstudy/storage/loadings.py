@@ -1,0 +1,85 @@
+"""Loadings of a user's own in results files: they are data, and stand there as variables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.parts import Segment
+from rsfstudy.slider import (
+    STRESS_RATE_COLUMN,
+    Protocol,
+    SampledHistory,
+    UserLoading,
+    UserPart,
+    history_from_table,
+    protocol,
+)
+from rsfstudy.storage.schema import invalid_part_error
+
+#: What the columns are, by how many there are in each row, and what a row is.
+_SAMPLE_ROW = ("sample", "time, load point velocity, fall and rate of normal stress")
+_SEGMENT_ROW = (
+    "segment",
+    "load point velocity and step, duration, and normal stress above sigma_star",
+)
+
+#: What tells of which kind samples are.
+_HISTORY_FLAGS = ("of_stress", "of_pressure")
+
+
+def loading_variables(parts: Iterable[UserPart]) -> dict[str, xr.Variable]:
+    """Variables that hold the loadings among parts of the user's own, a row a sample or a segment
+    of what they are made of, in units of the slider.
+    """
+    found = {}
+    for part in parts:
+        if isinstance(part, SampledHistory):
+            (row, columns), rows = _SAMPLE_ROW, part.sample_table
+        elif isinstance(part, Protocol):
+            (row, columns), rows = _SEGMENT_ROW, np.array(part.input_segments)
+        else:
+            continue
+        about: dict[str, Any] = {
+            "long_name": f"{columns} of a loading",
+            "units": "1",
+            "loading": part.name,
+            "coverage_content_type": "auxiliaryInformation",
+        }
+        if isinstance(part, SampledHistory):
+            about |= {name: int(getattr(part, name)) for name in _HISTORY_FLAGS}
+        dims = (f"{part.name}_{row}", f"{part.name}_column")
+        found[f"{part.name}_{row}s"] = xr.Variable(dims, rows, about)
+    return found
+
+
+def read_loadings(results: xr.Dataset) -> Mapping[str, UserLoading]:
+    """The loadings that results hold, by name.
+
+    Raises
+    ------
+    DataError
+        Where a variable that is said to hold one does not.
+    """
+    found: dict[str, UserLoading] = {}
+    for key, values in results.variables.items():
+        name = values.attrs.get("loading")
+        if name is None:
+            continue
+        if (
+            values.dtype.kind != "f"
+            or values.ndim != 2
+            or values.shape[1] != STRESS_RATE_COLUMN + 1
+        ):
+            raise invalid_part_error(
+                str(key), f"holds no loading of {STRESS_RATE_COLUMN + 1} columns"
+            )
+        if "of_stress" in values.attrs:
+            of = {key: bool(values.attrs.get(key, False)) for key in _HISTORY_FLAGS}
+            found[name] = history_from_table(values.values, name=name, **of)
+        else:
+            found[name] = protocol([Segment(*row) for row in values.values.tolist()], name)
+    return found

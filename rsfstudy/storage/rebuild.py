@@ -1,0 +1,248 @@
+"""Rebuilds a study from the declaration in its results. A declaration is plain data: no code from
+the results file is run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import msgspec
+import xarray as xr
+
+from rsfstudy import measures, reductions
+from rsfstudy.axes import Axis
+from rsfstudy.errors import DataError, InvalidValue, shorten
+from rsfstudy.measures import Measure
+
+# to be found by its name
+from rsfstudy.reductions import Reduction
+from rsfstudy.rig import Rig
+from rsfstudy.slider import SLOTS, UserPart, names_to_parts
+from rsfstudy.storage import loadings, schema
+from rsfstudy.storage.lattice import build_coordinates
+from rsfstudy.storage.schema import (
+    Declaration,
+    PlainAxis,
+    PlainMeasure,
+    PlainReduction,
+    build_dataclass,
+    invalid_part_error,
+)
+from rsfstudy.study import Study, figure_name, load_study, study_names
+from rsfstudy.vocabulary import coverage_content_type
+
+_STUDY_FILE_REMEDY = "Name the file that declares it: --study FILE (study=)."
+
+
+def rebuild_study(results: xr.Dataset, file: str | Path | None = None) -> Study:
+    """The study that made a dataset, from the declaration in it; where it uses code of the user,
+    from the file that declares the study. Parts of a named study's own are those of rsfstudy.
+    """
+    declared = schema.read_declaration(results)
+    if file is None and declared.name in study_names() and schema.find_user_part(declared):
+        file = declared.name
+    for axis in declared.axes:
+        points = results.sizes.get(axis["dimension"])
+        declared_points = len(schema.build_axis(axis))
+        if declared_points != points:
+            rule = f"has {declared_points} points in the declaration, and {points} in the file"
+            raise invalid_part_error(axis["dimension"], rule)
+    held = loadings.read_loadings(results)
+    if file is None and has_user_code(results):
+        rule = "is a user's own, and code is never taken from a results file"
+        remedy, named_in = _STUDY_FILE_REMEDY, schema.read_provenance(results)["declared_in"]
+        if named_in:
+            remedy += f" It was {shorten(named_in)}."
+        name, value = schema.find_user_part(declared, held) or (
+            "measure",
+            declared.measure["name"],
+        )
+        raise InvalidValue(name, value, rule, remedy=remedy)
+    named = None if file is None else load_study(str(file))
+    if named and named.name != declared.name:
+        rule = f"declares the study {named.name!r}, and the results are of {declared.name!r}"
+        raise InvalidValue("study", str(file), rule)
+    study = study_from_declaration(declared, held, named)
+    _check_axes(study, results)
+    return study
+
+
+def has_user_code(results: xr.Dataset) -> bool:
+    """True where code of the user decided a dataset; loadings, which it holds, are data."""
+    if schema.read_provenance(results)["fingerprint"]["own_code"] == "none":
+        return False
+    held = loadings.read_loadings(results)
+    return not held or schema.find_user_part(schema.read_declaration(results), held) is not None
+
+
+def load_user_figure(results: xr.Dataset, file: str | Path | None = None) -> Any:
+    """The figure that a user wrote for a dataset, from the file that declares the study. The file
+    that the dataset names is not run unasked, because the results may come from a stranger.
+
+    Raises
+    ------
+    InvalidValue
+        Where no file is given, or it has no such figure.
+    """
+    name, named_in = (
+        schema.read_declaration(results).plot,
+        schema.read_provenance(results)["declared_in"],
+    )
+    if file is None:
+        remedy = f"Name the file that declares it: --study {named_in or 'FILE'}."
+        raise InvalidValue("plot", name, "is no figure of rsfstudy", remedy=remedy)
+    study = load_study(str(file))
+    if study.name != results.attrs["id"] or figure_name(study.plot, study.name) != name:
+        rule = f"does not draw {name!r} of {results.attrs['id']!r}"
+        raise InvalidValue("study", str(file), rule)
+    return None if isinstance(study.plot, str) else study.plot
+
+
+def _check_axes(study: Study, results: xr.Dataset) -> None:
+    """Refuse results whose axes differ from those in their declaration."""
+    ours, dims = xr.Dataset(coords=build_coordinates(study)), results["status"].dims
+    if dims != study.dimensions:
+        raise invalid_part_error("status", f"lies along {dims}, not the axes of the declaration")
+    for name in study.dimensions:
+        if ours[name].values.tolist() != results[name].values.tolist():
+            raise invalid_part_error(name, "is not that axis of the declaration")
+
+
+def study_from_declaration(
+    declared: Declaration, held: Mapping[str, UserPart], of_its_own: Study | None = None
+) -> Study:
+    """The study with this declaration.
+
+    Parameters
+    ----------
+    declared : Declaration
+    held : mapping of str to UserPart
+        Loadings of the user's own, by name.
+    of_its_own : Study, optional
+        Where to take the measure, the reductions and parts of the slider from, if they are
+        not part of rsfstudy; the measure with the plain fields that the declaration states.
+
+    Raises
+    ------
+    InvalidValue
+        Where its measure or a reduction is not part of rsfstudy.
+    DataError
+        Where the declaration makes no study, naming the part.
+    """
+    parts = msgspec.structs.asdict(declared)
+    own = {**_known_user_parts(of_its_own), **held}
+    parts["base"] = schema.build_scene(declared.base, own)
+    if of_its_own is None:
+        parts["measure"] = rebuild_measure(declared.measure, "declaration.measure")
+        parts["reductions"] = [
+            _rebuild_reduction(described, f"declaration.reductions[{number}]")
+            for number, described in enumerate(declared.reductions)
+        ]
+    else:
+        for name in ("reductions", "source_file"):
+            parts[name] = getattr(of_its_own, name)
+        kind = of_its_own.measure
+        stated = {name: v for name, v in declared.measure.items() if name in kind.plain_fields}
+        parts["measure"] = kind.with_(**stated)
+    try:
+        parts["axes"] = [_rebuild_axis(axis, own) for axis in declared.axes]
+        del parts["laboratory"]
+        if declared.laboratory is not None:
+            parts["rig"] = _rebuild_rig(declared.laboratory)
+        return Study(**parts)
+    except InvalidValue as error:
+        raise invalid_part_error("declaration", f"makes no study ({error})") from error
+
+
+def _known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
+    """Parts that a user wrote, by name: those of the study, and all others defined in the files
+    that were loaded with it.
+    """
+    others = {name: part for slot in SLOTS for name, part in slot.user_parts.items()}
+    return {} if study is None else {**others, **study.user_parts}
+
+
+def _rebuild_axis(described: PlainAxis, own: Mapping[str, UserPart]) -> Axis:
+    named = schema.build_axis(described)
+    rows = [names_to_parts(row, own) for row in named.rows]
+    return named.with_rows(rows, named.units, named.sampling_info)
+
+
+def _rebuild_rig(stated: Mapping[str, float]) -> Rig:
+    unknown = sorted(set(stated) - {field.name for field in fields(Rig)})
+    if unknown:
+        raise invalid_part_error(f"declaration.laboratory.{unknown[0]}", "is unknown")
+    return Rig(**stated)
+
+
+def rebuild_measure(described: PlainMeasure, path: str) -> Measure:
+    """The measure with this description, which stands at `path` in a file."""
+    values: dict[str, Any] = dict(described)
+    kind = _find_class("measure", Measure, measures, values.pop("name"))
+    given = dict(kind.fields_from_description(values, path))
+    if isinstance(values.get("measure"), Mapping):
+        given["measure"] = rebuild_measure(values.pop("measure"), f"{path}.measure")
+    made: Measure = build_dataclass(values, kind, path, **given)
+    return made
+
+
+def _rebuild_reduction(described: PlainReduction, path: str) -> Reduction:
+    values: dict[str, Any] = dict(described)
+    if values["kind"] == "spread":  # what a range of a part of a coordinate was called
+        values |= {"kind": "range", "over": values.pop("on", "")}
+    kind = _find_class("reduction", Reduction, reductions, values.pop("kind"))
+    made: Reduction = build_dataclass(values, kind, path)
+    return made
+
+
+def _find_class(what: str, base: Any, package: ModuleType, name: str) -> Any:
+    """The class of rsfstudy that is derived from `base` and has a name in declarations; those in
+    the files of named studies are looked for where their package has none.
+    """
+    for exported in package.__all__:
+        getattr(package, exported)  # loads the module that defines it
+    if name not in _named_subclasses(base):
+        for study in study_names():
+            load_study(study)
+    kinds = _named_subclasses(base)
+    if name not in kinds:
+        rule = "is not part of rsfstudy"
+        raise InvalidValue(what, name, rule, choices=kinds, remedy=_STUDY_FILE_REMEDY)
+    return kinds[name]
+
+
+def _named_subclasses(base: Any) -> dict[str, Any]:
+    """The concrete classes of rsfstudy that are derived from `base`, by their names in
+    declarations.
+    """
+    found: dict[str, Any] = {}
+    for kind in base.__subclasses__():
+        found |= _named_subclasses(kind)
+        name = vars(kind).get("name") or vars(kind).get("kind")
+        if name and kind.__module__.partition(".")[0] == __name__.partition(".")[0]:
+            found[name] = kind
+    return found
+
+
+def find_primary_output(dataset: xr.Dataset) -> str | None:
+    """The number a dataset is about: what its measure says, or the first that was measured in each
+    cell, where the measure is a user's own; None where no cell has a plain number.
+    """
+    cells = set(dataset["status"].dims)
+    plain = [
+        str(name)
+        for name, values in dataset.data_vars.items()
+        if set(values.dims) == cells
+        and values.dtype.kind == "f"
+        and coverage_content_type(str(name)) == "modelResult"
+    ]
+    try:
+        described = schema.read_declaration(dataset).measure
+        stated = rebuild_measure(described, "declaration.measure").primary_output
+    except (DataError, InvalidValue):
+        stated = ""
+    return stated if stated in plain else next(iter(plain), None)

@@ -1,0 +1,60 @@
+"""Declarations of studies: axes, a measure, reductions, claims and a figure.
+
+A ``Study`` describes a lattice of cells and what to compute in them. The package checks
+declarations, knows the named studies, computes reductions of finished datasets, and compares these
+with claims. It never runs a study, never reads or writes a results file, and never draws a figure.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rsfstudy._lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from rsfstudy.study.catalogue import load_study
+    from rsfstudy.study.cell import Cell, CellChanges
+    from rsfstudy.study.claims import NOT_APPLICABLE, VERDICTS, Claim, build_verdict_table
+    from rsfstudy.study.figure_declarations import DrawFunction, Figure, Panel, figure_name
+    from rsfstudy.study.reductions.base import is_failed, read_quantities
+    from rsfstudy.study.rig_studies import with_rig
+    from rsfstudy.study.study import Study
+    from rsfstudy.study.study_index import STUDIES_PACKAGE, study_names, study_titles
+    from rsfstudy.study.verdict_table import format_claim_row
+else:
+    __getattr__, __dir__ = lazy_exports(
+        __name__,
+        {
+            "study.catalogue": ("load_study",),
+            "study.cell": ("Cell", "CellChanges"),
+            "study.claims": ("Claim", "NOT_APPLICABLE", "VERDICTS", "build_verdict_table"),
+            "study.figure_declarations": ("DrawFunction", "Figure", "Panel", "figure_name"),
+            "study.reductions.base": ("is_failed", "read_quantities"),
+            "study.rig_studies": ("with_rig",),
+            "study.study": ("Study",),
+            "study.study_index": ("STUDIES_PACKAGE", "study_names", "study_titles"),
+            "study.verdict_table": ("format_claim_row",),
+        },
+    )
+
+__all__ = [
+    "Cell",
+    "CellChanges",
+    "Claim",
+    "DrawFunction",
+    "Figure",
+    "NOT_APPLICABLE",
+    "Panel",
+    "STUDIES_PACKAGE",
+    "Study",
+    "VERDICTS",
+    "build_verdict_table",
+    "figure_name",
+    "format_claim_row",
+    "is_failed",
+    "load_study",
+    "read_quantities",
+    "study_names",
+    "study_titles",
+    "with_rig",
+]

@@ -1,0 +1,169 @@
+"""Checks of what a study is declared of: its parts, their names, and what its axes vary."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.axes import Axis
+from rsfstudy.errors import InvalidValue
+from rsfstudy.formatting import format_list, format_value
+from rsfstudy.measures import RESERVED_NAMES, Measure
+from rsfstudy.motion import Accuracy
+from rsfstudy.quantities import is_variable_name
+from rsfstudy.rig import RATIO_FIELD, Rig, RigScenes
+from rsfstudy.slider import (
+    FIELD_NAMES,
+    SLOT_NAMES,
+    Scene,
+    UserPart,
+    find_inapplicable_fields,
+    names_to_parts,
+    suggest_field,
+)
+from rsfstudy.study.claims import Claim
+from rsfstudy.study.reductions.application import Reduction
+from rsfstudy.vocabulary import QUANTITIES
+
+#: What parts of a study are made of, one of them or a list; the rig may be left out.
+_SINGLE_TYPES = {"base": Scene, "measure": Measure, "accuracy": Accuracy, "rig": Rig}
+_LIST_ITEM_TYPES = {"axes": Axis, "reductions": Reduction, "claims": Claim, "references": str}
+
+
+def check_types(declared: Mapping[str, Any]) -> None:
+    """Raise InvalidValue if the attributes of a study have wrong types."""
+    for name, kind in (_SINGLE_TYPES | _LIST_ITEM_TYPES).items():
+        given = declared[name]
+        if name in _LIST_ITEM_TYPES and not isinstance(given, list | tuple):
+            raise InvalidValue(name, given, f"must be a list of {kind.__name__} objects")
+        for value in given if name in _LIST_ITEM_TYPES else [given]:
+            if not isinstance(value, kind) and not (name == "rig" and value is None):
+                raise InvalidValue(name, value, f"must be made of {kind.__name__} objects")
+    if not declared["axes"]:
+        raise InvalidValue("axes", declared["axes"], "must hold at least one axis")
+
+
+def check_names(measure: Measure, reductions: Sequence[Reduction], axes: Sequence[Axis]) -> None:
+    """Raise InvalidValue for names that are taken, and for reductions of unknown results."""
+    measure.check()
+    known = list(measure.variables)
+    for reduction in reductions:
+        if not is_variable_name(reduction.name) or reduction.name in RESERVED_NAMES:
+            raise InvalidValue("reduction", reduction.name, "names something else, or nothing")
+        if reduction.of not in known:
+            raise InvalidValue("reduction of", reduction.of, "is not measured", choices=known)
+        known.append(reduction.name)
+    taken = {*known, *measure.inner_coordinates, *(RESERVED_NAMES - set(FIELD_NAMES))}
+    for axis in axes:
+        check_not_solved_for(measure, axis.fields)
+        for name in (axis.dimension, *axis.fields):
+            if name in taken:
+                raise InvalidValue("axis", name, "is the name of something measured")
+
+
+def check_not_solved_for(measure: Measure, fields: Sequence[str]) -> None:
+    """Raise InvalidValue if the measure solves for one of the fields."""
+    for name in fields:
+        if {name, RATIO_FIELD.get(name)} & set(measure.solved_fields):
+            rule = f"{measure.name} solves for {name}; it cannot be an axis or be set"
+            raise InvalidValue(name, "...", rule, remedy="Leave it out.")
+
+
+def check_user_fields(
+    measure: Measure, reductions: Sequence[Reduction], scene_fields: Sequence[str]
+) -> None:
+    """Raise InvalidValue if a field of a user-defined part has the name of another variable."""
+    taken = {*measure.variables, *measure.inner_coordinates}
+    taken |= {*RESERVED_NAMES, *QUANTITIES, *(reduction.name for reduction in reductions)}
+    for name in scene_fields[len(FIELD_NAMES) :]:
+        if name in taken - SLOT_NAMES:
+            rule, remedy = "is the name of something else", "Rename the field of your part."
+            raise InvalidValue("field", name, rule, remedy=remedy)
+
+
+def check_axis_fields(
+    measure: Measure,
+    axes: Sequence[Axis],
+    scene_fields: Sequence[str],
+    scene_builder: RigScenes | None,
+) -> None:
+    """Raise InvalidValue for axes over unknown fields, and for units without a rig."""
+    in_units = scene_builder.units if scene_builder else {}
+    known = dict.fromkeys((*scene_fields, *measure.plain_fields, *in_units))
+    for axis in axes:
+        if not axis.is_single_field and axis.dimension in (*scene_fields, *axis.fields):
+            rule = "is a field: a zipped axis needs a name of its own"
+            raise InvalidValue("axis", axis.dimension, rule)
+        if axis.units and scene_builder is None:
+            remedy = "Give the study its rig: Study(rig=rig)."
+            raise InvalidValue("axis", axis.dimension, "is in units of a rig", remedy=remedy)
+        for name in axis.fields:
+            if name not in known:
+                rule = (
+                    "is not a field of a scene, nor a number, flag or text of the measure "
+                    f"{measure.name}"
+                )
+                raise unknown_name_error("field", name, rule, known)
+
+
+def check_same_outputs(measure: Measure, changes: Iterable[Mapping[str, Any]]) -> None:
+    """Raise InvalidValue if a change of the measure's fields changes which results it has.
+
+    All cells of a lattice must have the same results.
+    """
+    given = _output_signature(measure)
+    for changed in (measure.with_(**values) for values in changes):
+        if _output_signature(changed) != given:
+            present = measure.plain_fields.items()
+            guilty = [n for n, v in changed.plain_fields.items() if (n, v) not in present]
+            rule = "decides which numbers are measured, which all cells must share"
+            remedy = "Make a study of each value."
+            raise InvalidValue("axis", ", ".join(guilty), rule, remedy=remedy)
+
+
+def check_override(
+    base: Scene, parts: Mapping[str, UserPart], axis: Axis, name: str, value: Any
+) -> None:
+    """Refuse another value of a field that some points of an axis state, and that others take from
+    the base.
+    """
+    stating = [point for point, row in zip(axis.point_names, axis.rows, strict=True) if name in row]
+    if axis.is_single_field or not 0 < len(stating) < len(axis):
+        return
+    for point, row in zip(axis.point_names, axis.rows, strict=True):
+        held = names_to_parts({**base.as_dict(), **row}, parts)
+        if (
+            name in row
+            or not held.get(name)
+            or name in find_inapplicable_fields(held, parts.values())
+        ):
+            continue
+        some = format_list(stating, ", ")
+        rule = f"is stated by some points of {axis.dimension} alone ({some}), and that of {point} "
+        rule += f"is {format_value(held[name])}: it would stay"
+        remedy = f"Select points of one kind too, as in '{axis.dimension}={stating[0]}'."
+        raise InvalidValue(name, value, rule, remedy=remedy)
+
+
+def check_distinct(axes: Sequence[Axis]) -> None:
+    """Refuse axes that repeat a dimension or vary the same field."""
+    taken: dict[str, str] = {}
+    for axis in axes:
+        for name in {RATIO_FIELD.get(n, n) for n in (axis.dimension, *axis.fields)}:
+            if name in taken:
+                rule = f"varies {name!r}, as {taken[name]!r} does already"
+                raise InvalidValue("axis", axis.dimension, rule)
+            taken[name] = axis.dimension
+
+
+def unknown_name_error(of: str, name: str, rule: str, known: Collection[str]) -> InvalidValue:
+    remedy = suggest_field(name)
+    return InvalidValue(of, name, rule, remedy=remedy, choices=() if remedy else known)
+
+
+def _output_signature(measure: Measure) -> str:
+    """The numbers a measure gives, and the fields it looks for; as text, where NaN equals NaN."""
+    inner = {name: np.asarray(at).tolist() for name, at in measure.inner_coordinates.items()}
+    return repr((measure.primary_output, dict(measure.variables), inner, measure.solved_fields))

@@ -1,0 +1,75 @@
+"""A study as a notebook shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from rsfstudy.axes import Axis
+from rsfstudy.formatting import format_list
+from rsfstudy.measures import Measure
+from rsfstudy.quantities import (
+    QUANTITY_TABLE_HEADINGS,
+    Quantity,
+    html_details,
+    html_quantities_table,
+    html_symbol,
+    html_table,
+    html_unit,
+    quantity_row,
+)
+from rsfstudy.slider import Scene, quantities_with_values
+from rsfstudy.vocabulary import find_quantity
+
+
+def study_html(
+    heading: str,
+    axes: Sequence[Axis],
+    base: Scene,
+    measure: Measure,
+    known: Mapping[str, Quantity],
+) -> str:
+    """Format a study as HTML tables of its axes, its fixed fields and its results.
+
+    Parameters
+    ----------
+    heading : str
+        Heading of the first table.
+    axes : sequence of Axis
+    base : Scene
+        Scene with the fixed fields, which are shown in a collapsed table.
+    measure : Measure
+    known : mapping of str to Quantity
+        Quantities that are not in the common vocabulary.
+
+    Returns
+    -------
+    str
+    """
+    varied = {name for axis in axes for name in axis.fields}
+    fixed = {name: v for name, v in base.as_dict().items() if name not in varied}
+    shared = quantities_with_values(fixed, base.user_parts)
+    along = [quantity_row(_axis_quantity(a, known), _format_points(a)) for a in axes]
+    measured = [find_quantity(name, known) for name in measure.variables]
+    numbers = [(q.name, html_symbol(q.symbol), html_unit(q), q.long_name) for q in measured]
+    return (
+        html_table(QUANTITY_TABLE_HEADINGS, along, heading)
+        + html_details("what all cells share", html_quantities_table(shared))
+        + html_details(
+            f"what {measure.name} gives in each",
+            html_table(
+                [heading for heading in QUANTITY_TABLE_HEADINGS if heading != "value"], numbers
+            ),
+        )
+    )
+
+
+def _axis_quantity(axis: Axis, known: Mapping[str, Quantity]) -> Quantity:
+    """The quantity along an axis, without symbol and scale where the axis is in units."""
+    about, units = find_quantity(axis.dimension, known), axis.units.get(axis.dimension)
+    return about if units is None else replace(about, symbol="", units=units, scale="")
+
+
+def _format_points(axis: Axis) -> str:
+    """The points of an axis, a long list cut short."""
+    return f"{format_list(axis.point_names, ', ')} ({len(axis)})"

@@ -1,0 +1,134 @@
+"""Reductions: from a lattice to boundaries and scaling slopes, kept in the same dataset.
+
+A reduction never draws on failed or missing cells: where there are any within its support, the
+result is NaN and says why, unless it is told to leave the failed ones out. Cells that answered
+without a number (such as `stable_for_all_steps`) are left out, and counted. Numerical errors of
+cells are carried to what is made of them (`rsfstudy.study.reductions.base.with_propagated_errors`).
+"""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from rsfstudy.error_boundary import error_boundary
+from rsfstudy.errors import InvalidValue
+from rsfstudy.status import Status
+from rsfstudy.study.reductions.base import (
+    Reduction,
+    is_failed,
+    mask_failures,
+    mask_unusable_values,
+    with_propagated_errors,
+    worst_status,
+)
+from rsfstudy.study.reductions.boundaries import Boundary, Inverse
+from rsfstudy.study.reductions.comparisons import (
+    ClosedFormRatio,
+    Difference,
+    Range,
+    RelativeDifference,
+)
+from rsfstudy.study.reductions.fits import LinearFit, PowerLaw, ProportionalFit, SemilogFit
+from rsfstudy.study.reductions.sobol_indices import SobolIndices
+from rsfstudy.study.reductions.statistics import (
+    Logarithm,
+    Mean,
+    Quantile,
+    StandardDeviation,
+    StatusShares,
+)
+from rsfstudy.study.reductions.units import describe_results
+from rsfstudy.vocabulary import coverage_content_type, find_quantity
+
+__all__ = [
+    "Boundary",
+    "SemilogFit",
+    "Difference",
+    "Inverse",
+    "LinearFit",
+    "Logarithm",
+    "Mean",
+    "ClosedFormRatio",
+    "PowerLaw",
+    "ProportionalFit",
+    "Quantile",
+    "Range",
+    "Reduction",
+    "RelativeDifference",
+    "SobolIndices",
+    "StandardDeviation",
+    "StatusShares",
+    "apply_reductions",
+]
+
+#: What tells of the quality of a result, by the ends of their names.
+_QUALITY_SUFFIXES = ("error", "stderr", "misfit", "points", "status")
+
+
+def _variable_names(dataset: xr.Dataset) -> list[str]:
+    return list(map(str, dataset.data_vars))
+
+
+@error_boundary
+def apply_reductions(
+    dataset: xr.Dataset, reductions: tuple[Reduction, ...], *, despite_failures: bool = False
+) -> xr.Dataset:
+    """The dataset with the results of its reductions, each described by the vocabulary.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    reductions : tuple of Reduction
+    despite_failures : bool
+        Leave failed cells out instead of refusing to draw on them; the results say so.
+    """
+    lost = int((is_failed(dataset["status"]) & (dataset["status"] != int(Status.PENDING))).sum())
+    despite = {"despite": f"{lost} failed cells are left out"} if lost and despite_failures else {}
+    drawn: dict[str, xr.DataArray] = {}
+    for reduction in reductions:
+        if reduction.of not in dataset:
+            raise InvalidValue(
+                "of", reduction.of, "is not measured", choices=_variable_names(dataset)
+            )
+        leaves_out = despite and not reduction.uses_failed_cells
+        support = mask_failures(dataset) if leaves_out else dataset
+        own = worst_status(support["status"], support[reduction.of].dims)
+        if not reduction.uses_failed_cells:
+            own = drawn.get(reduction.of, own)
+        support = mask_unusable_values(support, reduction.of, own)
+        found: object = reduction(support)  # user-defined reductions may return anything
+        if not isinstance(found, xr.Dataset):
+            rule = "must return an xarray.Dataset of the new variables"
+            remedy = "Write return self.results('how it was found', {'': values})."
+            what = f"result of {reduction.kind}"
+            raise InvalidValue(what, type(found).__name__, rule, remedy=remedy)
+        made = with_propagated_errors(reduction, support, found)
+        stated = {q.name: q for q in reduction.quantities}
+        quantities = describe_results(reduction, dataset, made)
+        for name, values in made.data_vars.items():
+            if name in dataset:
+                rule = f"would replace {name!r} by what it makes of {reduction.of!r}"
+                raise InvalidValue("reduction", reduction.name, rule)
+            drawn[str(name)] = worst_status(
+                reduction.support_status(support["status"]), values.dims
+            )
+            if bool(is_failed(drawn[str(name)]).any()):
+                values.attrs.setdefault("refused", "cells it draws on failed or are missing")
+            said = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
+            about = find_quantity(str(name), quantities).attributes
+            about |= {"coverage_content_type": coverage_content_type(str(name)), **said}
+            if str(name) in stated and stated[str(name)].symbol:
+                about["symbol"] = stated[str(name)].symbol
+            if beside := [n for end in _QUALITY_SUFFIXES if (n := f"{name}_{end}") in made]:
+                about["ancillary_variables"] = " ".join(beside)
+            values.attrs = {**about, **despite}
+            before = {key: along.attrs for key, along in dataset.coords.items()}
+            dataset = dataset.assign({name: values})
+            for coordinate, attributes in before.items():
+                # results may lack the attributes of coordinates: older versions of xarray drop them
+                dataset[coordinate].attrs = attributes
+            for coordinate in values.dims:
+                if coordinate in dataset.coords and not dataset[coordinate].attrs:
+                    along = find_quantity(str(coordinate), stated)
+                    dataset[coordinate].attrs = {"long_name": along.long_name, "units": along.units}
+    return dataset.assign_attrs({f"reduced_{key}": text for key, text in despite.items()})

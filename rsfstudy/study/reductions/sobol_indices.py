@@ -1,0 +1,147 @@
+"""Sobol indices: the share of the variance of a result that each sampled quantity explains."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.error_boundary import guard_methods
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantities import Quantity
+from rsfstudy.study.reductions.base import Reduction, is_refused
+
+#: How often samples are drawn anew from themselves, how many such at a time, and from which seed.
+_RESAMPLES, _RESAMPLES_PER_BATCH, _RESAMPLING_SEED = 400, 25, 2010
+#: Ends of the confidence interval.
+_INTERVAL_QUANTILES = (0.025, 0.975)
+_INDEX_NAMES = ("first_order", "total")
+
+
+@guard_methods
+@dataclass(frozen=True)
+class SobolIndices(Reduction):
+    """Sobol indices of first order and total, with 95 % confidence intervals, by
+    `scipy.stats.sobol_indices`.
+
+    A first-order index is the share of the variance that is explained by one quantity alone, a
+    total one the share that is left while all others are held. The intervals are those of resampled
+    points. A cell that failed, or has no number, leaves out all indices: a variance without it
+    would be that of another question.
+
+    Parameters
+    ----------
+    name : str
+        Beginning of the names: ``<name>_first_order``, ``<name>_total``, and the ends of their
+        intervals, ``..._low`` and ``..._high``, along the dimension ``input``.
+    of : str
+        Variable to explain.
+    over : str
+        Dimension of the samples, drawn by ``Axis.samples(..., method="saltelli")``.
+
+    References
+    ----------
+    Saltelli et al. (2010), Computer Physics Communications 181, 259-270.
+    """
+
+    over: str = "sample"
+    kind: ClassVar[str] = "sobol_indices"
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        about = Quantity("input", "", "", "sampled quantity")
+        return (about, *(Quantity(n, "", "1", text) for n, text in self._result_descriptions()))
+
+    def _result_descriptions(self) -> Iterator[tuple[str, str]]:
+        for order in _INDEX_NAMES:
+            text = f"{order.replace('_', '-')} Sobol index of {self.of.replace('_', ' ')}"
+            yield f"{self.name}_{order}", text
+            for end in ("low", "high"):
+                yield f"{self.name}_{order}_{end}", f"{end} end of the 95 % interval of the {text}"
+
+    def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
+        """The indices, for each point of the other dimensions.
+
+        Raises
+        ------
+        InvalidValue
+            Where the samples were not drawn for Sobol indices.
+        """
+        inputs = self._sampled_inputs(dataset)
+        of, d = dataset[self.of].transpose(..., self.over), len(inputs)
+        others = of.dims[:-1]
+        bad = is_refused(dataset, self.of, self.over) | of.isnull().any(self.over)
+        found = np.full((*of.shape[:-1], len(_INDEX_NAMES), 3, d), np.nan)
+        for place in np.ndindex(*of.shape[:-1]):
+            values = of.values[place]
+            if not bool(bad.isel(dict(zip(others, place, strict=True)))) and np.ptp(values) > 0.0:
+                found[place] = _indices_with_intervals(values.reshape(-1, d + 2).T)
+        lost = int(of.isnull().sum())
+        about = {"comment": f"samples drawn anew {_RESAMPLES} times for the intervals"}
+        if lost:
+            about["refused"] = (
+                f"{lost} of {of.size} cells have no number, and the indices need all: narrower "
+                "distributions, away from where answers end, may have them"
+            )
+        elif np.isnan(found).any():
+            about["refused"] = f"cells failed, or {self.of} is the same everywhere"
+        names = iter(name for name, _text in self._result_descriptions())
+        return xr.Dataset(
+            {
+                next(names): ((*others, "input"), found[..., result, end, :], about)
+                for result in range(len(_INDEX_NAMES))
+                for end in range(3)
+            },
+            {**{n: c for n, c in of.coords.items() if self.over not in c.dims}, "input": inputs},
+        )
+
+    def _sampled_inputs(self, dataset: xr.Dataset) -> list[str]:
+        """The quantities that were drawn."""
+        if self.over not in dataset[self.of].dims:
+            raise InvalidValue("over", self.over, f"is no dimension of {self.of}")
+        drawn: dict[str, Any] = json.loads(dataset[self.over].attrs.get("drawn", "{}"))
+        inputs = list(drawn.get("of", ()))
+        points, rest = divmod(dataset.sizes[self.over], len(inputs) + 2)
+        if drawn.get("method") != "saltelli" or rest or points & (points - 1):
+            rule = "was not drawn for Sobol indices, or only a part of it is here"
+            remedy = "Draw it by Axis.samples(..., n, method='saltelli'), n a power of two."
+            raise InvalidValue("over", self.over, rule, remedy=remedy)
+        return inputs
+
+
+def _indices_with_intervals(points: np.ndarray) -> np.ndarray:
+    """First-order and total indices with the ends of their intervals.
+
+    Parameters
+    ----------
+    points : ndarray, shape (2 + inputs, points)
+        Values at A, at B, and at A with one input after the other from B.
+
+    Returns
+    -------
+    ndarray, shape (2, 3, inputs)
+    """
+    random, count = np.random.default_rng(_RESAMPLING_SEED), points.shape[1]
+    resampled = []
+    for _ in range(_RESAMPLES // _RESAMPLES_PER_BATCH):
+        again = random.integers(count, size=(_RESAMPLES_PER_BATCH, count))
+        resampled.append(_saltelli_indices(points[:, again]))
+    ends = np.quantile(np.concatenate(resampled, axis=1), _INTERVAL_QUANTILES, axis=1)
+    best = _saltelli_indices(points[:, None, :])[:, 0]
+    return np.stack([best, *ends], axis=1)
+
+
+def _saltelli_indices(values: np.ndarray) -> np.ndarray:
+    """Indices of first order and total, of shape (2, sets, inputs), of several sets of values of
+    shape (2 + inputs, sets, points).
+    """
+    from scipy.stats import sobol_indices  # takes as long to load as the package
+
+    parts = {"f_A": values[0], "f_B": values[1], "f_AB": values[2:]}
+    found = sobol_indices(func=parts, n=values.shape[-1])
+    shape = values.shape[1], len(values) - 2
+    return np.stack([found.first_order.reshape(shape), found.total_order.reshape(shape)])

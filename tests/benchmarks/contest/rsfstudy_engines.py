@@ -1,0 +1,30 @@
+"""The engines of rsfstudy: cycles followed from a point, all events found on the way."""
+
+from __future__ import annotations
+
+from contest.hand_written_loops import CycleNumbers
+from contest.problem import BUDGET, Problem, meter
+from rsfstudy.limit_cycles.cycles import iterate_cycles
+from rsfstudy.motion.accuracy import Accuracy
+
+
+class RsfstudyEngine:
+    """One of the engines."""
+
+    def __init__(self, engine: str) -> None:
+        self.engine, self.name = engine, f"rsfstudy, {engine}"
+
+    def prepare(self, law: str, variable: bool) -> None:
+        """Nothing to do: the first call compiles."""
+
+    def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
+        """One cycle of each problem."""
+        found: CycleNumbers = []
+        accuracy = Accuracy(tolerance, budget=BUDGET, engine=self.engine)
+        for it in problems:
+            cycle = next(iterate_cycles(it.scene, accuracy, meter(self.engine), it.begin))
+            assert cycle is not None
+            found.append(
+                (cycle.recurrence_interval, cycle.max_spring_stress - cycle.min_spring_stress)
+            )
+        return found

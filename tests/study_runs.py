@@ -1,0 +1,330 @@
+"""Shared by the tests of running: a small lattice, and the command as a process of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import sqlite3
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import rsfstudy
+
+# what prints takes its width from the environment when it is loaded: not from that of a test
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.cli import command_line, commands  # noqa: F401
+from rsfstudy.critical_steps.critical_step import CriticalStep
+from rsfstudy.errors import DataError, IncompleteWarning
+from rsfstudy.execution import cells, plan
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.engines import COMPILED
+from rsfstudy.motion.integrate import integrate_events
+from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.slider.point import Point
+from rsfstudy.study import catalogue
+from rsfstudy.study.cell import Cell
+from rsfstudy.study.claims import Claim
+
+SMALL_STUDY = Study(
+    name="small",
+    title="A small lattice",
+    base=Scene(),
+    axes=[
+        Axis("case", {"constant": {"normal_stress": "constant"}, "variable": {"alpha": 0.56}}),
+        Axis("b_over_a", [2.0, 2.5, 3.0]),
+    ],
+    measure=CriticalStep(),
+)
+#: A study file with a measure of its own.
+USER_MEASURE_SOURCE = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rsfstudy import Axis, Scene, Study
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.status import Status
+
+
+@dataclass(frozen=True)
+class Power(Measure):
+    power: int = 1
+    offset: float = 0.0
+    name: ClassVar[str] = "power"
+    primary_output = "total"
+    variables = {"total": ()}
+    typical_work = 1
+
+    def compute(self, scene, accuracy, meter):
+        if self.power == 4:
+            raise ZeroDivisionError
+        return Outcome(Status.OK, {"total": scene.b_over_a**self.power + self.offset})
+
+
+study = Study(
+    name="own", title="Powers", base=Scene(),
+    axes=[Axis("power", [1, 2]), Axis("b_over_a", [2, 3])], measure=Power(),
+)
+"""
+FAULTY_STUDY_FILE = Path(__file__).with_name("faulty_study.py")
+#: Time in s after which what has not come on any machine never will.
+HANG_TIMEOUT = 1200.0
+
+
+def run(study=SMALL_STUDY, **options) -> xr.Dataset:
+    """In this process and in memory, unless told otherwise."""
+    return rsfstudy.run(study, **{"workers": 0, "output": None, "progress": False, **options})
+
+
+def study_of(name, measure, *axes, base=None, **fields) -> Study:
+    """A study, of scenes as they are by default unless told otherwise."""
+    return Study(name=name, title=name, base=base or Scene(), axes=axes, measure=measure, **fields)
+
+
+def example_claim(**fields) -> Claim:
+    """A claim that something is 1, to a tenth."""
+    usual = {"id": "C1", "statement": "", "source": "", "where": {}, "published": 1.0}
+    return Claim(**usual | {"tolerance": 0.1, "reason": ""} | fields)
+
+
+def cell_key(scene, measure) -> bytes:
+    """Name of a cell that is planned alone."""
+    return plan.cell_key(scene, measure)
+
+
+def run_with_failures(*words, **options) -> xr.Dataset:
+    """The same, where cells are to fail, which is told."""
+    with pytest.warns(
+        IncompleteWarning, match=r"^\d+ of \d+ cells failed: .*failures\(\) lists them$"
+    ):
+        return run(*words, **options)
+
+
+@contextlib.contextmanager
+def record_computed_cells() -> Iterator[list[Cell]]:
+    """The cells that are computed meanwhile, in this process."""
+    asked, computed = list[Cell](), cells.compute_cell
+
+    def counted(task, cell, **options):
+        asked.append(cell)
+        return computed(task, cell, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cells, "compute_cell", counted)
+        yield asked
+
+
+#: Clusters of Dask whose pages are seen from nowhere.
+QUIET_CLUSTER_OPTIONS = {
+    "dashboard_address": "127.0.0.1:0",
+    "scheduler_kwargs": {"dashboard": False},
+}
+
+
+#: What is enough of a dear study for its verdicts and its figure: of a dense axis, the points that
+#: claims speak of, and some between; of costs, the problems and integrators that they turn on.
+REDUCED_AXES = {
+    "accuracy_cost": {
+        "problem": [
+            "critical step",
+            "cycle, slip law: static drop",
+            "cycle, slowness law: recurrence",
+        ],
+        "integrator": ["DOP853", "RK45", "DOP853 + Radau"],
+        "requested_digits": [4, 6, 9],
+        "repeats": 1,
+    },
+    "bounded_slip": {"stiffness_ratio": [1.0, 1.1], "load_velocity_ratio": [2.0, 200.0]},
+    # one motion of the draw left out takes as long as all the others
+    "coverage": {"sample": [0, 1]},
+    "design_of_steps": {"seed": [0, 1]},
+    "dilatant_cycles": {"drainage": [1.0], "dilatancy": [0.0, 0.004, 0.008]},
+    "dilatant_steps": {"drainage": [0.1, 1.0, 10.0]},
+    "displacement_boundary": {"b_over_a": 1.0 + 1.0 / np.array([0.25, 0.5, 0.75, 1.0, 2.0])},
+    "fit_coverage": {"process": ["white", "ar1", "ma3", "encoder", "coarsely_rounded"]},
+    "fit_coverage_joint": {"process": ["white"]},
+    "injection": {"record": ["1000", "2000"]},
+    "instability_norm": {
+        "boundary": ["slowness at k_cr", "slowness at 1.5 k_cr", "slip at a/(b-a) = 4"],
+        "instability_norm": np.geomspace(5e-6, 5e-2, 33)[::4],
+    },
+    "law_choice": {"seed": [0, 1]},
+    "law_identification": {"seed": list(range(6))},
+    "laws": {"stiffness_ratio": [0.5, 1.0, 2.0]},
+    "laws_cycles": {"load_velocity_ratio": [2.0, 250.0]},
+    "laws_velocity_steps": {"stiffness_ratio": [1.25, 1.75]},
+    "rate_step_lattice": {"stiffness_ratio": [1.0, 1.5, 2.0]},
+    "rate_step_stiffness": {"stiffness_ratio": np.linspace(1.0, 2.0, 21)[[0, 2, 5, 10, 15, 20]]},
+    "slide_hold_slide": {"hold_time": [1.0, 1e4, 1e5, 1e6, 1e7, 1e8]},
+    "stability_map": {
+        "stiffness_ratio": [0.2, 0.6, 0.8, 0.87, 0.96, 1.04, 3.0, 8.0],
+        "load_velocity_ratio": np.geomspace(1.01, 1000.0, 5),
+    },
+    "stress_drop": {
+        "stiffness_ratio": [0.4, 0.8],
+        "load_velocity_ratio": 10.0 ** np.linspace(0.0, 3.0, 4),
+    },
+    "triggering": {
+        "case": ["imposed, alpha = 0", "imposed, alpha = 0.56", "inclined, alpha = 0.56"],
+        "stiffness_ratio": [0.05, 0.25, 0.5, 1.0, 1.25, 2.0],
+    },
+    # the first samples are a sample still
+    "uncertain_recurrence": {"sample": list(range(64))},
+    "velocity_steps": {"stiffness_ratio": [1.2, 3.0, 10.0, 300.0]},
+    "wave_triggering": {"cycle_phase": [0.5, 0.8, 0.9]},
+    "what_matters": {"sample": list(range(5 * 64))},
+    "two_states": {
+        "stiffness_ratio": [0.84, 0.8531, 0.8567, 0.8655, 0.8659, 0.8663, 0.8667, 0.9, 0.95, 1.02]
+    },
+}
+
+
+#: Studies whose motions are left to the compiled engine, which `test_compiled` holds to SciPy's.
+COMPILED_ONLY_STUDIES = (
+    "bounded_slip", "coverage", "dilatant_cycles", "dilatant_steps", "displacement_boundary",
+    "injection", "normal_stress_steps", "rate_step_lattice", "resonance", "rig_recurrence",
+    "slide_hold_slide", "stress_drop", "triggering", "two_states", "uncertain_recurrence",
+    "velocity_steps", "wave_triggering", "what_matters",
+)  # fmt: skip
+
+
+def reduced_study(name: str) -> Study:
+    """Return a study, or a part of it with fewer points and the claims about these points."""
+    study, points = catalogue.load_study(name), REDUCED_AXES.get(name, {})
+    if name in COMPILED_ONLY_STUDIES:
+        study = replace(study, accuracy=replace(study.accuracy, engine=COMPILED))
+    if kinds := points.get("process"):
+        claims = [claim for claim in study.claims if claim.where["process"] in kinds]
+        study = replace(study, claims=claims)
+    return replace(study.with_(**points), overrides=study.overrides)
+
+
+def named_results(name: str, tmp_path_factory) -> tuple[xr.Dataset, Path]:
+    """Results of enough of a named study, and their file, computed once for all processes of the
+    tests, by the first of them that asks.
+    """
+    place = tmp_path_factory.getbasetemp()
+    output = (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "named"
+    file, end = output / f"{name}.nc", time.monotonic() + HANG_TIMEOUT
+    while not file.exists():
+        try:
+            return run(reduced_study(name), output=output), file
+        except DataError as error:
+            if "another run uses" not in str(error) or time.monotonic() > end:
+                raise
+            time.sleep(0.1)
+    return rsfstudy.open(file), file
+
+
+def have_same_numbers(ours: xr.Dataset, theirs: xr.Dataset) -> None:
+    """The same bits, but for the time they took."""
+    xr.testing.assert_identical(
+        ours.drop_vars("wall_time").drop_attrs(), theirs.drop_vars("wall_time").drop_attrs()
+    )
+
+
+def call_main(*words, encoding: str = "utf-8") -> SimpleNamespace:
+    """The command in this process, from its real entry point; what would be a traceback is raised,
+    and so is what cannot be encoded.
+    """
+    out = io.TextIOWrapper(io.BytesIO(), encoding, write_through=True)
+    said = io.TextIOWrapper(io.BytesIO(), "utf-8", "backslashreplace", write_through=True)
+    with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
+        patch.setattr(sys, "argv", ["rsfstudy", *map(str, words)])
+        patch.setattr(sys, "stdout", out)
+        patch.setattr(sys, "stderr", said)
+        with pytest.raises(SystemExit) as ended:
+            command_line.main()
+    texts = [stream.buffer.getvalue().decode(stream.encoding) for stream in (out, said)]
+    return SimpleNamespace(returncode=ended.value.code, stdout=texts[0], stderr=texts[1])
+
+
+#: Signals end it even where the tests run in the background, or without a terminal, where shells
+#: have them ignored.
+_COMMAND_SOURCE = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
+from rsfstudy.cli.command_line import main
+main()
+"""
+
+
+def start_command(*words, **environment) -> subprocess.Popen:
+    """The command in a process, and a session, of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-c", _COMMAND_SOURCE, *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "COLUMNS": "500", **environment},
+    )
+
+
+def wait_for_command(process: subprocess.Popen) -> tuple[int, str, str]:
+    """Exit status, output, and errors without the lines of progress, once it has ended."""
+    out, said = process.communicate(timeout=HANG_TIMEOUT)
+    assert "Traceback" not in said, said
+    return (
+        process.returncode,
+        out,
+        re.sub(r"^\w+: \d+ of \d+ cells after .*\n", "", said, flags=re.M),
+    )
+
+
+def run_command(words: Sequence[str]) -> tuple[int, str]:
+    """Exit status and what is said by the command in this process, on one line."""
+    done = call_main(*words)
+    return int(done.returncode or 0), " ".join(f"{done.stdout}{done.stderr}".split())
+
+
+def start_point(scene: Scene) -> Point:
+    """Point at which the motion of a scene begins."""
+    return next(integrate_events(scene, Accuracy(), WorkMeter(1_000_000))).point
+
+
+def count_journal_cells(journal: Path) -> int:
+    """Number of cells that a run that has ended has kept; what it left unfinished is rolled back,
+    as by the next run.
+    """
+    with contextlib.closing(sqlite3.connect(f"file:{journal}?mode=rw", uri=True)) as db:
+        return int(db.execute("SELECT count(*) FROM cells").fetchone()[0])
+
+
+def wait_for_journal_cells(journal: Path, process: subprocess.Popen) -> None:
+    """Wait until a run has kept cells. It lets nobody else read its journal: what is on disk is
+    looked at without asking.
+    """
+    unfinished = journal.with_name(f"{journal.name}-journal")
+
+    def kept() -> bool:
+        with contextlib.suppress(sqlite3.Error):  # not there yet, or in the middle of a write
+            uri = f"file:{journal}?immutable=1"
+            with contextlib.closing(sqlite3.connect(uri, uri=True)) as db:
+                cells = db.execute("SELECT count(*) FROM cells").fetchone()[0]
+            # what would undo them has been made void
+            return cells > 0 and not unfinished.read_bytes()[:8].strip(b"\0")
+        return False
+
+    wait_until(kept, process)
+
+
+def wait_until(true: Callable[[], bool], process: subprocess.Popen) -> None:
+    """Wait until something is so, while a process goes on."""
+    end = time.monotonic() + HANG_TIMEOUT
+    while not true():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end, "it never came to be"
+        time.sleep(0.05)
