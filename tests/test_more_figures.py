@@ -57,7 +57,7 @@ def stiffnesses() -> xr.Dataset:
 
 def test_names_along_y_are_written_from_the_top_down():
     panel = Panel(x="critical_stiffness", y="weakening", hue=["phi"])
-    (axes,) = plots.draw_figure(stiffnesses(), plots.Declared([panel])).axes
+    (axes,) = plots.draw_figure(stiffnesses(), rsfstudy.Figure([panel])).axes
     assert [text.get_text() for text in axes.get_yticklabels()] == ["strong", "weak"]
     assert axes.yaxis_inverted()
     assert [line.get_linestyle() for line in axes.lines] == ["None", "None"]
@@ -68,7 +68,7 @@ def test_nothing_is_drawn_where_nothing_came_out():
     dataset = stiffnesses()
     failed = dataset["phi"] == 50.0
     dataset["critical_stiffness"] = dataset["critical_stiffness"].where(~failed)
-    panels = plots.Declared([Panel(x="weakening", y="critical_stiffness", facet=["phi"])])
+    panels = rsfstudy.Figure([Panel(x="weakening", y="critical_stiffness", facet=["phi"])])
     assert len(plots.draw_figure(dataset, panels).axes) == 2
     dataset["status"] = dataset["status"].where(~failed, np.int8(20))
     assert len(plots.draw_figure(dataset, panels).axes) == 1
@@ -95,13 +95,13 @@ def test_a_legend_beside_a_scale_of_colours_leaves_the_panel_its_room():
         Axis("normal_stress", ["constant", "variable", "imposed"]),
     ]
     dataset = run(Study(name="n", title="", base=Scene(), axes=axes, measure=LinearStability()))
-    drawn = plots.draw_figure(dataset, plots.Declared(lines.panels(dataset, "critical_stiffness")))
+    drawn = plots.draw_figure(dataset, rsfstudy.Figure(lines.panels(dataset, "critical_stiffness")))
     assert drawn.axes[0].get_position().width > 0.55
 
 
 def test_more_panels_than_can_be_read_are_lines_or_maps():
     """Seven panels, at each of two points of an axis that they do not know."""
-    many = plots.Declared([Panel(x="weakening", y="critical_stiffness", hue=["phi"])] * 7)
+    many = rsfstudy.Figure([Panel(x="weakening", y="critical_stiffness", hue=["phi"])] * 7)
     dataset = run(stiffnesses().rsf.study.with_(alpha=[0.2, 0.5]))
     assert len(plots.draw_figure(dataset.isel(alpha=[0]), many).axes) == 7
     assert len(plots.draw_figure(dataset, many).axes) < 7
