@@ -221,7 +221,7 @@ def make_set_option(words: str) -> Callable[[F], F]:
     return click.option("--set", "settings", multiple=True, metavar="FIELD=VALUE", help=words)
 
 
-#: What a rig may state, and an example of it.
+#: Quantities of a rig, with an example of each.
 RIG_EXAMPLES = {
     "normal_stress": "5 MPa",
     "slip_distance": "10 um",

@@ -164,8 +164,10 @@ def print_report(dataset: xr.Dataset, end: RunSummary, files: Sequence[Path]) ->
 
 
 def print_short(dataset: xr.Dataset, end: RunSummary, files: Sequence[Path]) -> None:
-    """Print what one of many runs ends with: as much as `print_report`, in a line for each table,
-    but for verdicts that have moved and cells that failed.
+    """Print a short report of one of several runs.
+
+    The report has one line for each table of ``print_report``. It lists changed verdicts and failed
+    cells in full.
     """
     console.print(f"{end.study}: {dataset.attrs['title']}", style="bold", soft_wrap=True)
     overrides = read_declaration(dataset).overrides

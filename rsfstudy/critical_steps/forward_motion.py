@@ -356,7 +356,13 @@ def _compute_excess(orbit: _Orbit, norm: float, *, with_inertia: bool) -> float:
 
 
 def _steady_sliding(scene: Scene) -> _SteadySliding:
-    """Steady sliding at the load point velocity of the scene; `MotionStopped` if there is none."""
+    """Compute steady sliding at the load point velocity of the scene.
+
+    Raises
+    ------
+    MotionStopped
+        If there is no steady state.
+    """
     load = scene.log_load_velocity
     sliding = steady_sliding(scene, load)
     if sliding is None:

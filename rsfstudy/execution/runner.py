@@ -134,8 +134,8 @@ class StudyRun:
         Parameters
         ----------
         mapper : callable
-            Where cells are computed: `cells.compute_serially`, or what
-            `workers.make_client_mapper` gives.
+            Function that computes the cells: ``cells.compute_serially``, or the result of
+            ``workers.make_client_mapper``.
         progress : callable
             Called with the number of finished cells and of all cells.
 

@@ -59,7 +59,7 @@ def compare_same_lattice(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
 
 
 def compare_motions(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
-    """How two motions of one scene agree, as `compare_same_lattice` tells it of studies."""
+    """Compare two motions of one scene (see ``compare_same_lattice`` for studies)."""
     rows = [
         _variable_agreement(n, theirs, ours)
         for n, values in theirs.variables.items()

@@ -27,7 +27,7 @@ from rsfstudy.study.claims import Claim
 from rsfstudy.study.reductions.application import Reduction
 from rsfstudy.vocabulary import QUANTITIES
 
-#: What parts of a study are made of, one of them or a list; the rig may be left out.
+#: Types of the parts of a study, and types of the items of its lists. The rig is optional.
 _SINGLE_TYPES = {"base": Scene, "measure": Measure, "accuracy": Accuracy, "rig": Rig}
 _LIST_ITEM_TYPES = {"axes": Axis, "reductions": Reduction, "claims": Claim, "references": str}
 

@@ -69,10 +69,10 @@ class Panel:
     fit_line : function of row
         x and y of a line through the points of a curve, in its colour: a fit or a theory.
     curve_label : function of row
-        What the legend calls a curve, by default its place on the axes of `hue`.
+        Name of a curve in the legend. By default, the name is its point on the axes of ``hue``.
     annotation : str
-        A slope that the legend says of each curve, with its standard error; left out where there
-        is none.
+        Name of a slope that the legend shows for each curve, with its standard error. Curves
+        without a slope have no such entry.
     overlays : sequence of function of (dataset, axes)
         What is drawn beside the curves.
     title : str, or function of dataset
