@@ -11,47 +11,22 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from rsfstudy.referee.answer_comparison import (
-        AnswerComparison,
-        compare_answers,
-        known_answer,
-        round_digits_down,
-    )
-    from rsfstudy.referee.external import read_answer
-    from rsfstudy.referee.problem_files import (
-        BenchmarkProblem,
-        read_problem,
-        shipped_problems,
-        write_problems,
-    )
+    from rsfstudy.referee.answer_comparison import AnswerComparison
+    from rsfstudy.referee.problem_files import write_problems
+    from rsfstudy.referee.verification import compare_file, summarise_comparisons
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
-            "referee.answer_comparison": (
-                "AnswerComparison",
-                "compare_answers",
-                "known_answer",
-                "round_digits_down",
-            ),
-            "referee.external": ("read_answer",),
-            "referee.problem_files": (
-                "BenchmarkProblem",
-                "read_problem",
-                "shipped_problems",
-                "write_problems",
-            ),
+            "referee.answer_comparison": ("AnswerComparison",),
+            "referee.problem_files": ("write_problems",),
+            "referee.verification": ("compare_file", "summarise_comparisons"),
         },
     )
 
 __all__ = [
     "AnswerComparison",
-    "BenchmarkProblem",
-    "compare_answers",
-    "known_answer",
-    "read_answer",
-    "read_problem",
-    "round_digits_down",
-    "shipped_problems",
+    "compare_file",
+    "summarise_comparisons",
     "write_problems",
 ]

@@ -102,6 +102,27 @@ class AnswerComparison:
         """True if every quantity has digits enough, or all that are known."""
         return self.digits >= min(self.required_digits, self.problem.digits)
 
+    def describe_agreements(self) -> list[str]:
+        """How far each quantity agrees, in one line for each."""
+        problem, lines = self.problem, []
+        for agreement in self.agreements:
+            text = f"  {agreement.quantity:20s} {round_digits_down(agreement.digits):4.1f} digits"
+            if agreement.agrees_as_written:
+                text += ", to the last place that is written"
+            elif agreement.digits == problem.digits:
+                text += ", all that are known"
+            elif problem.index_column:
+                text += f", fewest at {_format_row(problem, agreement.worst_row)}"
+            if agreement.first_failing_row is not None and problem.index_column:
+                text += f"; they part at {_format_row(problem, agreement.first_failing_row)}"
+            lines.append(text)
+        return lines
+
+
+def _format_row(problem: BenchmarkProblem, row: int) -> str:
+    units = {"time": " s"}.get(problem.index_column, "")
+    return f"{problem.index_column} = {problem.index_values[row]:g}{units}"
+
 
 def known_answer(
     problem: BenchmarkProblem, path: Path | None

@@ -357,9 +357,14 @@ def shipped_problems() -> dict[int, Path]:
     return {int(path.name[:2]): path for path in sorted(PROBLEM_FOLDER.glob("*.toml"))}
 
 
-def write_problems(directory: Path) -> None:
+def write_problems(directory: Path) -> int:
     """Write all problems into ``problems``, their answers into ``answers``, a table to be filled
     for each into ``templates``, and ``example.py``.
+
+    Returns
+    -------
+    int
+        Number of problems.
 
     Raises
     ------
@@ -372,11 +377,12 @@ def write_problems(directory: Path) -> None:
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
         remedy = "Name a new one: nothing is replaced."
         raise InvalidValue("DIR", str(directory), "is there already", remedy=remedy)
+    shipped = shipped_problems()
     try:
         places = {name: directory / name for name in ("problems", "answers", "templates")}
         for place in places.values():
             place.mkdir(parents=True)
-        for path in shipped_problems().values():
+        for path in shipped.values():
             shutil.copyfile(path, places["problems"] / path.name)
             answer = path.with_suffix(".csv")
             shutil.copyfile(answer, places["answers"] / answer.name)
@@ -384,6 +390,7 @@ def write_problems(directory: Path) -> None:
         shutil.copyfile(PROBLEM_FOLDER / "example.txt", directory / "example.py")
     except OSError as error:
         raise DataError(f"{directory}: cannot be written ({error})") from error
+    return len(shipped)
 
 
 def _write_template(problem: BenchmarkProblem, path: Path) -> None:
