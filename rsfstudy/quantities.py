@@ -137,7 +137,7 @@ def parse_heading(text: str) -> tuple[str, str] | None:
 # ---- tables, as notebooks show them --------------------------------------------------------------
 
 #: Of a table of quantities.
-QUANTITY_TABLE_HEADINGS = ("field", "symbol", "value", "unit", "meaning")
+_QUANTITY_TABLE_HEADINGS = ("field", "symbol", "value", "unit", "meaning")
 _FUNCTION_NAMES = ("ln", "log", "exp")
 _SCRIPT_TAGS = {"_": "sub", "^": "sup"}
 _CELL_STYLE = 'style="text-align: left; vertical-align: top"'
@@ -176,15 +176,21 @@ def html_table(
     return HtmlMarkup(f"{above}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
 
 
-def html_quantities_table(rows: Iterable[tuple[Quantity, object]], caption: str = "") -> HtmlMarkup:
-    """A table of quantities with their values."""
+def html_quantities_table(
+    rows: Iterable[tuple[Quantity, object]], caption: str = "", *, with_values: bool = True
+) -> HtmlMarkup:
+    """A table of quantities, with their values unless ``with_values`` is False."""
+    shown = [n for n, text in enumerate(_QUANTITY_TABLE_HEADINGS) if with_values or text != "value"]
+    table = (_quantity_row(about, value) for about, value in rows)
     return html_table(
-        QUANTITY_TABLE_HEADINGS, (quantity_row(about, value) for about, value in rows), caption
+        [_QUANTITY_TABLE_HEADINGS[n] for n in shown],
+        ([row[n] for n in shown] for row in table),
+        caption,
     )
 
 
-def quantity_row(about: Quantity, value: object) -> tuple[object, ...]:
-    """The row of a quantity, under `QUANTITY_TABLE_HEADINGS`."""
+def _quantity_row(about: Quantity, value: object) -> tuple[object, ...]:
+    """The row of a quantity, under `_QUANTITY_TABLE_HEADINGS`."""
     return about.name, html_symbol(about.symbol), value, html_unit(about), about.long_name
 
 
@@ -197,11 +203,6 @@ class HtmlTableMixin:
 
     def _repr_html_(self) -> str:
         return html_quantities_table(self.quantities_with_values(), type(self).__name__)
-
-
-def html_details(caption: str, content: HtmlMarkup) -> HtmlMarkup:
-    """Content that is shown once its caption is clicked."""
-    return HtmlMarkup(f"<details><summary>{escape_html(caption)}</summary>{content}</details>")
 
 
 def html_symbol(formula: str) -> HtmlMarkup:

@@ -8,16 +8,7 @@ from dataclasses import replace
 from rsfstudy.axes import Axis
 from rsfstudy.formatting import format_list
 from rsfstudy.measures import Measure
-from rsfstudy.quantities import (
-    QUANTITY_TABLE_HEADINGS,
-    Quantity,
-    html_details,
-    html_quantities_table,
-    html_symbol,
-    html_table,
-    html_unit,
-    quantity_row,
-)
+from rsfstudy.quantities import HtmlMarkup, Quantity, escape_html, html_quantities_table
 from rsfstudy.slider import Scene, quantities_with_values
 from rsfstudy.vocabulary import find_quantity
 
@@ -49,19 +40,21 @@ def study_html(
     varied = {name for axis in axes for name in axis.fields}
     fixed = {name: v for name, v in base.as_dict().items() if name not in varied}
     shared = quantities_with_values(fixed, base.user_parts)
-    along = [quantity_row(_axis_quantity(a, known), _format_points(a)) for a in axes]
-    measured = [find_quantity(name, known) for name in measure.variables]
-    numbers = [(q.name, html_symbol(q.symbol), html_unit(q), q.long_name) for q in measured]
+    along = [(_axis_quantity(a, known), _format_points(a)) for a in axes]
+    measured = [(find_quantity(name, known), None) for name in measure.variables]
     return (
-        html_table(QUANTITY_TABLE_HEADINGS, along, heading)
-        + html_details("what all cells share", html_quantities_table(shared))
-        + html_details(
+        html_quantities_table(along, heading)
+        + _html_details("what all cells share", html_quantities_table(shared))
+        + _html_details(
             f"what {measure.name} gives in each",
-            html_table(
-                [heading for heading in QUANTITY_TABLE_HEADINGS if heading != "value"], numbers
-            ),
+            html_quantities_table(measured, with_values=False),
         )
     )
+
+
+def _html_details(caption: str, content: HtmlMarkup) -> HtmlMarkup:
+    """Content that is shown once its caption is clicked."""
+    return HtmlMarkup(f"<details><summary>{escape_html(caption)}</summary>{content}</details>")
 
 
 def _axis_quantity(axis: Axis, known: Mapping[str, Quantity]) -> Quantity:
