@@ -419,22 +419,8 @@ def renamed_members(kind: C, *, writable: bool = False) -> C:
     return kind
 
 
-def renamed_attribute(instance: Any, kind: type, name: str) -> Any:
-    """Return an attribute by its former name, for the ``__getattr__`` of a class.
-
-    Raises
-    ------
-    AttributeError
-        If the name is not the former name of an attribute.
-    """
-    if (new := RENAMED[_key(kind)].get(name)) is None:
-        raise AttributeError(f"a {kind.__name__} has no field or attribute {name!r}")
-    warn_renamed(name, new, kind.__name__)
-    return getattr(instance, new)
-
-
 def renamed_value(kind: type, name: str) -> str:
-    """Return the new name of a class member. The class is specified by its name, as a string."""
+    """Return the new name of a class member, and any name that is not a former name unchanged."""
     new = RENAMED[_key(kind)].get(name, name)
     if new != name:
         warn_renamed(name, new, kind.__name__)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple, Self
 
-from rsfstudy._deprecation import renamed_attribute
+from rsfstudy._deprecation import renamed_value
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import HtmlTableMixin, Quantity
@@ -271,7 +271,9 @@ class SceneBase(HtmlTableMixin):
             return getattr(self.parts, name).name
         if name in layout.inactive_values:
             return layout.inactive_values[name]
-        return renamed_attribute(self, SceneBase, name)
+        if (new := renamed_value(SceneBase, name)) == name:
+            raise AttributeError(f"a {SceneBase.__name__} has no field or attribute {name!r}")
+        return getattr(self, new)
 
     def __repr__(self) -> str:
         return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
