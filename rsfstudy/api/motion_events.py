@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from rsfstudy.api.event_catalogue import build_catalogue
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.fitting import EventNumbers
-from rsfstudy.rig import Scale, slip_rate_from_log
+from rsfstudy.rig import slip_rate_from_log
 from rsfstudy.slider import Scene
 
 #: Slip rate over that of the load point from which on a motion is an event. Steady sliding is 1,
@@ -63,8 +63,8 @@ def find_motion_events(
     told = build_catalogue(found, about).assign_attrs(slip_rate_threshold=slip_rate)
     if "slip_rate" in motion and motion.sizes["time"]:  # in units
         rate = motion["slip_rate"]
-        per = Scale(float(rate[0]) / 10.0 ** float(motion["log10_slip_rate"][0]), rate.units)
-        told = told.assign(slip_rate_from_log(told, "peak_log10_slip_rate", per))
+        size = float(rate[0]) / 10.0 ** float(motion["log10_slip_rate"][0])
+        told = told.assign(slip_rate_from_log(told, "peak_log10_slip_rate", size, rate.units))
     return told
 
 

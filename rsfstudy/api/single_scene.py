@@ -17,7 +17,7 @@ from rsfstudy.execution import provenance_attributes
 from rsfstudy.measures import CriticalStep, LimitCycle, Measure
 from rsfstudy.motion import DEFAULT_BUDGET, DEFAULT_RTOL, SCIPY, Accuracy, check_engine
 from rsfstudy.netcdf import with_cf_encoding
-from rsfstudy.rig import apply_scales, convert_to_si, read_scales
+from rsfstudy.rig import convert_to_si, convert_units, read_scales
 from rsfstudy.slider import Scene, check_scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import find_quantity
@@ -158,7 +158,7 @@ def to_si(
         for name, value in zip(units, given, strict=True)
         if value is not None
     }
-    return apply_scales(dataset, read_scales(dataset, **stated))
+    return convert_units(dataset, read_scales(dataset, **stated), "Pa", "m", "s")
 
 
 def _measure_scene(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:

@@ -17,12 +17,9 @@ if TYPE_CHECKING:
         Row,
         check_storable_text,
         fields_of_point,
-        group_rows_by_kind,
         row_kinds,
         to_plain_value,
-        to_plain_values,
     )
-    from rsfstudy.axes.overrides import replace_values, select_points
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
@@ -32,12 +29,9 @@ else:
                 "Row",
                 "check_storable_text",
                 "fields_of_point",
-                "group_rows_by_kind",
                 "row_kinds",
                 "to_plain_value",
-                "to_plain_values",
             ),
-            "axes.overrides": ("replace_values", "select_points"),
         },
     )
 
@@ -46,10 +40,6 @@ __all__ = [
     "Row",
     "check_storable_text",
     "fields_of_point",
-    "group_rows_by_kind",
-    "replace_values",
     "row_kinds",
-    "select_points",
     "to_plain_value",
-    "to_plain_values",
 ]

@@ -5,7 +5,7 @@ labelled or numbered.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -185,7 +185,7 @@ class Axis:
             return  # of equal ones one is computed
         seen: set[frozenset[tuple[str, Any]]] = set()
         for row in self.rows:
-            key = point_key(row)
+            key = frozenset(row.items())
             if key in seen:
                 value = row.get(self.dimension, dict(row))
                 raise InvalidValue(self.dimension, value, "stands twice on its axis")
@@ -255,18 +255,6 @@ def row_kinds(rows: Sequence[Row]) -> np.ndarray:
     return np.array([known.setdefault(_row_kind(row), len(known)) for row in rows])
 
 
-def group_rows_by_kind(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
-    """Rows on each axis that are of one kind, for each combination of kinds."""
-    every = [row_kinds(axis.rows) for axis in axes]
-    for kind in np.ndindex(*(int(of.max()) + 1 for of in every)):
-        yield tuple(np.flatnonzero(of == n) for of, n in zip(every, kind, strict=True))
-
-
-def point_key(row: Row) -> frozenset[tuple[str, Any]]:
-    """Convert the fields and values of a row to a hashable key."""
-    return frozenset(row.items())
-
-
 def _row_kind(row: Row) -> tuple[Any, ...]:
     return tuple(
         (name, type(value), bool(value) if isinstance(value, float) else value)
@@ -325,15 +313,6 @@ def check_storable_text(name: str, text: object) -> None:
         text.encode()
     except UnicodeError as error:
         raise InvalidValue(name, text, "must be a text that UTF-8 can hold") from error
-
-
-def to_plain_values(field: str, value: Any) -> Any:
-    """A value of a field, or a list of them, as `to_plain_value` gives it."""
-    return (
-        [to_plain_value(field, each) for each in value]
-        if is_list_like(value)
-        else to_plain_value(field, value)
-    )
 
 
 def to_plain_value(field: str, value: Any) -> Any:

@@ -25,14 +25,10 @@ from rsfstudy.formatting import (
 from rsfstudy.measure_base import SLOW_NORM_PREFIX
 from rsfstudy.quantities import units_or_scale
 from rsfstudy.rig import (
-    AXIS_NAME,
     DIMENSIONLESS_PREFIX,
-    DISPLAY_UNITS,
-    RIG_QUANTITIES,
     convert_to_display_units,
     drop_ratio_from_name,
-    multiply_exactly,
-    unit_factor,
+    in_display_units,
 )
 from rsfstudy.status import STATUS_LABELS, Status
 from rsfstudy.storage import find_primary_output, read_declaration, read_provenance, thin_dimensions
@@ -142,20 +138,16 @@ def describe_fields(
     rig states, but for what is varied; nothing of what there is none of.
     """
     fields = {n: v for n, v in fields.items() if n not in varied}
-    units = {n: RIG_QUANTITIES[n].units for n in rig if AXIS_NAME.get(n, n) not in varied}
-    shown = {n: DISPLAY_UNITS.get(si, si) for n, si in units.items()}
-    sizes = {
-        n: multiply_exactly(rig[n], 1 / unit_factor(n, shown[n], si)) for n, si in units.items()
-    }
+    sizes = in_display_units(rig, varied)
     told = {
         what: format_fields({n: v for n, v in fields.items() if v}),
         "0 or absent": ", ".join(n for n, v in fields.items() if not v and v is not None),
-        "laboratory": format_fields({n: f"{v:g} {shown[n]}" for n, v in sizes.items()}),
+        "laboratory": format_fields({n: f"{v:g} {units}" for n, (v, units) in sizes.items()}),
     }
     norm, period = fields.get("instability_norm"), fields.get("period")
     if norm and period and {"slip_distance", "reference_velocity"} <= set(sizes):
-        rate = norm * math.tau * sizes["slip_distance"] / period
-        if rate > sizes["reference_velocity"]:  # else it is no norm that tells anything
+        rate = norm * math.tau * sizes["slip_distance"][0] / period
+        if rate > sizes["reference_velocity"][0]:  # else it is no norm that tells anything
             told["unstable from"] = f"a slip rate of {rate:.4g} um/s on"
     return {name: text for name, text in told.items() if text}
 

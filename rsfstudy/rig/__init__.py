@@ -13,23 +13,18 @@ from rsfstudy._lazy import lazy_exports
 
 if TYPE_CHECKING:
     from rsfstudy.rig.quantities import (
-        AXIS_NAME,
-        DISPLAY_UNITS,
-        EQUIVALENT_FIELD,
         RATIO_FIELD,
         REQUIRED_QUANTITIES,
         RIG_QUANTITIES,
-        derive_scene_fields,
+        in_display_units,
         is_friction_stiffness,
     )
     from rsfstudy.rig.rig import Rig
-    from rsfstudy.rig.rig_scenes import RigScenes, axes_on_rig, with_rig_value
+    from rsfstudy.rig.rig_scenes import RigScenes, put_on_rig, with_rig_value
     from rsfstudy.rig.scales import (
         DIMENSIONLESS_PREFIX,
         DISPLAY_BASE_UNITS,
         SCALES_ATTRIBUTE,
-        Scale,
-        apply_scales,
         convert_to_display_units,
         convert_units,
         drop_ratio_from_name,
@@ -39,42 +34,25 @@ if TYPE_CHECKING:
         variable_scale,
     )
     from rsfstudy.rig.table_files import Column, read_table
-    from rsfstudy.rig.unit_axes import (
-        axis_field_name,
-        axis_si_units,
-        convert_axis,
-        convert_values,
-        make_axis,
-    )
-    from rsfstudy.rig.units import (
-        convert_to_si,
-        expand_range,
-        multiply_exactly,
-        parse_number,
-        unit_factor,
-    )
+    from rsfstudy.rig.unit_axes import axis_name_and_units, convert_axis, convert_values, make_axis
+    from rsfstudy.rig.units import convert_to_si, expand_range, parse_number, unit_factor
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
             "rig.quantities": (
-                "AXIS_NAME",
-                "DISPLAY_UNITS",
-                "EQUIVALENT_FIELD",
                 "RATIO_FIELD",
                 "REQUIRED_QUANTITIES",
                 "RIG_QUANTITIES",
-                "derive_scene_fields",
+                "in_display_units",
                 "is_friction_stiffness",
             ),
             "rig.rig": ("Rig",),
-            "rig.rig_scenes": ("RigScenes", "axes_on_rig", "with_rig_value"),
+            "rig.rig_scenes": ("RigScenes", "put_on_rig", "with_rig_value"),
             "rig.scales": (
                 "DIMENSIONLESS_PREFIX",
                 "DISPLAY_BASE_UNITS",
                 "SCALES_ATTRIBUTE",
-                "Scale",
-                "apply_scales",
                 "convert_to_display_units",
                 "convert_units",
                 "drop_ratio_from_name",
@@ -84,54 +62,35 @@ else:
                 "variable_scale",
             ),
             "rig.table_files": ("Column", "read_table"),
-            "rig.unit_axes": (
-                "axis_field_name",
-                "axis_si_units",
-                "convert_axis",
-                "convert_values",
-                "make_axis",
-            ),
-            "rig.units": (
-                "convert_to_si",
-                "expand_range",
-                "multiply_exactly",
-                "parse_number",
-                "unit_factor",
-            ),
+            "rig.unit_axes": ("axis_name_and_units", "convert_axis", "convert_values", "make_axis"),
+            "rig.units": ("convert_to_si", "expand_range", "parse_number", "unit_factor"),
         },
     )
 
 __all__ = [
-    "AXIS_NAME",
     "Column",
     "DIMENSIONLESS_PREFIX",
     "DISPLAY_BASE_UNITS",
-    "DISPLAY_UNITS",
-    "EQUIVALENT_FIELD",
     "RATIO_FIELD",
     "REQUIRED_QUANTITIES",
     "RIG_QUANTITIES",
     "Rig",
     "RigScenes",
     "SCALES_ATTRIBUTE",
-    "Scale",
-    "apply_scales",
-    "axes_on_rig",
-    "axis_field_name",
-    "axis_si_units",
+    "axis_name_and_units",
     "convert_axis",
     "convert_to_display_units",
     "convert_to_si",
     "convert_units",
     "convert_values",
-    "derive_scene_fields",
     "drop_ratio_from_name",
     "expand_range",
     "has_unexpected_units",
+    "in_display_units",
     "is_friction_stiffness",
     "make_axis",
-    "multiply_exactly",
     "parse_number",
+    "put_on_rig",
     "read_scales",
     "read_table",
     "slip_rate_from_log",

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rsfstudy.error_boundary import user_stacklevel
 from rsfstudy.errors import InvalidValue, RsfStudyWarning
-from rsfstudy.rig.units import convert_to_si
-from rsfstudy.slider import FIELD_QUANTITIES, STIFFNESS_FIELDS
+from rsfstudy.rig.units import convert_to_si, multiply_exactly, unit_factor
+from rsfstudy.slider import FIELD_QUANTITIES
 
 
 class RigQuantity(NamedTuple):
@@ -58,12 +58,6 @@ RATIO_FIELD = {
     name.removesuffix("_ratio"): name
     for name, about in SCENE_QUANTITIES.items()
     if about.scale == "V_*" and name.endswith("_ratio")
-}
-#: What states the same as another field does: of slip rates and of the spring.
-EQUIVALENT_FIELD = {
-    **RATIO_FIELD,
-    **{ratio: name for name, ratio in RATIO_FIELD.items()},
-    **dict(zip(STIFFNESS_FIELDS, STIFFNESS_FIELDS[::-1], strict=True)),
 }
 
 
@@ -123,6 +117,18 @@ def check_consistency(rig: Mapping[str, Any]) -> None:
     if ("shear_modulus" in rig) != ("density" in rig):
         remedy = "State shear_modulus and density, or neither."
         raise InvalidValue("density", rig.get("density"), "goes with shear_modulus", remedy=remedy)
+
+
+def in_display_units(
+    rig: Mapping[str, float], without: Collection[str] = ()
+) -> dict[str, tuple[float, str]]:
+    """Numbers and units in which what a rig states is shown, but for what these axes vary."""
+    units = {n: RIG_QUANTITIES[n].units for n in rig if AXIS_NAME.get(n, n) not in without}
+    shown = {n: DISPLAY_UNITS.get(si, si) for n, si in units.items()}
+    return {
+        n: (multiply_exactly(rig[n], 1 / unit_factor(n, shown[n], si)), shown[n])
+        for n, si in units.items()
+    }
 
 
 def derive_scene_fields(rig: Mapping[str, Any]) -> dict[str, Any]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes import Axis, Row, group_rows_by_kind
+from rsfstudy.axes import Axis, Row, row_kinds
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.quantities import (
     AXIS_NAME,
@@ -177,16 +177,21 @@ def _is_close(theirs: Any, value: Any) -> bool:
     return isinstance(theirs, float) and math.isclose(theirs, value, rel_tol=1e-9)
 
 
-def axes_on_rig(rig: Rig, axes: Sequence[Axis]) -> tuple[list[Axis], dict[str, float]]:
-    """Convert dimensionless axes to the units of a rig.
+def put_on_rig(
+    rig: Rig, base: Scene, axes: Sequence[Axis]
+) -> tuple[Scene, list[Axis], dict[str, float]]:
+    """Convert a dimensionless scene and axes to those of a rig, with axes in its units.
 
     Parameters
     ----------
     rig : Rig
+    base : Scene
     axes : sequence of Axis
 
     Returns
     -------
+    base : Scene
+        The scene with the fields that the rig states in place of its own.
     axes : list of Axis
     sizes : dict of str to float
         Factor by which the values of each field were multiplied.
@@ -209,7 +214,10 @@ def axes_on_rig(rig: Rig, axes: Sequence[Axis]) -> tuple[list[Axis], dict[str, f
             for row in along.rows
         ]
         converted.append(along.with_rows(rows, units, along.sampling_info))
-    return converted, every
+    changes = derive_scene_fields(rig.as_dict())
+    if {"inertia", "radiation_damping"} & set(changes):  # in place of what the study has
+        changes = {"inertia": False, "radiation_damping": 0.0, **changes}
+    return base.with_(**changes), converted, every
 
 
 def with_rig_value(rig: Rig, base: Scene, name: str, value: Any) -> tuple[Rig, Scene]:
@@ -265,3 +273,10 @@ def _drop_constant_dimensions(
         else:
             kept.insert(0, axis.dimension)
     return tuple(kept), values
+
+
+def group_rows_by_kind(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
+    """Rows on each axis that are of one kind, for each combination of kinds."""
+    every = [row_kinds(axis.rows) for axis in axes]
+    for kind in np.ndindex(*(int(of.max()) + 1 for of in every)):
+        yield tuple(np.flatnonzero(of == n) for of, n in zip(every, kind, strict=True))

@@ -235,7 +235,7 @@ def apply_scales(dataset: xr.Dataset, by: Mapping[str, Scale]) -> xr.Dataset:
         words = dataset[name].attrs | {"units": by[held[name]].units}
         result[name] = one.dims, one.values, words
     for name in logarithms:
-        result = result.assign(slip_rate_from_log(dataset, name, by["V_*"]))
+        result = result.assign(slip_rate_from_log(dataset, name, *by["V_*"]))
     new = {str(name): drop_ratio_from_name(str(name)) for name in sizes}
     result = result.rename({old: name for old, name in new.items() if name != old})
     for variable in result.variables.values():
@@ -254,12 +254,14 @@ def drop_ratio_from_name(name: str) -> str:
     return name
 
 
-def slip_rate_from_log(dataset: xr.Dataset, name: str, scale: Scale) -> dict[str, xr.Variable]:
+def slip_rate_from_log(
+    dataset: xr.Dataset, name: str, factor: float | xr.Variable, units: str
+) -> dict[str, xr.Variable]:
     """The slip rate of a logarithm of one, and of its error, if there is one."""
     log, plain = dataset[name].variable, name.replace("log10_", "")
     words = str(log.attrs.get("long_name", plain))
-    about = {"long_name": re.sub(_LOG_DESCRIPTION_PATTERN, "", words), "units": scale.units}
-    rates = xr.Variable(log.dims, 10.0**log.values) * scale.factor
+    about = {"long_name": re.sub(_LOG_DESCRIPTION_PATTERN, "", words), "units": units}
+    rates = xr.Variable(log.dims, 10.0**log.values) * factor
     found = {plain: xr.Variable(rates.dims, rates.values, about)}
     if f"{name}_error" in dataset:
         error = dataset[f"{name}_error"].variable

@@ -91,8 +91,7 @@ def _convert_rows(
     for row, new in zip(rows, found, strict=True):
         for given, value in row.items():
             example = rows[0][given] if by_column else value
-            name = axis_field_name(given, example)
-            si = axis_si_units(name, example)
+            name, si = axis_name_and_units(given, example)
             new[name if si else given] = value
             if si:
                 quantities.setdefault(name, []).append((new, value))
@@ -113,7 +112,7 @@ def convert_values(name: str, values: Sequence[Any], units: str) -> list[float]:
     kind = (
         "1/m"
         if name == "stiffness" and is_friction_stiffness(f"1 {units}")
-        else axis_si_units(name, "1")
+        else _axis_si_units(name, "1")
     )
     for value in values:
         number, written = (
@@ -141,7 +140,15 @@ def _is_allowed_number(name: str, number: Any) -> bool:
     return name not in RIG_NAME or (isinstance(number, float) and number > 0.0)
 
 
-def axis_field_name(name: str, value: Any) -> str:
+def axis_name_and_units(name: str, value: Any) -> tuple[str, str | None]:
+    """The name and the SI units that a value has on an axis; the units are None where it is none in
+    units.
+    """
+    name = _axis_field_name(name, value)
+    return name, _axis_si_units(name, value)
+
+
+def _axis_field_name(name: str, value: Any) -> str:
     """The name on an axis of what bears another in a rig or, as a ratio, in a scene."""
     quantity = not isinstance(value, str) or split_number_and_units(value)[0] is not None
     if name in AXIS_NAME and quantity:
@@ -152,7 +159,7 @@ def axis_field_name(name: str, value: Any) -> str:
     return short if RATIO_FIELD.get(short) == name and field_si_units(name, value) else name
 
 
-def axis_si_units(name: str, value: Any) -> str | None:
+def _axis_si_units(name: str, value: Any) -> str | None:
     """SI units of a value on an axis; None where it is none in units."""
     if value is None or isinstance(value, bool):
         return None
@@ -171,7 +178,7 @@ def factor_to_si(name: str, units: str) -> Fraction:
     """Factor to SI units; of a stiffness that is friction over displacement to 1/m."""
     if name == "stiffness" and is_friction_stiffness(f"1 {units}"):
         return unit_factor(name, units, "1/m")
-    si = axis_si_units(name, f"1 {units}")
+    si = _axis_si_units(name, f"1 {units}")
     if si is None:
         raise InvalidValue(name, units, "is no quantity of a rig, nor in units of one")
     return unit_factor(name, units, si)

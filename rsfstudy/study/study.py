@@ -15,14 +15,7 @@ from typing import Any
 import numpy as np
 
 from rsfstudy._deprecation import renamed_keywords, renamed_members
-from rsfstudy.axes import (
-    Axis,
-    Row,
-    check_storable_text,
-    replace_values,
-    select_points,
-    to_plain_values,
-)
+from rsfstudy.axes import Axis, Row, check_storable_text
 from rsfstudy.error_boundary import error_boundary, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import is_list_like
@@ -30,11 +23,10 @@ from rsfstudy.measures import Measure
 from rsfstudy.motion import Accuracy, user_stepper
 from rsfstudy.quantities import Quantity
 from rsfstudy.rig import (
-    EQUIVALENT_FIELD,
+    RATIO_FIELD,
     Rig,
     RigScenes,
-    axis_field_name,
-    axis_si_units,
+    axis_name_and_units,
     convert_axis,
     convert_values,
     with_rig_value,
@@ -43,6 +35,7 @@ from rsfstudy.rig import make_axis as axis_in_units
 from rsfstudy.slider import (
     SELECTOR_FIELDS,
     SLOT_NAMES,
+    STIFFNESS_FIELDS,
     Scene,
     UserPart,
     find_inapplicable_fields,
@@ -56,12 +49,19 @@ from rsfstudy.study.cell import Cell, CellChanges
 from rsfstudy.study.claims import Claim
 from rsfstudy.study.figure_declarations import check_figure, figure_name
 from rsfstudy.study.html import study_html
+from rsfstudy.study.overrides import replace_values, select_points, to_plain_values
 from rsfstudy.study.reductions.application import Reduction
 
 #: Most bytes of the name of a study: a file name has at most 255, and endings follow.
 _MAX_NAME_BYTES = 200
 #: Fields that decide what fills a slot.
 _SELECTING_FIELDS = frozenset({*SLOT_NAMES, *SELECTOR_FIELDS})
+#: What states the same as another field does: of slip rates and of the spring.
+_EQUIVALENT_FIELD = {
+    **RATIO_FIELD,
+    **{ratio: name for name, ratio in RATIO_FIELD.items()},
+    **dict(zip(STIFFNESS_FIELDS, STIFFNESS_FIELDS[::-1], strict=True)),
+}
 
 
 @renamed_keywords
@@ -346,11 +346,11 @@ class Study:
     def _apply_override(self, name: str, value: Any) -> Study:
         values = list(value) if is_list_like(value) else [value]
         of_rig = self.rig is not None and bool(values)
-        name = axis_field_name(name, values[0]) if of_rig else name
+        name, units = axis_name_and_units(name, values[0]) if of_rig else (name, None)
         for index, axis in enumerate(self.axes):
             if changed := self._override_axis(axis, name, values):
                 return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
-        of_rig = of_rig and axis_si_units(name, values[0]) is not None
+        of_rig = units is not None
         known = dict.fromkeys((*self.dimensions, *self.scene_fields, *self.measure.plain_fields))
         if (
             name not in known
@@ -384,11 +384,11 @@ class Study:
             return replace_values(
                 axis, name, convert_values(name, values, units) if units else values
             )
-        if EQUIVALENT_FIELD.get(name) not in axis.fields:
+        if _EQUIVALENT_FIELD.get(name) not in axis.fields:
             return None
         if axis.labels is not None:
-            rule = f"states what {EQUIVALENT_FIELD[name]} does along {axis.dimension}"
-            raise InvalidValue(name, values, rule, remedy=f"Give {EQUIVALENT_FIELD[name]}.")
+            rule = f"states what {_EQUIVALENT_FIELD[name]} does along {axis.dimension}"
+            raise InvalidValue(name, values, rule, remedy=f"Give {_EQUIVALENT_FIELD[name]}.")
         return self._make_axis(name, values)
 
     def _make_axis(self, name: str, values: Sequence[Any], units: str = "") -> Axis:

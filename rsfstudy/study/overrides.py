@@ -7,9 +7,9 @@ from collections.abc import Hashable, Sequence
 from functools import partial
 from typing import Any
 
-from rsfstudy.axes.axis import Axis, Row, point_key, to_plain_value
+from rsfstudy.axes import Axis, Row, to_plain_value
 from rsfstudy.errors import InvalidValue
-from rsfstudy.formatting import format_value
+from rsfstudy.formatting import format_value, is_list_like
 
 
 def select_points(axis: Axis, points: Sequence[Any]) -> Axis:
@@ -61,8 +61,8 @@ def replace_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
         if not isinstance(value, Hashable):
             rule = "must be a number, a string, True, False or a part"
             raise InvalidValue(name, value, rule, remedy=f"Write {name}=[first, second].")
-    existing = {point_key(row): label for label, row in zip(axis.labels, axis.rows, strict=True)}
-    others = {point_key({**row, name: None}) for row in axis.rows if name in row}
+    existing = {_point_key(row): label for label, row in zip(axis.labels, axis.rows, strict=True)}
+    others = {_point_key({**row, name: None}) for row in axis.rows if name in row}
     points: dict[str, Row] = {}
     for label, row in zip(axis.labels, axis.rows, strict=True):
         if name not in row:
@@ -72,13 +72,18 @@ def replace_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
             changed = {**row, name: value}
             if changed in points.values():
                 continue
-            new = existing.get(point_key(changed), "")
+            new = existing.get(_point_key(changed), "")
             if not new:
                 new = _new_label(label, name, row[name], value, is_unique=len(others) == 1)
                 while new in points or new in axis.labels:
                     new = f"{label}, {new}"
             points[new] = changed
     return Axis(axis.dimension, points, axis.units)
+
+
+def _point_key(row: Row) -> frozenset[tuple[str, Any]]:
+    """Convert the fields and values of a row to a hashable key."""
+    return frozenset(row.items())
 
 
 def _new_label(label: str, name: str, old: Any, new: Any, *, is_unique: bool) -> str:
@@ -101,3 +106,12 @@ def _format_exact(value: Any) -> str:
     short_text = format_value(value)
     is_rounded = isinstance(value, float) and float(short_text) != value
     return repr(value) if is_rounded else short_text
+
+
+def to_plain_values(field: str, value: Any) -> Any:
+    """A value of a field, or a list of them, as `to_plain_value` gives it."""
+    return (
+        [to_plain_value(field, each) for each in value]
+        if is_list_like(value)
+        else to_plain_value(field, value)
+    )
