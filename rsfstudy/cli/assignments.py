@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
 from rsfstudy import Rig, Study, history, read_protocol, read_table
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig import REQUIRED_QUANTITIES, RIG_QUANTITIES, expand_range, parse_number
+from rsfstudy.rig import RIG_QUANTITIES, expand_range, parse_number
 from rsfstudy.slider import UserLoading
 
 _FLAG_VALUES = {"true": True, "yes": True, "false": False, "no": False}
@@ -66,10 +67,10 @@ def parse_rig(texts: Mapping[str, str]) -> Rig:
     stated = {
         name: parse_number_or_text(text) for name, text in texts.items() if name in RIG_QUANTITIES
     }
-    for name in REQUIRED_QUANTITIES:
-        if name not in stated:
+    for field in fields(Rig):
+        if field.default is MISSING and field.name not in stated:
             remedy = "A rig is stated by these three at least."
-            option = f"--{name.replace('_', '-')}"
+            option = f"--{field.name.replace('_', '-')}"
             raise InvalidValue(option, None, "must be stated", remedy=remedy)
     return Rig(**stated)
 

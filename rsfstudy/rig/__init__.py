@@ -14,7 +14,6 @@ from rsfstudy._lazy import lazy_exports
 if TYPE_CHECKING:
     from rsfstudy.rig.quantities import (
         RATIO_FIELD,
-        REQUIRED_QUANTITIES,
         RIG_QUANTITIES,
         in_display_units,
         is_friction_stiffness,
@@ -42,7 +41,6 @@ else:
         {
             "rig.quantities": (
                 "RATIO_FIELD",
-                "REQUIRED_QUANTITIES",
                 "RIG_QUANTITIES",
                 "in_display_units",
                 "is_friction_stiffness",
@@ -72,7 +70,6 @@ __all__ = [
     "DIMENSIONLESS_PREFIX",
     "DISPLAY_BASE_UNITS",
     "RATIO_FIELD",
-    "REQUIRED_QUANTITIES",
     "RIG_QUANTITIES",
     "Rig",
     "RigScenes",
