@@ -1,12 +1,14 @@
 """Figures of laws, of dilatant cycles and of motions: comparable, and printable as all others."""
 
 import numpy as np
+import pytest
 import test_figures as checks
 import xarray as xr
 from study_runs import named_results, run
 
 import rsfstudy
 from rsfstudy import Axis, Panel, Scene, Study, plots
+from rsfstudy.errors import DataError
 from rsfstudy.plots import _text, lines
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.rig.scales import Scale, apply_scales
@@ -61,6 +63,19 @@ def test_names_along_y_are_written_from_the_top_down():
     assert [text.get_text() for text in axes.get_yticklabels()] == ["strong", "weak"]
     assert axes.yaxis_inverted()
     assert [line.get_linestyle() for line in axes.lines] == ["None", "None"]
+
+
+def test_a_curve_along_two_axes_is_refused():
+    panel = Panel(x="weakening", y="critical_stiffness")
+    with pytest.raises(DataError, match=r"shape \(2,\) and shape \(2, 2\).*facet= or isel="):
+        plots.draw_figure(stiffnesses(), plots.Declared([panel]))
+
+
+def test_slip_rates_beyond_the_range_of_floats_are_refused():
+    motion = rsfstudy.simulate(Scene(hold_time=1.0), duration=1.0, rtol=1e-3)
+    motion["log10_slip_rate"] = motion["log10_slip_rate"] + 310.0
+    with pytest.raises(DataError, match="log10_slip_rate = 310 must be at most 308"):
+        rsfstudy.plot_motion(motion)
 
 
 def test_nothing_is_drawn_where_nothing_came_out():

@@ -5,6 +5,7 @@ phase plane.
 from __future__ import annotations
 
 import math
+import sys
 from functools import partial
 from typing import Any
 
@@ -126,6 +127,10 @@ def _check_motion(motion: xr.Dataset, against: str | None) -> None:
         if motion[name].dims != motion["slip"].dims or motion[name].dtype.kind not in "fiu":
             text = f"must be numbers along {', '.join(map(str, motion['slip'].dims))}, as slip is"
             raise DataError(f"{name} {text}: the dataset is no motion as simulate returns it")
+    largest = float(np.abs(motion["log10_slip_rate"]).max())
+    if largest > sys.float_info.max_10_exp:
+        rule = f"must be at most {sys.float_info.max_10_exp} in absolute value"
+        raise DataError(f"log10_slip_rate = {largest:g} {rule}: the file is damaged. Run it again.")
 
 
 def _normal_stress_name(motion: xr.Dataset) -> str:

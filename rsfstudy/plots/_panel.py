@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from rsfstudy.errors import DataError
 from rsfstudy.plots._axes import (
     add_colour_bar,
     describe_point,
@@ -192,8 +193,20 @@ def _curve_name(panel: Panel, row: xr.Dataset, by: Sequence[str]) -> str | None:
 
 
 def _draw_curve(panel: Panel, row: xr.Dataset, axes: Axes, style: dict[str, Any]) -> np.ndarray:
-    """Draw one curve, and give its values."""
+    """Draw one curve, and return its y values.
+
+    Raises
+    ------
+    DataError
+        If x and y are not one-dimensional arrays of the same size.
+    """
     values = _evaluate(panel.x, row), _evaluate(panel.y, row)
+    if values[0].shape != values[1].shape or values[0].ndim != 1:
+        shapes = " and ".join(f"shape {found.shape}" for found in values)
+        remedy = "Assign each other axis to hue=, facet= or isel= of the panel."
+        raise DataError(
+            f"x and y of a curve have {shapes}, but must be equally long lists. {remedy}"
+        )
     named = [found.dtype.kind not in "fiu" for found in values]
     x, y = (
         np.arange(found.size) if by_name else np.asarray(found, dtype=float)
