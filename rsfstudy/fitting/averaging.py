@@ -16,8 +16,8 @@ class AveragingCorrelation:
     Parameters
     ----------
     time : ndarray, shape (rows,)
-        Times in s. If the time decreases from one row to the next, the following rows belong to
-        another window, and are not correlated with the previous rows.
+        Times in s. If the time does not increase from one row to the next, the following rows
+        belong to another window, and are not correlated with the previous rows.
     averaging_time : float
         Averaging time in s.
 
@@ -35,7 +35,6 @@ class AveragingCorrelation:
     """
 
     def __init__(self, time: np.ndarray, averaging_time: float) -> None:
-        """Compute the Cholesky factor of the correlation matrix."""
         clock = np.concatenate([[0], np.cumsum(np.diff(time) <= 0.0)])
         band = [np.full(len(time), 1.0 + _EXTRA_VARIANCE)]
         for lag in range(1, min(_MAX_LAG, len(time) - 1)):
@@ -45,7 +44,6 @@ class AveragingCorrelation:
                 break
             band.append(np.append(overlap, np.zeros(lag)))
         self.cholesky_factor = cholesky_banded(np.array(band), lower=True)
-        #: Number of correlated rows per independent row.
         self.rows_per_independent_row = float(1.0 + 2.0 * np.sum(band[1:]) / len(time))
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:

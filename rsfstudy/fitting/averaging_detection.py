@@ -60,7 +60,7 @@ def find_filter(found: FitSolution, time: np.ndarray, noise: str) -> tuple[str, 
     free = len(found.coordinate_stderr)
 
     def describe(kind: str, size: float) -> tuple[float, float]:
-        """Return the AIC and the largest parameter change in standard errors."""
+        """Return the AIC and the largest change in standard errors."""
         parts = [_filtered(kind, size, time[rows], columns[rows]) for rows in windows]
         filtered = np.concatenate(parts)
         left = found.residuals + columns[:, -1] - filtered[:, -1]

@@ -169,7 +169,7 @@ class JointModel:
 
     @property
     def averaging_time(self) -> float:
-        """Averaging time of friction in s, or 0 if friction was not averaged."""
+        """Averaging time of friction in s, or 0 if there is no averaging."""
         passed = self.models[0].filter
         return passed.size if passed is not None and passed.kind not in LOW_PASS_ORDERS else 0.0
 
@@ -180,7 +180,7 @@ class JointModel:
 
     @cached_property
     def displacement(self) -> np.ndarray:
-        """Displacements of all rows in um, relative to the step of each window."""
+        """Displacements of all rows in um, relative to the step."""
         return np.concatenate([part.displacement for part in self.models])
 
     def is_linear(self, name: str) -> bool:

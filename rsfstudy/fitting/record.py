@@ -260,15 +260,7 @@ class Record:
 
 
 def _parse_step(fields: Sequence[float]) -> LoadingStep:
-    """Validate the numbers of a step, and create a ``LoadingStep``.
-            return fields
-        rule = "is no step
-
-    --
-    --
-            return fields
-        rule = "is no step
-    """
+    """Validate the numbers of a step, and create a ``LoadingStep``."""
     if isinstance(fields, LoadingStep):  # Steps of another record are valid.
         return fields
     rule = "is no step: begins, ends, velocity before and after, and, if it changes, "

@@ -179,7 +179,6 @@ class RunningSums:
     """
 
     def __init__(self, t: np.ndarray, x: np.ndarray, weights: np.ndarray) -> None:
-        """Compute the cumulative sums."""
         columns = weights * np.array([np.ones(len(t)), t, x, t * t, t * x, x * x])
         self.sums = np.concatenate([np.zeros((1, 6)), np.cumsum(columns.T, axis=0)])
 
