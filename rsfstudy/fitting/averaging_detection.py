@@ -2,8 +2,8 @@
 
 A filter smooths the friction peak after a velocity step, and correlates the noise. A running mean
 over m rows also causes notches in the noise spectrum. The function ``find_filter`` compares
-linearised models with and without these effects. If a filter improves the AIC and changes a
-parameter noticeably, friction was probably filtered.
+linearised models with and without a filter. If a filter improves the AIC and changes a parameter
+noticeably, friction was probably filtered.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _MAX_ROWS, _PASSES = 20_000, 2
 
 
 def find_filter(found: FitSolution, time: np.ndarray, noise: str) -> tuple[str, ...]:
-    """Test if friction was filtered before it was recorded.
+    """Test whether friction was filtered before it was recorded.
 
     Running means are tested for all records. Low-pass filters are tested only if the noise is
     correlated, because a low-pass filter correlates white noise.
@@ -60,7 +60,10 @@ def find_filter(found: FitSolution, time: np.ndarray, noise: str) -> tuple[str, 
     free = len(found.coordinate_stderr)
 
     def describe(kind: str, size: float) -> tuple[float, float]:
-        """Return the AIC and the largest change in standard errors."""
+        """Return the AIC and the largest change of a parameter.
+
+        The change is relative to the standard error of the parameter.
+        """
         parts = [_filtered(kind, size, time[rows], columns[rows]) for rows in windows]
         filtered = np.concatenate(parts)
         left = found.residuals + columns[:, -1] - filtered[:, -1]

@@ -2,11 +2,12 @@
 
 The function ``detect_drops`` compares the mean stress in a window before each sample with the mean
 stress in a window after the sample. The windows are 4, 8, 16 and more sampling intervals long. The
-difference of the means is divided by its standard deviation due to noise. Peaks of this ratio that
-exceed a threshold are drops (see ``scipy.signal.find_peaks``).
+scaled difference is the difference between the two means, divided by its standard deviation. Peaks
+of the scaled difference that exceed a threshold are drops (see ``scipy.signal.find_peaks``).
 
-The standard deviation is estimated from the most frequent differences [1]_, which occur during
-loading. The estimate is valid if drops occupy at most a third of the record.
+The standard deviation is estimated from the most frequent differences [1]_, because the most
+frequent differences occur during loading. The estimate is valid if drops occupy at most a third of
+the record.
 
 References
 ----------
@@ -141,9 +142,9 @@ def find_resolution(values: np.ndarray) -> float:
 def estimate_mode(values: np.ndarray) -> tuple[float, float]:
     """Estimate the mean and standard deviation of the most frequent values.
 
-    The function finds the shortest interval that contains 40 % of the values. This interval is then
-    compared with the central 40 % of a Gaussian distribution. Other values of a mixture have little
-    effect on the estimate.
+    The function finds the shortest interval that contains 40 % of the values. The mean and the
+    standard deviation follow from a Gaussian distribution with its central 40 % in this interval.
+    Values outside the interval have little effect on the estimate.
 
     Parameters
     ----------
@@ -152,8 +153,10 @@ def estimate_mode(values: np.ndarray) -> tuple[float, float]:
 
     Returns
     -------
-    mean, standard_deviation : float
-        Mean and standard deviation of the Gaussian distribution.
+    mean : float
+        Mean of the Gaussian distribution.
+    standard_deviation : float
+        Standard deviation of the Gaussian distribution.
     """
     ordered = np.sort(values)
     count = max(int(_MODE_FRACTION * len(ordered)), 1)
@@ -224,8 +227,8 @@ def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
 def _resample_evenly(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Resample a record if its sampling intervals vary strongly.
 
-    Half of the duration of the record has sampling intervals up to the new sampling interval.
-    Samples within a new interval are averaged. Values for empty intervals are interpolated.
+    The new sampling interval is the median sampling interval, weighted by duration. Samples within
+    a new interval are averaged. Values for empty intervals are interpolated.
     """
     gaps = np.diff(time)
     if gaps.max() < _MAX_INTERVAL_RATIO * gaps.min():
@@ -280,7 +283,9 @@ class _WindowScale:
         self.correlation_factor = min(max(ratio, 1.0), math.sqrt(window))
 
     def compute_score(self, indices: np.ndarray) -> np.ndarray:
-        """Compute the scaled difference over the square root of the window.
+        """Compute the score of samples.
+
+        The score is the scaled difference divided by the square root of the window length.
 
         Parameters
         ----------

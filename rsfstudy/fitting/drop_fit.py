@@ -2,11 +2,12 @@
 
 The function ``fit_drop`` models the stress around a drop by three connected lines: before, during
 and after the drop. The lines meet at the times at which the drop begins and ends. For each pair of
-times, the lines are fitted by least squares. The pair with the smallest sum of squares determines
-the drop. The size of the drop is the difference between the highest and the lowest stress.
+times, the lines are fitted by least squares. The pair of times with the smallest sum of squares
+determines the drop. The size of the drop is the difference between the highest and the lowest
+stress.
 
-The confidence intervals of the times contain all pairs with a sum of squares that exceeds the
-minimum by less than a fixed multiple of the noise variance [1]_.
+The confidence intervals of the times contain all pairs of times with a sum of squares close to the
+minimum. The largest difference is a fixed multiple of the noise variance [1]_.
 
 References
 ----------
@@ -206,7 +207,7 @@ def _search_times(
     """Search for the times at which the drop begins and ends.
 
     The search evaluates a grid of pairs of times. The grid is then refined several times around the
-    best pair.
+    best pair of times.
     """
     reach = max(_SEARCH_WINDOWS * window, ends - begins)
     halves = np.sort(np.concatenate([t, 0.5 * (t[1:] + t[:-1])]))
@@ -235,7 +236,7 @@ def _select_evenly(times: np.ndarray) -> list[float]:
 def _select_nearby(times: np.ndarray, centre: float, extent: float, level: int) -> np.ndarray:
     """Select the times near the best time for the next level of the search.
 
-    The last levels contain the immediate neighbours of the best time.
+    At the last levels of the search, the nearest neighbours of the best time are selected.
     """
     reach = extent / _GRID_SIZE * (4.0 / _GRID_SIZE) ** level
     place = int(np.searchsorted(times, centre))
@@ -248,10 +249,10 @@ def _fit_lines(t: np.ndarray, y: np.ndarray, pairs: np.ndarray) -> _LineFits:
     """Fit three connected lines for each pair of times.
 
     The coefficients are the stresses at both times, and the slopes before and after the drop. A
-    pair is rejected if it describes only a part of a longer drop, which is indicated by one of two
-    conditions. First, stress outside the drop decreases at more than 0.3 times the rate during the
-    drop. Second, stress on one side decreases by half of the drop more than with the slope of the
-    other side.
+    pair of times is rejected if it covers only a part of a longer drop. This is the case if the
+    rate of decrease outside the drop exceeds 0.3 times the rate during the drop. It is also the
+    case if the decrease on one side is larger than expected from the slope on the other side, and
+    the difference exceeds half of the drop.
     """
     t0, t1 = pairs[:, :1], pairs[:, 1:]
     share = np.clip((t - t0) / (t1 - t0), 0.0, 1.0)

@@ -1,6 +1,6 @@
 """Properties of stress drops in a record: times, stresses and slip.
 
-The function ``read_drops`` finds the drops, and computes their properties with errors.
+The function ``read_drops`` finds the drops, and computes the properties of each drop with errors.
 """
 
 from __future__ import annotations
@@ -192,7 +192,7 @@ def drop_properties(
     location: DropIndices,
     limits: tuple[float, float],
 ) -> EventNumbers:
-    """Compute the properties of a drop with errors.
+    """Compute the properties of a drop and their errors.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
-"""Filters of recorded friction, which a fit also applies to the model.
+"""Filters that were applied to friction before it was recorded.
 
-A filter smooths the friction peak after a velocity step. If the model does not include the filter,
-the fitted direct effect is too small, and the fitted slip distance is too long.
+A fit applies the same filter to the friction of the model. A filter smooths the friction peak after
+a velocity step. If the model does not include the filter, the fitted direct effect is too small,
+and the fitted slip distance is too long.
 """
 
 from __future__ import annotations
@@ -138,10 +139,10 @@ class Filter:
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
 
     def _offsets(self, time: np.ndarray) -> np.ndarray:
-        """Return the times of the points of a running mean, relative to a row.
+        """Return the offsets of the points in a running mean.
 
-        If the averaging time is at least four sampling intervals, the points are one sampling
-        interval apart.
+        Each offset is a time in s relative to the time of a row. If the averaging time is at least
+        four sampling intervals, the points are one sampling interval apart.
         """
         count = max(round(self.size / float(np.median(np.diff(time)))), 1)
         count *= max(math.ceil(_MIN_MEAN_POINTS / count), 1) if count < _MIN_MEAN_POINTS // 2 else 1

@@ -260,7 +260,7 @@ class Fit(Measure):
 
     @property
     def outputs(self) -> Sequence[Output]:
-        """Outputs of the parameters, of the fit and of the rows."""
+        """Outputs of the fit, including the parameters and their errors."""
         return fit_outputs(self.parameters, self.posterior > 0, len(self._selected_steps))
 
     @property
@@ -344,7 +344,7 @@ class Fit(Measure):
 
     @cached_property
     def _first_rows(self) -> dict[Record, int]:
-        """First row in the outputs for each record that is fitted."""
+        """Index of the first row in the outputs for each fitted record."""
         records = [*dict.fromkeys(window.record for window in self._windows)]
         return {record: sum(map(len, records[:n])) for n, record in enumerate(records)}
 

@@ -1,4 +1,4 @@
-r"""Search for the parameters of a record by generalised least squares.
+r"""Estimation of friction parameters by generalised least squares.
 
 The class ``FitProblem`` minimises :math:`|W (y - f(p))|^2` with respect to the parameters
 :math:`p`, where :math:`y` is the recorded friction and :math:`f` is the model [1]_. The matrix
@@ -203,9 +203,10 @@ class FitProblem:
         return np.asarray(self.model.friction - curve - self.model.trend(values))
 
     def _jacobian(self, x: np.ndarray, differences: DifferenceScheme) -> np.ndarray:
-        """Compute the derivatives of the model by the coordinates.
+        """Compute the Jacobian of the model.
 
-        A derivative is set to 0 if one of the motions of its finite difference fails.
+        The Jacobian contains the derivatives with respect to the coordinates of the free
+        parameters. A derivative is set to 0 if one of the motions of its finite difference fails.
         """
         found = self.model.jacobian(self.values(x), self.free, differences)
         return np.where(np.isfinite(found).all(axis=0), found, 0.0)
@@ -332,11 +333,11 @@ class FitProblem:
     def _build_solution(self, x: np.ndarray, noise: NoiseModel) -> FitSolution:
         """Compute the final parameters, their errors and the noise.
 
-        Gauss-Newton steps :math:`(J^T R^{-1} J)^{-1} J^T R^{-1} (y - f)` with accurate derivatives
-        refine the parameters first. The numerical error of a parameter is the last Gauss-Newton
-        step plus three times the change of the parameter if the tolerances are reduced by a factor
-        of ten. The degrees of freedom are the degrees of freedom of the noise, multiplied by (n -
-        p)/n for p parameters and n rows.
+        First, Gauss-Newton steps :math:`(J^T R^{-1} J)^{-1} J^T R^{-1} (y - f)` with accurate
+        derivatives refine the parameters. The numerical error of a parameter is the last
+        Gauss-Newton step plus three times the change due to a tenfold reduction of the integration
+        tolerances. The degrees of freedom are the degrees of freedom of the noise, multiplied by (n
+        - p)/n for p parameters and n rows.
         """
         change = math.inf
         for number in range(_NEWTON_STEP_COUNTS[2]):
@@ -403,8 +404,8 @@ class FitProblem:
     def _aic_without_steps(self, jacobian: np.ndarray, noise: NoiseModel) -> float:
         """Compute the AIC of a model without a response to the steps.
 
-        The model contains only trends and has a = b = 0. The noise model is the noise of the fit,
-        because noise fitted to these residuals would describe the response as predictable noise.
+        The model contains only trends and has a = b = 0. The noise model of the fit is not changed,
+        because a new noise model would describe the response to the steps as predictable noise.
         """
         linear = [self.model.is_linear(name) for name in self.free]
         columns = np.column_stack([jacobian[:, linear], self.model.friction])
@@ -452,8 +453,10 @@ class FitProblem:
 
         Returns
         -------
-        low, high : float
-            Bounds of the parameter, or NaN for a missing bound.
+        low : float
+            Lower bound of the parameter, or NaN if there is no lower bound.
+        high : float
+            Upper bound of the parameter, or NaN if there is no upper bound.
         """
         place = self.free.index(name)
         ends = self.lower_bounds[place], self.upper_bounds[place]

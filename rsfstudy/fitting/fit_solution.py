@@ -91,7 +91,7 @@ class FitSolution:
 
     @property
     def coordinate_derivatives(self) -> np.ndarray:
-        """Derivatives of the free parameters by their coordinates."""
+        """Derivatives of parameters with respect to their coordinates."""
         return np.array([coordinate_derivative(name, self.values[name]) for name in self.free])
 
     @property

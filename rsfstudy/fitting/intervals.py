@@ -73,8 +73,10 @@ def confidence_interval(
 
     Returns
     -------
-    low, high : float
-        Ends of the interval in the unit of the parameter.
+    low : float
+        Lower end of the interval, in the unit of the parameter.
+    high : float
+        Upper end of the interval, in the unit of the parameter.
     """
     profile, far = (
         LikelihoodProfile(problem, solution, name),
@@ -91,7 +93,7 @@ def confidence_interval(
 class LikelihoodProfile:
     """Profile likelihood of a parameter.
 
-    The noise model is the noise of the fit.
+    The noise model of the fit is not changed.
 
     Parameters
     ----------
@@ -214,7 +216,7 @@ class LikelihoodProfile:
     def _linearised_excess(self, x: np.ndarray) -> float:
         """Compute the excess sum of squares with a linearised model.
 
-        The other parameters minimise the sum of squares to first order.
+        The other parameters minimise the sum of squares of the linearised model.
         """
         left = self._whitened_residuals(x)
         if not np.isfinite(left).all():

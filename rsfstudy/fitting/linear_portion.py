@@ -1,4 +1,4 @@
-"""Selection of the part of a record before a step with linear friction."""
+"""Selection of the rows before a step in which friction is linear."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rsfstudy.fitting.velocity_steps import RunningSums
 #: and fewest rows of a part that is tested.
 _MAX_MEANS, _MIN_SIDE_MEANS, _MIN_ROWS = 120, 6, 20
 #: Smallest decrease of the sum of squares by a second line, divided by the residual variance and by
-#: ln n for n block averages.
+#: ln n for n block averages. The residual variance is increased if the residuals are correlated.
 _MIN_BREAK_GAIN = 15.0
 #: Smallest deviation of friction from the line of the later part, as an absolute value and in
 #: standard deviations of the residuals. For comparison, a tenfold velocity step changes friction by
@@ -29,13 +29,13 @@ _MAX_CORRELATION = 0.98
 
 @lru_cache(maxsize=256)
 def find_linear_start(record: Record, start: float, end: float) -> float:
-    """Find the time before a step from which friction varies linearly.
+    """Find the start of the linear part of friction before a step.
 
     The earlier part of the rows is discarded if two conditions are met. First, two separate lines
-    must describe friction far better than a single line. This test allows for the correlation of
-    the residuals. Second, friction in the earlier part must differ noticeably from the line through
-    the later part. The test is repeated with the remaining rows. Outliers are replaced by
-    interpolated values first.
+    must describe friction far better than a single line. The comparison accounts for the
+    correlation of the residuals. Second, friction in the earlier part must differ noticeably from
+    the line through the later part. The test is repeated with the remaining rows. Before the test,
+    outliers are replaced by interpolated values.
 
     Parameters
     ----------

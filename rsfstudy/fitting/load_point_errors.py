@@ -31,8 +31,9 @@ _MIN_NOISE_PER_QUANTUM, _PHASE_DRAW_COUNT = 0.4, 200
 def shift_steps(record: Record, steps: Sequence[LoadingStep]) -> list[list[LoadingStep]]:
     """Return copies of the steps that are shifted by their errors.
 
-    Each copy is shifted by 1 % of one error. The errors are statistically independent, and their
-    combined covariance matrix equals the covariance matrix of the step times and velocities.
+    In each copy, the times and velocities are shifted by 1 % of one error. The errors are
+    statistically independent, and their combined covariance matrix equals the covariance matrix of
+    the step times and velocities.
 
     Parameters
     ----------
@@ -142,7 +143,7 @@ def _step_errors(
 
 
 def _noise_covariance_root(t: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Compute a root of the covariance matrix for noisy displacement.
+    """Compute a root of the covariance matrix for random noise.
 
     Parameters
     ----------
@@ -176,9 +177,9 @@ def _rounding_covariance_root(
 ) -> np.ndarray:
     """Compute a root of the covariance matrix for rounded displacement.
 
-    At a constant velocity, the rounding errors repeat, and are not random. Their phase, however, is
-    arbitrary in each straight segment. The function therefore fits lines to rounding errors with
-    random phases.
+    At a constant velocity, the rounding errors repeat, and are not random. However, the phase of
+    the rounding errors is arbitrary in each straight segment. The function therefore fits lines to
+    rounding errors with random phases.
 
     Returns
     -------

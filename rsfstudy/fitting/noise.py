@@ -207,7 +207,7 @@ class NoiseModel:
 
     @property
     def _power_at_zero(self) -> list[float]:
-        """Power at zero frequency of each process over its variance."""
+        """Power at zero frequency of each process, in units of variance."""
         told = ((c[-1], v[-1]) for c, v in self.predictors)
         return [left / (1.0 - math.fsum(last)) ** 2 for last, left in told]
 
@@ -404,8 +404,8 @@ def _estimate_by_moments(
 class _LaggedProducts:
     """Sums of products of lagged columns.
 
-    The sum of squares of whitened columns is a function of these sums for any coefficients. The
-    cost of the search is therefore independent of the number of rows.
+    The sums determine the sum of squares of whitened columns for any autoregressive coefficients.
+    The cost of the search is therefore independent of the number of rows.
 
     Parameters
     ----------

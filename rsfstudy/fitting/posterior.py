@@ -60,8 +60,8 @@ def sample_coordinates(
 ) -> tuple[np.ndarray, float]:
     """Sample the posterior distribution of the free parameters.
 
-    Half of the steps are stretch moves. The other half are independent proposals from a
-    multivariate t distribution with the covariance matrix of the fit. The sampler stops when the
+    Half of the steps are stretch moves. The other half of the steps are independent proposals from
+    a multivariate t distribution with the covariance matrix of the fit. The sampler stops when the
     chain is longer than 50 autocorrelation times and the number of independent samples exceeds the
     number of draws.
 

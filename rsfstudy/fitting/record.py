@@ -202,9 +202,9 @@ class Record:
     def loading_steps(self) -> tuple[LoadingStep, ...]:
         """Steps of the record, as a tuple of ``LoadingStep``.
 
-        The steps are the specified steps if the user specified steps, and the detected steps
-        otherwise. If the record has a normal stress, each step includes the normal stresses before
-        and after the step.
+        If the user specified steps, the property contains the specified steps. Otherwise, it
+        contains the detected steps. If the record has a normal stress, each step includes the
+        normal stresses before and after the step.
         """
         stress, moved = self.columns.get("normal_stress"), self.columns["displacement"]
         steps = (
@@ -255,7 +255,7 @@ class Record:
         return with_cf_encoding(xr.Dataset(data, attrs=self._attributes("Laboratory record")))
 
     def _attributes(self, title: str) -> dict[str, str]:
-        """Return the global attributes of a dataset of the record."""
+        """Return the global attributes for a dataset."""
         return {"title": f"{title}: {self.name}", "Conventions": "CF-1.11"}
 
 

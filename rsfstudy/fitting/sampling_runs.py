@@ -76,7 +76,7 @@ def find_runs(time: np.ndarray) -> tuple[SamplingRun, ...]:
 
 
 def split_runs(runs: Sequence[SamplingRun], change_rows: Sequence[int]) -> tuple[SamplingRun, ...]:
-    """Split runs at the rows at which the noise level changes.
+    """Split runs at changes of the noise level.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ _MIN_RELATIVE_SIZE = 1.0
 
 
 class FittedCandidate(NamedTuple):
-    """Fitted drop with the candidate that was fitted.
+    """Fitted drop, and the candidate from which it was fitted.
 
     Parameters
     ----------

@@ -4,8 +4,8 @@ A step is a change from one constant level of normal stress to another. The algo
 mean normal stress in a window of rows with the mean in the previous window. A step is detected if
 the two means differ by at least 2 % and by far more than the typical difference. The typical
 difference includes correlated noise and a drift of the whole record. A ramp between two levels is a
-step with a duration. A drift that continues to the beginning or the end of the record is not a
-step.
+step with a finite duration. A drift that continues to the beginning or the end of the record is not
+a step.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def find_stress_steps(time: np.ndarray, stress: np.ndarray) -> list[StressStep]:
 def _median_levels(stress: np.ndarray, rows: slice, window: int, reach: int) -> tuple[float, float]:
     """Compute the median normal stress before and after a change.
 
-    Each median is computed from ``reach`` rows next to the change.
+    The argument ``reach`` is the number of rows in each median.
     """
     first, last = rows.start + window, rows.stop - window
     before, after = stress[max(first - reach, 0) : first], stress[last : last + reach]

@@ -67,8 +67,8 @@ def describe_asymmetry(
 ) -> tuple[str, ...]:
     """Describe the parameters with very asymmetric confidence intervals.
 
-    If a record bounds a parameter on one side only, the standard errors of all correlated
-    parameters are too small. An example is the stiffness of a very stiff machine.
+    If a record constrains a parameter on one side only, such as the stiffness of a very stiff
+    machine, the standard errors of all correlated parameters are too small.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
 r"""Detection of load point velocity steps in a record.
 
 The displacement of the load point is approximated by straight segments, and a step is the boundary
-between two segments. The segments are found by binary segmentation [1]_ [2]_. Let :math:`S(i, j)`
-be the sum of squared residuals of the line through the rows i to j. The algorithm splits the rows
-at the row k that minimises :math:`S(i, k) + S(k, j)`. A split is accepted if it reduces the sum of
-squares by more than :math:`12 \ln(j - i)` times the noise variance, which is far more than expected
-by chance.
+between two segments. Binary segmentation [1]_ [2]_ finds the segments. Let :math:`S(i, j)` be the
+sum of squared residuals of the line through the rows i to j. The algorithm splits the rows at the
+row k that minimises :math:`S(i, k) + S(k, j)`. A split is accepted if it reduces the sum of squares
+by more than :math:`12 \ln(j - i)` times the noise variance, which is far more than expected by
+chance.
 
 References
 ----------
@@ -97,7 +97,7 @@ class LoadingStep(NamedTuple):
 
     @property
     def stress_ratio(self) -> float:
-        """Ratio of the normal stresses after and before the step.
+        """Ratio of normal stress after the step to normal stress before it.
 
         The ratio is 1 if the normal stress was not recorded.
         """
@@ -110,7 +110,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
 
     Neighbouring segments are separate if their velocities differ by at least 20 %, and if the split
     reduces the sum of squares by far more than expected by chance. A ramp between two velocities is
-    a single step with a duration.
+    detected as a single step with a finite duration.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ class RunningSums:
         return mt, mx, stt - st * mt, stx - st * mx, sxx - sx * mx
 
     def residual_squares(self, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
-        """Compute the sum of squared residuals of the line through a range.
+        """Compute the sum of squared residuals of a line fit.
 
         Parameters
         ----------
@@ -217,7 +217,7 @@ class RunningSums:
         return np.asarray(np.maximum(xx - tx * tx / tt, 0.0))
 
     def squares_about_mean(self, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
-        """Compute the sum of squared deviations from the mean of a range.
+        """Compute the sum of squared deviations from the mean.
 
         Parameters
         ----------
@@ -241,8 +241,10 @@ class RunningSums:
 
         Returns
         -------
-        intercept, slope : float
-            Value of x at t = 0, and slope of the line.
+        intercept : float
+            Value of x at t = 0.
+        slope : float
+            Slope of the line.
         """
         mt, mx, tt, tx, _xx = self.moments(i, j)
         return float(mx - tx / tt * mt), float(tx / tt)
@@ -406,9 +408,9 @@ def _intersection_time(
 def _refine_intersection(
     time: np.ndarray, displacement: np.ndarray, at: float, reach: int, variance: float
 ) -> float:
-    """Recompute the intersection of two lines from all rows near it.
+    """Refine the intersection of two lines with all rows of the record.
 
-    The function uses all rows of a record whose rows were averaged for the segmentation.
+    The refinement is necessary if rows were averaged for the segmentation.
     """
     middle = int(np.searchsorted(time, at))
     i, j = max(middle - 20 * reach, 0), min(middle + 20 * reach, len(time))
@@ -427,7 +429,8 @@ def _group_velocity_changes(
     """Group changes of velocity into steps.
 
     A step may contain several changes of velocity if the segments between the changes are short or
-    have few rows. Examples are a ramp between two velocities, and a velocity that overshoots.
+    have few rows. For example, a ramp between two velocities is a single step, and a velocity that
+    overshoots and returns is also a single step.
 
     Yields
     ------

@@ -123,7 +123,7 @@ class FitWindow:
 
     @property
     def properties(self) -> dict[str, float]:
-        """Velocities, ends, normal stress and noise of the window by name."""
+        """Velocities, limits, normal stress and noise of the window."""
         record, rows = self.record, self.rows
         moved, time = record.columns["displacement"][rows], record.time[rows]
         return {
@@ -173,9 +173,9 @@ class FitWindow:
         at = np.interp(step.start, record.time, moved)
 
         def reached(distance: float) -> float:
-            """Return the time when the load point reaches a distance.
+            """Return the time in s when the load point reaches a distance.
 
-            The distance in um is relative to the displacement at the step.
+            The distance in um is measured from the step.
              If the load point does not reach the distance, the function returns the current end of
              the window.
             """
@@ -221,7 +221,7 @@ class FitWindow:
         return found
 
     def _earliest_start_time(self, step: LoadingStep) -> float:
-        """Return the earliest start in s of the window of a step.
+        """Return the earliest possible start of a window in s.
 
         The window begins later if friction before the step is not linear.
         """
@@ -311,10 +311,10 @@ class FitWindow:
         return [stepwise_loading(begins, sorted([*each, *others])) for each in moved]
 
     def _check_normal_stress(self, rows: np.ndarray, pieces: np.ndarray) -> None:
-        """Raise ``MotionStopped`` if the model lacks changes of normal stress.
+        """Raise ``MotionStopped`` if the modelled normal stress is wrong.
 
-        The recorded normal stress may differ from the normal stress of the model by noise and by 2
-        %.
+        The recorded normal stress may differ from the modelled normal stress by up to 2 % in
+        addition to noise.
         """
         record = self.record
         if "normal_stress" not in record.columns:

@@ -1,4 +1,4 @@
-"""Model friction along the rows of a window, with derivatives.
+"""Model of the friction in a window of a record.
 
 A ``WindowModel`` simulates the motion of a scene under the loading of a record. The method
 ``model_friction`` returns friction at each row, and ``jacobian`` returns the derivatives of
@@ -125,7 +125,7 @@ def check_free_parameters(free: Sequence[str]) -> None:
 
 
 def parameters_of_law(scene: Scene, free: Sequence[str]) -> tuple[str, ...]:
-    """Select the free parameters that the friction law of a scene has.
+    """Select the parameters that the friction law of a scene uses.
 
     Parameters
     ----------
@@ -548,7 +548,7 @@ def parameters_to_fields(values: Values, velocity: float) -> dict[str, float]:
 
 
 def shift_parameter(values: Values, name: str, change: float) -> dict[str, float]:
-    """Return values of parameters with a shift of one parameter.
+    """Shift the value of one parameter.
 
     Parameters
     ----------
