@@ -96,8 +96,9 @@ class Fit(Measure):
         ``mu_star_1``.
     before, after : float, default: 0.0
         Load point displacements in um to fit before and after the step. If ``before`` is 0, the
-        window begins halfway between the previous step and this step. If ``after`` is 0, the window
-        ends at the next step, or at the window of the next step in a joint fit.
+        window begins halfway between the previous step and this step, or at the beginning of the
+        record if there is no previous step. If ``after`` is 0, the window ends at the next step or
+        at the end of the record. In a joint fit, the window ends at the window of the next step.
     part : float, default: 1.0
         Fraction of the displacement after the step to fit.
     noise : str, default: "ar"

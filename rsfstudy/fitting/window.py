@@ -53,10 +53,11 @@ class FitWindow:
         Number of the step, starting from 1.
     displacement_before : float, default: 0.0
         Load point displacement in um to include before the step. If 0, the window begins halfway
-        between the previous step and this step.
+        between the previous step and this step, or at the beginning of the record if there is no
+        previous step.
     displacement_after : float, default: 0.0
         Load point displacement in um to include after the step. If 0, the window ends at the next
-        step.
+        step or at the end of the record.
     fraction : float, default: 1.0
         Fraction of the displacement after the step to include.
     other_steps : collection of int, optional
@@ -66,7 +67,7 @@ class FitWindow:
     Notes
     -----
     If friction before the step is not a linear function of time, the window begins later, with the
-    linear part.
+    linear part. The window of a hold includes the sliding after the hold.
 
     Examples
     --------
