@@ -1,8 +1,9 @@
 """Fits of friction parameters to laboratory records.
 
-The package contains ``Record`` for measured data, the detection of load point steps and stress
-drops, models of the record, noise models, confidence intervals and the measure ``Fit``. It never
-reads a file: ``rsfstudy.rig`` does that, and ``rsfstudy.fit`` runs a fit.
+The class ``Record`` contains the data of an experiment, and the measure ``Fit`` fits friction
+parameters to a record. Other modules detect load point steps and stress drops, model the noise, and
+compute confidence intervals. The package never reads files. Use ``rsfstudy.read_record`` to read a
+record, and ``rsfstudy.fit`` to fit a record.
 """
 
 from __future__ import annotations

@@ -1,27 +1,37 @@
-"""Correlation of noise that a data logger has averaged."""
+"""Noise correlation due to averaging by a data logger."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import cholesky_banded, solve_banded
 
-#: Variance of unaveraged noise relative to averaged noise, which prevents an infinite weight of the
-#: notches of the spectrum; and the largest number of rows within an averaging time.
+#: Variance added to the diagonal of the correlation matrix, so that frequencies without noise do
+#: not receive an infinite weight, and largest number of rows within an averaging time.
 _EXTRA_VARIANCE, _MAX_LAG = 0.002, 200
 
 
 class AveragingCorrelation:
-    """Correlation matrix of rows with overlapping averaging times.
-
-    If white noise is averaged over a time T, the correlation of two rows is ``max(1 - |t_i -
-    t_j|/T, 0)``.
+    r"""Correlation matrix of rows with overlapping averaging times.
 
     Parameters
     ----------
     time : ndarray, shape (rows,)
-        Times in s. If the clock restarts, the rows that follow belong to another window.
+        Times in s. If the time does not increase from one row to the next, the following rows
+        belong to another window, and are not correlated with the previous rows.
     averaging_time : float
         Averaging time in s.
+
+    Attributes
+    ----------
+    cholesky_factor : ndarray
+        Lower Cholesky factor of the correlation matrix, in banded form.
+    rows_per_independent_row : float
+        Number of correlated rows that contain as much information as one independent row.
+
+    Notes
+    -----
+    If white noise is averaged over a time :math:`T`, the correlation of the rows i and j is
+    :math:`\max(1 - |t_i - t_j|/T, 0)`.
     """
 
     def __init__(self, time: np.ndarray, averaging_time: float) -> None:
@@ -34,7 +44,6 @@ class AveragingCorrelation:
                 break
             band.append(np.append(overlap, np.zeros(lag)))
         self.cholesky_factor = cholesky_banded(np.array(band), lower=True)
-        #: Number of correlated rows per independent row.
         self.rows_per_independent_row = float(1.0 + 2.0 * np.sum(band[1:]) / len(time))
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
@@ -43,10 +52,12 @@ class AveragingCorrelation:
         Parameters
         ----------
         columns : ndarray, shape (rows, columns)
+            Columns with correlated rows.
 
         Returns
         -------
         ndarray, shape (rows, columns)
+            Columns multiplied by the inverse of the Cholesky factor.
         """
         if not columns.size:
             return columns
@@ -71,12 +82,14 @@ def apply_running_mean(time: np.ndarray, columns: np.ndarray, averaging_time: fl
     time : ndarray, shape (rows,)
         Times in s, in increasing order.
     columns : ndarray, shape (rows, columns)
+        Columns to average.
     averaging_time : float
         Averaging time in s.
 
     Returns
     -------
     ndarray, shape (rows, columns)
+        Averaged columns.
     """
     at = np.concatenate([[time[0] - averaging_time], time, [time[-1] + averaging_time]])
     padded = np.concatenate([columns[:1], columns, columns[-1:]])

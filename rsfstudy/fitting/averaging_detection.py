@@ -1,9 +1,9 @@
-"""Detection of filtered friction if the user did not specify a filter.
+"""Detection of friction that was filtered before it was recorded.
 
-A filter smooths the peak of a velocity step and correlates the noise. A running mean over m rows
-also causes notches in the spectrum of the noise. The function compares linearised models with and
-without these effects. If the criterion improves and a parameter changes noticeably, friction was
-probably filtered.
+A filter smooths the friction peak after a velocity step, and correlates the noise. A running mean
+over m rows also causes notches in the noise spectrum. The function ``find_filter`` compares
+linearised models with and without a filter. If a filter improves the AIC and changes a parameter
+noticeably, friction was probably filtered.
 """
 
 from __future__ import annotations
@@ -18,23 +18,24 @@ from rsfstudy.fitting.averaging import apply_running_mean
 from rsfstudy.fitting.filters import LOW_PASS_ORDERS, Filter
 from rsfstudy.fitting.fit_solution import FitSolution, compute_aic
 
-#: Rows of the averages that are tested, improvement of the criterion that decides, and change of a
-#: parameter, in standard errors, that matters.
+#: Number of rows of the running means that are tested, smallest decrease of the AIC, and smallest
+#: change of a parameter in standard errors.
 _TESTED_WINDOW_ROWS, _MIN_AIC_GAIN, _MIN_PARAMETER_CHANGE = range(2, 21), 20.0, 0.5
-#: The same improvement for low-pass filters, which is larger because an inaccurate step time or
-#: stiffness has a similar effect.
+#: Smallest decrease of the AIC for low-pass filters. The value is larger than for running means
+#: because an inaccurate step time or stiffness has a similar effect.
 _MIN_LOW_PASS_GAIN = 60.0
 #: Corner frequencies of the low-pass filters that are tested, relative to the sampling rate.
 _TESTED_CORNER_FREQUENCIES = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.025, 0.015)
-#: Largest number of rows that are tested, and passes in which noise and parameters are found.
+#: Largest number of rows that are tested, and number of alternating estimates of the noise and the
+#: parameters.
 _MAX_ROWS, _PASSES = 20_000, 2
 
 
 def find_filter(found: FitSolution, time: np.ndarray, noise: str) -> tuple[str, ...]:
     """Test whether friction was filtered before it was recorded.
 
-    Running means are tested on all records. Low-pass filters are tested if the noise is correlated,
-    because a low-pass filter correlates white noise.
+    Running means are tested for all records. Low-pass filters are tested only if the noise is
+    correlated, because a low-pass filter correlates white noise.
 
     Parameters
     ----------
@@ -43,23 +44,26 @@ def find_filter(found: FitSolution, time: np.ndarray, noise: str) -> tuple[str, 
     time : ndarray, shape (rows,)
         Times in s.
     noise : str
-        Noise model (see ``noise.fitted``).
+        Noise model (see ``rsfstudy.fitting.noise.fit_noise``).
 
     Returns
     -------
     tuple of str
-        The reason why the standard errors are not valid, with the filter that describes the record
-        best. Empty if no filter describes the record better than unfiltered friction.
+        Reason why the standard errors are not valid, with the filter that describes the record
+        best. The tuple is empty if no filter describes the record better than unfiltered friction.
     """
     windows = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) <= 0.0) + 1)
     least = found.quantum / math.sqrt(12.0)
-    # a filter delays friction, as an error of the time of a step does
+    # The delay caused by a filter is similar to an error of the step time.
     delays = found.by_loading[:, :0] if "step_time" in found.free else found.by_loading
     columns = np.column_stack([found.jacobian, delays, found.model_friction])
     free = len(found.coordinate_stderr)
 
     def describe(kind: str, size: float) -> tuple[float, float]:
-        """Return the criterion and the largest change of a parameter, in standard errors."""
+        """Return the AIC and the largest change of a parameter.
+
+        The change is relative to the standard error of the parameter.
+        """
         parts = [_filtered(kind, size, time[rows], columns[rows]) for rows in windows]
         filtered = np.concatenate(parts)
         left = found.residuals + columns[:, -1] - filtered[:, -1]
@@ -77,7 +81,7 @@ def find_filter(found: FitSolution, time: np.ndarray, noise: str) -> tuple[str, 
 
     if len(time) > _MAX_ROWS or not np.isfinite(columns).all():
         return ()
-    # the noise of the fit may describe unfiltered friction better than this first estimate
+    # The noise model of the fit may describe unfiltered friction better than this estimate.
     plain = min(describe("", 0.0)[0], found.aic)
     interval = float(np.median(np.diff(time[windows[0]])))
     tried = [(*describe(kind, size), kind, size) for kind, size in _candidates(found, interval)]
@@ -106,7 +110,7 @@ def _candidates(found: FitSolution, interval: float) -> Iterator[tuple[str, floa
 
 
 def _filtered(kind: str, size: float, time: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Return the filtered columns of a window, as an array of shape (rows, columns)."""
+    """Return the filtered columns of a window, with shape (rows, columns)."""
     if not kind:
         return columns
     if kind == "mean":

@@ -1,15 +1,17 @@
 """Detection of drops of shear stress in a noisy record.
 
-The mean stress in a window before each sample is compared with the mean stress in a window after
-the sample. The windows are 4, 8, 16 and more sampling intervals long. The difference is divided by
-its standard deviation under noise. The standard deviation is estimated from the most frequent
-differences, which occur during loading. This estimate is valid if drops occupy no more than a third
-of the record. Peaks of the scaled difference that exceed a threshold are drops [1]_.
+The function ``detect_drops`` compares the mean stress in a window before each sample with the mean
+stress in a window after the sample. The windows are 4, 8, 16 and more sampling intervals long. The
+scaled difference is the difference between the two means, divided by its standard deviation. Peaks
+of the scaled difference that exceed a threshold are drops (see ``scipy.signal.find_peaks``).
+
+The standard deviation is estimated from the most frequent differences [1]_, because the most
+frequent differences occur during loading. The estimate is valid if drops occupy at most a third of
+the record.
 
 References
 ----------
-.. [1] ``scipy.signal.find_peaks``, with a minimum height and a minimum prominence.
-.. [2] Rousseeuw and Leroy (1988), Statistica Neerlandica 42, 103-116, for the shortest half.
+.. [1] Rousseeuw and Leroy (1988), Statistica Neerlandica 42, 103-116.
 """
 
 from __future__ import annotations
@@ -23,38 +25,40 @@ from scipy.stats import norm
 
 #: Probability of a false detection in a record of Gaussian noise.
 FALSE_DETECTION_PROBABILITY = 1e-4
-#: Shortest windows in samples, and samples of a record for each sample of the longest window.
+#: Length of the shortest window in samples, and smallest ratio of the record length to the length
+#: of the longest window.
 MIN_WINDOW, SAMPLES_PER_WINDOW = 4, 100
-#: Smallest number of samples of a record.
+#: Smallest number of samples in a record.
 MIN_SAMPLES = MIN_WINDOW * SAMPLES_PER_WINDOW
-#: Standard deviations by which a drop must exceed the threshold to be missed once in 1,000.
+#: Number of standard deviations above the threshold at which a drop is missed with a probability of
+#: 0.001.
 DETECTION_MARGIN = 3.1
-#: Scaled difference down to which a drop extends from its peak, in standard deviations.
+#: Scaled difference at which a drop ends on both sides of its peak, in standard deviations.
 _EXTENT_THRESHOLD = 2.0
-#: Fraction of the values in the shortest interval, from which the noise is estimated.
+#: Fraction of the values in the shortest interval from which the noise is estimated.
 _MODE_FRACTION = 0.4
-#: Ratio of standard deviation to median absolute deviation of Gaussian noise.
+#: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _SD_PER_MAD = 1.4826
-#: A record is resampled if its sampling intervals differ by more than this factor.
+#: Ratio of the longest to the shortest sampling interval above which a record is resampled.
 _MAX_INTERVAL_RATIO = 3.0
-#: A window covers only a part of a drop if the score of a window 2 or 4 times as long is larger by
-#: this factor. The score is the scaled difference divided by the square root of the window length.
+#: Ratio of scores that shows that a window covers only a part of a drop. The score of the window is
+#: compared with the scores of windows that are twice and four times as long.
 _PARTIAL_SCORE_RATIO = 1.4
-#: Index of the shortest window from which the correlation of the noise is estimated: 16 samples.
+#: Index of the shortest window, 16 samples long, from which the noise correlation is estimated.
 _CORRELATION_SCALE_INDEX = 2
-#: Peaks are separate if the minimum between them is lower by this fraction of the lower peak.
+#: Smallest prominence of a separate peak, relative to its height.
 _MIN_RELATIVE_PROMINENCE = 0.5
 
 
 class Candidate(NamedTuple):
-    """A drop of stress that exceeds the noise.
+    """Detected drop of stress.
 
-    Attributes
+    Parameters
     ----------
     start, end : float
-        Times between which stress falls, at the resolution of the window.
+        Times between which stress decreases, at the resolution of the window.
     window : float
-        Length of the window, in units of time.
+        Length of the window in units of time.
     difference_stderr : float
         Standard error of the difference between two window means.
     correlation_factor : float
@@ -69,18 +73,31 @@ class Candidate(NamedTuple):
 
 
 class Detection(NamedTuple):
-    """Drops that were detected in a record.
+    """Result of the detection of stress drops in a record.
 
-    Attributes
+    Parameters
     ----------
     candidates : list of Candidate
-        Drops in order of time.
+        Detected drops in order of time.
     noise_sd : float
         Standard deviation of the noise.
     detectable_drop : float
-        Size of a drop that is missed once in 1,000 records.
+        Size of a drop that is missed with a probability of 0.001.
     max_decrease : float
         Largest decrease of the moving average of stress.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rsfstudy.fitting import read_drops
+    >>> time = np.arange(2000.0)
+    >>> noise = np.random.default_rng(0).normal(scale=0.01, size=2000)
+    >>> stress = 5.0 + 0.002 * (time % 500.0) + noise  # stress drops by 1 at 500, 1000 and 1500
+    >>> detection = read_drops(time, stress, None, check_slip=False).detection
+    >>> len(detection.candidates)
+    3
+    >>> round(detection.noise_sd, 2)
+    0.01
     """
 
     candidates: list[Candidate]
@@ -90,17 +107,33 @@ class Detection(NamedTuple):
 
 
 def robust_sd(values: np.ndarray) -> float:
-    """Estimate the standard deviation from the median absolute deviation."""
+    """Estimate the standard deviation from the median absolute deviation.
+
+    Parameters
+    ----------
+    values : ndarray
+        Samples of approximately Gaussian noise.
+
+    Returns
+    -------
+    float
+        Estimated standard deviation.
+    """
     return _SD_PER_MAD * float(np.median(np.abs(values - np.median(values))))
 
 
 def find_resolution(values: np.ndarray) -> float:
     """Return the smallest nonzero difference between successive samples.
 
+    Parameters
+    ----------
+    values : ndarray, shape (samples,)
+        Samples.
+
     Returns
     -------
     float
-        Infinity if all samples are equal.
+        Smallest difference, or infinity if all samples are equal.
     """
     steps = np.abs(np.diff(values))
     return float(steps[steps > 0.0].min(initial=math.inf))
@@ -109,13 +142,21 @@ def find_resolution(values: np.ndarray) -> float:
 def estimate_mode(values: np.ndarray) -> tuple[float, float]:
     """Estimate the mean and standard deviation of the most frequent values.
 
-    The function finds the shortest interval that contains 40 % of the values. The interval is then
-    matched to the central 40 % of a Gaussian distribution. Other values of the mixture have little
-    effect on the estimate.
+    The function finds the shortest interval that contains 40 % of the values. The mean and the
+    standard deviation follow from a Gaussian distribution with its central 40 % in this interval.
+    Values outside the interval have little effect on the estimate.
+
+    Parameters
+    ----------
+    values : ndarray
+        Samples of a mixture of distributions.
 
     Returns
     -------
-    mean, standard_deviation : float
+    mean : float
+        Mean of the Gaussian distribution.
+    standard_deviation : float
+        Standard deviation of the Gaussian distribution.
     """
     ordered = np.sort(values)
     count = max(int(_MODE_FRACTION * len(ordered)), 1)
@@ -126,18 +167,19 @@ def estimate_mode(values: np.ndarray) -> tuple[float, float]:
 
 
 def window_mean_decreases(values: np.ndarray, window: int) -> np.ndarray:
-    """Compute the difference of window means before and after each sample.
+    """Compute the decrease of the window mean at each sample.
 
     Parameters
     ----------
     values : ndarray, shape (samples,)
+        Samples.
     window : int
         Length of each window in samples.
 
     Returns
     -------
     ndarray, shape (samples - 2 * window + 1,)
-        Mean of the window before the sample minus mean of the window after the sample.
+        Mean of the window before a sample minus the mean of the window from this sample on.
     """
     sums = np.concatenate([[0.0], np.cumsum(values - values.mean())])
     fallen = 2.0 * sums[window:-window] - sums[: -2 * window] - sums[2 * window :]
@@ -150,10 +192,12 @@ def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
     Parameters
     ----------
     time, stress : ndarray, shape (samples,)
+        Times and shear stresses of the samples, in any units.
 
     Returns
     -------
     Detection
+        Detected drops, with properties of the noise.
     """
     t, s = _resample_evenly(time, stress)
     apart = float(t[-1] - t[0]) / (len(t) - 1)
@@ -181,11 +225,10 @@ def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
 
 
 def _resample_evenly(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Resample a record to even intervals if its sampling intervals vary.
+    """Resample a record if its sampling intervals vary strongly.
 
-    The new sampling interval is chosen such that half of the record duration was sampled at this
-    interval or at shorter intervals. Samples within a new interval are averaged. Values for empty
-    intervals are interpolated.
+    The new sampling interval is the median sampling interval, weighted by duration. Samples within
+    a new interval are averaged. Values for empty intervals are interpolated.
     """
     gaps = np.diff(time)
     if gaps.max() < _MAX_INTERVAL_RATIO * gaps.min():
@@ -212,11 +255,12 @@ class _WindowScale:
     Parameters
     ----------
     stress : ndarray, shape (samples,)
+        Shear stresses of the samples.
     window : int
         Window length in samples.
     looks : float
-        Detection threshold in standard deviations. The threshold accounts for the number of windows
-        and samples that are tested.
+        Detection threshold in standard deviations, which accounts for the number of tested windows
+        and samples.
     quantum : float
         Resolution of stress.
     """
@@ -225,21 +269,23 @@ class _WindowScale:
         change = window_mean_decreases(stress, window)
         self.window, self.sample_count = window, len(stress)
         self.typical_decrease, decrease_sd = estimate_mode(change)
-        # if there is no noise, the resolution determines the spread
+        # If there is no noise, the resolution of stress determines the spread.
         self.spread = max(decrease_sd, quantum / math.sqrt(6.0 * window))
-        # allow for the error of the spread, which is estimated from few independent windows
+        # The spread has an error, because it is estimated from few independent windows.
         surely = 1.0 + 2.33 / math.sqrt(len(stress) / (2.0 * window))
         self.threshold = max(looks * surely * self.spread, 2.0 * quantum)
         self.detectable_drop = self.threshold + DETECTION_MARGIN * self.spread
         self.excess_decrease = change - max(0.0, self.typical_decrease)
         lag = estimate_mode(stress[window:] - stress[:-window])[1]
         self.noise_sd = max(lag / math.sqrt(2.0), quantum / math.sqrt(12.0))
-        # between white noise and noise that is constant within a window
+        # The limits correspond to white noise, and to noise that is constant within a window.
         ratio = self.spread / (self.noise_sd or 1.0) / math.sqrt(2.0 / window)
         self.correlation_factor = min(max(ratio, 1.0), math.sqrt(window))
 
     def compute_score(self, indices: np.ndarray) -> np.ndarray:
-        """Compute the scaled difference divided by the square root of the window.
+        """Compute the score of samples.
+
+        The score is the scaled difference divided by the square root of the window length.
 
         Parameters
         ----------
@@ -249,7 +295,7 @@ class _WindowScale:
         Returns
         -------
         ndarray
-            The values are 0 for samples too close to the ends of the record.
+            Score of each sample, or 0 for samples that are too close to the ends of the record.
         """
         at = indices - self.window
         inside = (at >= 0) & (at < len(self.excess_decrease))
@@ -259,22 +305,22 @@ class _WindowScale:
         return np.asarray(net / (self.spread or 1.0) / math.sqrt(self.window))
 
     def find_peaks_of_scale(self, longer_scales: list[_WindowScale]) -> list[tuple[int, int]]:
-        """Find the drops that are detected best with this window.
+        """Find the drops that are detected best with this window length.
 
         Parameters
         ----------
-        longer_scales : list of _Scale
-            Scales with longer windows. Drops that stand out more with a longer window are skipped.
+        longer_scales : list of _WindowScale
+            Differences for longer windows. Drops with a clearly higher score for a longer window
+            are skipped.
 
         Returns
         -------
         list of (int, int)
-            For each drop, the index of the first sample after its beginning, and the index of the
-            first sample after its end.
+            For each drop, the index of the first sample after its start, and the index of the first
+            sample after its end.
         """
-        padded = np.concatenate(
-            [[0.0], self.excess_decrease, [0.0]]
-        )  # so that peaks may be at the ends
+        # The padding allows for peaks at the ends.
+        padded = np.concatenate([[0.0], self.excess_decrease, [0.0]])
         peaks, about = find_peaks(padded, height=self.threshold, prominence=0.0)
         peaks = peaks[about["prominences"] > _MIN_RELATIVE_PROMINENCE * padded[peaks]]
         places = peaks - 1 + self.window
@@ -288,8 +334,8 @@ class _WindowScale:
         found = []
         for peak in peaks[complete].tolist():
             place = int(np.searchsorted(below, peak))
-            start, stop = int(below[place - 1]), int(below[place])  # in terms of `padded`
-            # a sudden drop affects all windows that contain it
+            start, stop = int(below[place - 1]), int(below[place])
+            # A sudden drop affects all windows that contain the drop.
             begin = min(start + self.window - 1, peak - 1)
             end = max(stop - 1 - self.window, peak - 1)
             found.append((begin + self.window, end + self.window))

@@ -1,15 +1,17 @@
-"""Sizes and times of drops of shear stress, with errors.
+"""Sizes and times of stress drops, with confidence intervals.
 
-The stress around a drop is modelled by three connected lines: before, during and after the drop.
-The lines meet at the times at which the drop begins and ends. For each pair of times, the lines are
-fitted by least squares. The pair with the smallest sum of squares determines the drop, which is the
-difference between the highest and the lowest stress. The confidence intervals of the times contain
-all pairs whose sum of squares exceeds the minimum by less than a fixed multiple of the noise
-variance [1]_.
+The function ``fit_drop`` models the stress around a drop by three connected lines: before, during
+and after the drop. The lines meet at the times at which the drop begins and ends. For each pair of
+times, the lines are fitted by least squares. The pair of times with the smallest sum of squares
+determines the drop. The size of the drop is the difference between the highest and the lowest
+stress.
+
+The confidence intervals of the times contain all pairs of times with a sum of squares close to the
+minimum. The largest difference is a fixed multiple of the noise variance [1]_.
 
 References
 ----------
-.. [1] Yao (1987), The Annals of Statistics 15, 1321-1328, for the time of a change in noise.
+.. [1] Yao (1987), The Annals of Statistics 15, 1321-1328.
 """
 
 from __future__ import annotations
@@ -20,44 +22,53 @@ import numpy as np
 
 from rsfstudy.fitting.drop_detection import Candidate
 
-#: Length of each side of the fit, in windows and in durations; fewest and most samples of a side.
+#: Extent of the fit on each side of the drop, in windows and in durations of the drop, and smallest
+#: and largest number of samples on each side.
 _SIDE_WINDOWS, _SIDE_DURATIONS, _MIN_SIDE_SAMPLES, _MAX_SIDE_SAMPLES = 3.0, 1.0, 16, 400
-#: Largest number of samples in a fit. Longer records are averaged.
+#: Largest number of samples in a fit. If there are more samples, blocks of samples are averaged.
 _MAX_FIT_SAMPLES = 300
-#: Windows beyond the candidate in which the drop may begin or end.
+#: Number of windows around the candidate in which the drop may begin or end.
 _SEARCH_WINDOWS = 2.0
-#: Number of times in each grid for the beginning and the end, and number of grid refinements.
+#: Number of start times and of end times in each grid, and number of grid refinements.
 _GRID_SIZE, _GRID_REFINEMENTS = 16, 3
-#: Largest slope of the lines before and after the drop, relative to the slope of the drop.
+#: Largest rate of decrease before and after the drop, relative to the rate during the drop.
 _MAX_SLOPE_RATIO = 0.3
-#: Largest difference between the falls of stress on both sides, relative to the drop.
+#: Largest excess decrease on one side compared with the slope of the other side, relative to the
+#: drop.
 _MAX_SIDE_FALL_RATIO = 0.5
-#: Excess of the sum of squares, in variances of the noise, at the ends of 95 % intervals: of the
-#: time of a sudden change (twice -ln 0.0253), and of a parameter.
+#: Excess of the sum of squares at the ends of 95 % confidence intervals, in noise variances. The
+#: first value, -2 ln 0.0253, applies to the time of a sudden change, and the second value applies
+#: to a parameter.
 _TIME_INTERVAL_EXCESS, _SIZE_INTERVAL_EXCESS = 7.4, 3.84
-#: Standard errors in half of a 95 % interval.
+#: Half width of a 95 % confidence interval in standard errors.
 CI_STDERR_FACTOR = 1.96
 #: Error of a time between two samples, relative to the sampling interval.
 _SAMPLING_TIME_ERROR = 0.55
-#: Fewest samples next to a drop that show the stress before or after the drop.
+#: Fewest samples next to a drop that determine the stress before or after the drop.
 _MIN_END_SAMPLES = 3
 
 
 class Drop(NamedTuple):
-    """A fitted drop of stress. Errors are half widths of 95 % intervals.
+    """Fitted drop of stress.
 
-    Attributes
+    Errors are half widths of 95 % confidence intervals.
+
+    Parameters
     ----------
     start, end : float
         Times at which stress is highest and lowest.
     stress_before, stress_after : float
         Highest and lowest stress.
-    start_error, end_error, stress_before_error, stress_after_error, drop_error : float
-        Errors of the values above, and of the drop ``stress_before - stress_after``.
+    start_error, end_error : float
+        Errors of the times.
+    stress_before_error, stress_after_error : float
+        Errors of the stresses.
+    drop_error : float
+        Error of the drop ``stress_before - stress_after``.
     residual_sd : float
-        Standard deviation of the samples around the fitted lines.
+        Standard deviation of the residuals.
     starts_before_record, ends_after_record : bool
-        True if the record contains no stress before the drop, or no stress after it.
+        True if the record has too few samples before the drop, or after the drop.
     """
 
     start: float
@@ -77,7 +88,7 @@ class Drop(NamedTuple):
 class _LineFits(NamedTuple):
     """Least-squares fits of three connected lines, one for each pair of times.
 
-    Attributes
+    Parameters
     ----------
     pairs : ndarray, shape (pairs, 2)
         Times at which the lines meet.
@@ -86,7 +97,7 @@ class _LineFits(NamedTuple):
     inverse_normal_matrix : ndarray, shape (pairs, 4, 4)
         Inverse of the normal matrix.
     residual_squares : ndarray, shape (pairs,)
-        Sum of squares of the residuals.
+        Sum of squared residuals.
     """
 
     pairs: np.ndarray
@@ -115,15 +126,18 @@ def fit_drop(
     Parameters
     ----------
     time, stress : ndarray, shape (samples,)
+        Times and shear stresses of the samples, in any units.
     candidate : Candidate
+        Detected drop.
     limits : (float, float)
-        End of the previous drop and beginning of the next drop.
+        End of the previous drop, and start of the next drop.
     noise : float
         Standard deviation of the noise.
 
     Returns
     -------
     Drop
+        Times and stresses of the drop with errors.
     """
     rows = _rows_around(time, candidate, limits)
     every = -(-len(rows) // _MAX_FIT_SAMPLES)
@@ -150,7 +164,7 @@ def fit_drop(
     (early, later), gaps = np.searchsorted(t, (t0, t1), "right"), np.diff(t)
     last = len(gaps) - 1
     gap0, gap1 = (float(gaps[min(max(at - 1, 0), last)]) for at in (early, later))
-    if not ((t > t0) & (t < t1)).any():  # the drop is between two samples
+    if not ((t > t0) & (t < t1)).any():  # The drop occurs between two samples.
         begins = float(t[max(early - 1, 0)]) + 0.5 * gap0
     return Drop(
         start=origin + scale * begins,
@@ -169,7 +183,10 @@ def fit_drop(
 
 
 def _rows_around(time: np.ndarray, candidate: Candidate, limits: tuple[float, float]) -> np.ndarray:
-    """Return the rows around a drop, without the rows of neighbouring drops."""
+    """Return the indices of the samples around a drop.
+
+    Samples of neighbouring drops are excluded.
+    """
     begins, ends, window = candidate[:3]
     reach = max(_SIDE_WINDOWS * window, _SIDE_DURATIONS * (ends - begins))
     first = int(np.searchsorted(time, begins, "left"))
@@ -189,8 +206,8 @@ def _search_times(
 ) -> _LineFits:
     """Search for the times at which the drop begins and ends.
 
-    The search evaluates a grid of pairs of times. The grid is refined around the best pair several
-    times.
+    The search evaluates a grid of pairs of times. The grid is then refined several times around the
+    best pair of times.
     """
     reach = max(_SEARCH_WINDOWS * window, ends - begins)
     halves = np.sort(np.concatenate([t, 0.5 * (t[1:] + t[:-1])]))
@@ -219,7 +236,7 @@ def _select_evenly(times: np.ndarray) -> list[float]:
 def _select_nearby(times: np.ndarray, centre: float, extent: float, level: int) -> np.ndarray:
     """Select the times near the best time for the next level of the search.
 
-    The last levels contain the immediate neighbours of the best time.
+    At the last levels of the search, the nearest neighbours of the best time are selected.
     """
     reach = extent / _GRID_SIZE * (4.0 / _GRID_SIZE) ** level
     place = int(np.searchsorted(times, centre))
@@ -231,18 +248,18 @@ def _select_nearby(times: np.ndarray, centre: float, extent: float, level: int) 
 def _fit_lines(t: np.ndarray, y: np.ndarray, pairs: np.ndarray) -> _LineFits:
     """Fit three connected lines for each pair of times.
 
-    The coefficients are the stress at both times, and the slopes before and after the drop. Some
-    pairs describe only a part of a longer drop, and are rejected. A pair is rejected if stress
-    outside the drop falls at more than 0.3 times the rate within the drop. It is also rejected if
-    the line on one side falls by half of the drop more than it would with the slope of the other
-    side.
+    The coefficients are the stresses at both times, and the slopes before and after the drop. A
+    pair of times is rejected if it covers only a part of a longer drop. This is the case if the
+    rate of decrease outside the drop exceeds 0.3 times the rate during the drop. It is also the
+    case if the decrease on one side is larger than expected from the slope on the other side, and
+    the difference exceeds half of the drop.
     """
     t0, t1 = pairs[:, :1], pairs[:, 1:]
     share = np.clip((t - t0) / (t1 - t0), 0.0, 1.0)
     columns = np.stack([1.0 - share, share, np.minimum(t - t0, 0.0), np.maximum(t - t1, 0.0)], -1)
     turned = columns.transpose(0, 2, 1)
     normal = turned @ columns
-    # a small ridge term, because a slope is undetermined if one side has no samples
+    # The small ridge term is necessary because one side may have no samples.
     normal += 1e-9 * np.eye(4) * len(t)
     inverse = np.linalg.inv(normal)
     centre = y.mean()

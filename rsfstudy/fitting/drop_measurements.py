@@ -1,4 +1,7 @@
-"""Properties of stress drops in a record: times, stresses, slip and slip rate."""
+"""Properties of stress drops in a record: times, stresses and slip.
+
+The function ``read_drops`` finds the drops, and computes the properties of each drop with errors.
+"""
 
 from __future__ import annotations
 
@@ -20,14 +23,15 @@ from rsfstudy.fitting.drop_detection import (
 from rsfstudy.fitting.drop_fit import CI_STDERR_FACTOR
 from rsfstudy.fitting.stress_drops import EventNumbers, FittedCandidate, find_drops
 
-#: Smallest excess of slip over the usual displacement: in standard deviations, and as a fraction.
+#: Smallest excess of slip during the drops, in standard deviations and as a fraction of the
+#: displacement around the drops.
 _MIN_EXCESS_SIGMAS, _MIN_EXCESS_FRACTION = 3.0, 0.1
 
 
 class DropIndices(NamedTuple):
     """Location of a drop among the samples.
 
-    Attributes
+    Parameters
     ----------
     start : int
         Index of the first sample in the drop.
@@ -45,13 +49,14 @@ class DropIndices(NamedTuple):
 class DropReadings(NamedTuple):
     """Stress drops in a record.
 
-    Attributes
+    Parameters
     ----------
     rows : list of EventNumbers
         Properties of each drop.
     detection : Detection
+        Result of the detection.
     is_slip : bool
-        False if displacement was checked and is not faster during the drops than around them.
+        False if the displacement was checked, and is not faster during the drops than around them.
     """
 
     rows: list[EventNumbers]
@@ -62,18 +67,33 @@ class DropReadings(NamedTuple):
 def read_drops(
     times: np.ndarray, stress: np.ndarray, displacement: np.ndarray | None, *, check_slip: bool
 ) -> DropReadings:
-    """Find the drops of stress in a record, and compute their properties.
+    """Find the stress drops in a record, and compute their properties.
 
     Parameters
     ----------
     times, stress : ndarray, shape (samples,)
-    displacement : ndarray, shape (samples,), optional
+        Times and shear stresses of the samples.
+    displacement : ndarray, shape (samples,), or None
+        Displacement of the samples. If None, slip and slip rate are not computed.
     check_slip : bool
-        If True, check that displacement is the slip of the fault.
+        If True, check that the displacement is fault slip, and not load point displacement.
 
     Returns
     -------
     DropReadings
+        Properties of the drops, in the units of the arguments. Errors are half widths of 95 %
+        confidence intervals.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rsfstudy.fitting import read_drops
+    >>> time = np.arange(2000.0)
+    >>> noise = np.random.default_rng(0).normal(scale=0.01, size=2000)
+    >>> stress = 5.0 + 0.002 * (time % 500.0) + noise  # stress drops by 1 at 500, 1000 and 1500
+    >>> readings = read_drops(time, stress, None, check_slip=False)
+    >>> [round(values["static_stress_drop"][0], 1) for values, _ in readings.rows]
+    [1.0, 1.0, 1.0]
     """
     found, detection = find_drops(times, stress)
     ends = [-math.inf, *(of.drop.end for of in found)]
@@ -97,6 +117,18 @@ def displacement_follows_drops(
 
     The displacement during each drop is compared with the displacement over the same duration
     before and after the drop.
+
+    Parameters
+    ----------
+    times, displacement : ndarray, shape (samples,)
+        Times and displacements of the samples.
+    locations : sequence of DropIndices
+        Locations of the drops.
+
+    Returns
+    -------
+    bool
+        True if the excess displacement during the drops is significant.
     """
     excess = usual = variance = 0.0
     quantum = find_resolution(displacement)
@@ -111,7 +143,7 @@ def displacement_follows_drops(
         lasts, slips = (
             np.diff([of[at : at + window].mean() for at in starts]) for of in (times, displacement)
         )
-        # the record may not extend far enough before or after a drop
+        # The record may be too short before or after a drop.
         ratios = (lasts[1] / np.where(lasts > 0.0, lasts, math.inf))[::2]
         moved, ratio = float((ratios * slips[::2]).max()), float(ratios.max())
         excess, usual = excess + float(slips[1]) - moved, usual + abs(moved)
@@ -126,8 +158,21 @@ def locate_drop(
 ) -> DropIndices:
     """Locate a drop among the samples.
 
-    The window is shortened if it would overlap with a neighbouring drop or extend beyond the
-    record.
+    The window is shortened if it would overlap a neighbouring drop or extend beyond the record.
+
+    Parameters
+    ----------
+    times : ndarray, shape (samples,)
+        Times of the samples.
+    found : FittedCandidate
+        Fitted drop.
+    limits : (float, float)
+        End of the previous drop, and start of the next drop.
+
+    Returns
+    -------
+    DropIndices
+        Indices of the drop, and length of the window.
     """
     drop, candidate = found
     begin = int(np.searchsorted(times, drop.start, "right"))
@@ -147,15 +192,28 @@ def drop_properties(
     location: DropIndices,
     limits: tuple[float, float],
 ) -> EventNumbers:
-    """Compute the properties of one event and their errors.
+    """Compute the properties of a drop and their errors.
+
+    Parameters
+    ----------
+    times, stress : ndarray, shape (samples,)
+        Times and shear stresses of the samples.
+    displacement : ndarray, shape (samples,), or None
+        Displacement of the samples. If None, slip and slip rate are not computed.
+    found : FittedCandidate
+        Fitted drop.
+    location : DropIndices
+        Location of the drop.
+    limits : (float, float)
+        End of the previous drop, and start of the next drop.
 
     Returns
     -------
-    row : dict
-        Pairs of a value and its error, which is the half width of a 95 % interval.
+    row : dict of {str: (float, float)}
+        Pairs of a value and its error, which is the half width of a 95 % confidence interval.
     cut : int
-        0 if the record contains the stress before and after the event. 1 is added if the record
-        begins during the event, and 2 if the record ends during the event.
+        0 if the record contains the stress before and after the drop. Otherwise, the sum of 1 if
+        the record begins during the drop, and 2 if the record ends during the drop.
     """
     drop = found.drop
     row = {
@@ -186,7 +244,7 @@ def _slip_properties(
 
     Returns
     -------
-    dict
+    dict of {str: (float, float)}
         Pairs of a value and its error. The peak slip rate and the dynamic stress drop are NaN if
         the slip rate does not exceed its noise.
     """
@@ -194,8 +252,8 @@ def _slip_properties(
     size = drop.stress_before - drop.stress_after
     first, last = (int(np.searchsorted(times, at)) for at in limits)
     # If the window is shifted by m samples, the difference of means decreases by m drop/window.
-    # The noise of this change has a standard deviation of sqrt(3 m/window) times the error. Noise
-    # shifts the drop further than this limit only once in 1,000.
+    # The standard deviation of this change is sqrt(3 m/window) times the standard error. The
+    # probability that noise shifts the drop further than this limit is 0.001.
     off = math.ceil(3.0 * window * (DETECTION_MARGIN * candidate.difference_stderr / size) ** 2)
     off = max(0, min(off, window, begin - window - first, last - end - window))
     begin, end = begin - off, end + off
@@ -211,7 +269,7 @@ def _slip_properties(
     row["peak_slip_rate"] = row["dynamic_stress_drop"] = math.nan, math.nan
     if rates[fastest] > noise * norm.isf(FALSE_DETECTION_PROBABILITY / len(rates)):
         row["peak_slip_rate"] = rates[fastest], CI_STDERR_FACTOR * noise
-        # the stress at this time is between the values of the two samples
+        # The stress at the peak slip rate is between the stresses of the two samples.
         ends = stress[fastest : fastest + 2]
         reading = 0.5 * float(np.ptp(ends)) + CI_STDERR_FACTOR * robust_sd(np.diff(stress))
         row["dynamic_stress_drop"] = (

@@ -1,7 +1,8 @@
-"""Filters of recorded friction, which the fit applies to the model too.
+"""Filters that were applied to friction before it was recorded.
 
-A filter smooths the peak of a velocity step. If the model does not include the filter, the fitted
-direct effect is too small, and the fitted slip distance is too long.
+A fit applies the same filter to the friction of the model. A filter smooths the friction peak after
+a velocity step. If the model does not include the filter, the fitted direct effect is too small,
+and the fitted slip distance is too long.
 """
 
 from __future__ import annotations
@@ -14,32 +15,52 @@ from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from rsfstudy.errors import InvalidValue
 
+#: Names of a running mean centred at each row, and of a running mean that ends at each row.
 MEAN, TRAILING_MEAN = "mean", "trailing_mean"
-#: Low-pass filters, with their orders: all are Butterworth filters.
+#: Names of the low-pass filters, with their orders. All low-pass filters are Butterworth filters.
 LOW_PASS_ORDERS = {"first_order": 1, "butterworth_2": 2, "butterworth_4": 4}
+#: Names of all filters.
 FILTER_KINDS = (MEAN, TRAILING_MEAN, *LOW_PASS_ORDERS)
-#: Fewest points of a running mean, points per period of the corner frequency, periods after which a
-#: low-pass filter has settled, and largest number of points on its grid.
+#: Smallest number of points in a running mean, points per period of the corner frequency, number of
+#: periods after which a low-pass filter has settled, and largest number of points in the time grid
+#: of a low-pass filter.
 _MIN_MEAN_POINTS, _POINTS_PER_PERIOD, _SETTLING_PERIODS, _MAX_GRID_POINTS = 8, 60, 3.0, 400_000
 
 
 @dataclass(frozen=True)
 class Filter:
-    """A filter of friction.
+    """Filter of friction.
 
     Parameters
     ----------
     kind : {"mean", "trailing_mean", "first_order", "butterworth_2", "butterworth_4"}
-        A running mean centred at each row, a running mean that ends at each row, or a low-pass
-        filter.
+        Kind of filter. The filter is a running mean centred at each row, a running mean that ends
+        at each row, or a low-pass filter.
     size : float
         Averaging time in s for a running mean, or corner frequency in Hz for a low-pass filter.
+
+    Raises
+    ------
+    InvalidValue
+        If the kind is unknown, or if the size is not positive and finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rsfstudy.fitting import Filter
+    >>> running_mean = Filter.parse("mean 1.0")
+    >>> time = np.arange(0.0, 5.0, 0.25)
+    >>> samples = running_mean.sample_times(time)
+    >>> filtered = running_mean.apply(time, samples)  # the mean of a straight line is the line
+    >>> bool(np.allclose(filtered, time))
+    True
     """
 
     kind: str
     size: float
 
     def __post_init__(self) -> None:
+        """Validate the kind and the size."""
         if self.kind not in FILTER_KINDS:
             raise InvalidValue("filter", self.kind, "is unknown", choices=FILTER_KINDS)
         if not 0.0 < self.size < math.inf:
@@ -50,10 +71,20 @@ class Filter:
     def parse(cls, text: str) -> Filter | None:
         """Create a filter from a string such as "mean 1.0".
 
+        Parameters
+        ----------
+        text : str
+            Kind and size of the filter, separated by a space.
+
         Returns
         -------
         Filter or None
             None if the string is empty.
+
+        Raises
+        ------
+        InvalidValue
+            If the string is not a kind of filter followed by a number.
         """
         if not text:
             return None
@@ -66,24 +97,36 @@ class Filter:
         return cls(kind, number)
 
     def sample_times(self, time: np.ndarray) -> np.ndarray:
-        """Return the times, in s, at which unfiltered friction is required."""
-        if self.kind in LOW_PASS_ORDERS:
-            return self._time_grid(time)
-        return np.unique(time[:, None] + self._offsets(time))
-
-    def apply(self, time: np.ndarray, samples: np.ndarray) -> np.ndarray:
-        """Filter friction.
+        """Return the times at which unfiltered friction is required.
 
         Parameters
         ----------
         time : ndarray, shape (rows,)
             Times of the rows in s.
-        samples : ndarray
+
+        Returns
+        -------
+        ndarray, shape (samples,)
+            Times in s, in increasing order.
+        """
+        if self.kind in LOW_PASS_ORDERS:
+            return self._time_grid(time)
+        return np.unique(time[:, None] + self._offsets(time))
+
+    def apply(self, time: np.ndarray, samples: np.ndarray) -> np.ndarray:
+        """Apply the filter to samples of friction.
+
+        Parameters
+        ----------
+        time : ndarray, shape (rows,)
+            Times of the rows in s.
+        samples : ndarray, shape (samples,)
             Unfiltered friction at ``sample_times(time)``.
 
         Returns
         -------
         ndarray, shape (rows,)
+            Filtered friction of each row.
         """
         at = self.sample_times(time)
         if self.kind not in LOW_PASS_ORDERS:
@@ -91,14 +134,15 @@ class Filter:
             return np.asarray(samples[places].mean(axis=1))
         rate = 1.0 / float(at[1] - at[0])
         sections = butter(LOW_PASS_ORDERS[self.kind], self.size, fs=rate, output="sos")
-        begin = sosfilt_zi(sections) * samples[0]  # steady before the first row
+        # Friction is assumed to be constant before the first row.
+        begin = sosfilt_zi(sections) * samples[0]
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
 
     def _offsets(self, time: np.ndarray) -> np.ndarray:
-        """Return the offsets of the points of a running mean, in s.
+        """Return the offsets of the points in a running mean.
 
-        If the sampling interval is shorter than the averaging time, the points are one sampling
-        interval apart.
+        Each offset is a time in s relative to the time of a row. If the averaging time is at least
+        four sampling intervals, the points are one sampling interval apart.
         """
         count = max(round(self.size / float(np.median(np.diff(time)))), 1)
         count *= max(math.ceil(_MIN_MEAN_POINTS / count), 1) if count < _MIN_MEAN_POINTS // 2 else 1
@@ -106,6 +150,7 @@ class Filter:
         return np.asarray(self.size * ((np.arange(count) + 0.5) / count - middle))
 
     def _time_grid(self, time: np.ndarray) -> np.ndarray:
+        """Return the evenly spaced times for evaluating a low-pass filter."""
         first = float(time[0]) - _SETTLING_PERIODS / self.size
         finest = max(1.0 / (_POINTS_PER_PERIOD * self.size), (time[-1] - first) / _MAX_GRID_POINTS)
         return np.arange(first, float(time[-1]) + 2.0 * finest, finest)

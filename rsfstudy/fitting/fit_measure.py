@@ -1,4 +1,8 @@
-"""Fits of friction parameters to laboratory records, with standard errors."""
+"""Fits of friction parameters to laboratory records.
+
+The measure ``Fit`` selects windows of records, runs the search of a ``FitProblem``, and computes
+confidence intervals. Users normally call ``rsfstudy.fit``.
+"""
 
 from __future__ import annotations
 
@@ -49,89 +53,119 @@ from rsfstudy.quantities import Output, Quantity
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
-#: Accuracy of motions at which their differences tell derivatives.
+#: Largest relative tolerance of a motion for which finite differences of motions are accurate.
 _DERIVATIVE_RTOL = 1e-9
-#: Standard errors that numerical errors are held to as to the parameter itself: at the default
-#: accuracy, 1e-7, of which a hundredfold is let pass, a hundredth of one is too much.
+#: Weight of the standard error in the scale of numerical errors. At the default accuracy of 1e-7, a
+#: numerical error of more than 1 % of the standard error is then reported as too large.
 _STDERR_SCALE = 1000.0
-#: Fields of a scene that follow from what is found.
+#: Fields of a scene that every fit determines.
 _SOLVED_FIELDS = (
     *("a", "b_over_a", "b1_over_a", "b2_over_a", "length_ratio", "mu_star", "stiffness"),
     *("stiffness_ratio", "reference_rate", "load_velocity_ratio"),
 )
-#: A direct effect over its lower bound below which it is at that bound.
+#: Ratio of the direct effect to its lower bound below which the direct effect is at the bound.
 _LOWER_BOUND_FACTOR = 1.001
 
 
 @guard_methods
 @dataclass(frozen=True)
 class Fit(Measure):
-    """Fit of friction parameters to a laboratory record by least squares.
+    r"""Fit of friction parameters to a laboratory record by least squares.
 
-    The least-squares fit accounts for the noise that is estimated from the residuals. The model is
-    the motion of the scene under the loading of the record, plus a trend in powers of load point
-    displacement from the step:
-
-        mu(t) = mu_* + a ln(V/V_0) + Theta + c_1 x + c_2 x^2 + ...,    dmu/dt = k (V_l - V)
-
-    Here V_l is the load point velocity, V_0 is the load point velocity before the step, and k is
-    stiffness over normal stress. Theta evolves by the friction law. The equation for dmu/dt applies
-    at constant normal stress and without inertia. Lengths are in um, times in s, and normal
-    stresses in Pa. Outputs along the rows have the shape (rows,), and ``covariance`` and
-    ``correlation`` have the shape (parameters, parameters).
-
-    For each parameter, ``<name>_stderr`` is the standard error, and ``<name>_low`` and
-    ``<name>_high`` are the ends of the 95 % confidence interval. ``<name>_error`` is the numerical
-    error. If the record does not constrain a parameter, the status is ``not_identified``, and the
-    message names the parameter. Its interval then extends to the bounds of the search, or is NaN if
-    there are no bounds.
+    The fit accounts for correlated noise, which is estimated from the residuals.
 
     Parameters
     ----------
     records : tuple of Record
         Records that may be fitted.
-    free : tuple of str
-        Names of the free parameters (see ``analysis.fitting.model.PARAMETERS``). The other
-        parameters have the values of the scene.
-    slip_distance_guess : float
-        Slip distance D_c in um, the unit of slip of the scene. If D_c is free, this is its initial
-        value.
-    slip_distance_2_guess : float
+    free : tuple of str, default: ("a", "b", "slip_distance", "mu_star", "trend1")
+        Names of the free parameters (see ``rsfstudy.fitting.PARAMETERS``). The other parameters
+        have the values of the scene.
+    slip_distance_guess : float, default: 10.0
+        Slip distance D_c in um, which is the unit of slip in the scene. If D_c is free, this value
+        is the initial guess.
+    slip_distance_2_guess : float, default: 100.0
         Slip distance in um of the second state, if the law has two states.
-    record : str
-        Name of the record to fit. By default, the first record.
-    step : int
-        Number of the step to fit, from 1.
-    together : tuple of (str, int)
-        Names of records and numbers of steps for a joint fit, which replaces ``record`` and
-        ``step``. Each step has its own friction before the step, trend and step time, named
-        ``mu_star_1`` and so on.
-    before, after : float
-        Load point displacements in um to fit before and after the step. By default, the window
-        begins halfway between the previous step and this step. It ends at the next step, or at the
-        window of the next step in a joint fit.
-    part : float
+    record : str, optional
+        Name of the record to fit. By default, the first record is fitted.
+    step : int, default: 1
+        Number of the step to fit, starting from 1.
+    together : tuple of (str, int), optional
+        Record names and step numbers of a joint fit, which replace ``record`` and ``step``. Each
+        step has its own friction before the step, trend and step time, with names such as
+        ``mu_star_1``.
+    before, after : float, default: 0.0
+        Load point displacements in um to fit before and after the step. If ``before`` is 0, the
+        window begins halfway between the previous step and this step, or at the beginning of the
+        record if there is no previous step. If ``after`` is 0, the window ends at the next step or
+        at the end of the record. In a joint fit, the window ends at the window of the next step.
+    part : float, default: 1.0
         Fraction of the displacement after the step to fit.
-    noise : str
+    noise : str, default: "ar"
         Noise model: "white" for the usual formula of standard errors, "ar" for an autoregressive
-        process of automatic order, or "ar1", "ar2" and so on.
-    loading : {"steps", "recorded"}
-        Loading by steps with constant velocities between them, or recorded loading. Recorded
-        loading includes normal stress, unless the normal stress of the scene is constant.
-    machine_stiffness : float
+        process with an automatic order, or "ar1", "ar2" and so on.
+    loading : {"steps", "recorded"}, default: "steps"
+        Loading by steps with constant velocities between the steps, or loading by the recorded
+        rows. Recorded loading includes the normal stress, unless the normal stress of the scene is
+        constant.
+    filter : str, optional
+        Filter that was applied to friction before it was recorded, such as "mean 1.0" (see
+        ``rsfstudy.fitting.Filter``). By default, friction was not filtered.
+    posterior : int, default: 0
+        Number of draws from the posterior distribution.
+    machine_stiffness : float, default: 0.0
         Stiffness of the machine in Pa/um, which is divided by the normal stress before the step of
-        each window. If 0, the stiffness over normal stress of the scene is used in all windows.
-    filter : str
-        Filter applied to friction before it was recorded, such as "mean 1.0" (see
-        ``analysis.fitting.filters.Filter``). Empty if there is no filter.
-    posterior : int
-        Number of draws from the posterior (see ``analysis.fitting.posterior``).
+        each window. If 0, all windows have the stiffness of the scene.
+
+    Raises
+    ------
+    InvalidValue
+        If an option is invalid, or if emcee is required and not installed.
+
+    Notes
+    -----
+    The model is the motion of the scene under the loading of the record, plus a trend in powers of
+    the load point displacement :math:`x` from the step:
+
+    .. math::
+
+        \mu(t) = \mu_* + a \ln(V/V_0) + \Theta + c_1 x + c_2 x^2 + \dots, \qquad
+        \dot\mu = k (V_l - V),
+
+    where :math:`V_l` is the load point velocity, :math:`V_0` is the load point velocity before the
+    step, :math:`k` is the stiffness divided by the normal stress, and :math:`\Theta` is the state
+    variable, which evolves by the friction law. The second equation describes the friction without
+    its trend, at constant normal stress and without inertia.
+
+    Lengths are in um, times in s, and normal stresses in Pa. Outputs along the rows have the shape
+    (rows,). The outputs ``covariance`` and ``correlation`` have the shape (parameters, parameters).
+
+    For each parameter, ``<name>_stderr`` is the standard error, ``<name>_low`` and ``<name>_high``
+    are the ends of the 95 % confidence interval, and ``<name>_error`` is the numerical error. If
+    the record does not constrain a parameter, the status is ``not_identified``, and the message
+    names the parameter. The confidence interval of an unconstrained parameter extends to the bounds
+    of the search, or is NaN if the search has no bounds for this parameter.
+
+    The standard errors account for correlated noise [1]_. Fits of velocity steps are described in
+    [2]_ and [3]_.
 
     References
     ----------
-    Patterson and Thompson (1971), Biometrika 58, 545-554, for errors under correlated noise; Reinen
-    and Weeks (1993), J. Geophys. Res. 98, 15937-15950, and Marone (1998), Annu. Rev. Earth Planet.
-    Sci. 26, 643-696, for fits of velocity steps.
+    .. [1] Patterson and Thompson (1971), Biometrika 58, 545-554.
+    .. [2] Reinen and Weeks (1993), J. Geophys. Res. 98, 15937-15950.
+    .. [3] Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rsfstudy.fitting import Fit, Record
+    >>> time = np.arange(0.0, 100.0, 0.5)
+    >>> displacement = np.where(time < 50.0, time, 50.0 + 10.0 * (time - 50.0))
+    >>> friction = np.full(200, 0.6)
+    >>> record = Record({"time": time, "displacement": displacement, "friction": friction})
+    >>> fit = Fit((record,), free=("a", "b", "slip_distance", "mu_star"), after=200.0)
+    >>> fit.parameters
+    ('a', 'b', 'slip_distance', 'mu_star')
     """
 
     records: tuple[Record, ...]
@@ -166,6 +200,7 @@ class Fit(Measure):
     )
 
     def __post_init__(self) -> None:
+        """Validate the options."""
         if not self.records:
             raise InvalidValue("records", self.records, "must hold a record at least")
         names = [record.name for record in self.records]
@@ -199,19 +234,19 @@ class Fit(Measure):
 
     @property
     def primary_output(self) -> str:
-        """Name of the first parameter that all laws have."""
+        """Name of the first free parameter that all laws have."""
         return next(
             (n for n in self.parameters if n not in LAW_SPECIFIC_PARAMETERS), self.parameters[0]
         )
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the free parameters, numbered by window if necessary."""
+        """Names of the free parameters, with window numbers in joint fits."""
         return number_parameters(self.free, len(self._selected_steps))
 
     @property
     def _selected_steps(self) -> tuple[tuple[str, int], ...]:
-        """Names of the records and numbers of the steps to fit."""
+        """Record names and step numbers of the steps to fit."""
         return self.together or ((self.record or self.records[0].name, self.step),)
 
     @cached_property
@@ -226,18 +261,18 @@ class Fit(Measure):
 
     @property
     def outputs(self) -> Sequence[Output]:
-        """Parameters with their errors, properties of the fit, and rows."""
+        """Outputs of the fit, including the parameters and their errors."""
         return fit_outputs(self.parameters, self.posterior > 0, len(self._selected_steps))
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Meanings and units of results, dimensions and fields."""
+        """Meanings and units of outputs, inner dimensions and options."""
         draws = [Quantity("draw", "", "1", "number of the draw")] if self.posterior else []
         return (*super().quantities, *draws)
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        """Names of the parameters, and indices of rows and draws."""
+        """Names of the parameters, and indices of the rows and draws."""
         names = np.array(self.parameters, dtype=object)
         together = sum(map(len, self._first_rows))
         rows = np.arange(together if self.together else max(map(len, self.records)))
@@ -247,9 +282,21 @@ class Fit(Measure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of each parameter.
 
-        The scale is the sum of the absolute value of the parameter and a large multiple of its
-        standard error. Parameters that may be zero have an additional constant, because a record
-        may have no noise.
+        The scale of a parameter is its absolute value plus a large multiple of its standard error.
+        For parameters that may be zero, the scale also contains a constant, because a record may
+        have no noise.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the fit.
+        values : mapping of str to float or ndarray
+            Outputs of the fit.
+
+        Returns
+        -------
+        dict of {str: float}
+            Scales by parameter name.
         """
         extent = abs(values["window_ends"] - values["window_begins"])
         sizes = dict.fromkeys(("b", "b1", "b2"), values.get("a", scene.a))
@@ -265,28 +312,66 @@ class Fit(Measure):
         }
 
     def describe(self) -> dict[str, Any]:
-        """Return a description of the measure, with hashes of the records."""
+        """Return a description of the measure.
+
+        Returns
+        -------
+        dict
+            Name and options of the measure. Digests replace the data of the records.
+        """
         stated = {f.name: getattr(self, f.name) for f in fields(self)}
         records = {record.name: record.digest for record in self.records}
         return {"name": self.name, **stated, "free": list(self.free), "records": records}
 
     @classmethod
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Raise ``InvalidValue``, because a file contains only hashes of records."""
+        """Raise ``InvalidValue``, because a file does not contain the records.
+
+        Parameters
+        ----------
+        described : dict
+            Description of the measure from a file.
+        path : str
+            Path of the file.
+
+        Raises
+        ------
+        InvalidValue
+            Always, because the description contains only digests of the records.
+        """
         rule = "are fitted, and the file has no more than digests of them"
         remedy = "Fit them again: show FILE tells the command."
         raise InvalidValue("records", [*described["records"]], rule, remedy=remedy)
 
     @cached_property
     def _first_rows(self) -> dict[Record, int]:
-        """Records that are fitted, with the index of their first row in the result."""
+        """Index of the first row in the outputs for each fitted record."""
         records = [*dict.fromkeys(window.record for window in self._windows)]
         return {record: sum(map(len, records[:n])) for n, record in enumerate(records)}
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Fit the parameters and compute their errors and confidence intervals.
+        """Fit the parameters, and compute their confidence intervals.
 
-        Parameters that the law does not have are omitted.
+        Parameters that the friction law does not have are omitted.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene with the friction law and the fixed parameters.
+        accuracy : Accuracy
+            Requested accuracy and integrator.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, outputs and message of the fit.
+
+        Raises
+        ------
+        MotionStopped
+            If the fit fails, for example because a window has too few rows.
         """
         own = parameters_of_law(scene, self.free)
         if own != self.free:
@@ -335,12 +420,28 @@ class Fit(Measure):
     def solve(
         self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
     ) -> tuple[FitProblem, FitSolution]:
-        """Fit the windows with a law that has all free parameters.
+        """Fit the windows with a friction law that has all free parameters.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene with the friction law and the fixed parameters.
+        accuracy : Accuracy
+            Requested accuracy and integrator.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
 
         Returns
         -------
         search : FitProblem
+            Problem with the model of all windows.
         found : FitSolution
+            Solution of the problem.
+
+        Raises
+        ------
+        MotionStopped
+            If the fit fails.
         """
         smooth = accuracy.with_rtol(min(accuracy.rtol, _DERIVATIVE_RTOL))
         windows = self._windows
@@ -349,7 +450,7 @@ class Fit(Measure):
         of_each = zip(windows, scenes, strict=True)
         parts = [w.create_model(one, self.free, self.loading, smooth, meter) for w, one in of_each]
         parts = [replace(part, filter=Filter.parse(self.filter)) for part in parts]
-        if self.noise == WHITE:  # the usual formula
+        if self.noise == WHITE:  # The usual formula ignores the noise of the load point.
             parts = [replace(part, shifted_loadings=()) for part in parts]
         distances = self.slip_distance_guess, self.slip_distance_2_guess
         first: dict[str, float] = {}
@@ -369,15 +470,18 @@ class Fit(Measure):
         Parameters
         ----------
         problem : FitProblem
+            Problem with the model of all windows.
         solution : FitSolution
+            Solution of the problem.
 
         Returns
         -------
         tuple of str
-            Empty if the standard errors are valid.
+            Reasons. The tuple is empty if the standard errors are valid.
         """
         reasons = find_validity_problems(solution, problem.model.friction)
-        # a recorded load point has noise that any average would reduce
+        # With recorded loading, any filter would reduce the noise of the load point, so the test
+        # for a filter would be misleading.
         is_recorded = self.loading == "recorded"
         is_exact = solution.noise_sd < MIN_NOISE_SD
         if (
@@ -391,7 +495,7 @@ class Fit(Measure):
         return (*find_filter(solution, problem.model.time, self.noise), *reasons)
 
     def _insert_missing_parameters(self, outcome: Outcome) -> Outcome:
-        """Insert NaN into the matrices for parameters that the law does not have."""
+        """Insert NaN for parameters that the friction law does not have."""
         values = dict(outcome.values)
         has = np.array([name in values for name in self.parameters])
         before = np.cumsum(has)[~has]
@@ -403,7 +507,7 @@ class Fit(Measure):
     def _collect_values(
         self, found: FitSolution, rows: np.ndarray, model: JointModel
     ) -> dict[str, OutputValue]:
-        """Return the numbers and the rows of a fit."""
+        """Return the outputs of a fit except for confidence intervals."""
         values: dict[str, OutputValue] = {}
         for name in found.free:
             values[name], values[f"{name}_error"] = found.values[name], found.numerical_errors[name]

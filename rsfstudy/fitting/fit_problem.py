@@ -1,18 +1,23 @@
-"""Search for the parameters of a record by generalised least squares.
+r"""Estimation of friction parameters by generalised least squares.
 
-The parameters p minimise ``|W (y - f(p))|^2``, where y is recorded friction and f is the model. The
-matrix W whitens the noise: ``W'W`` is the inverse of the correlation matrix R of the noise. The
-noise and the parameters are estimated in turn. The covariance matrix of the parameters is then
-``s^2 (J'R^-1 J)^-1``, where J contains the derivatives of f, and ``s^2 = |W (y - f)|^2/(n - p)``
-for n rows and p parameters. Errors of the times and velocities of steps (see ``load_point``) change
-f by the columns of a matrix G. These errors add A A' to the covariance matrix, where ``A = (J'R^-1
-J)^-1 J'R^-1 G``.
+The class ``FitProblem`` minimises :math:`|W (y - f(p))|^2` with respect to the parameters
+:math:`p`, where :math:`y` is the recorded friction and :math:`f` is the model [1]_. The matrix
+:math:`W` whitens the noise, so that :math:`W^T W` is the inverse of the correlation matrix
+:math:`R` of the noise. The parameters and the noise are estimated in turn. The covariance matrix of
+the parameters is
+
+.. math:: s^2 (J^T R^{-1} J)^{-1}, \qquad s^2 = \frac{|W (y - f)|^2}{n - p},
+
+with the derivatives :math:`J` of the model, for :math:`n` rows and :math:`p` parameters. Errors of
+the times and velocities of steps change the model by the columns of a matrix :math:`G` (see
+``load_point_errors``). These errors add :math:`A A^T` to the covariance matrix, with
+:math:`A = (J^T R^{-1} J)^{-1} J^T R^{-1} G`. The noise is estimated by restricted maximum
+likelihood [2]_.
 
 References
 ----------
-Seber and Wild (1989), Nonlinear Regression, Wiley, chapters 2 and 6, for least squares under
-autocorrelated noise; Patterson and Thompson (1971), Biometrika 58, 545-554, for noise by restricted
-maximum likelihood; Hurvich and Tsai (1989), Biometrika 76, 297-307, for the criterion.
+.. [1] Seber and Wild (1989), Nonlinear Regression, Wiley, chapters 2 and 6.
+.. [2] Patterson and Thompson (1971), Biometrika 58, 545-554.
 """
 
 from __future__ import annotations
@@ -42,7 +47,7 @@ from rsfstudy.fitting.window_model import (
 from rsfstudy.motion import MotionStopped
 from rsfstudy.status import Status
 
-#: Bounds of parameters; those of stiffness are over the first guess.
+#: Bounds of parameters.
 _PARAMETER_BOUNDS = {
     "a": (1e-4, 1.0),
     "b": (-1.0, 1.0),
@@ -51,17 +56,20 @@ _PARAMETER_BOUNDS = {
     "alpha": (0.0, 2.0),
     "law_exponent": (0.0, 1.0),
 }
+#: Largest difference between the logarithms of the stiffness and of its initial guess.
 _MAX_LOG_STIFFNESS_CHANGE = math.log(1e4)
-#: Longest slip distance over the displacement of the window; the shortest is the distance of rows.
+#: Largest slip distance relative to the displacement of the window. The smallest slip distance is
+#: the mean displacement between two rows.
 _MAX_RELATIVE_SLIP_DISTANCE = 10.0
-#: Difference of logarithms by which the bounds of two slip distances are apart.
+#: Difference between the logarithmic bounds of the first and the second slip distance.
 _MIN_LOG_DISTANCE_GAP = 1e-6
-#: Slip distances to begin with, over the first guess.
+#: Initial slip distances that are tested, relative to the initial guess.
 _INITIAL_DISTANCE_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0)
-#: Passes in which noise and parameters are found in turn, until those move by this part of their
-#: standard errors; most curves of a pass, and where it ends; and the number of Newton steps at the
-#: end: at least, at most, and at most if each step is shorter than the last one by this factor. The
-#: last step is shorter than a fraction of the standard errors.
+#: Largest number of passes that estimate the noise and the parameters in turn, change of the
+#: parameters relative to their standard errors at which the passes end, largest number of model
+#: evaluations per pass, and relative tolerance of the search. The last two items limit the final
+#: Gauss-Newton steps. They are the smallest number of steps, the largest number of steps that do
+#: not shrink, the largest number of steps, and the ratio below which successive steps shrink.
 (
     _MAX_PASSES,
     _PASS_TOLERANCE,
@@ -70,34 +78,47 @@ _INITIAL_DISTANCE_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0)
     _NEWTON_STEP_COUNTS,
     _MAX_SHRINK_FACTOR,
 ) = 4, 0.05, 200, 1e-8, (2, 8, 24), 0.9
+#: Options of ``scipy.optimize.least_squares``.
 _LEAST_SQUARES_OPTIONS = {
     "x_scale": "jac",
     "xtol": _SEARCH_TOLERANCE,
     "gtol": 1e-12,
     "max_nfev": _MAX_CURVES,
 }
+#: Largest final Gauss-Newton step, relative to the standard errors.
 _NEWTON_TOLERANCE = 1e-3
-#: Fewest degrees of freedom of intervals.
+#: Lower bound for the degrees of freedom of confidence intervals.
 _MIN_DEGREES_OF_FREEDOM = 3.0
-#: Standard error of a logarithm, and of a or b over the larger of both, beyond which a record does
-#: not tell them; and the standard errors that b must differ from 0 by to have a slip distance.
+#: Largest standard error of an identified parameter, and smallest evolution effect in standard
+#: errors for which its slip distance is identified. The first limit applies to the logarithm of a
+#: parameter, or to a and b relative to the largest effect.
 _MAX_IDENTIFIED_STDERR, _MIN_EFFECT_SIGMAS = 0.5, 2.0
-#: By how much the criterion of a record must be better with its steps than without them.
+#: Smallest decrease of the AIC due to the response to the steps.
 _MIN_AIC_GAIN = 10.0
 
 
 class FitProblem:
-    """Search for the free parameters of a model.
+    """Least-squares problem for the free parameters of a model.
 
     Parameters
     ----------
     model : JointModel
+        Model of the windows.
     values : mapping of str to float
-        Values of all parameters. The values of free parameters are the initial guess.
+        Values of all parameters. The values of the free parameters are the initial guess.
     free : sequence of str
         Names of the free parameters.
     noise : str
-        Noise model (see ``noise.fitted``).
+        Noise model (see ``rsfstudy.fitting.noise.fit_noise``).
+
+    Attributes
+    ----------
+    lower_bounds, upper_bounds : ndarray, shape (parameters,)
+        Bounds of the coordinates of the free parameters.
+    quantum : float
+        Quantum to which friction is rounded, or 0 if friction is not rounded.
+    has_converged : bool
+        True if the last search converged.
     """
 
     def __init__(self, model: JointModel, values: Values, free: Sequence[str], noise: str) -> None:
@@ -118,7 +139,7 @@ class FitProblem:
                 math.log(extent / len(moved)),
                 math.log(_MAX_RELATIVE_SLIP_DISTANCE * extent),
             )
-            # at bounds too the second one is longer
+            # If both slip distances are at a bound, the second slip distance is longer.
             return (
                 (low + _MIN_LOG_DISTANCE_GAP, high)
                 if name.endswith("_2")
@@ -133,33 +154,70 @@ class FitProblem:
         return _PARAMETER_BOUNDS.get(name, (-math.inf, math.inf))
 
     def values(self, x: np.ndarray) -> dict[str, float]:
-        """Return the values of all parameters for given coordinates."""
+        """Convert coordinates to the values of all parameters.
+
+        Parameters
+        ----------
+        x : ndarray, shape (parameters,)
+            Coordinates of the free parameters.
+
+        Returns
+        -------
+        dict of {str: float}
+            Values of all parameters.
+        """
         found = zip(self.free, x.tolist(), strict=True)
         return self.initial_values | {name: from_coordinate(name, v) for name, v in found}
 
     def coordinates(self, values: Values) -> np.ndarray:
-        """Return the coordinates of the free parameters."""
+        """Convert the values of parameters to coordinates.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of all parameters.
+
+        Returns
+        -------
+        ndarray, shape (parameters,)
+            Coordinates of the free parameters.
+        """
         return np.array([to_coordinate(name, values[name]) for name in self.free])
 
     def residuals(self, values: Values, *, require_stable: bool = False) -> np.ndarray:
-        """Compute recorded friction minus model friction and trend, shape (rows,)."""
+        """Compute recorded friction minus model friction and trend.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of all parameters.
+        require_stable : bool, default: False
+            If True, the motion is not computed if the stiffness is below the critical stiffness.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+            Residuals. The values of a window are NaN if its motion fails.
+        """
         curve = self.model.model_friction(values, require_stable=require_stable)
         return np.asarray(self.model.friction - curve - self.model.trend(values))
 
     def _jacobian(self, x: np.ndarray, differences: DifferenceScheme) -> np.ndarray:
-        """Compute the derivatives of the model.
+        """Compute the Jacobian of the model.
 
-        A derivative is set to 0 if one of the simulations of its finite difference fails.
+        The Jacobian contains the derivatives with respect to the coordinates of the free
+        parameters. A derivative is set to 0 if one of the motions of its finite difference fails.
         """
         found = self.model.jacobian(self.values(x), self.free, differences)
         return np.where(np.isfinite(found).all(axis=0), found, 0.0)
 
     def solve(self) -> FitSolution:
-        """Run the search.
+        """Estimate the parameters and the noise.
 
         Returns
         -------
         FitSolution
+            Parameters, errors and noise of the fit.
 
         Raises
         ------
@@ -198,11 +256,13 @@ class FitProblem:
         return found
 
     def _initial_coordinates(self) -> np.ndarray:
-        """Return the initial coordinates.
+        """Return the initial coordinates with the best slip distance.
 
-        Several slip distances are tried, and the one with the smallest residuals is selected.
+        Several initial slip distances are tested, and the slip distance with the smallest residuals
+        is used.
         """
-        self.model.check_parameters(self.initial_values)  # whatever is wrong with it is said
+        # Check the initial guess, because the search treats invalid parameters as failed motions.
+        self.model.check_parameters(self.initial_values)
         scales = _INITIAL_DISTANCE_FACTORS if "slip_distance" in self.free else (1.0,)
         distances = [n for n in ("slip_distance", "slip_distance_2") if n in self.free]
         linear = [n for n in self.free if self.model.is_linear(n)]
@@ -227,22 +287,23 @@ class FitProblem:
     def minimise(
         self, x: np.ndarray, noise: NoiseModel, rtol: float = _SEARCH_TOLERANCE
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Minimise the sum of squares for a given noise.
+        """Minimise the sum of squares for given noise.
 
-        The function uses the trust-region method of ``scipy.optimize.least_squares`` within the
+        The search uses the trust-region method of ``scipy.optimize.least_squares`` within the
         bounds.
 
         Parameters
         ----------
-        x : ndarray
+        x : ndarray, shape (parameters,)
             Initial coordinates.
         noise : NoiseModel
-        rtol : float
-            Relative tolerance of the sum of squares.
+            Noise that whitens the residuals.
+        rtol : float, optional
+            Relative tolerance of the sum of squares. The default is 1e-8.
 
         Returns
         -------
-        x : ndarray
+        x : ndarray, shape (parameters,)
             Coordinates at the minimum.
         jacobian : ndarray, shape (rows, parameters)
             Derivatives at the minimum.
@@ -260,7 +321,8 @@ class FitProblem:
         scale = 1.0
         inner = np.clip(x, self.lower_bounds + 1e-9, self.upper_bounds - 1e-9)
         scale = math.sqrt(float(np.square(left(inner)).mean())) or 1.0
-        if not math.isfinite(scale):  # next to what can be followed: there is no better neighbour
+        # The motion at the initial coordinates fails, so the search cannot improve them.
+        if not math.isfinite(scale):
             self.has_converged = True
             return x, self._jacobian(x, QUICK_DIFFERENCES)
         bounds = self.lower_bounds, self.upper_bounds
@@ -271,11 +333,11 @@ class FitProblem:
     def _build_solution(self, x: np.ndarray, noise: NoiseModel) -> FitSolution:
         """Compute the final parameters, their errors and the noise.
 
-        First, Gauss-Newton steps ``(J'R^-1 J)^-1 J'R^-1 (y - f)`` with accurate derivatives refine
-        the parameters. The numerical error of a parameter is the sum of two terms. The first term
-        is three times the change of the parameter if the motion is computed with a tenth of all
-        tolerances. The second term is the last Gauss-Newton step. The degrees of freedom are those
-        of the noise, multiplied by (n - p)/n for p parameters and n rows.
+        First, Gauss-Newton steps :math:`(J^T R^{-1} J)^{-1} J^T R^{-1} (y - f)` with accurate
+        derivatives refine the parameters. The numerical error of a parameter is the last
+        Gauss-Newton step plus three times the change due to a tenfold reduction of the integration
+        tolerances. The degrees of freedom are the degrees of freedom of the noise, multiplied by (n
+        - p)/n for p parameters and n rows.
         """
         change = math.inf
         for number in range(_NEWTON_STEP_COUNTS[2]):
@@ -293,7 +355,7 @@ class FitProblem:
                 moved, whitened, _NEWTON_TOLERANCE
             ):
                 break
-            # rounding errors no longer shrink, but steps with large residuals do
+            # Steps due to rounding errors do not shrink, but steps due to large residuals do.
             if number + 1 >= _NEWTON_STEP_COUNTS[1] and not change < _MAX_SHRINK_FACTOR * before:
                 break
         values = self.values(x)
@@ -311,7 +373,7 @@ class FitProblem:
             covariance = by_noise + shifts @ shifts.T
         degrees = max(noise.degrees_of_freedom * free_of / count, _MIN_DEGREES_OF_FREEDOM)
         finer = self.model.model_friction(values, refined=True) - curve
-        with np.errstate(invalid="ignore"):  # of what is not told
+        with np.errstate(invalid="ignore"):  # The inverse is infinite if a derivative is zero.
             off = np.abs(inverse @ whitened[:, :-1].T @ noise.whiten(finer[:, None])[:, 0])
         slopes = [coordinate_derivative(name, values[name]) for name in self.free]
         errors = (3.0 * off + np.abs(moved)) * slopes
@@ -340,10 +402,10 @@ class FitProblem:
         )
 
     def _aic_without_steps(self, jacobian: np.ndarray, noise: NoiseModel) -> float:
-        """Compute the criterion of the trends without a response (a = b = 0).
+        """Compute the AIC of a model without a response to the steps.
 
-        The noise model is the noise of the fit. A noise model fitted to these residuals would
-        describe the response to a step as predictable noise.
+        The model contains only trends and has a = b = 0. The noise model of the fit is not changed,
+        because a new noise model would describe the response to the steps as predictable noise.
         """
         linear = [self.model.is_linear(name) for name in self.free]
         columns = np.column_stack([jacobian[:, linear], self.model.friction])
@@ -358,8 +420,8 @@ class FitProblem:
     ) -> tuple[str, ...]:
         """Return the free parameters that the record does not constrain.
 
-        If the record shows no response to the steps, a parameter can be constrained only if
-        friction is a linear function of it.
+        If the record shows no response to the steps, only parameters with a linear effect on
+        friction can be constrained.
         """
         spread = dict(zip(self.free, np.sqrt(np.diag(covariance)).tolist(), strict=True))
         bound = (x - self.lower_bounds < 1e-6) | (self.upper_bounds - x < 1e-6)
@@ -384,10 +446,17 @@ class FitProblem:
     def parameter_bounds(self, name: str) -> tuple[float, float]:
         """Return the bounds of a parameter in the search.
 
+        Parameters
+        ----------
+        name : str
+            Name of a free parameter.
+
         Returns
         -------
-        low, high : float
-            NaN for a missing bound.
+        low : float
+            Lower bound of the parameter, or NaN if there is no lower bound.
+        high : float
+            Upper bound of the parameter, or NaN if there is no upper bound.
         """
         place = self.free.index(name)
         ends = self.lower_bounds[place], self.upper_bounds[place]
@@ -398,7 +467,7 @@ class FitProblem:
 def _solve_linear(columns: np.ndarray) -> np.ndarray:
     """Solve a linear least-squares problem.
 
-    The last column is the right-hand side. The result contains the coefficients of the other
+    The last column is the right-hand side, and the result contains the coefficients of the other
     columns.
     """
     return np.asarray(np.linalg.lstsq(columns[:, :-1], columns[:, -1])[0])
@@ -424,9 +493,9 @@ def _has_converged(
 
 
 def _inverse_normal_matrix(columns: np.ndarray) -> np.ndarray:
-    """Compute ``(J'J)^-1``.
+    """Compute the inverse of the normal matrix, :math:`(J^T J)^{-1}`.
 
-    All entries are infinite if a column is zero or not finite.
+    All elements are infinite if a column is zero or not finite.
     """
     sizes = np.linalg.norm(columns, axis=0)
     if not (np.isfinite(sizes).all() and (sizes > 0.0).all()):

@@ -1,4 +1,4 @@
-"""Result of a fit: parameters, covariance matrix and noise of the record."""
+"""Solution of a fit: parameters, covariance matrix and noise."""
 
 from __future__ import annotations
 
@@ -13,44 +13,45 @@ from rsfstudy.fitting.window_model import coordinate_derivative
 
 @dataclass(frozen=True)
 class FitSolution:
-    """Result of a fit.
+    """Solution of a fit.
 
-    The coordinate of a parameter is the parameter itself, or its logarithm for slip distances and
-    the stiffness.
+    The coordinate of a slip distance or stiffness is the logarithm of the parameter. For all other
+    parameters, the coordinate is the parameter itself.
 
-    Attributes
+    Parameters
     ----------
-    values : dict
-        Values of all parameters, including fixed parameters.
+    values : dict of {str: float}
+        Values of all parameters, including the fixed parameters.
     free : tuple of str
         Names of the free parameters.
-    covariance : ndarray
+    covariance : ndarray, shape (parameters, parameters)
         Covariance matrix of the coordinates of the free parameters.
-    noise_covariance : ndarray
-        Contribution of the noise of friction to the covariance matrix. The remainder is the
-        contribution of the noise of load point displacement.
-    numerical_errors : dict
+    noise_covariance : ndarray, shape (parameters, parameters)
+        Contribution of the friction noise to the covariance matrix. The noise of load point
+        displacement contributes the rest.
+    numerical_errors : dict of {str: float}
         Numerical errors of the free parameters.
     noise : NoiseModel
+        Noise of the record.
     noise_sd : float
         Standard deviation of the noise.
     degrees_of_freedom : float
         Degrees of freedom of the confidence intervals.
-    model_friction : ndarray
-        Friction of the model at each row, without the trend.
-    residuals : ndarray
-        Recorded friction minus fitted friction, which includes the trend.
-    whitened_residuals : ndarray
+    model_friction : ndarray, shape (rows,)
+        Friction of the model, without the trend.
+    residuals : ndarray, shape (rows,)
+        Recorded friction minus fitted friction. The fitted friction includes the trend.
+    whitened_residuals : ndarray, shape (kept rows,)
         Whitened residuals divided by their standard deviation.
-    jacobian : ndarray
-        Derivatives of the curve and its trend with respect to the coordinates.
+    jacobian : ndarray, shape (rows, parameters)
+        Derivatives of the fitted friction with respect to the coordinates.
     by_loading : ndarray, shape (rows, errors)
         Changes of friction by one standard error of the times and velocities of the steps.
     aic : float
-        Akaike's information criterion of the fit, including the noise model. Smaller values are
+        Akaike information criterion of the fit, including the noise model. Smaller values are
         better.
     unidentified : tuple of str
-        Free parameters that the record does not constrain.
+        Names of the free parameters that the record does not constrain.
     ols_residual_rms : float
         Root mean square of the residuals of the ordinary least-squares fit.
     quantum : float
@@ -90,7 +91,7 @@ class FitSolution:
 
     @property
     def coordinate_derivatives(self) -> np.ndarray:
-        """Derivatives of the free parameters with respect to their coordinates."""
+        """Derivatives of parameters with respect to their coordinates."""
         return np.array([coordinate_derivative(name, self.values[name]) for name in self.free])
 
     @property
@@ -100,27 +101,65 @@ class FitSolution:
 
     @property
     def curve_stderr(self) -> np.ndarray:
-        """Standard error of the fitted curve and its trend at each row.
+        """Standard error of the fitted friction at each row.
 
-        The standard error is ``sqrt(J C J')``, where J is the Jacobian and C is the covariance
-        matrix.
+        The standard error is the square root of the diagonal of :math:`J C J^T`, where :math:`J` is
+        the Jacobian and :math:`C` is the covariance matrix.
         """
         variances = np.einsum("ij,jk,ik->i", self.jacobian, self.covariance, self.jacobian)
-        # rounding errors may cause negative values if a parameter is not constrained
+        # Rounding errors may cause negative variances if a parameter is not constrained.
         return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
     def stderr(self, name: str) -> float:
-        """Return the standard error of a parameter."""
+        """Return the standard error of a parameter.
+
+        Parameters
+        ----------
+        name : str
+            Name of a free parameter.
+
+        Returns
+        -------
+        float
+            Standard error in the unit of the parameter.
+        """
         return float((self.coordinate_stderr * self.coordinate_derivatives)[self.free.index(name)])
 
 
 def compute_aic(
     whitened_residuals: np.ndarray, noise: NoiseModel, parameters: int, count: int
 ) -> float:
-    """Compute Akaike's criterion, corrected for few samples (Hurvich and Tsai, 1989).
+    r"""Compute the corrected Akaike information criterion.
 
-    It is ``n [ln(2 pi S/n) + 1] + ln|R| + 2 k n/(n - k - 1)`` for n rows, a sum of squares S of the
-    innovations and k parameters, including those of the noise and one for each outlier.
+    Parameters
+    ----------
+    whitened_residuals : ndarray, shape (kept rows,)
+        Whitened residuals without outliers.
+    noise : NoiseModel
+        Noise that whitened the residuals.
+    parameters : int
+        Number of parameters of the model.
+    count : int
+        Number of rows, including outliers.
+
+    Returns
+    -------
+    float
+        Information criterion. Smaller values are better.
+
+    Notes
+    -----
+    With the correction for small samples [1]_, the criterion is
+
+    .. math:: n [\ln(2 \pi S/n) + 1] + \ln|R| + \frac{2 k n}{n - k - 1},
+
+    where :math:`n` is the number of rows, :math:`S` is the sum of squares of the whitened
+    residuals, and :math:`R` is the correlation matrix of the noise. The number of parameters
+    :math:`k` includes the parameters of the noise model and one parameter per outlier.
+
+    References
+    ----------
+    .. [1] Hurvich and Tsai (1989), Biometrika 76, 297-307.
     """
     parameters, size = (
         parameters + count - len(whitened_residuals),

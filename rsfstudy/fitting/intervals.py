@@ -1,14 +1,16 @@
-"""Intervals of parameters: of Student's t where the likelihood is nearly a parabola, else of the
-likelihood itself.
+"""Confidence intervals of parameters from the profile likelihood.
 
-The squared distance of a value is what the sum of squares of whitened residuals grows by, in
-variances of the noise, where the parameter has that value and all others are found anew (profile
-likelihood). The ends of an interval have the squared distance ``t^2``, t being the quantile of
-Student's distribution with the degrees of freedom of the fit: standard errors, for a parabola.
+The profile likelihood of a parameter is the maximum likelihood with respect to all other
+parameters, at a fixed value of the parameter [1]_. The squared distance of a value is the resulting
+increase of the sum of squared whitened residuals, divided by the noise variance. At the ends of a
+confidence interval, the squared distance is :math:`t^2`, where :math:`t` is a quantile of Student's
+t distribution with the degrees of freedom of the fit. If the log-likelihood is nearly quadratic,
+the standard error determines the interval.
 
 References
 ----------
-Bates and Watts (1988), Nonlinear Regression Analysis and Its Applications, Wiley, section 6.1.
+.. [1] Bates and Watts (1988), Nonlinear Regression Analysis and Its Applications, Wiley, section
+   6.1.
 """
 
 from __future__ import annotations
@@ -21,9 +23,10 @@ from scipy.stats import t as student
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
 from rsfstudy.fitting.window_model import from_coordinate
 
-#: What intervals cover, and by how much of itself a squared distance may miss that of a parabola
-#: before the likelihood is followed, how often, how closely; and the variances by which the least
-#: sum of squares may be missed then.
+#: Confidence level, relative deviation from a quadratic log-likelihood above which the profile
+#: likelihood is computed, largest number of iterations for an end of an interval, relative
+#: tolerance of the squared distance at an end, and tolerance of the minimum sum of squares in noise
+#: variances.
 CONFIDENCE_LEVEL, _PARABOLA_TOLERANCE, _MAX_END_ITERATIONS, _END_TOLERANCE, _MINIMUM_TOLERANCE = (
     0.95,
     0.2,
@@ -34,27 +37,46 @@ CONFIDENCE_LEVEL, _PARABOLA_TOLERANCE, _MAX_END_ITERATIONS, _END_TOLERANCE, _MIN
 
 
 def stderr_multiplier(solution: FitSolution, confidence_level: float) -> float:
-    """Distance, in standard errors, to the ends of intervals that cover so much."""
+    """Return the half width of confidence intervals in standard errors.
+
+    Parameters
+    ----------
+    solution : FitSolution
+        Solution of a fit.
+    confidence_level : float
+        Confidence level between 0 and 1.
+
+    Returns
+    -------
+    float
+        Quantile of Student's t distribution with the degrees of freedom of the fit.
+    """
     return float(student.isf(0.5 * (1.0 - confidence_level), solution.degrees_of_freedom))
 
 
 def confidence_interval(
     problem: FitProblem, solution: FitSolution, name: str
 ) -> tuple[float, float]:
-    """Ends of the 95 % interval of a parameter, in its units: where the likelihood has fallen as
-    far as Student's t says, or the bounds of the search. Noise of load point displacement makes it
-    wider by as much as the standard error.
+    """Compute the 95 % confidence interval of a parameter.
+
+    The interval follows from the profile likelihood, and is limited to the bounds of the search.
+    Noise of load point displacement widens the interval by the same factor as the standard error.
 
     Parameters
     ----------
     problem : FitProblem
+        Problem with the model of the record.
     solution : FitSolution
-        Of that search.
+        Solution of the problem.
     name : str
+        Name of a free parameter.
 
     Returns
     -------
-    (float, float)
+    low : float
+        Lower end of the interval, in the unit of the parameter.
+    high : float
+        Upper end of the interval, in the unit of the parameter.
     """
     profile, far = (
         LikelihoodProfile(problem, solution, name),
@@ -69,17 +91,27 @@ def confidence_interval(
 
 
 class LikelihoodProfile:
-    """The likelihood of a parameter, all others being where it is greatest.
+    """Profile likelihood of a parameter.
 
-    The noise is as the fit found it.
+    The noise model of the fit is not changed.
 
     Parameters
     ----------
     search : FitProblem
+        Problem with the model of the record.
     found : FitSolution
-        Of that search.
+        Solution of the problem.
     name : str
-        The parameter.
+        Name of a free parameter.
+
+    Attributes
+    ----------
+    best_coordinates : ndarray, shape (parameters,)
+        Coordinates of all free parameters at the maximum of the likelihood.
+    noise_stderr : float
+        Standard error of the coordinate due to friction noise.
+    covariation : ndarray, shape (parameters,)
+        Changes of all coordinates per unit change of the coordinate of the parameter.
     """
 
     def __init__(self, search: FitProblem, found: FitSolution, name: str) -> None:
@@ -87,11 +119,23 @@ class LikelihoodProfile:
         self.best_coordinates = search.coordinates(found.values)
         variance = float(found.noise_covariance[self.index, self.index])
         self.noise_stderr = math.sqrt(variance)
-        #: By how much the others go with the parameter.
         self.covariation = found.noise_covariance[:, self.index] / variance
 
     def find_end(self, sign: float, stderr_count: float) -> float:
-        """Coordinate where the squared distance is that of so many standard errors, or a bound."""
+        """Find the coordinate with a given squared distance.
+
+        Parameters
+        ----------
+        sign : float
+            Direction of the search: -1 for the lower end and 1 for the upper end.
+        stderr_count : float
+            Square root of the squared distance, in standard errors.
+
+        Returns
+        -------
+        float
+            Coordinate, limited to the bounds of the search.
+        """
         bound = (self.problem.lower_bounds if sign < 0.0 else self.problem.upper_bounds)[self.index]
         most = abs(float(bound - self.best_coordinates[self.index]))
         at, power, before = min(stderr_count * self.noise_stderr, most), 2.0, (0.0, 0.0)
@@ -102,19 +146,33 @@ class LikelihoodProfile:
             ) < _END_TOLERANCE:
                 break
             here = math.log(at), math.log(min(max(squared, 1e-9), 1e9))
-            if number:  # the likelihood may flatten, or fall faster than a parabola
+            if number:  # The log-likelihood may be flatter or steeper than a parabola.
                 power = min(max((here[1] - before[1]) / (here[0] - before[0]), 0.3), 6.0)
             factor = math.exp((2.0 * math.log(stderr_count) - here[1]) / power)
             at, before = min(most, at * min(max(factor, 0.3), 3.0)), here
         return float(self.best_coordinates[self.index] + sign * at)
 
     def squared_distance(self, coordinate: float) -> float:
-        """Twice the logarithm by which the likelihood has fallen where the parameter, or its
-        logarithm, is this: by how much the sum of squares has grown, in variances of the noise.
+        """Compute the squared distance of a value of the parameter.
+
+        The squared distance is twice the decrease of the log-likelihood, which equals the increase
+        of the sum of squares in noise variances. If the log-likelihood is nearly quadratic, the
+        function returns the quadratic approximation.
+
+        Parameters
+        ----------
+        coordinate : float
+            Coordinate of the parameter.
+
+        Returns
+        -------
+        float
+            Squared distance, or infinity if the motion fails.
         """
         moved = coordinate - self.best_coordinates[self.index]
         parabola = float(moved / self.noise_stderr) ** 2
-        if not parabola or self.solution.unidentified:  # what is not told leads nowhere
+        # Without constraints on all parameters, the search would not converge.
+        if not parabola or self.solution.unidentified:
             return parabola
         x = np.clip(
             self.best_coordinates + moved * self.covariation,
@@ -144,15 +202,22 @@ class LikelihoodProfile:
         return self._excess_squares(left)
 
     def _whitened_residuals(self, x: np.ndarray) -> np.ndarray:
-        """Residuals freed of correlation, over their size; NaN where no motion can be followed."""
+        """Compute whitened residuals in standard deviations of the noise.
+
+        The residuals are NaN if the motion fails.
+        """
         left = self.problem.residuals(self.problem.values(x), require_stable=True)
         return self.solution.noise.whiten(left[:, None])[:, 0] / self.solution.noise_sd
 
     def _excess_squares(self, residuals: np.ndarray) -> float:
+        """Return the sum of squares minus the minimum sum of squares."""
         return float(residuals @ residuals - np.square(self.solution.whitened_residuals).sum())
 
     def _linearised_excess(self, x: np.ndarray) -> float:
-        """By how much squares have grown where the others move, to first order, to the least."""
+        """Compute the excess sum of squares with a linearised model.
+
+        The other parameters minimise the sum of squares of the linearised model.
+        """
         left = self._whitened_residuals(x)
         if not np.isfinite(left).all():
             return math.inf

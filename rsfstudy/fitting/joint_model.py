@@ -1,7 +1,7 @@
 """Joint fits of several windows.
 
-The windows share the parameters of the material. If there are several windows, each window has its
-own friction before the step, trend and step time.
+All windows of a joint fit share the parameters of the material. Each window has its own friction
+before the step, trend and step time, with names such as ``mu_star_1``.
 """
 
 from __future__ import annotations
@@ -21,20 +21,41 @@ from rsfstudy.motion import MotionStopped
 from rsfstudy.status import Status
 
 T = TypeVar("T")
-#: What parameters that each window may have for itself begin with.
+#: Prefixes of the parameters that have a separate value in each window.
 _WINDOW_PREFIXES = ("mu_star", "step_time", "trend")
 
 
 def is_window_parameter(name: str) -> bool:
-    """Return True if each window has its own value of a parameter."""
+    """Return True if each window has its own value of a parameter.
+
+    Parameters
+    ----------
+    name : str
+        Name of the parameter, with or without a window number.
+
+    Returns
+    -------
+    bool
+        True for friction before the step, step time and trend.
+    """
     return name.startswith(_WINDOW_PREFIXES)
 
 
 def number_parameters(names: Sequence[str], windows: int) -> tuple[str, ...]:
-    """Return the names of the parameters of a number of windows.
+    """Return the names of the parameters of a joint fit.
 
-    If there are several windows, the parameters of each window are numbered: ``mu_star_1``,
-    ``mu_star_2`` and so on.
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the parameters without window numbers.
+    windows : int
+        Number of windows.
+
+    Returns
+    -------
+    tuple of str
+        Names of the shared parameters, followed by the numbered names for each window, such as
+        ``mu_star_1`` and ``mu_star_2``. If there is a single window, the names are not numbered.
     """
     if windows == 1:
         return tuple(names)
@@ -44,36 +65,93 @@ def number_parameters(names: Sequence[str], windows: int) -> tuple[str, ...]:
 
 
 def split_window_number(name: str) -> tuple[str, int]:
-    """Split the name of a parameter into its plain name and its window number.
+    """Split the name of a parameter into a plain name and a window number.
 
-    The number is 0 if all windows share the parameter.
+    Parameters
+    ----------
+    name : str
+        Name of the parameter, such as "mu_star_2".
+
+    Returns
+    -------
+    name : str
+        Name without the window number.
+    number : int
+        Window number, or 0 if the name has no window number.
+
+    Examples
+    --------
+    >>> from rsfstudy.fitting import split_window_number
+    >>> split_window_number("mu_star_2")
+    ('mu_star', 2)
+    >>> split_window_number("slip_distance_2")
+    ('slip_distance_2', 0)
     """
     before, _, number = name.rpartition("_")
     return (before, int(number)) if number.isdecimal() and is_window_parameter(name) else (name, 0)
 
 
 def strip_window_number(name: str) -> str:
-    """Return the name of a parameter without its window number."""
+    """Remove the window number from the name of a parameter.
+
+    Parameters
+    ----------
+    name : str
+        Name of the parameter, such as "mu_star_2".
+
+    Returns
+    -------
+    str
+        Name without the window number.
+
+    Examples
+    --------
+    >>> from rsfstudy.fitting import strip_window_number
+    >>> strip_window_number("mu_star_2")
+    'mu_star'
+    """
     return split_window_number(name)[0]
 
 
 def window_values(values: Mapping[str, T], number: int) -> dict[str, T]:
-    """Return the values for one window, with plain parameter names as keys."""
+    """Select the values of the parameters of a window.
+
+    Parameters
+    ----------
+    values : mapping of str to object
+        Values by parameter name, with or without window numbers.
+    number : int
+        Number of the window, starting from 1.
+
+    Returns
+    -------
+    dict
+        Values of the shared parameters and of the parameters of the window, by names without window
+        numbers.
+
+    Examples
+    --------
+    >>> from rsfstudy.fitting import window_values
+    >>> window_values({"a": 0.01, "mu_star_1": 0.6, "mu_star_2": 0.62}, 2)
+    {'a': 0.01, 'mu_star': 0.62}
+    """
     names = {name: split_window_number(name) for name in values}
     return {own: values[name] for name, (own, of) in names.items() if of in (0, number)}
 
 
 @dataclass(frozen=True)
 class JointModel:
-    """Combined model of one or several windows, used in the same way as a ``Model``.
+    """Model of one or several windows.
 
-    Attributes
+    The class combines the rows of all windows, and has the same methods as ``WindowModel``.
+
+    Parameters
     ----------
     models : tuple of WindowModel
         Models of the windows.
-    stiffness_factors : tuple of float
-        Ratio of stiffness to normal stress in each window, relative to the first window. Empty if
-        the ratio is the same in all windows.
+    stiffness_factors : tuple of float, optional
+        Ratio of stiffness to normal stress in each window, relative to the ratio in the first
+        window. By default, the ratio is the same in all windows.
     """
 
     models: tuple[WindowModel, ...]
@@ -81,43 +159,75 @@ class JointModel:
 
     @cached_property
     def time(self) -> np.ndarray:
-        """Times of all rows. The clock restarts at the first row of each window."""
+        """Times of all rows in s, relative to the first row of each window."""
         return np.concatenate([part.time - part.time[0] for part in self.models])
 
     @cached_property
     def friction(self) -> np.ndarray:
-        """Friction of all rows."""
+        """Recorded friction of all rows."""
         return np.concatenate([part.friction for part in self.models])
 
     @property
     def averaging_time(self) -> float:
-        """Averaging time of friction in s, or 0 if friction was not averaged."""
+        """Averaging time of friction in s, or 0 if there is no averaging."""
         passed = self.models[0].filter
         return passed.size if passed is not None and passed.kind not in LOW_PASS_ORDERS else 0.0
 
     @property
     def friction_per_window(self) -> list[np.ndarray]:
-        """Friction of the rows, as one array per window."""
+        """Recorded friction of the rows, as one array per window."""
         return [part.friction for part in self.models]
 
     @cached_property
     def displacement(self) -> np.ndarray:
-        """Displacements of all rows, in um, relative to the step of each window."""
+        """Displacements of all rows in um, relative to the step."""
         return np.concatenate([part.displacement for part in self.models])
 
     def is_linear(self, name: str) -> bool:
         """Return True if friction is a linear function of a parameter.
 
-        Friction must be linear for all values of the other parameters.
+        Friction must be linear in the parameter for all values of the other parameters.
+
+        Parameters
+        ----------
+        name : str
+            Name of the parameter, with or without a window number.
+
+        Returns
+        -------
+        bool
+            True if friction is linear in all windows.
         """
         return all(part.is_linear(strip_window_number(name)) for part in self.models)
 
     def max_delay(self, name: str) -> float:
-        """Return the largest delay in s of the loading of a window."""
+        """Return the largest delay of the loading that the model supports.
+
+        Parameters
+        ----------
+        name : str
+            Name of the step time, with or without a window number.
+
+        Returns
+        -------
+        float
+            Largest delay in s for the window of the step time.
+        """
         return self.models[max(split_window_number(name)[1] - 1, 0)].max_delay
 
     def check_parameters(self, values: Values) -> None:
-        """Raise ``MotionStopped`` if the parameters are invalid for the scene."""
+        """Raise ``MotionStopped`` if the parameters are invalid for the scene.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of all parameters.
+
+        Raises
+        ------
+        MotionStopped
+            If the scene of a window cannot be built from the parameters.
+        """
         try:
             for part, own in self._iterate_windows(values):
                 part.build_scene(own)
@@ -128,9 +238,23 @@ class JointModel:
     def model_friction(
         self, values: Values, *, refined: bool = False, require_stable: bool = False
     ) -> np.ndarray:
-        """Compute friction of the rows of all windows, without trends.
+        """Compute the friction of the model at each row of all windows.
 
-        See ``Model.model_friction`` for the parameters.
+        The trend is not included. See ``WindowModel.model_friction`` for details.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of all parameters.
+        refined : bool, default: False
+            If True, all tolerances are reduced by a factor of ten.
+        require_stable : bool, default: False
+            If True, the motion is not computed if the stiffness is below the critical stiffness.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+            Friction of the model. The values of a window are NaN if its motion fails.
         """
         told = {"refined": refined, "require_stable": require_stable}
         return np.concatenate(
@@ -138,7 +262,18 @@ class JointModel:
         )
 
     def trend(self, values: Values) -> np.ndarray:
-        """Compute the trends of the rows of all windows."""
+        """Compute the trend at each row of all windows.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of all parameters.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+            Trend of each row.
+        """
         return np.concatenate([part.trend(own) for part, own in self._iterate_windows(values)])
 
     def jacobian(
@@ -147,9 +282,24 @@ class JointModel:
         free: Sequence[str],
         difference_scheme: DifferenceScheme = FINE_DIFFERENCES,
     ) -> np.ndarray:
-        """Compute the derivatives of friction in all windows.
+        """Compute the derivatives of friction with respect to parameters.
 
-        See ``Model.jacobian`` for the parameters.
+        See ``WindowModel.jacobian`` for details.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of all parameters.
+        free : sequence of str
+            Names of the free parameters, with window numbers.
+        difference_scheme : (float, int), optional
+            Step size and order of the finite differences. The default is ``FINE_DIFFERENCES``.
+
+        Returns
+        -------
+        ndarray, shape (rows, parameters)
+            Derivatives. The derivative with respect to a parameter of one window is 0 in all other
+            windows.
         """
         blocks = []
         places = {name: place for place, name in enumerate(free)}
@@ -161,7 +311,19 @@ class JointModel:
         return np.concatenate(blocks)
 
     def loading_sensitivity(self, values: Values) -> np.ndarray:
-        """Compute the change of friction due to errors of the loading of each window."""
+        """Compute the changes of friction due to errors of the loading.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of all parameters.
+
+        Returns
+        -------
+        ndarray, shape (rows, errors)
+            Changes of friction by one standard error of each independent error. An error of the
+            loading changes friction in one window only.
+        """
         return np.asarray(
             block_diag(
                 *(part.loading_sensitivity(own) for part, own in self._iterate_windows(values))
@@ -169,7 +331,7 @@ class JointModel:
         )
 
     def _iterate_windows(self, values: Values) -> Iterator[tuple[WindowModel, dict[str, float]]]:
-        """Iterate over the models and the parameters of their windows."""
+        """Iterate over the models and parameters of the windows."""
         factors = self.stiffness_factors or (1.0,) * len(self.models)
         for number, (part, factor) in enumerate(zip(self.models, factors, strict=True), start=1):
             own = window_values(values, number)

@@ -1,4 +1,4 @@
-"""Selection of the part of a record with linear friction before a step."""
+"""Selection of the rows before a step in which friction is linear."""
 
 from __future__ import annotations
 
@@ -11,40 +11,43 @@ from rsfstudy.fitting.outliers import find_kept_mask, find_quantum
 from rsfstudy.fitting.record import Record
 from rsfstudy.fitting.velocity_steps import RunningSums
 
-#: Means of rows that are fitted, fewest of them on either side of a break, and fewest rows that
-#: remain.
+#: Largest number of block averages that are tested, fewest block averages on each side of a break,
+#: and fewest rows of a part that is tested.
 _MAX_MEANS, _MIN_SIDE_MEANS, _MIN_ROWS = 120, 6, 20
-#: Gain in the sum of squares by a broken line, in variances of its residuals over ln n.
+#: Smallest decrease of the sum of squares by a second line, divided by the residual variance and by
+#: ln n for n block averages. The residual variance is increased if the residuals are correlated.
 _MIN_BREAK_GAIN = 15.0
-#: Departure of friction from the line of the later part that matters, in absolute terms and in
-#: standard deviations of the residuals. A step of velocity by a factor of ten changes friction by
-#: 0.02 or so.
+#: Smallest deviation of friction from the line of the later part, as an absolute value and in
+#: standard deviations of the residuals. For comparison, a tenfold velocity step changes friction by
+#: about 0.02.
 _MIN_DEPARTURE, _MIN_DEPARTURE_SIGMAS = 4e-4, 4.0
-#: Fraction of the rows, next to the step, from which the noise is estimated.
+#: Fraction of the rows from which the noise is estimated. These rows are next to the step.
 _NOISE_ROW_FRACTION = 0.4
-#: Upper bound of the estimated correlation of successive means.
+#: Upper bound of the estimated correlation between successive block averages.
 _MAX_CORRELATION = 0.98
 
 
 @lru_cache(maxsize=256)
 def find_linear_start(record: Record, start: float, end: float) -> float:
-    """Find the start of the interval before a step in which friction varies linearly with time.
+    """Find the start of the linear part of friction before a step.
 
-    Two conditions are tested. First, two separate lines must describe friction far better than a
-    single line, after allowing for the correlation of the residuals. Second, the earlier part must
-    deviate significantly from the line through the later part. If both conditions hold, the earlier
-    part is discarded, and the remainder is tested again. Outliers are interpolated first.
+    The earlier part of the rows is discarded if two conditions are met. First, two separate lines
+    must describe friction far better than a single line. The comparison accounts for the
+    correlation of the residuals. Second, friction in the earlier part must differ noticeably from
+    the line through the later part. The test is repeated with the remaining rows. Before the test,
+    outliers are replaced by interpolated values.
 
     Parameters
     ----------
     record : Record
+        Record with time and friction.
     start, end : float
         Times in s between which friction is tested.
 
     Returns
     -------
     float
-        Time in s. The result is ``start`` if friction is linear throughout.
+        Time in s. The result is ``start`` if friction is linear in the whole interval.
     """
     rows = np.flatnonzero((record.time >= start) & (record.time < end))
     time, friction = record.time[rows], record.columns["friction"][rows]
@@ -64,12 +67,12 @@ def find_linear_start(record: Record, start: float, end: float) -> float:
 
 
 def _find_break(t: np.ndarray, friction: np.ndarray) -> int:
-    """Find the row at which a split into two separate lines fits friction best.
+    """Find the row at which a split into two lines fits friction best.
 
     Returns
     -------
     int
-        0 if a single line describes friction equally well.
+        Index of the row, or 0 if a single line is sufficient.
     """
     count = len(t)
     sums = RunningSums(t - t[0], friction - friction[0], np.ones(count))
@@ -77,13 +80,14 @@ def _find_break(t: np.ndarray, friction: np.ndarray) -> int:
     both = sums.residual_squares(0, places) + sums.residual_squares(places, count)
     place = int(places[np.argmin(both)])
     time, moved = t - t[0], friction - friction[0]
-    # the noise is estimated from the last part, because residuals of a curved part are not noise
+    # Curvature in the earlier part is not noise, so the noise is estimated from the last rows.
     last = count - max(int(_NOISE_ROW_FRACTION * count), _MIN_SIDE_MEANS)
     (x0, v0), (x1, v1) = sums.fit_line(last, count), sums.fit_line(place, count)
     left = (moved - x0 - v0 * time)[last:]
     size = float(np.sqrt(left @ left / (len(left) - 2)))
     rho = float(left[1:] @ left[:-1] / max(left @ left, 1e-300))
-    rho += 4.0 * (1.0 + rho) / len(left)  # the fit of the line reduces the correlation
+    # Subtracting the fitted line reduces the estimated correlation.
+    rho += 4.0 * (1.0 + rho) / len(left)
     rho = min(max(rho, 0.0), _MAX_CORRELATION)
     gain = float(sums.residual_squares(0, count)) - float(both.min())
     departs = float(np.abs(moved[:place] - x1 - v1 * time[:place]).max())

@@ -1,9 +1,8 @@
-"""Errors of step times and velocities due to noise of load point displacement.
+"""Errors of step times and velocities due to load point noise.
 
-The displacement is ``x_0 + V_0 t`` before the first step, and each segment that follows has its own
-velocity. The errors follow as in a fit of friction. The covariance matrix of the times and
-velocities is computed from the derivatives of displacement with respect to times, velocities and
-x_0, and from the noise of the residuals (see ``noise``).
+The displacement is a straight line before the first step, and another straight line after each
+step. The covariance matrix of the step times and velocities is computed from the derivatives of
+this displacement and from the noise of its residuals, as in a fit of friction.
 """
 
 from __future__ import annotations
@@ -19,33 +18,35 @@ from rsfstudy.fitting.record import Record
 from rsfstudy.fitting.velocity_steps import LoadingStep
 from rsfstudy.fitting.window_model import STEP_SHIFT_FRACTION
 
-#: Means of rows of which noise is told: an autoregressive process of them remembers long enough for
-#: a load point that wanders about its set point.
+#: Largest number of block averages from which the noise is estimated. An autoregressive process of
+#: block averages also describes slow fluctuations of the load point around its set point.
 _MAX_MEANS = 1000
-#: Part of the displacement of a record that noise exceeds.
+#: Smallest noise relative to the displacement of the record. Smaller noise is neglected.
 _MIN_RELATIVE_NOISE = 1e-7
-#: Ratio of the standard deviation of displacement residuals to the quantum below which rounding
-#: errors are not random; and the number of random phases that are drawn.
+#: Ratio of the noise to the quantum of displacement below which rounding errors are not random, and
+#: number of random phases in the simulation of rounding errors.
 _MIN_NOISE_PER_QUANTUM, _PHASE_DRAW_COUNT = 0.4, 200
 
 
 def shift_steps(record: Record, steps: Sequence[LoadingStep]) -> list[list[LoadingStep]]:
     """Return copies of the steps that are shifted by their errors.
 
-    Each copy is shifted by a hundredth of one error. The errors are independent, and together they
-    have the covariance matrix of the times and velocities.
+    In each copy, the times and velocities are shifted by 1 % of one error. The errors are
+    statistically independent, and their combined covariance matrix equals the covariance matrix of
+    the step times and velocities.
 
     Parameters
     ----------
     record : Record
+        Record that contains the steps.
     steps : sequence of LoadingStep
-        Successive steps of the record.
+        Successive steps of load point velocity.
 
     Returns
     -------
-    list of list of Step
+    list of list of LoadingStep
         One copy of the steps for each independent error. The list is empty if the user specified
-        the steps, or if displacement has no noise.
+        the steps, or if the displacement has no noise.
     """
     if record.specified_steps is not None or not steps:
         return []
@@ -68,15 +69,15 @@ def shift_steps(record: Record, steps: Sequence[LoadingStep]) -> list[list[Loadi
 def integrate_displacement(loading: np.ndarray, time: np.ndarray, origin: float) -> np.ndarray:
     """Integrate the load point velocity to obtain the displacement.
 
-    The integrated displacement has no noise, in contrast to the recorded displacement. Noise of a
-    regressor would bias the trend in generalised least squares, because the noise dominates at
-    short lags.
+    In contrast to the recorded displacement, the result has no noise. Noise of the recorded
+    displacement would bias the trend in generalised least squares, because this noise dominates the
+    differences between neighbouring rows.
 
     Parameters
     ----------
     loading : ndarray, shape (segments, 4)
-        Segments of constant velocity, as returned by ``loading_of``. The first segment also applies
-        to earlier times.
+        Segments of constant velocity (see ``rsfstudy.fitting.record.loading_history``). The
+        velocity of the first segment is also used before the first segment.
     time : ndarray, shape (rows,)
         Times in s.
     origin : float
@@ -105,7 +106,8 @@ def _step_errors(
     Returns
     -------
     list of (ndarray, ndarray)
-        Errors of the times, shape (steps,), and of the velocities, shape (steps + 1,).
+        For each error, the shifts of the times in s, with shape (steps,), and the changes of the
+        velocities in um/s, with shape (steps + 1,).
     """
     found, time = record.loading_steps, record.time
     begins = max((s.end for s in found if s.end < steps[0].start), default=time[0])
@@ -132,7 +134,7 @@ def _step_errors(
         root = _rounding_covariance_root(columns[:, :-1], exact, np.searchsorted(at, t), quantum)
     else:
         root = _noise_covariance_root(t, columns)
-    # the detected steps differ from the least-squares solution for all rows
+    # The detected steps differ from the least-squares solution for all rows.
     missed = best[:-1] - np.concatenate([np.zeros(len(at)), velocities[moves]])
     root = np.column_stack([root, missed])
     faster = np.zeros((len(velocities), root.shape[1]))
@@ -141,19 +143,21 @@ def _step_errors(
 
 
 def _noise_covariance_root(t: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Compute a root of the covariance matrix under noise of displacement.
+    """Compute a root of the covariance matrix for random noise.
 
     Parameters
     ----------
     t : ndarray, shape (rows,)
+        Times in s.
     columns : ndarray, shape (rows, parameters + 1)
         Derivatives of displacement, followed by the residuals. The last derivative is with respect
-        to x_0.
+        to the initial displacement.
 
     Returns
     -------
     ndarray
-        A matrix A such that A A' is the covariance matrix of times and velocities.
+        A matrix :math:`A` such that :math:`A A^T` is the covariance matrix of the times and
+        velocities.
     """
     every = -(-len(t) // _MAX_MEANS)
     table = np.column_stack([t, columns])[: len(t) // every * every]
@@ -162,7 +166,8 @@ def _noise_covariance_root(t: np.ndarray, columns: np.ndarray) -> np.ndarray:
     told = noise.fit_noise(noise.AUTOREGRESSIVE, t, left, jacobian)
     white = told.whiten(np.eye(len(t)))
     size = np.linalg.norm(white @ left) / np.sqrt(len(t) - jacobian.shape[1])
-    # lines are those of least squares, with J^+ R J^+' for covariance, J^+ = (J'J)^-1 J'
+    # The steps are ordinary least-squares estimates, so their covariance matrix is J^+ R J^+'
+    # with the pseudoinverse J^+ = (J'J)^-1 J' and the correlation matrix R of the noise.
     acting = solve_triangular(white, np.linalg.pinv(jacobian).T, trans="T", lower=True)
     return np.asarray(size * np.linalg.qr(acting)[1].T[:-1, :-1])
 
@@ -170,16 +175,17 @@ def _noise_covariance_root(t: np.ndarray, columns: np.ndarray) -> np.ndarray:
 def _rounding_covariance_root(
     jacobian: np.ndarray, exact: np.ndarray, pieces: np.ndarray, quantum: float
 ) -> np.ndarray:
-    """Compute a root of the covariance matrix if displacement is only rounded.
+    """Compute a root of the covariance matrix for rounded displacement.
 
-    Rounding errors are not random within a record, because they repeat at a constant velocity.
-    However, their phase is arbitrary in each straight segment. The lines are therefore fitted to
+    At a constant velocity, the rounding errors repeat, and are not random. However, the phase of
+    the rounding errors is arbitrary in each straight segment. The function therefore fits lines to
     rounding errors with random phases.
 
     Returns
     -------
     ndarray
-        A matrix A such that A A' is the covariance matrix of times and velocities.
+        A matrix :math:`A` such that :math:`A A^T` is the covariance matrix of the times and
+        velocities.
     """
     rng = np.random.default_rng(0)
     phases = quantum * rng.random((_PHASE_DRAW_COUNT, pieces.max() + 1))[:, pieces]

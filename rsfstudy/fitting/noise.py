@@ -1,26 +1,28 @@
-"""White and autoregressive models of the noise of a record.
+r"""White and autoregressive models of the noise of a record.
 
-The autoregressive coefficients are estimated by restricted maximum likelihood (REML), which
-accounts for the noise that the fit absorbs. Let J be the derivatives of the model, R the
-correlation matrix of the noise, p the number of parameters and n the number of rows. REML minimises
+The function ``fit_noise`` estimates a ``NoiseModel`` from the residuals of a fit by restricted
+maximum likelihood (REML) [1]_. REML accounts for the noise that the fit absorbs. Let :math:`J` be
+the derivatives of the model, :math:`R` the correlation matrix of the noise, :math:`p` the number of
+parameters, and :math:`n` the number of rows. REML minimises
 
-    (n - p) ln(S/(n - p)) + ln|R| + ln|J' R^-1 J|,
+.. math:: (n - p) \ln\frac{S}{n - p} + \ln|R| + \ln|J^T R^{-1} J|,
 
-where S is the sum of squared residuals of generalised least squares. Rows with another sampling
-interval have another noise process, with its own standard deviation and correlation. If the
-sampling interval changes, the rows before the change still predict the rows after it, scaled by the
-ratio of the standard deviations.
+where :math:`S` is the sum of squared residuals of generalised least squares.
 
-The process is ``e_i = c_1 e_(i-1) + ... + c_m e_(i-m) + w_i`` with white noise w. The process is
-stationary if its partial autocorrelations are between -1 and 1. The search therefore varies the
-partial autocorrelations.
+The noise is an autoregressive process :math:`e_i = c_1 e_{i-1} + \dots + c_m e_{i-m} + w_i` with
+white noise :math:`w`. The process is stationary if all partial autocorrelations are between -1 and
+1, so the search varies the partial autocorrelations [2]_. The Burg method [3]_ provides the initial
+guess.
+
+Rows with different sampling intervals have different noise processes, each with its own standard
+deviation and correlation. If the sampling interval changes, the rows before the change are scaled
+by the ratio of the standard deviations, and still predict the rows after the change.
 
 References
 ----------
-Patterson and Thompson (1971), Biometrika 58, 545-554, for REML; Burg (1967), Proc. 37th Meeting of
-the Society of Exploration Geophysicists, for the initial guess; Barndorff-Nielsen and Schou (1973),
-J. Multivar. Anal. 3, 408-419, for partial autocorrelations; Ljung and Box (1978), Biometrika 65,
-297-303.
+.. [1] Patterson and Thompson (1971), Biometrika 58, 545-554.
+.. [2] Barndorff-Nielsen and Schou (1973), J. Multivar. Anal. 3, 408-419.
+.. [3] Burg (1967), Proc. 37th Meeting of the Society of Exploration Geophysicists.
 """
 
 from __future__ import annotations
@@ -47,21 +49,33 @@ from rsfstudy.fitting.sampling_runs import (
 from rsfstudy.fitting.whiteness_test import LAG_COUNT as LAG_COUNT
 from rsfstudy.fitting.whiteness_test import ljung_box_p_value as ljung_box_p_value
 
+#: Names of the noise models: white noise, and an autoregressive process with an automatic order.
 WHITE, AUTOREGRESSIVE = "white", "ar"
-#: Highest order that is looked for, and samples that each coefficient takes at least.
+#: Highest order of the autoregressive process, and fewest rows per coefficient.
 MAX_ORDER, _SAMPLES_PER_COEFFICIENT = 12, 10
-#: Largest partial correlation, and slope of what REML minimises at which the search ends.
+#: Largest partial autocorrelation, and gradient of the REML objective at which the search ends.
 _MAX_PARTIAL_AUTOCORRELATION, _GRADIENT_TOLERANCE = 0.999, 0.02
-#: Passes in which the noise levels and the autoregressive process are estimated in turn.
+#: Largest number of passes that refine the noise levels and the autoregressive process in turn.
 _LEVEL_PASSES = 2
-#: Smallest standard deviation of a level, relative to that of all residuals.
+#: Smallest standard deviation of a noise level, relative to the root mean square of the residuals.
 _MIN_RELATIVE_SD = 1e-3
-#: Largest logarithm of a level relative to the first one.
+#: Largest logarithm of the ratio of a noise level to the first noise level.
 _MAX_LOG_LEVEL_RATIO = 30.0
 
 
 def check_noise_name(name: str) -> None:
-    """Raise ``InvalidValue`` if the name of a noise model is unknown."""
+    """Raise ``InvalidValue`` if the name of a noise model is unknown.
+
+    Parameters
+    ----------
+    name : str
+        Name of the noise model, such as "white", "ar" or "ar2".
+
+    Raises
+    ------
+    InvalidValue
+        If the name is unknown.
+    """
     if name not in (WHITE, AUTOREGRESSIVE, *(f"ar{order}" for order in range(1, MAX_ORDER + 1))):
         choices = (WHITE, AUTOREGRESSIVE, f"ar1 to ar{MAX_ORDER}")
         raise InvalidValue("noise", name, "is unknown", choices=choices)
@@ -69,19 +83,20 @@ def check_noise_name(name: str) -> None:
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Noise of a record, with an autoregressive process for each sampling interval.
+    """Noise of a record, with an autoregressive process per sampling interval.
 
-    The standard deviation of the noise (its level) may also change along the record.
+    The noise level, which is the standard deviation of the noise, may change along the record.
 
-    Attributes
+    Parameters
     ----------
     runs : tuple of SamplingRun
+        Runs of rows with the same process and noise level.
     partial_autocorrelations : ndarray, shape (processes, order)
         Partial autocorrelations of each process.
     level_sds : ndarray, shape (levels,)
-        Standard deviation of each level, relative to the first level.
+        Standard deviation of each noise level, relative to the first level.
     kept_mask : ndarray of bool, shape (rows,), optional
-        False for outliers, which are excluded. By default, all rows are kept.
+        Mask that is False for outliers, which are excluded. By default, all rows are kept.
     averaging_correlation : AveragingCorrelation, optional
         Correlation due to averaging, which is removed before the correlation of the process.
     """
@@ -106,10 +121,12 @@ class NoiseModel:
         Parameters
         ----------
         columns : ndarray, shape (rows, columns)
+            Columns to whiten, including the rows of outliers.
 
         Returns
         -------
         ndarray, shape (kept rows, columns)
+            Whitened columns without the rows of outliers.
         """
         columns = self.drop_outliers(columns)
         columns = (
@@ -128,12 +145,26 @@ class NoiseModel:
         return found
 
     def drop_outliers(self, columns: np.ndarray) -> np.ndarray:
-        """Remove the rows of outliers from columns."""
+        """Remove the rows of outliers from columns.
+
+        Parameters
+        ----------
+        columns : ndarray, shape (rows, ...)
+            Array with one entry per row.
+
+        Returns
+        -------
+        ndarray, shape (kept rows, ...)
+            Array without the rows of outliers.
+        """
         return columns if self.kept_mask is None else columns[self.kept_mask]
 
     @cached_property
     def predictors(self) -> list[tuple[list[list[float]], list[float]]]:
-        """Coefficients and variances of each process (see ``_levinson_durbin``)."""
+        """Coefficients and variances of each process.
+
+        Each item is a result of ``_levinson_durbin``.
+        """
         return [*map(_levinson_durbin, self.partial_autocorrelations)]
 
     @property
@@ -154,11 +185,16 @@ class NoiseModel:
 
     @property
     def effective_sample_size(self) -> float:
-        """Effective sample size for a mean.
+        r"""Effective sample size for estimating a mean.
 
-        The effective sample size is n divided by the power at zero frequency, ``(1 - k_1^2)(1 -
-        k_2^2).../(1 - c_1 - ... - c_m)^2``, where k are the partial autocorrelations. For an AR(1)
-        process, the effective sample size is ``n (1 - rho)/(1 + rho)``.
+        The effective sample size is the number of rows divided by the power at zero frequency,
+        relative to the variance:
+
+        .. math:: \frac{(1 - k_1^2)(1 - k_2^2) \cdots}{(1 - c_1 - \dots - c_m)^2},
+
+        where :math:`k_i` are the partial autocorrelations and :math:`c_i` are the coefficients. For
+        an AR(1) process with correlation :math:`\rho`, the effective sample size is
+        :math:`n (1 - \rho)/(1 + \rho)`.
         """
         power = self._power_at_zero
         lasts = ((run.stop - run.start, run.process) for run in self.runs)
@@ -171,29 +207,40 @@ class NoiseModel:
 
     @property
     def _power_at_zero(self) -> list[float]:
-        """Power at zero frequency of each process, divided by its variance."""
+        """Power at zero frequency of each process, in units of variance."""
         told = ((c[-1], v[-1]) for c, v in self.predictors)
         return [left / (1.0 - math.fsum(last)) ** 2 for last, left in told]
 
     @property
     def degrees_of_freedom(self) -> float:
-        """Degrees of freedom of the power at zero frequency.
+        """Degrees of freedom of the estimated power at zero frequency.
 
-        This power determines the errors of slow trends. The degrees of freedom are 2 divided by the
-        variance of the logarithm of the power. The variance includes the uncertainty of the
-        estimated coefficients.
+        The power at zero frequency determines the standard errors of slow trends. The degrees of
+        freedom are 2 divided by the variance of the logarithm of the power. This variance includes
+        the uncertainty of the estimated coefficients.
         """
         total = 0.0
         rows = np.bincount(index_rows(self.runs, "process")).tolist()
         for count, told, power in zip(rows, self.predictors, self._power_at_zero, strict=True):
-            # coefficients have the covariance (variance left) R^-1/rows
+            # The coefficients have the covariance matrix (innovation variance) R^-1/rows.
             ones = _prediction_errors(np.ones((self.order, 1)), *told)
             total += count / (1.0 + 2.0 * power * float(np.square(ones).sum()))
         return total
 
 
 def white_noise(time: np.ndarray) -> NoiseModel:
-    """Return white noise with one level for each sampling interval."""
+    """Return white noise with one noise level for each sampling interval.
+
+    Parameters
+    ----------
+    time : ndarray, shape (rows,)
+        Times in s.
+
+    Returns
+    -------
+    NoiseModel
+        White noise, with the same standard deviation for all levels.
+    """
     runs = find_runs(time)
     return NoiseModel(runs, np.zeros((count_processes(runs), 0)), np.ones(count_processes(runs)))
 
@@ -212,22 +259,26 @@ def fit_noise(
     Parameters
     ----------
     name : str
-        "white", "ar" for the order that minimises the AIC, or "ar1", "ar2" and so on.
+        Noise model: "white" for white noise, "ar" for the autoregressive order that minimises the
+        AIC, or "ar1", "ar2" and so on for a fixed order.
     time : ndarray, shape (rows,)
+        Times in s.
     residuals : ndarray, shape (rows,)
+        Residuals of the fit.
     jacobian : ndarray, shape (rows, parameters)
-        Derivatives of the model.
+        Derivatives of the model with respect to the parameters.
     kept_mask : ndarray of bool, shape (rows,), optional
-        False for outliers. By default, all rows are kept.
-    min_sd : float
-        Lower bound of the standard deviation of a level, such as the rounding error.
-    averaging_time : float
+        Mask that is False for outliers. By default, all rows are kept.
+    min_sd : float, default: 0.0
+        Lower bound of the standard deviation of a noise level, such as the rounding error.
+    averaging_time : float, default: 0.0
         Averaging time of friction in s, or 0 if friction was not averaged.
 
     Returns
     -------
     NoiseModel
-        Noise with one process for each sampling interval, and one level for each segment.
+        Noise with one process for each sampling interval, and one noise level for each segment of
+        the record.
     """
     begin, min_sd = guess_noise(name, time, residuals, kept_mask, min_sd, averaging_time)
     shape, order = begin.partial_autocorrelations.shape, begin.order
@@ -261,9 +312,10 @@ def fit_noise(
         np.arctanh(begin.partial_autocorrelations.ravel() / _MAX_PARTIAL_AUTOCORRELATION),
         np.log(begin.level_sds[1:]),
     )
-    if not math.isfinite(misfit(x)):  # the residuals vanish
+    if not math.isfinite(misfit(x)):  # All residuals are zero.
         return noise(x)
-    with np.errstate(invalid="ignore", over="ignore"):  # the misfit may be infinite near by
+    # The objective may be infinite at some points that the search evaluates.
+    with np.errstate(invalid="ignore", over="ignore"):
         found = minimize(misfit, x, method="BFGS", options={"gtol": _GRADIENT_TOLERANCE})
     return noise(found.x if found.fun <= misfit(x) else x)
 
@@ -276,15 +328,29 @@ def guess_noise(
     min_sd: float = 0.0,
     averaging_time: float = 0.0,
 ) -> tuple[NoiseModel, float]:
-    """Estimate the noise by the method of moments.
+    """Estimate the noise from the residuals of a fit by the method of moments.
 
-    See ``fitted`` for the parameters.
+    Parameters
+    ----------
+    name : str
+        Noise model (see ``fit_noise``).
+    time : ndarray, shape (rows,)
+        Times in s.
+    residuals : ndarray, shape (rows,)
+        Residuals of the fit.
+    kept_mask : ndarray of bool, shape (rows,), optional
+        Mask that is False for outliers. By default, all rows are kept.
+    min_sd : float, default: 0.0
+        Lower bound of the standard deviation of a noise level.
+    averaging_time : float, default: 0.0
+        Averaging time of friction in s, or 0 if friction was not averaged.
 
     Returns
     -------
     noise : NoiseModel
+        Noise of the record.
     min_sd : float
-        Lower bound of the standard deviation of a level, relative to the first level.
+        Lower bound of the standard deviation of a noise level, relative to the first level.
     """
     if kept_mask is not None:
         time, residuals = time[kept_mask], residuals[kept_mask]
@@ -299,11 +365,12 @@ def guess_noise(
 def _estimate_by_moments(
     name: str, sampling_runs: tuple[SamplingRun, ...], residuals: np.ndarray, min_sd: float
 ) -> tuple[NoiseModel, float]:
-    """Compute the initial guess of the noise by the method of moments.
+    """Estimate the noise and its levels by the method of moments.
 
     Returns
     -------
     noise : NoiseModel
+        Noise with standard deviations relative to the first level.
     first : float
         Standard deviation of the first level.
     """
@@ -337,12 +404,13 @@ def _estimate_by_moments(
 class _LaggedProducts:
     """Sums of products of lagged columns.
 
-    The sum of squares of whitened columns follows from these sums for any coefficients. The cost of
-    the search is therefore independent of the number of rows.
+    The sums determine the sum of squares of whitened columns for any autoregressive coefficients.
+    The cost of the search is therefore independent of the number of rows.
 
     Parameters
     ----------
     runs : tuple of SamplingRun
+        Runs of rows with the same process and noise level.
     columns : ndarray, shape (rows, columns)
         Derivatives of the model, followed by the residuals.
     order : int
@@ -351,15 +419,16 @@ class _LaggedProducts:
 
     def __init__(self, runs: Sequence[SamplingRun], columns: np.ndarray, order: int) -> None:
         self.row_count, self.parameter_count = len(columns), columns.shape[1] - 1
-        # derivatives may be next to dependent: those of the same span are as good, up to a constant
+        # The derivatives may be almost linearly dependent. With an orthonormal basis of the same
+        # space, the objective function changes by a constant only.
         base, left = np.linalg.qr(columns[:, :-1])[0], columns[:, -1]
         left = left - base @ (base.T @ left)
         columns = np.column_stack([base, left / (np.linalg.norm(left) or 1.0)])
         width = columns.shape[1]
         self.process_levels = sorted({(run.process, run.level) for run in runs})
         self.sums = np.zeros((len(self.process_levels), order + 1, order + 1, width, width))
-        #: For each run: the first rows and the rows before them that predict them, the number of
-        #: rows before them, the process of the run, and the levels of these rows.
+        #: For each run, the first rows together with the earlier rows that predict them, the number
+        #: of earlier rows, the process of the run, and the noise levels of all these rows.
         self.initial_blocks: list[tuple[np.ndarray, int, int, np.ndarray]] = []
         levels = index_rows(runs, "level")
         for run in runs:
@@ -378,12 +447,17 @@ class _LaggedProducts:
                         sums[j, i] += found.T
 
     def reml_objective(self, noise: NoiseModel) -> float:
-        """Compute the objective function of REML, up to a constant.
+        """Compute the REML objective up to a constant.
+
+        Parameters
+        ----------
+        noise : NoiseModel
+            Noise with the same runs and order.
 
         Returns
         -------
         float
-            Infinity if the residuals vanish.
+            Value of the objective function, or infinity if all residuals are zero.
         """
         total = np.zeros(self.sums.shape[-2:])
         for (number, level), sums in zip(self.process_levels, self.sums, strict=True):
@@ -405,7 +479,7 @@ class _LaggedProducts:
 
 
 def _select_order(parts: Sequence[Sequence[np.ndarray]]) -> int:
-    """Return the autoregressive order that minimises Akaike's criterion."""
+    """Return the autoregressive order that minimises the AIC."""
     shortest = min(max(map(len, part)) for part in parts)
     highest = min(MAX_ORDER, shortest // _SAMPLES_PER_COEFFICIENT)
     criterion = np.zeros(highest + 1)
@@ -417,7 +491,7 @@ def _select_order(parts: Sequence[Sequence[np.ndarray]]) -> int:
 
 
 def _burg_coefficients(part: Sequence[np.ndarray], order: int) -> list[float]:
-    """Estimate partial autocorrelations by Burg's recursion."""
+    """Estimate partial autocorrelations by the Burg method."""
     forward, backward = [[p - p.mean() for p in part] for _ in range(2)]
     found = []
     for _ in range(order):
@@ -442,8 +516,8 @@ def _levinson_durbin(
     Returns
     -------
     coefficients : list of list of float
-        Coefficients that predict a row from the previous 0, 1, 2, ... rows, in order of increasing
-        lag.
+        For each m from 0 to the order, the coefficients that predict a row from the m previous
+        rows, in order of increasing lag.
     variances : list of float
         Variance of each prediction error, relative to the variance of the process.
     """
@@ -462,7 +536,8 @@ def _prediction_errors(
 ) -> np.ndarray:
     """Compute prediction errors divided by their standard errors."""
     full = np.append(1.0, -np.array(coefficients[-1]))
-    is_plain = len(full) == 1 or not columns.size  # lfilter refuses empty arrays
+    # The function ``lfilter`` rejects empty arrays.
+    is_plain = len(full) == 1 or not columns.size
     found = columns.copy() if is_plain else np.asarray(lfilter(full, [1.0], columns, axis=0))
     for row, told in enumerate(coefficients[: min(len(coefficients) - 1, len(columns))]):
         found[row] = columns[row] - np.array(told) @ columns[:row][::-1]

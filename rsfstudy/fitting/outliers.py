@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import maximum_filter, rank_filter
 
-#: Neighbours on each side whose median is compared with a row, and rows of a block with a scale of
-#: its own.
+#: Number of neighbours on each side in the median that is compared with a row, and number of rows
+#: in a block with its own standard deviation.
 _NEIGHBOUR_COUNT, _BLOCK_ROWS = 3, 100
-#: Standard deviations beyond which a row is an outlier, and the same in deviations of the model
-#: from its own median of neighbours: a misfit at a peak of the model is no outlier.
+#: Smallest deviation of an outlier in standard deviations, and relative to the same deviation of
+#: the model. The second condition excludes misfits at a peak of the model.
 _OUTLIER_SIGMAS, _MAX_MODEL_DEPARTURE_RATIO = 6.0, 2.0
-#: Standard deviation of Gaussian noise over its median absolute deviation.
+#: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _SD_PER_MAD = 1.4826
-#: Largest misfit of a grid of values, relative to its quantum.
+#: Largest deviation of rounded values from multiples of the quantum, relative to the quantum.
 _QUANTUM_TOLERANCE = 0.02
 
 
@@ -22,10 +22,15 @@ def find_quantum(values: np.ndarray) -> float:
 
     Values are rounded if they are multiples of a quantum, up to a constant offset.
 
+    Parameters
+    ----------
+    values : ndarray
+        Values such as friction or displacement.
+
     Returns
     -------
     float
-        0 if the values are not rounded.
+        Quantum, or 0 if the values are not rounded.
     """
     distinct = np.unique(values)
     gaps = np.diff(distinct)
@@ -52,20 +57,20 @@ def find_kept_mask(
     residuals : ndarray, shape (rows,)
         Residuals of a fit.
     model_friction : ndarray, shape (rows,)
-        Friction of the fit.
+        Fitted friction.
     quantum : float
         Quantum to which friction is rounded.
 
     Returns
     -------
     ndarray of bool, shape (rows,), or None
-        None if there are no outliers.
+        Mask that is False for outliers. The result is None if there are no outliers.
     """
     off = residuals - _median_of_neighbours(residuals)
     blocks = np.array_split(np.abs(off), max(len(off) // _BLOCK_ROWS, 1))
     least = max(0.5 * quantum, 0.1 * _SD_PER_MAD * float(np.median(np.abs(off))))
     scales = [max(_SD_PER_MAD * float(np.median(block)), least) for block in blocks]
-    # the noise level may change within a block, and then one of the neighbours has that level
+    # If the noise level changes within a block, a neighbouring block has the higher level.
     scale = np.repeat(maximum_filter(scales, 3), [len(block) for block in blocks])
     peaked = maximum_filter(
         np.abs(model_friction - _median_of_neighbours(model_friction)), 2 * _NEIGHBOUR_COUNT + 1

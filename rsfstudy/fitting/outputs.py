@@ -1,4 +1,4 @@
-"""Outputs of a fit of a record, with their units."""
+"""Outputs of a fit, with their units and meanings."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from rsfstudy.fitting.record import RECORD_COLUMNS
 from rsfstudy.fitting.window_model import LAW_SPECIFIC_PARAMETERS, PARAMETERS
 from rsfstudy.quantities import Output
 
+#: Outputs of every fit that do not depend on the rows.
 _SCALAR_OUTPUTS = (
     Output("a_minus_b", "$a-b$", "1", "rate dependence of steady friction"),
     Output("a_minus_b_stderr", "", "1", "standard error of a - b"),
@@ -34,6 +35,7 @@ _SCALAR_OUTPUTS = (
         for name in ("covariance", "correlation")
     ),
 )
+#: Outputs with one value per row.
 _ROW_OUTPUTS = tuple(
     Output(*about, dims=("row",))
     for about in (
@@ -45,11 +47,13 @@ _ROW_OUTPUTS = tuple(
         ("innovation", "", "1", "residual freed of correlation, over its standard deviation"),
     )
 )
+#: Suffixes of the outputs that each parameter has in addition to its value.
 _SUFFIX_MEANINGS = {
     "stderr": "standard error",
     "low": "lower end of the 95 % interval",
     "high": "upper end of the 95 % interval",
 }
+#: Outputs of a fit with posterior draws.
 _POSTERIOR_OUTPUTS = (
     Output("autocorrelation_time", "", "1", "steps after which a chain has forgotten where it was"),
     Output(
@@ -80,6 +84,7 @@ def fit_outputs(
     Returns
     -------
     tuple of Output
+        Outputs of the parameters, of the fit and of the rows.
     """
     found = [output for name in parameters for output in _parameter_outputs(name)]
     stresses = [
@@ -96,6 +101,7 @@ def fit_outputs(
 
 
 def _parameter_outputs(name: str) -> Iterator[Output]:
+    """Yield the outputs of a parameter and of its errors."""
     about = PARAMETERS[strip_window_number(name)]
     optional = strip_window_number(name) in LAW_SPECIFIC_PARAMETERS
     yield Output(name, about.symbol, about.units, about.long_name, error=True, optional=optional)

@@ -1,12 +1,12 @@
 """Posterior sampling of the parameters of a fit with emcee.
 
-The likelihood is the likelihood that the fit maximises, evaluated with the estimated noise. Priors
-are uniform between the bounds of the search. For slip distances and stiffness, the priors are
-uniform in the logarithm.
+The sampler [1]_ uses the likelihood that the fit maximises, with the estimated noise. Priors are
+uniform between the bounds of the search. For slip distances and stiffness, priors are uniform in
+the logarithm.
 
 References
 ----------
-Foreman-Mackey et al. (2013), Publ. Astron. Soc. Pac. 125, 306-312.
+.. [1] Foreman-Mackey et al. (2013), Publ. Astron. Soc. Pac. 125, 306-312.
 """
 
 from __future__ import annotations
@@ -27,17 +27,26 @@ if TYPE_CHECKING:
 
 #: Largest number of draws.
 _MAX_DRAWS = 1_000_000
-#: Steps between two looks at a chain, autocorrelation times that it must be long, and times that
-#: are left out at its beginning.
+#: Number of steps between two convergence checks, smallest length of a chain in autocorrelation
+#: times, and length of the burn-in in autocorrelation times.
 _STEPS_PER_CHECK, _MIN_AUTOCORRELATION_TIMES, _BURN_IN_AUTOCORRELATION_TIMES = 100, 50.0, 5.0
-#: Degrees of freedom of proposals: their tails are longer than those of the likelihood.
+#: Degrees of freedom of the proposal distribution. The distribution has longer tails than the
+#: likelihood.
 _PROPOSAL_DEGREES_OF_FREEDOM = 5.0
 
 
 def check_sampling(draws: int) -> None:
-    """Raise ``InvalidValue`` if sampling is impossible.
+    """Raise ``InvalidValue`` if posterior sampling is impossible.
 
-    Sampling requires a valid number of draws and an installation of emcee.
+    Parameters
+    ----------
+    draws : int
+        Number of draws.
+
+    Raises
+    ------
+    InvalidValue
+        If the number of draws is invalid, or if emcee is not installed.
     """
     if not isinstance(draws, int) or not 0 <= draws <= _MAX_DRAWS:
         raise InvalidValue("posterior", draws, f"must be a whole number from 0 to {_MAX_DRAWS:,}")
@@ -49,24 +58,28 @@ def check_sampling(draws: int) -> None:
 def sample_coordinates(
     problem: FitProblem, solution: FitSolution, draws: int, seed: int = 0
 ) -> tuple[np.ndarray, float]:
-    """Sample the posterior of the free parameters.
+    """Sample the posterior distribution of the free parameters.
 
-    Half of the steps are stretch moves. The other half are proposals from the covariance matrix of
-    the fit. The chain continues until its length exceeds 50 autocorrelation times and the number of
-    independent samples exceeds the number of draws.
+    Half of the steps are stretch moves. The other half of the steps are independent proposals from
+    a multivariate t distribution with the covariance matrix of the fit. The sampler stops when the
+    chain is longer than 50 autocorrelation times and the number of independent samples exceeds the
+    number of draws.
 
     Parameters
     ----------
     problem : FitProblem
+        Problem with the model of the record.
     solution : FitSolution
-        Result of the search, with a finite covariance matrix.
+        Solution of the problem, with a finite covariance matrix.
     draws : int
-    seed : int
+        Number of draws.
+    seed : int, default: 0
+        Seed of the random number generator.
 
     Returns
     -------
     draws : ndarray, shape (draws, parameters)
-        Draws of the coordinates of the free parameters.
+        Coordinates of the free parameters.
     autocorrelation_time : float
         Longest autocorrelation time of the chain in steps.
 
@@ -127,14 +140,27 @@ def sample_coordinates(
 
 
 def draw_parameters(problem: FitProblem, solution: FitSolution, draws: int) -> dict[str, Any]:
-    """Sample the posterior, and return the draws as parameter values.
+    """Sample the posterior distribution, and return values of the parameters.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        Problem with the model of the record.
+    solution : FitSolution
+        Solution of the problem.
+    draws : int
+        Number of draws.
 
     Returns
     -------
     dict
-        ``posterior`` contains the draws, with shape (draws, parameters), and
-        ``autocorrelation_time`` the autocorrelation time of the chain. Both are NaN if the standard
-        errors are infinite.
+        Dictionary with the draws ``posterior``, with shape (draws, parameters), and with
+        ``autocorrelation_time``. All values are NaN if a standard error is infinite.
+
+    Raises
+    ------
+    MotionStopped
+        If the work budget is exhausted before the chain is long enough.
     """
     drawn, time = np.full((draws, len(solution.free)), math.nan), math.nan
     if np.isfinite(solution.covariance).all():

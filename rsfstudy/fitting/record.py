@@ -1,4 +1,9 @@
-"""Laboratory records for fits: time series, steps and loading history."""
+"""Laboratory records with their steps and loading histories.
+
+A ``Record`` validates its columns, and detects the steps of load point velocity and normal stress.
+The function ``loading_history`` converts the steps, or the recorded rows, to the loading of a
+model.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +25,7 @@ from rsfstudy.fitting.velocity_steps import LoadingStep, detect_velocity_steps
 from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.quantities import Quantity, is_variable_name
 
-#: Its columns.
+#: Columns of a record with their symbols, units and meanings. The normal stress is optional.
 RECORD_COLUMNS = (
     Quantity("time", "$t$", "s", "time"),
     Quantity("displacement", r"$\delta_0$", "um", "load point displacement"),
@@ -28,7 +33,7 @@ RECORD_COLUMNS = (
     Quantity("normal_stress", r"$\sigma$", "Pa", "normal stress"),
 )
 
-#: Columns of the table of its velocity steps, in the order of `Step`.
+#: Columns of the table of steps, in the order of the fields of ``LoadingStep``.
 _STEP_COLUMNS = (
     Quantity("begins", "$t$", "s", "time at which the step begins"),
     Quantity("ends", "$t$", "s", "time at which the step ends"),
@@ -38,7 +43,8 @@ _STEP_COLUMNS = (
     Quantity("normal_stress_after", r"$\sigma$", "Pa", "normal stress after the step"),
 )
 
-#: Pieces of steady velocity that stand for a ramp: at their ends displacement is exact.
+#: Number of segments of constant velocity that approximate a ramp of the load point velocity. The
+#: displacement is exact at the end of each segment.
 _RAMP_SEGMENTS = 16
 
 
@@ -47,23 +53,40 @@ _RAMP_SEGMENTS = 16
 @guard_methods
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A laboratory record of an experiment.
+    """Laboratory record of a friction experiment.
 
-    Attributes
+    Parameters
     ----------
-    columns : mapping of str to ndarray
-        ``time`` (s), load point ``displacement`` (um), ``friction``, and ``normal_stress`` (Pa) if
-        it was recorded. All columns have the same length.
-    name : str
-        Name of the record in results.
-    specified_steps : tuple of LoadingStep or None
-        Steps that the user specified. If None, steps are detected.
+    columns : dict of {str: ndarray}
+        Columns by name: ``time`` in s, ``displacement`` of the load point in um, ``friction``, and
+        optionally ``normal_stress`` in Pa. All columns have the shape (rows,).
+    name : str, default: "record"
+        Name of the record in results. The name must be a valid Python identifier.
+    specified_steps : tuple of LoadingStep, optional
+        Steps that replace the detected steps. By default, the steps are detected.
 
     Raises
     ------
     InvalidValue
-        If a column is missing, has another length or contains values that are not finite, if time
-        does not increase, or if a step is invalid.
+        If a required column is missing, if the columns differ in length, if a value is not finite,
+        if the time does not increase from row to row, or if the name is not a valid identifier.
+
+    Notes
+    -----
+    Two records are equal if their names, their columns and their specified steps are equal.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rsfstudy.fitting import Record
+    >>> time = np.arange(0.0, 100.0, 0.5)
+    >>> displacement = np.where(time < 50.0, time, 50.0 + 10.0 * (time - 50.0))
+    >>> friction = np.full(200, 0.6)
+    >>> record = Record({"time": time, "displacement": displacement, "friction": friction})
+    >>> len(record)
+    200
+    >>> record.steps()["velocity_after"].values.round(2)
+    array([10.])
     """
 
     columns: dict[str, np.ndarray]
@@ -71,6 +94,7 @@ class Record:
     specified_steps: tuple[LoadingStep, ...] | None = None
 
     def __post_init__(self) -> None:
+        """Validate the name and the columns."""
         if not is_variable_name(self.name):
             raise InvalidValue("name", self.name, "must be a Python identifier")
         for about in RECORD_COLUMNS[:3]:
@@ -94,28 +118,52 @@ class Record:
 
     @property
     def time(self) -> np.ndarray:
-        """Times of the rows in s, shape (rows,)."""
+        """Times of the rows in s, as an array of shape (rows,)."""
         return self.columns["time"]
 
     @cached_property
     def digest(self) -> str:
-        """Hash of the columns and the specified steps. Equal records have equal hashes."""
+        """Hash of the columns and the specified steps.
+
+        Records with equal columns and equal specified steps have the same hash.
+        """
         told = hashlib.sha256(repr((sorted(self.columns), self.specified_steps)).encode())
         for name in sorted(self.columns):
             told.update(np.ascontiguousarray(self.columns[name]).tobytes())
         return told.hexdigest()[:16]
 
     def __eq__(self, other: object) -> bool:
+        """Return True if two records have equal names and equal digests."""
         return isinstance(other, Record) and (self.name, self.digest) == (other.name, other.digest)
 
     def __hash__(self) -> int:
+        """Return the hash of the digest."""
         return hash(self.digest)
 
     def __len__(self) -> int:
+        """Return the number of rows."""
         return len(self.time)
 
     def window(self, start: float, end: float) -> Record:
-        """Return the part of the record between two times in s."""
+        """Return the part of the record between two times.
+
+        Parameters
+        ----------
+        start, end : float
+            Times in s. The result contains the rows from ``start`` to ``end``, including both
+            times.
+
+        Returns
+        -------
+        Record
+            Record with the selected rows, and with the same name and specified steps.
+
+        Raises
+        ------
+        InvalidValue
+            If ``end`` is not later than ``start``, or if the record has no rows between the two
+            times.
+        """
         if not start < end:
             raise InvalidValue("window", (start, end), "must end after it begins")
         rows = (self.time >= start) & (self.time <= end)
@@ -125,27 +173,39 @@ class Record:
         return replace(self, columns={n: v[rows] for n, v in self.columns.items()})
 
     def with_steps(self, steps: Sequence[Sequence[float]]) -> Record:
-        """Return a copy of the record with the given steps.
+        """Return a copy of the record with user-defined steps.
 
-        The given steps replace the detected steps.
+        The user-defined steps replace the detected steps.
 
         Parameters
         ----------
-        steps : sequence of (float, float, float, float) or of six floats
+        steps : sequence of (float, float, float, float) or sequence of six floats
             For each step, the times in s at which the change begins and ends, and the load point
-            velocities in um/s before and after the step. If normal stress changes, also the normal
-            stresses in Pa before and after the step. By default, the normal stresses are taken from
-            the record.
+            velocities in um/s before and after the step. If the normal stress changes, append the
+            normal stresses in Pa before and after the step. By default, the normal stresses are
+            taken from the record.
 
         Returns
         -------
         Record
+            Record with the same columns and the given steps.
+
+        Raises
+        ------
+        InvalidValue
+            If a step does not consist of four or six finite numbers, if a step ends before it
+            begins, if a velocity is negative, or if a normal stress is not positive.
         """
         return replace(self, specified_steps=tuple(map(_parse_step, steps)))
 
     @cached_property
     def loading_steps(self) -> tuple[LoadingStep, ...]:
-        """The steps that the user specified, or else the detected steps."""
+        """Steps of the record, as a tuple of ``LoadingStep``.
+
+        If the user specified steps, the property contains the specified steps. Otherwise, it
+        contains the detected steps. If the record has a normal stress, each step includes the
+        normal stresses before and after the step.
+        """
         stress, moved = self.columns.get("normal_stress"), self.columns["displacement"]
         steps = (
             self.specified_steps
@@ -161,14 +221,15 @@ class Record:
         return set_stress_levels(steps, changes, self.time, stress)
 
     def steps(self) -> xr.Dataset:
-        """Return a table of the steps of load point velocity and normal stress.
+        """Return a table of the steps of velocity and normal stress.
 
         Returns
         -------
         xarray.Dataset
-            Along ``step``, numbered from 1: ``begins``, ``ends`` (s), ``velocity_before``,
-            ``velocity_after`` (um/s), and, if normal stress was recorded, ``normal_stress_before``
-            and ``normal_stress_after`` (Pa).
+            Dataset with the dimension ``step``, which is numbered from 1, and the variables
+            ``begins`` and ``ends`` in s, and ``velocity_before`` and ``velocity_after`` in um/s. If
+            the normal stress was recorded, the dataset also contains ``normal_stress_before`` and
+            ``normal_stress_after`` in Pa.
         """
         numbers = [step[: len(_STEP_COLUMNS)] for step in self.loading_steps]
         rows = np.array(numbers, dtype=float).reshape(-1, len(_STEP_COLUMNS))
@@ -179,7 +240,13 @@ class Record:
         return with_cf_encoding(xr.Dataset(data, steps, self._attributes("Detected steps")))
 
     def to_dataset(self) -> xr.Dataset:
-        """Convert the record to a dataset with the dimension ``time``."""
+        """Convert the record to a dataset.
+
+        Returns
+        -------
+        xarray.Dataset
+            Dataset with one variable per column along the dimension ``time``.
+        """
         about = {column.name: column for column in RECORD_COLUMNS}
         data = {
             name: ("time", values, {"long_name": about[name].long_name, "units": about[name].units})
@@ -188,13 +255,13 @@ class Record:
         return with_cf_encoding(xr.Dataset(data, attrs=self._attributes("Laboratory record")))
 
     def _attributes(self, title: str) -> dict[str, str]:
-        """Return the global attributes of a dataset created from the record."""
+        """Return the global attributes for a dataset."""
         return {"title": f"{title}: {self.name}", "Conventions": "CF-1.11"}
 
 
 def _parse_step(fields: Sequence[float]) -> LoadingStep:
-    """Validate the numbers of a step, and convert them to a ``Step``."""
-    if isinstance(fields, LoadingStep):  # from another record
+    """Validate the numbers of a step, and create a ``LoadingStep``."""
+    if isinstance(fields, LoadingStep):  # Steps of another record are valid.
         return fields
     rule = "is no step: begins, ends, velocity before and after, and, if it changes, "
     rule += "normal stress before and after"
@@ -215,22 +282,30 @@ def _parse_step(fields: Sequence[float]) -> LoadingStep:
 def loading_history(record: Record, start: float, end: float, *, from_rows: bool) -> np.ndarray:
     """Return the loading history between two times.
 
+    Before the first segment, the slider slides steadily at the load point velocity before the first
+    step.
+
     Parameters
     ----------
     record : Record
+        Record with the steps and the rows.
     start, end : float
-        Times in s. Before the first segment, the slider slides steadily at the load point velocity
-        before the first step.
+        Times in s.
     from_rows : bool
         If True, each row begins a segment, and the recorded displacement is replaced by the closest
-        displacement that never decreases. If False, the loading consists of steps, and load point
-        velocity and normal stress change at a constant rate during a step.
+        displacement that never decreases. If False, the load point velocity and the normal stress
+        are constant between the steps, and change at a constant rate during a step.
 
     Returns
     -------
     ndarray, shape (segments, 4)
         For each segment, its start in s, the load point velocity in um/s, the ratio of normal
-        stress to its initial value, and the rate of this ratio in 1/s.
+        stress to its initial value, and the rate of change of this ratio in 1/s.
+
+    Raises
+    ------
+    InvalidValue
+        If ``from_rows`` is True and the record has no rows between the two times.
     """
     steps = steps_between(record, start, end)
     if from_rows:
@@ -246,23 +321,37 @@ def loading_history(record: Record, start: float, end: float, *, from_rows: bool
 
 
 def steps_between(record: Record, start: float, end: float) -> list[LoadingStep]:
-    """Return the steps of a record between two times."""
+    """Return the steps of a record between two times.
+
+    Parameters
+    ----------
+    record : Record
+        Record with the steps.
+    start, end : float
+        Times in s.
+
+    Returns
+    -------
+    list of LoadingStep
+        Steps that begin after ``start`` and end before ``end``.
+    """
     return [step for step in record.loading_steps if start < step.start and step.end < end]
 
 
 def stepwise_loading(start: float, steps: Sequence[LoadingStep]) -> np.ndarray:
-    """Return the loading history that consists of steps.
+    """Return a loading history with constant loading between steps.
 
     Parameters
     ----------
     start : float
         Start of the first segment in s.
     steps : sequence of LoadingStep
+        Steps in order of time.
 
     Returns
     -------
     ndarray, shape (segments, 4)
-        Segments as returned by ``loading_history``.
+        Segments in the format of ``loading_history``.
     """
     pieces, level = [(start, steps[0].velocity_before if steps else 0.0, 1.0, 0.0)], 1.0
     for step in steps:
@@ -276,13 +365,13 @@ def stepwise_loading(start: float, steps: Sequence[LoadingStep]) -> np.ndarray:
 
 
 def _velocity_profile(step: LoadingStep) -> list[tuple[float, float]]:
-    """Return the velocities within a step.
+    """Return the load point velocities during a step.
 
     Returns
     -------
     list of (float, float)
-        The start of each velocity, as a fraction of the duration of the step, and the velocity in
-        um/s.
+        For each segment of constant velocity, its start as a fraction of the duration of the step,
+        and its velocity in um/s. The list is empty if the step is immediate.
     """
     lasts = step.end - step.start
     if not lasts > 0.0:
@@ -302,16 +391,22 @@ def _velocity_profile(step: LoadingStep) -> list[tuple[float, float]]:
 
 
 def _rowwise_loading(record: Record, first_velocity: float, stress_before: float) -> np.ndarray:
-    """Return the loading history with one segment per row.
+    """Return a loading history with one segment per row.
 
     Parameters
     ----------
     record : Record
+        Part of a record.
     first_velocity : float
         Load point velocity of the first segment in um/s.
     stress_before : float
-        Normal stress in Pa before the first step, by which normal stress is divided. If NaN, the
-        normal stress of the first row is used.
+        Normal stress in Pa before the first step, by which the normal stress is divided. If NaN,
+        the normal stress of the first row is used.
+
+    Returns
+    -------
+    ndarray, shape (rows, 4)
+        Segments in the format of ``loading_history``.
     """
     lasts = np.diff(record.time)
     moved = isotonic_regression(record.columns["displacement"]).x
@@ -322,6 +417,6 @@ def _rowwise_loading(record: Record, first_velocity: float, stress_before: float
     if "normal_stress" in record.columns:
         stress = record.columns["normal_stress"]
         table[:, 2] = stress / (stress_before if stress_before > 0.0 else stress[0])
-        table[0, 2] = 1.0  # the motion begins in steady sliding
+        table[0, 2] = 1.0  # The motion starts from steady sliding.
         table[:-1, 3] = np.diff(table[:, 2]) / lasts
     return table

@@ -1,8 +1,8 @@
 """Segmentation of a record into runs with uniform sampling and noise.
 
-Sampling intervals are classified by their running mean, so that all intervals of a clock with
-jitter fall into one class. Changes of the noise level are detected by binary segmentation of the
-whitened residuals.
+The sampling intervals are classified by their running mean, so jitter of the clock does not affect
+the classes. Changes of the noise level are detected by binary segmentation of the whitened
+residuals.
 """
 
 from __future__ import annotations
@@ -15,31 +15,31 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-#: Sampling intervals whose ratio is smaller than this factor belong to one class.
+#: Ratio of two sampling intervals above which the intervals belong to different classes.
 _MAX_INTERVAL_RATIO = 2.0
-#: Rows of the running mean of sampling intervals, fewest rows of a class with a noise process of
-#: its own, and fewest rows of a run.
+#: Number of rows in the running mean of the sampling intervals, fewest rows of a class with its own
+#: noise process, and fewest rows of a run.
 _MEAN_ROWS, _MIN_PROCESS_ROWS, _MIN_RUN_ROWS = 15, 100, 30
-#: Fewest rows with a noise level of their own, and as a fraction of the record; the least squared
-#: change of the mean logarithm at a change of the level, in its variances and over ln n; and the
-#: largest number of changes.
+#: Criteria for a separate noise level: the fewest rows, the smallest fraction of the record, the
+#: smallest likelihood gain divided by ln n for n rows, and the largest number of changes of the
+#: level.
 _MIN_LEVEL_ROWS, _MIN_LEVEL_FRACTION, _MIN_LEVEL_GAIN, _MAX_LEVEL_CHANGES = 30, 0.08, 3.0, 7
-#: Variance of the logarithm of the absolute value of Gaussian noise, and the least difference of
-#: rows relative to the root mean square.
+#: Variance of the logarithm of the absolute value of Gaussian noise, and lower bound of the
+#: differences between rows relative to their root mean square.
 _LOG_VARIANCE, _MIN_RELATIVE_DIFFERENCE = math.pi**2 / 8.0, 0.01
 
 
 class SamplingRun(NamedTuple):
-    """Consecutive rows with the same sampling interval and the same noise level.
+    """Consecutive rows with the same sampling interval and noise level.
 
-    Attributes
+    Parameters
     ----------
     start, stop : int
         Index of the first row, and index after the last row.
     process : int
         Index of the noise process.
     preceding_rows : int
-        Number of earlier rows since the clock started.
+        Number of rows between the start of the clock and the start of the run.
     level : int
         Index of the noise level.
     """
@@ -52,10 +52,19 @@ class SamplingRun(NamedTuple):
 
 
 def find_runs(time: np.ndarray) -> tuple[SamplingRun, ...]:
-    """Find the runs of rows with the same sampling interval.
+    """Find runs of rows with the same sampling interval.
 
-    If the clock restarts, as in joint fits, a new run begins. Each noise process has one noise
-    level at this stage, so both have the same index.
+    A new run also begins when the clock restarts, as between the windows of a joint fit.
+
+    Parameters
+    ----------
+    time : ndarray, shape (rows,)
+        Times in s.
+
+    Returns
+    -------
+    tuple of SamplingRun
+        Runs that cover all rows. Each noise process has a single noise level with the same index.
     """
     kinds, begins = _classify_intervals(time), np.diff(time) <= 0.0
     bounds = (np.flatnonzero((np.diff(kinds) != 0) | begins) + 1).tolist()
@@ -67,9 +76,19 @@ def find_runs(time: np.ndarray) -> tuple[SamplingRun, ...]:
 
 
 def split_runs(runs: Sequence[SamplingRun], change_rows: Sequence[int]) -> tuple[SamplingRun, ...]:
-    """Split runs at the rows at which the noise level changes.
+    """Split runs at changes of the noise level.
 
-    Each segment of the record has its own noise levels.
+    Parameters
+    ----------
+    runs : sequence of SamplingRun
+        Runs that cover all rows.
+    change_rows : sequence of int
+        Rows at which the noise level changes. Changes close to the ends of a run are ignored.
+
+    Returns
+    -------
+    tuple of SamplingRun
+        Runs with a separate noise level for each noise process between two changes.
     """
     found: list[SamplingRun] = []
     levels: dict[tuple[int, int], int] = {}
@@ -87,18 +106,35 @@ def split_runs(runs: Sequence[SamplingRun], change_rows: Sequence[int]) -> tuple
 
 
 def count_processes(runs: Sequence[SamplingRun]) -> int:
-    """Return the number of noise processes."""
-    return 1 + max(run.process for run in runs)
-
-
-def index_rows(runs: Sequence[SamplingRun], field: str) -> np.ndarray:
-    """Return the index of the noise process, or of the noise level, for each row.
+    """Return the number of noise processes.
 
     Parameters
     ----------
     runs : sequence of SamplingRun
+        Runs that cover all rows.
+
+    Returns
+    -------
+    int
+        Number of noise processes.
+    """
+    return 1 + max(run.process for run in runs)
+
+
+def index_rows(runs: Sequence[SamplingRun], field: str) -> np.ndarray:
+    """Return the index of the noise process or the noise level of each row.
+
+    Parameters
+    ----------
+    runs : sequence of SamplingRun
+        Runs that cover all rows.
     field : {"process", "level"}
-        Return the index of the process or of the level.
+        Kind of index to return.
+
+    Returns
+    -------
+    ndarray of int, shape (rows,)
+        Index of each row.
     """
     return np.repeat([getattr(run, field) for run in runs], [run.stop - run.start for run in runs])
 
@@ -106,15 +142,15 @@ def index_rows(runs: Sequence[SamplingRun], field: str) -> np.ndarray:
 def find_level_changes(whitened_residuals: np.ndarray, min_difference: float = 0.0) -> list[int]:
     """Find the rows at which the standard deviation of the noise changes.
 
-    The function segments the logarithms of the absolute differences between successive rows. Misfit
-    of the model near a step is either smooth or short, so it affects few of these differences. A
-    change of the noise level affects all of them.
+    The function segments the logarithms of the absolute differences between successive rows. A
+    misfit of the model near a step is either smooth or short, so it affects only a few differences.
+    A change of the noise level affects all differences after the change.
 
     Parameters
     ----------
     whitened_residuals : ndarray, shape (rows,)
         Whitened residuals.
-    min_difference : float
+    min_difference : float, default: 0.0
         Lower bound of the absolute differences.
 
     Returns
@@ -146,15 +182,20 @@ def find_level_changes(whitened_residuals: np.ndarray, min_difference: float = 0
 
 
 def _refine_change(squares: np.ndarray, first: int, row: int, last: int) -> int:
-    """Refine the row at which the noise level changes, by the Gaussian likelihood.
+    """Refine the location of a noise level change by maximum likelihood.
 
     Parameters
     ----------
     squares : ndarray, shape (rows,)
         Squares of the whitened residuals.
     first, row, last : int
-        First row of the segment before the change, the row that is refined, and the row after the
-        last row of the segment that follows.
+        First row of the segment before the change, estimated row of the change, and row after the
+        segment that follows the change.
+
+    Returns
+    -------
+    int
+        Row at which the noise level changes.
     """
     reach = min(_MIN_RUN_ROWS, (row - first) // 2, (last - row) // 2)
     before, after = squares[first : row - reach].mean(), squares[row + reach : last].mean()
@@ -164,7 +205,13 @@ def _refine_change(squares: np.ndarray, first: int, row: int, last: int) -> int:
 
 
 def _classify_intervals(time: np.ndarray) -> np.ndarray:
-    """Return the class of the sampling interval of each row: 0, 1 and so on."""
+    """Return the class of the sampling interval of each row.
+
+    Returns
+    -------
+    ndarray of int, shape (rows,)
+        Number of the class, starting from 0.
+    """
     gaps = np.diff(time)
     gaps[gaps <= 0.0] = np.median(gaps)
     smooth = np.log(uniform_filter1d(gaps, min(_MEAN_ROWS, len(gaps)), mode="nearest"))
@@ -185,7 +232,10 @@ def _classify_intervals(time: np.ndarray) -> np.ndarray:
 
 
 def _refine_boundary(logs: np.ndarray, row: int) -> int:
-    """Refine the row at which the sampling interval changes, by least squares."""
+    """Refine the row at which the sampling interval changes.
+
+    The result minimises the sum of squared deviations from the means on both sides of the boundary.
+    """
     first, last = max(row - 1 - 2 * _MEAN_ROWS, 0), min(row - 1 + 2 * _MEAN_ROWS, len(logs))
     part = logs[first:last]
     costs = [np.var(part[:k]) * k + np.var(part[k:]) * (len(part) - k) for k in range(1, len(part))]

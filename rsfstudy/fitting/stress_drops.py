@@ -9,7 +9,7 @@ import numpy as np
 from rsfstudy.fitting.drop_detection import Candidate, Detection, detect_drops
 from rsfstudy.fitting.drop_fit import Drop, fit_drop
 
-#: Scale, heading in tables and description of each quantity of an event.
+#: Scale, table heading and description of each property of an event.
 EVENT_QUANTITIES = {
     "time": ("D_c/V_*", "time", "time at which the event begins"),
     "duration": ("D_c/V_*", "duration", "duration of the event"),
@@ -26,14 +26,23 @@ EVENT_QUANTITIES = {
         "highest shear stress less that at peak slip rate",
     ),
 }
-#: Values of an event with their errors by name, and the flag for the missing part of the event.
+#: Properties of an event as pairs of a value and its error, by name, and a flag for incomplete
+#: events.
 EventNumbers = tuple[dict[str, tuple[float, float]], int]
-#: Smallest fitted drop, in half widths of its 95 % interval.
+#: Smallest drop, relative to half of the width of its 95 % confidence interval.
 _MIN_RELATIVE_SIZE = 1.0
 
 
 class FittedCandidate(NamedTuple):
-    """A fitted drop, and the candidate from which it was fitted."""
+    """Fitted drop, and the candidate from which it was fitted.
+
+    Parameters
+    ----------
+    drop : Drop
+        Result of the fit.
+    candidate : Candidate
+        Detected drop.
+    """
 
     drop: Drop
     candidate: Candidate
@@ -42,17 +51,19 @@ class FittedCandidate(NamedTuple):
 def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedCandidate], Detection]:
     """Find and fit the drops of stress in a record.
 
-    If two fitted drops overlap, their candidates are merged and fitted again as one drop.
+    If two fitted drops overlap, their candidates are merged and fitted again as a single drop.
 
     Parameters
     ----------
     time, stress : ndarray, shape (samples,)
+        Times and shear stresses of the samples, in any units.
 
     Returns
     -------
     drops : list of FittedCandidate
         Drops in order of time.
     detection : Detection
+        Result of the detection.
     """
     detection = detect_drops(time, stress)
     candidates = detection.candidates
@@ -63,20 +74,21 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedCandida
             break
         candidates = merged
     sure = [of for of in found if _drop_size(of.drop) > _MIN_RELATIVE_SIZE * of.drop.drop_error]
-    if sure:  # slow drops increase the noise estimate of long windows
+    if sure:  # Slow drops increase the noise estimate of long windows.
         residual = float(np.median([of.drop.residual_sd for of in sure]))
         detection = detection._replace(noise_sd=min(detection.noise_sd, residual))
     return sure, detection
 
 
 def _drop_size(drop: Drop) -> float:
+    """Return the size of a drop."""
     return drop.stress_before - drop.stress_after
 
 
 def _fit_candidates(
     time: np.ndarray, stress: np.ndarray, candidates: list[Candidate], detection: Detection
 ) -> list[FittedCandidate]:
-    """Fit each candidate, limited to the interval between its neighbours."""
+    """Fit each candidate within the interval between its neighbours."""
     ends = [float(time[0]), *(one.end for one in candidates)]
     begins = [*(one.start for one in candidates[1:]), float(time[-1])]
     return [

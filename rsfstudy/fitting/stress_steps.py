@@ -1,11 +1,11 @@
 """Detection of normal stress steps in a record.
 
-A step is a change from one constant level of normal stress to another. The mean normal stress of a
-window of rows is compared with the mean of the previous window of the same length. A step is
-detected if both means differ by at least 2 % and by far more than the typical difference. The
-typical difference includes the drift of the whole record and the noise, which may be correlated. A
-ramp between two levels is a step with a duration. A drift that extends beyond the beginning or the
-end of the record is not a step.
+A step is a change from one constant level of normal stress to another. The algorithm compares the
+mean normal stress in a window of rows with the mean in the previous window. A step is detected if
+the two means differ by at least 2 % and by far more than the typical difference. The typical
+difference includes correlated noise and a drift of the whole record. A ramp between two levels is a
+step with a finite duration. A drift that continues to the beginning or the end of the record is not
+a step.
 """
 
 from __future__ import annotations
@@ -20,31 +20,31 @@ from scipy.ndimage import find_objects, label
 
 from rsfstudy.fitting.velocity_steps import LoadingStep
 
-#: Least change of level, relative to the level before, and relative to the robust standard
-#: deviation of differences.
+#: Smallest change of normal stress that is a step, relative to the normal stress and relative to
+#: the robust standard deviation of the differences.
 MIN_RELATIVE_CHANGE, _MIN_CHANGE_SIGMAS = 0.02, 6.0
-#: Largest difference of levels over longer windows, as a fraction of the change. A larger
-#: difference indicates that the change is a part of a ramp.
+#: Largest difference between the levels in short and long windows, as a fraction of the change. If
+#: the difference is larger, the change is part of a longer ramp.
 _MAX_LEVEL_DRIFT_FRACTION = 0.25
-#: Fraction of the smallest change down to which a change extends.
+#: Fraction of the smallest detectable change above which a difference belongs to a step.
 _EXTENT_FRACTION = 0.4
-#: Most rows at once (of a longer record, means of several rows), parts of the record that are
-#: compared, and the fewest rows of a part.
+#: Largest number of rows that are searched, numbers of windows in a record, and fewest rows of a
+#: window. A longer record is averaged over blocks of rows first.
 _MAX_ROWS, _PARTITION_COUNTS, _MIN_PART_ROWS = 20_000, (400, 100, 25), 8
-#: Shares of the change of level between which rows determine the line of a ramp, and fewest rows.
+#: Fractions of the change of level between which rows are used to fit a ramp, and fewest rows for
+#: the fit.
 _RAMP_FRACTIONS, _MIN_RAMP_ROWS = (0.1, 0.9), 3
-#: Standard deviation over the median of absolute deviations of Gaussian noise.
+#: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _SD_PER_MAD = 1.4826
 
 
 class StressStep(NamedTuple):
-    """A change of normal stress.
+    """Change of normal stress at a constant rate.
 
-    Attributes
+    Parameters
     ----------
     start, end : float
-        Times in s at which the change begins and ends. Normal stress changes at a constant rate
-        between these times.
+        Times in s at which the change begins and ends.
     stress_before, stress_after : float
         Normal stresses in Pa before and after the change.
     """
@@ -66,7 +66,7 @@ def find_stress_steps(time: np.ndarray, stress: np.ndarray) -> list[StressStep]:
     Returns
     -------
     list of StressStep
-        Steps in order of time, without changes of less than 2 %.
+        Steps in order of time. Changes of less than 2 % are ignored.
     """
     every = max(1, math.ceil(len(time) / _MAX_ROWS))
     count = len(time) // every * every
@@ -92,7 +92,7 @@ def find_stress_steps(time: np.ndarray, stress: np.ndarray) -> list[StressStep]:
 def _median_levels(stress: np.ndarray, rows: slice, window: int, reach: int) -> tuple[float, float]:
     """Compute the median normal stress before and after a change.
 
-    Each median is taken over ``reach`` rows outside the change.
+    The argument ``reach`` is the number of rows in each median.
     """
     first, last = rows.start + window, rows.stop - window
     before, after = stress[max(first - reach, 0) : first], stress[last : last + reach]
@@ -100,12 +100,12 @@ def _median_levels(stress: np.ndarray, rows: slice, window: int, reach: int) -> 
 
 
 def _find_changes(stress: np.ndarray, window: int) -> list[slice]:
-    """Find changes of the mean of normal stress.
+    """Find the changes of mean normal stress for one window length.
 
     Returns
     -------
     list of slice
-        Rows of each change, with one window of nearly constant stress on either side.
+        Rows of each change, including one window of nearly constant stress on each side.
     """
     if len(stress) < 4 * window:
         return []
@@ -118,12 +118,13 @@ def _find_changes(stress: np.ndarray, window: int) -> list[slice]:
     for signed in (change, -change):
         joined: list[slice] = []
         for (rows,) in find_objects(label(signed > _EXTENT_FRACTION * least)[0]):
-            if joined and rows.start < joined[-1].stop + window:  # noise interrupts a ramp
+            # Noise may interrupt a ramp.
+            if joined and rows.start < joined[-1].stop + window:
                 joined[-1] = slice(joined[-1].start, rows.stop)
             elif signed[rows].max() > least:
                 joined.append(rows)
         found += joined
-    # a change at an end of the record has no constant level on one side
+    # A change at the beginning or the end of the record has only one constant level.
     inside = [rows for rows in found if rows.start > 0 and rows.stop < len(change)]
     return [slice(rows.start, rows.stop - 1 + 2 * window) for rows in inside]
 
@@ -131,23 +132,24 @@ def _find_changes(stress: np.ndarray, window: int) -> list[slice]:
 def merge_stress_steps(
     steps: Sequence[LoadingStep], stress_steps: Sequence[StressStep], velocity: float
 ) -> tuple[LoadingStep, ...]:
-    """Merge steps of normal stress into the steps of load point velocity.
+    """Merge steps of normal stress with steps of load point velocity.
 
-    If normal stress changes during a step of load point velocity, the result is one step that
-    includes both changes.
+    If the normal stress changes during a step of load point velocity, the result is a single step
+    that includes both changes.
 
     Parameters
     ----------
     steps : sequence of LoadingStep
         Steps of load point velocity.
     stress_steps : sequence of StressStep
+        Steps of normal stress.
     velocity : float
-        Load point velocity in um/s if there are no velocity steps.
+        Load point velocity in um/s that is used if there are no steps of load point velocity.
 
     Returns
     -------
-    tuple of Step
-        Steps in order of time.
+    tuple of LoadingStep
+        Steps in order of time. The normal stresses of the steps are not set.
     """
     found = []
     for step in steps:
@@ -171,20 +173,23 @@ def set_stress_levels(
 ) -> tuple[LoadingStep, ...]:
     """Set the normal stresses of steps from the record.
 
-    Steps with given normal stresses are not changed.
+    Normal stresses that the user specified are not changed.
 
     Parameters
     ----------
     steps : sequence of LoadingStep
+        Steps in order of time.
     stress_steps : sequence of StressStep
-        Detected steps of normal stress. If there is no such step during a step of velocity, its
-        normal stresses before and after are equal.
+        Detected steps of normal stress. If the normal stress does not change during a step, the
+        normal stresses before and after the step are equal.
     time, stress : ndarray, shape (rows,)
         Times in s and normal stresses in Pa.
 
     Returns
     -------
-    tuple of Step
+    tuple of LoadingStep
+        Steps with normal stresses. An immediate change of normal stress is extended to one sampling
+        interval.
     """
     ends = [-math.inf, *(step.end for step in steps)]
     begins = [*(step.start for step in steps[1:]), math.inf]
@@ -199,7 +204,7 @@ def set_stress_levels(
             )
             step = step._replace(stress_before=before, stress_after=after)
         if step.start == step.end and step.stress_ratio != 1.0:
-            # a change of normal stress lasts at least one sampling interval
+            # A change of normal stress takes at least one sampling interval.
             row = int(np.clip(np.searchsorted(time, step.start, "right"), 1, len(time) - 1))
             step = step._replace(start=float(time[row - 1]), end=float(time[row]))
         found.append(step)
@@ -207,15 +212,16 @@ def set_stress_levels(
 
 
 def _steps_overlap(step: LoadingStep, change: StressStep) -> bool:
-    """Return True if normal stress changes during a step."""
+    """Return True if the normal stress changes during or close to a step."""
     near = change.end - change.start
     return step.start - near <= change.end and change.start <= step.end + near
 
 
 def _fit_ramp(time: np.ndarray, stress: np.ndarray, before: float, after: float) -> StressStep:
-    """Locate the ramp between two levels by a linear fit."""
+    """Fit a ramp between two levels of normal stress."""
     share = (stress - before) / (after - before)
-    middle = int(np.argmax(np.cumsum(0.5 - share)))  # the best boundary at half of the change
+    # This row is the best boundary between rows below and above half of the change.
+    middle = int(np.argmax(np.cumsum(0.5 - share)))
     first = int(np.flatnonzero(share[: middle + 1] <= _RAMP_FRACTIONS[0]).max(initial=0))
     reached = np.flatnonzero(share[middle:] >= _RAMP_FRACTIONS[1])
     last = middle + int(reached[0]) if len(reached) else len(share) - 1

@@ -1,8 +1,8 @@
 """Checks of the standard errors of a fit.
 
-If the standard errors are not valid, the status of the fit is ``errors_not_valid``, and its
-parameter values can still be used. Each check returns a reason as a string without a final full
-stop. The reason describes the violated condition and a remedy.
+If the standard errors are not valid, the status of the fit is ``errors_not_valid``, but the
+parameter values can still be used. Each check returns a reason, which is a string without a final
+full stop. The reason describes the violated condition and a remedy.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from rsfstudy.fitting.noise import ljung_box_p_value
 from rsfstudy.fitting.window_model import LOGARITHMIC_PARAMETERS
 from rsfstudy.formatting import pluralize
 
-#: Parameters that are slip distances.
+#: Names of the parameters that are slip distances.
 SLIP_DISTANCES = ("slip_distance", "slip_distance_2")
 #: Significance level of the test for autocorrelated whitened residuals.
 SIGNIFICANCE_LEVEL = 0.01
-#: Standard deviation of friction below which residuals are numerical, not statistical.
+#: Standard deviation of friction below which the residuals are numerical errors rather than noise.
 MIN_NOISE_SD = 1e-7
-#: Largest ratio of the residual standard deviation to that of an ordinary least-squares fit.
+#: Largest ratio of the residuals to the residuals of an ordinary least-squares fit.
 _MAX_RESIDUAL_RATIO = 2.0
-#: Standard deviation of the noise, over the quantum of friction, below which rounding errors depend
-#: on friction; and the largest fraction of rows that may be outliers.
+#: Ratio of the noise to the quantum of friction below which rounding errors depend on friction, and
+#: largest fraction of rows that may be outliers.
 _MIN_NOISE_PER_QUANTUM, _MAX_OUTLIER_FRACTION = 0.4, 0.05
-#: Fewest rows within a slip distance for which confidence intervals are reliable.
+#: Fewest rows per slip distance for which confidence intervals are reliable.
 _MIN_ROWS_PER_SLIP_DISTANCE = 1.5
-#: Largest ratio of the two sides of a 95 % interval, in the logarithm of a parameter.
+#: Largest ratio of the two sides of a 95 % confidence interval of the logarithm of a parameter.
 _MAX_INTERVAL_ASYMMETRY = 3.0
-#: Largest number of outliers that a message names.
+#: Largest number of outliers that a message lists.
 _MAX_LISTED_OUTLIERS = 10
 
 
@@ -43,13 +43,14 @@ def find_validity_problems(solution: FitSolution, friction: np.ndarray) -> tuple
     Parameters
     ----------
     solution : FitSolution
+        Result of the fit.
     friction : ndarray, shape (rows,)
         Recorded friction.
 
     Returns
     -------
     tuple of str
-        Empty if the standard errors are valid.
+        Reasons. The tuple is empty if the standard errors are valid.
     """
     if solution.noise_sd < MIN_NOISE_SD:
         return ()
@@ -64,21 +65,22 @@ def find_validity_problems(solution: FitSolution, friction: np.ndarray) -> tuple
 def describe_asymmetry(
     found: FitSolution, ends: Mapping[str, tuple[float, float]]
 ) -> tuple[str, ...]:
-    """Return the parameters whose 95 % intervals are too asymmetric for standard errors.
+    """Describe the parameters with very asymmetric confidence intervals.
 
-    If the record constrains a parameter from one side only, such as the stiffness of a very stiff
+    If a record constrains a parameter on one side only, such as the stiffness of a very stiff
     machine, the standard errors of all correlated parameters are too small.
 
     Parameters
     ----------
     found : FitSolution
+        Result of the fit.
     ends : mapping of str to (float, float)
-        Ends of the 95 % intervals, from the likelihood.
+        Ends of the 95 % confidence intervals of the free parameters.
 
     Returns
     -------
     tuple of str
-        Reasons why the standard errors are not valid.
+        Reasons why the standard errors are not valid, one for each of these parameters.
     """
     reasons = []
     for name in (
@@ -102,12 +104,12 @@ def describe_outliers(outliers: np.ndarray) -> str:
     Parameters
     ----------
     outliers : ndarray of int
-        Indices of rows in the window. The remark numbers the rows from 1.
+        Indices of the outliers in the window. The remark numbers the rows from 1.
 
     Returns
     -------
     str
-        Empty if there are no outliers.
+        Remark, or an empty string if there are no outliers.
     """
     if not len(outliers):
         return ""
@@ -135,7 +137,7 @@ def _check_misfit(found: FitSolution, friction: np.ndarray) -> Iterator[str]:
 
 
 def _check_rounding(found: FitSolution) -> Iterator[str]:
-    """Yield a reason if the rounding of friction exceeds the noise."""
+    """Yield a reason if the rounding of friction is too coarse."""
     if is_rounding_too_coarse(found):
         yield (
             f"friction is rounded to {found.quantum:.2g}, more than 2.5 times the noise, so "
@@ -148,6 +150,16 @@ def is_rounding_too_coarse(solution: FitSolution) -> bool:
 
     Rounding errors are random only if the standard deviation of the noise exceeds 0.4 times the
     quantum of friction.
+
+    Parameters
+    ----------
+    solution : FitSolution
+        Result of the fit.
+
+    Returns
+    -------
+    bool
+        True if rounding errors are not random.
     """
     variance = (
         solution.noise_sd * float(solution.noise.level_sds.min())
@@ -173,12 +185,21 @@ def _check_autocorrelation(found: FitSolution) -> Iterator[str]:
 
 
 def describe_load_point_noise(solution: FitSolution, loading: str, noise: float) -> str:
-    """Return a remark on the noise of the load point.
+    """Return a remark about the noise of load point displacement.
+
+    Parameters
+    ----------
+    solution : FitSolution
+        Result of the fit.
+    loading : {"steps", "recorded"}
+        Kind of loading.
+    noise : float
+        Standard deviation of the load point noise in um.
 
     Returns
     -------
     str
-        Empty if the noise of the load point has little effect on the parameters.
+        Remark, or an empty string if the noise has little effect on the parameters.
     """
     if loading == "steps":
         moved = np.diag(solution.covariance) > 2.0 * np.diag(solution.noise_covariance)
@@ -189,7 +210,8 @@ def describe_load_point_noise(solution: FitSolution, loading: str, noise: float)
         return text if names else ""
     if "slip_distance" not in solution.free:
         return ""
-    # of second order: ln V of a stiff slider follows the load point by k x/a
+    # Displacement noise x changes ln V of a stiff slider by k x/a. The change of the slip
+    # distance is of second order.
     shift = 0.5 * (solution.values["stiffness"] * noise / solution.values["a"]) ** 2
     if shift < solution.stderr("slip_distance") / solution.values["slip_distance"]:
         return ""
@@ -202,17 +224,19 @@ def describe_load_point_noise(solution: FitSolution, loading: str, noise: float)
 def find_unidentified(solution: FitSolution, row_spacing: float) -> tuple[str, ...]:
     """Return the parameters that the record does not constrain.
 
-    A slip distance is also unconstrained if the record has too few rows per slip distance.
+    A slip distance is also unconstrained if the record has fewer than 1.5 rows per slip distance.
 
     Parameters
     ----------
     solution : FitSolution
+        Result of the fit.
     row_spacing : float
         Load point displacement in um between rows after the step.
 
     Returns
     -------
     tuple of str
+        Names of the parameters.
     """
     sparse = [
         n
@@ -230,8 +254,9 @@ def describe_unidentified(
     Parameters
     ----------
     solution : FitSolution
+        Result of the fit.
     names : tuple of str
-        Names of these parameters.
+        Names of the unconstrained parameters.
     row_spacing : float
         Load point displacement in um between rows after the step.
     is_a_at_bound : bool
@@ -240,6 +265,7 @@ def describe_unidentified(
     Returns
     -------
     str
+        Message that names the parameters, with possible reasons.
     """
     text = f"the record does not constrain {', '.join(names)}"
     if sparse := set(names) - set(solution.unidentified):

@@ -1,14 +1,16 @@
-"""Detection of load point velocity steps in a record.
+r"""Detection of load point velocity steps in a record.
 
-The displacement is approximated by straight segments, and a step is the boundary between two
-segments. The segments are found by binary segmentation. Let S(i, j) be the sum of squared residuals
-of the line through rows i to j. The rows are split at the row k that minimises ``S(i, k) + S(k,
-j)``. A split is accepted if this sum is smaller than S(i, j) by at least ``12 ln(j - i)`` noise
-variances, which is far more than expected by chance.
+The displacement of the load point is approximated by straight segments, and a step is the boundary
+between two segments. Binary segmentation [1]_ [2]_ finds the segments. Let :math:`S(i, j)` be the
+sum of squared residuals of the line through the rows i to j. The algorithm splits the rows at the
+row k that minimises :math:`S(i, k) + S(k, j)`. A split is accepted if it reduces the sum of squares
+by more than :math:`12 \ln(j - i)` times the noise variance, which is far more than expected by
+chance.
 
 References
 ----------
-Scott and Knott (1974), Biometrics 30, 507-512; Bai and Perron (1998), Econometrica 66, 47-78.
+.. [1] Scott and Knott (1974), Biometrics 30, 507-512.
+.. [2] Bai and Perron (1998), Econometrica 66, 47-78.
 """
 
 from __future__ import annotations
@@ -23,48 +25,61 @@ from scipy.ndimage import maximum_filter1d, median_filter
 
 from rsfstudy.error_boundary import guard_methods
 
-#: Rows among which steps are looked for at once: of a longer record, the means of as many.
+#: Largest number of rows that are segmented. A longer record is averaged over blocks of rows first.
 _MAX_ROWS = 20_000
-#: Fewest rows of a piece, part of the faster velocity by which the next one must differ, and by how
-#: much that must move displacement, in standard deviations of what lines leave of it: displacement
-#: wanders about its set point.
+#: Criteria for separate segments: the fewest rows of a segment, the smallest change of velocity
+#: relative to the faster velocity, and the smallest displacement that the change causes, relative
+#: to the standard deviation of the residuals. The displacement criterion is necessary because a
+#: controlled load point fluctuates around its set point.
 _MIN_SEGMENT_ROWS, _MIN_RELATIVE_VELOCITY_CHANGE, _MIN_DISPLACEMENT_SIGMAS = 5, 0.2, 10.0
-#: What two lines must explain better than one, in variances of the noise over ln n.
+#: Smallest reduction of the sum of squares by a split, divided by the noise variance and by ln n
+#: for n rows.
 _MIN_SPLIT_GAIN = 12.0
-#: Part of the faster velocity below which the load point is held.
+#: Fraction of the highest velocity below which the load point is considered to be held.
 _HOLD_VELOCITY_FRACTION = 0.01
-#: Part of the piece before and of the rest behind that pieces of a ramp last at most, and rows that
-#: each holds less than: a fit takes more.
+#: Limits for combining changes of velocity into a step: the longest duration relative to the
+#: segment before the step and to the rest of the record, and the number of rows below which a
+#: segment is too short for a fit.
 _MAX_RAMP_SEGMENT_FRACTION, _MAX_RAMP_SEGMENT_ROWS = 0.05, 15
-#: Rows over which local noise is taken, and the factor by which it must exceed that of the whole
-#: record to count.
+#: Number of rows from which the local noise is estimated, and ratio of the local noise to the
+#: typical noise above which the local noise is used.
 _LOCAL_NOISE_ROWS, _LOCAL_NOISE_FACTOR = 31, 2.0
-#: Standard deviation over the median of absolute deviations of Gaussian noise.
+#: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _SD_PER_MAD = 1.4826
 
 
-#: Function that returns the sum of squared residuals of rows i to j.
+#: Function that returns the sum of squared residuals of the rows i to j.
 SquaresFunction = Callable[[np.ndarray | int, np.ndarray | int], np.ndarray]
-#: Displacement at time 0, and velocity.
+#: Line of displacement against time: displacement at time 0, and velocity.
 _Line = tuple[float, float]
 
 
 @guard_methods
 class LoadingStep(NamedTuple):
-    """A change of load point velocity, of normal stress, or of both.
+    """Change of load point velocity, of normal stress, or of both.
 
-    Attributes
+    Parameters
     ----------
     start, end : float
-        Times in s at which the change begins and ends. Both are equal if the change is immediate.
+        Times in s at which the change begins and ends. The two times are equal if the change is
+        immediate.
     velocity_before, velocity_after : float
-        Load point velocities in um/s. The velocity is 0 if the load point is held.
-    stress_before, stress_after : float
-        Normal stresses in Pa, or NaN if normal stress was not recorded.
-    velocity_profile : tuple of (float, float)
-        Velocities within a step that overshoots. Each item contains a time in s since the beginning
-        of the step, and the velocity in um/s from this time on. If the tuple is empty, the velocity
-        changes at a constant rate.
+        Load point velocities in um/s. A velocity of 0 means that the load point is held.
+    stress_before, stress_after : float, default: NaN
+        Normal stresses in Pa, or NaN if the normal stress was not recorded.
+    velocity_profile : tuple of (float, float), optional
+        Velocities during a step that overshoots. Each item contains a time in s after the start of
+        the step, and the velocity in um/s from this time on. By default, the velocity changes at a
+        constant rate.
+
+    Examples
+    --------
+    >>> from rsfstudy.fitting import LoadingStep
+    >>> step = LoadingStep(50.0, 51.0, 1.0, 10.0, stress_before=10e6, stress_after=12e6)
+    >>> step.changes_velocity
+    True
+    >>> step.stress_ratio
+    1.2
     """
 
     start: float
@@ -82,9 +97,9 @@ class LoadingStep(NamedTuple):
 
     @property
     def stress_ratio(self) -> float:
-        """Ratio of normal stress after the step to normal stress before the step.
+        """Ratio of normal stress after the step to normal stress before it.
 
-        The ratio is 1 if normal stress was not recorded.
+        The ratio is 1 if the normal stress was not recorded.
         """
         ratio = self.stress_after / self.stress_before
         return ratio if math.isfinite(ratio) else 1.0
@@ -93,18 +108,18 @@ class LoadingStep(NamedTuple):
 def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[LoadingStep, ...]:
     """Detect the load point velocity steps in a record.
 
-    The displacement is approximated by straight segments. Neighbouring segments are separate if
-    their velocities differ by at least a fifth, and if the split reduces the sum of squares by more
-    than expected by chance.
+    Neighbouring segments are separate if their velocities differ by at least 20 %, and if the split
+    reduces the sum of squares by far more than expected by chance. A ramp between two velocities is
+    detected as a single step with a finite duration.
 
     Parameters
     ----------
     time, displacement : ndarray, shape (rows,)
-        Times in s and displacements in um.
+        Times in s and load point displacements in um.
 
     Returns
     -------
-    tuple of Step
+    tuple of LoadingStep
         Steps in order of time.
     """
     every = max(1, math.ceil(len(time) / _MAX_ROWS))
@@ -140,7 +155,8 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
             found.append(step._replace(velocity_profile=tuple(through)))
             continue
         if last > first:
-            # the lines before and behind meet in the middle: so displacement behind is theirs
+            # The middle of the ramp is the intersection of the lines before and after the ramp,
+            # so that the displacement after the ramp is correct.
             (x, v), (y, w) = lines[first], lines[last + 1]
             late = min(max((x - y) / (w - v), begins), ends) - 0.5 * (begins + ends)
             begins, ends = begins + late, ends + late
@@ -149,35 +165,87 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
 
 
 class RunningSums:
-    """Cumulative sums for fitting lines to any range of rows in constant time."""
+    """Cumulative sums for fitting lines to ranges of rows in constant time.
+
+    In all methods, the range from ``i`` to ``j`` includes row ``i`` and excludes row ``j``. If
+    ``i`` or ``j`` is an array, the methods return one result for each range.
+
+    Parameters
+    ----------
+    t, x : ndarray, shape (rows,)
+        Independent and dependent variable.
+    weights : ndarray, shape (rows,)
+        Weights of the squared residuals.
+    """
 
     def __init__(self, t: np.ndarray, x: np.ndarray, weights: np.ndarray) -> None:
         columns = weights * np.array([np.ones(len(t)), t, x, t * t, t * x, x * x])
         self.sums = np.concatenate([np.zeros((1, 6)), np.cumsum(columns.T, axis=0)])
 
     def moments(self, i: np.ndarray | int, j: np.ndarray | int) -> tuple[np.ndarray, ...]:
-        """Compute the moments of rows i to j.
+        """Compute the weighted moments of a range of rows.
+
+        Parameters
+        ----------
+        i, j : int or ndarray of int
+            First row of the range, and row after the last row.
 
         Returns
         -------
         tuple of ndarray
-            Means of t and x, and sums of squares and products about the means: tt, tx and xx.
+            Mean of t, mean of x, and the sums of squares and products about the means: tt, tx and
+            xx.
         """
         n, st, sx, stt, stx, sxx = (self.sums[j] - self.sums[i]).T
         mt, mx = st / n, sx / n
         return mt, mx, stt - st * mt, stx - st * mx, sxx - sx * mx
 
     def residual_squares(self, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
-        """Compute the sum of squared residuals of the line through rows i to j."""
+        """Compute the sum of squared residuals of a line fit.
+
+        Parameters
+        ----------
+        i, j : int or ndarray of int
+            First row of the range, and row after the last row.
+
+        Returns
+        -------
+        ndarray
+            Weighted sum of squared residuals of each range.
+        """
         _mt, _mx, tt, tx, xx = self.moments(i, j)
         return np.asarray(np.maximum(xx - tx * tx / tt, 0.0))
 
     def squares_about_mean(self, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
-        """Compute the sum of squared deviations from the mean of rows i to j."""
+        """Compute the sum of squared deviations from the mean.
+
+        Parameters
+        ----------
+        i, j : int or ndarray of int
+            First row of the range, and row after the last row.
+
+        Returns
+        -------
+        ndarray
+            Weighted sum of squared deviations of each range.
+        """
         return np.asarray(np.maximum(self.moments(i, j)[4], 0.0))
 
     def fit_line(self, i: int, j: int) -> _Line:
-        """Compute the intercept and slope of the line through rows i to j."""
+        """Fit a line to a range of rows.
+
+        Parameters
+        ----------
+        i, j : int
+            First row of the range, and row after the last row.
+
+        Returns
+        -------
+        intercept : float
+            Value of x at t = 0.
+        slope : float
+            Slope of the line.
+        """
         mt, mx, tt, tx, _xx = self.moments(i, j)
         return float(mx - tx / tt * mt), float(tx / tt)
 
@@ -185,8 +253,8 @@ class RunningSums:
 def _deviations_from_neighbours(t: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Compute the deviation of each sample from a line through its neighbours.
 
-    The deviations are scaled such that their standard deviation equals the standard deviation of
-    white noise.
+    For white noise, the standard deviation of the deviations equals the standard deviation of the
+    noise.
     """
     share = (t[1:-1] - t[:-2]) / (t[2:] - t[:-2])
     off = x[1:-1] - (1.0 - share) * x[:-2] - share * x[2:]
@@ -195,12 +263,12 @@ def _deviations_from_neighbours(t: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _relative_noise(t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Estimate the local noise of displacement relative to the whole record.
+    """Estimate the local noise of displacement relative to the typical noise.
 
     Returns
     -------
     ndarray, shape (rows,)
-        1 for each row, except where the local noise is more than twice the typical noise.
+        Ratio of the local noise to the typical noise, or 1 if the ratio is less than 2.
     """
     off = np.abs(_deviations_from_neighbours(t, x))
     typical = float(np.median(off))
@@ -214,24 +282,42 @@ def _relative_noise(t: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _overshoots(speeds: Sequence[float]) -> bool:
-    """Return True if the velocity both increases and decreases during a step."""
+    """Return True if the velocity increases and decreases during a step."""
     changes = np.diff(speeds)
     return bool((changes > 0.0).any() and (changes < 0.0).any())
 
 
 def noise_variance(t: np.ndarray, x: np.ndarray) -> float:
-    """Estimate the variance of the noise of samples.
+    """Estimate the noise variance of samples.
 
-    The estimate uses the deviation of each sample from the line through its neighbours. The median
-    of the deviations is robust against steps.
+    The estimate is based on the deviation of each sample from the line through its two neighbours.
+    Because the function uses the median of the deviations, steps have little effect on the
+    estimate.
+
+    Parameters
+    ----------
+    t : ndarray, shape (samples,)
+        Times or other increasing coordinates of the samples.
+    x : ndarray, shape (samples,)
+        Values of the samples.
 
     Returns
     -------
     float
-        Variance in the squared units of the samples.
+        Noise variance, in squared units of ``x``. The result is positive even if the samples have
+        no noise.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rsfstudy.fitting import noise_variance
+    >>> t = np.arange(1000.0)
+    >>> x = 2.0 * t + np.random.default_rng(0).normal(scale=0.1, size=1000)
+    >>> round(noise_variance(t, x), 2)
+    0.01
     """
     spread = _SD_PER_MAD * float(np.median(np.abs(_deviations_from_neighbours(t, x))))
-    least = 1e-9 * float(np.ptp(x))  # a record may be without noise
+    least = 1e-9 * float(np.ptp(x))  # A synthetic record may have no noise.
     return max(spread, least) ** 2
 
 
@@ -246,11 +332,11 @@ def segment_rows(
     Parameters
     ----------
     residual_squares : callable
-        Function that returns the sum of squared residuals of rows i to j.
+        Function that returns the sum of squared residuals of the rows i to j.
     first, last : int
-        Range of rows.
+        First row of the range that is split, and row after the last row.
     variance : float
-        Variance of the noise.
+        Noise variance.
 
     Returns
     -------
@@ -280,7 +366,7 @@ def _merge_similar_segments(
 ) -> list[int]:
     """Remove boundaries between segments with similar velocities.
 
-    The boundary with the smallest difference is removed first.
+    The boundary with the smallest change of velocity is removed first.
     """
     while len(boundaries) > 2:
         pieces = [*itertools.pairwise(boundaries)]
@@ -305,11 +391,12 @@ def _merge_similar_segments(
 def _intersection_time(
     one: _Line, other: _Line, between: tuple[float, float], variance: float
 ) -> float:
-    """Compute the time at which two lines intersect.
+    r"""Compute the time at which two lines intersect.
 
-    The time is limited to the vicinity of the boundary between the samples of both lines. Because
-    of noise, this boundary is uncertain by about (variance gap/change**2)**(1/3), where ``gap`` is
-    the sampling interval and ``change`` is the change of velocity.
+    The time is restricted to a neighbourhood of the boundary between the rows of the two lines.
+    Noise makes the boundary uncertain by about :math:`(s^2 h/\Delta V^2)^{1/3}`, where :math:`s^2`
+    is the noise variance, :math:`h` is the sampling interval, and :math:`\Delta V` is the change of
+    velocity.
     """
     (last, first), change = between, other[1] - one[1]
     middle, gap = 0.5 * (last + first), first - last
@@ -321,7 +408,10 @@ def _intersection_time(
 def _refine_intersection(
     time: np.ndarray, displacement: np.ndarray, at: float, reach: int, variance: float
 ) -> float:
-    """Recompute the intersection of two lines from all rows near it."""
+    """Refine the intersection of two lines with all rows of the record.
+
+    The refinement is necessary if rows were averaged for the segmentation.
+    """
     middle = int(np.searchsorted(time, at))
     i, j = max(middle - 20 * reach, 0), min(middle + 20 * reach, len(time))
     t, x = time[i:j] - at, displacement[i:j]
@@ -338,8 +428,9 @@ def _group_velocity_changes(
 ) -> Iterator[tuple[int, int]]:
     """Group changes of velocity into steps.
 
-    A step may contain several changes of velocity, separated by segments that are short or contain
-    few rows. Such a step is a ramp from one velocity to another, or it overshoots.
+    A step may contain several changes of velocity if the segments between the changes are short or
+    have few rows. For example, a ramp between two velocities is a single step, and a velocity that
+    overshoots and returns is also a single step.
 
     Yields
     ------
@@ -359,7 +450,7 @@ def _group_velocity_changes(
         last = n
         while last + 1 < len(times) and changes[last + 1] == changes[n] and is_short(n, last + 1):
             last += 1
-        # overshoot and return
+        # An overshoot and the return from the overshoot belong to one step.
         back = last + 1
         while (
             back < len(times)
@@ -388,7 +479,7 @@ def _returns_after_overshoot(speeds: list[float], first: int, last: int, back: i
 def _noise_at_boundaries(pieces: list[tuple[int, int]], relative_noise: np.ndarray) -> np.ndarray:
     """Compute the relative noise at each boundary between segments.
 
-    The value is the larger of the mean noise levels of both segments.
+    The result is the larger of the mean relative noise levels of the two adjacent segments.
     """
     local = np.array([relative_noise[i:j].mean() for i, j in pieces])
     return np.asarray(np.maximum(local[1:], local[:-1]))

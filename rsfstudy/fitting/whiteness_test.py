@@ -1,36 +1,43 @@
-"""Test of whitened residuals for autocorrelation.
-
-References
-----------
-Ljung and Box (1978), Biometrika 65, 297-303.
-"""
+"""Test of whitened residuals for autocorrelation."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.stats import chi2
 
-#: Number of lags in the test of whitened residuals.
+#: Number of lags in the test, in addition to the order of the noise model.
 LAG_COUNT = 20
 
 
 def ljung_box_p_value(whitened_residuals: np.ndarray, order: int) -> float:
-    """Compute the p-value of the Ljung-Box test for autocorrelation.
-
-    The test statistic is ``n (n + 2) sum r_k^2/(n - k)``, where r_k is the autocorrelation of the
-    whitened residuals at lag k (Ljung and Box, 1978). The statistic is compared with a chi-squared
-    distribution.
+    r"""Compute the p-value of the Ljung-Box test for autocorrelation.
 
     Parameters
     ----------
     whitened_residuals : ndarray, shape (rows,)
         Whitened residuals.
     order : int
-        Number of estimated coefficients, which is subtracted from the degrees of freedom.
+        Number of estimated autoregressive coefficients, which is subtracted from the degrees of
+        freedom.
 
     Returns
     -------
     float
+        The p-value of the test.
+
+    Notes
+    -----
+    The test statistic [1]_ is
+
+    .. math:: n (n + 2) \sum_k \frac{r_k^2}{n - k},
+
+    where :math:`r_k` is the autocorrelation of the whitened residuals at lag :math:`k`, and
+    :math:`n` is the number of rows. If the residuals are white, the statistic has a chi-squared
+    distribution.
+
+    References
+    ----------
+    .. [1] Ljung and Box (1978), Biometrika 65, 297-303.
     """
     count, seen = len(whitened_residuals), whitened_residuals - whitened_residuals.mean()
     lags = np.arange(1, min(LAG_COUNT + order, count // 4) + 1)

@@ -1,4 +1,8 @@
-"""Window of a record around a step, its loading, and initial parameters."""
+"""Windows of a record around steps, with initial guesses of parameters.
+
+A ``FitWindow`` selects the rows around a step, and creates the model of the selected rows. The
+function ``guess_parameters`` estimates initial parameters from the recorded friction.
+"""
 
 from __future__ import annotations
 
@@ -19,37 +23,63 @@ from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
-#: Part of the way back to the step before that a window begins at, and rows for each parameter.
+#: Fraction of the interval after the previous step that a window includes by default, and fewest
+#: rows per free parameter.
 _BACKWARD_FRACTION, _ROWS_PER_PARAMETER = 0.5, 3
-#: Part of the time before the first step by which loading may come late.
+#: Largest delay of the loading, as a fraction of the duration of the window before the step.
 _MAX_DELAY_FRACTION = 0.2
-#: Smallest fraction of a requested extent for which no remark is made.
+#: Smallest ratio of the actual extent of a window to its requested extent for which no remark is
+#: added.
 _MIN_EXTENT_FRACTION = 0.98
+#: Names of the kinds of loading.
 LOADING_KINDS = ("steps", "recorded")
-#: Rows of the running median by which noise of normal stress is reduced, the quantile of departures
-#: that is compared, and the standard deviations of noise by which it may exceed the limit.
+#: Number of rows in the running median that reduces the noise of normal stress, quantile of the
+#: deviations that is compared with the limit, and allowance for noise in standard deviations.
 _MEDIAN_ROWS, _DEPARTURE_QUANTILE, _MAX_NOISE_SIGMAS = 5, 0.99, 2.0
-#: Logarithm of the ratio of velocities below which the initial a and b are not read from the step.
+#: Logarithm of the velocity ratio below which a step is too small for estimating the initial a and
+#: b.
 _MIN_LOG_VELOCITY_RATIO = 0.02
 
 
 @dataclass(frozen=True)
 class FitWindow:
-    """Part of a record around a step that is fitted.
+    """Part of a record around a step.
 
-    Attributes
+    Parameters
     ----------
     record : Record
+        Record that contains the step.
     step_number : int
-        Number of the step, from 1.
-    displacement_before, displacement_after : float
-        Load point displacements in um before and after the step. If ``displacement_before`` is 0,
-        the window begins halfway between the previous step and this step. If ``displacement_after``
-        is 0, the window ends at the next step.
-    fraction : float
-        Fraction of the displacement after the step that is included.
-    other_steps : collection of int
-        Numbers of other steps of the record that are fitted too. Their windows do not overlap.
+        Number of the step, starting from 1.
+    displacement_before : float, default: 0.0
+        Load point displacement in um to include before the step. If 0, the window begins halfway
+        between the previous step and this step, or at the beginning of the record if there is no
+        previous step.
+    displacement_after : float, default: 0.0
+        Load point displacement in um to include after the step. If 0, the window ends at the next
+        step or at the end of the record.
+    fraction : float, default: 1.0
+        Fraction of the displacement after the step to include.
+    other_steps : collection of int, optional
+        Numbers of other steps of the record in a joint fit. The window ends before the window of
+        the next step if this step is in ``other_steps``.
+
+    Notes
+    -----
+    If friction before the step is not a linear function of time, the window begins later, with the
+    linear part. The window of a hold includes the sliding after the hold.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rsfstudy.fitting import FitWindow, Record
+    >>> time = np.arange(0.0, 100.0, 0.5)
+    >>> displacement = np.where(time < 50.0, time, 50.0 + 10.0 * (time - 50.0))
+    >>> friction = np.full(200, 0.6)
+    >>> record = Record({"time": time, "displacement": displacement, "friction": friction})
+    >>> window = FitWindow(record, step_number=1, displacement_before=30.2)
+    >>> float(record.time[window.rows[0]])
+    20.0
     """
 
     record: Record
@@ -61,12 +91,12 @@ class FitWindow:
 
     @property
     def step(self) -> LoadingStep:
-        """The step.
+        """Step of the window.
 
         Raises
         ------
         MotionStopped
-            If the record has fewer steps.
+            If the record has fewer steps than ``step_number``.
         """
         found = self.record.loading_steps
         if self.step_number > len(found):
@@ -84,7 +114,7 @@ class FitWindow:
     def normal_stress(self) -> float:
         """Mean normal stress in Pa in the window before the step.
 
-        The mean is NaN if normal stress was not recorded.
+        The mean is NaN if the normal stress was not recorded.
         """
         time, stress = self.record.time, self.record.columns.get("normal_stress")
         if stress is None:
@@ -94,7 +124,7 @@ class FitWindow:
 
     @property
     def properties(self) -> dict[str, float]:
-        """Properties of the window: velocities, ends, normal stress and noise."""
+        """Velocities, limits, normal stress and noise of the window."""
         record, rows = self.record, self.rows
         moved, time = record.columns["displacement"][rows], record.time[rows]
         return {
@@ -115,9 +145,14 @@ class FitWindow:
         Parameters
         ----------
         scene : Scene
+            Scene with any stiffness.
         machine_stiffness : float
-            Stress in Pa for a displacement of one slip distance. If 0, the scene is returned
-            unchanged.
+            Stiffness of the machine in Pa per slip distance. If 0, the scene is returned unchanged.
+
+        Returns
+        -------
+        Scene
+            Scene with the stiffness of the machine.
         """
         if not machine_stiffness:
             return scene
@@ -126,7 +161,7 @@ class FitWindow:
     def _end_time(self) -> float:
         """Return the time in s at which the window ends."""
         record, step = self.record, self.step
-        # a hold is fitted with the sliding that ends it
+        # The window of a hold includes the sliding after the hold.
         later = [
             s
             for s in record.loading_steps
@@ -139,9 +174,11 @@ class FitWindow:
         at = np.interp(step.start, record.time, moved)
 
         def reached(distance: float) -> float:
-            """Return the time at which the load point reaches a distance from the step.
+            """Return the time in s when the load point reaches a distance.
 
-            If the load point does not reach the distance, return the last time.
+            The distance in um is measured from the step.
+             If the load point does not reach the distance, the function returns the current end of
+             the window.
             """
             beyond = (moved > at + distance) & (record.time > step.start)
             return float(record.time[np.argmax(beyond)] if beyond.any() else last)
@@ -158,7 +195,7 @@ class FitWindow:
 
     @property
     def truncation_remarks(self) -> list[str]:
-        """Remarks on parts of the requested window that are not included."""
+        """Remarks about parts of the requested window that are left out."""
         record, step, moved = self.record, self.step, self.record.columns["displacement"]
         nominal, begins, at, ends = np.interp(
             [self._earliest_start_time(step), self._start_time(step), step.start, self._end_time()],
@@ -185,7 +222,7 @@ class FitWindow:
         return found
 
     def _earliest_start_time(self, step: LoadingStep) -> float:
-        """Return the earliest time in s at which the window of a step may begin.
+        """Return the earliest possible start of a window in s.
 
         The window begins later if friction before the step is not linear.
         """
@@ -207,7 +244,9 @@ class FitWindow:
         accuracy: Accuracy,
         meter: WorkMeter,
     ) -> WindowModel:
-        """Create the model of the window. Displacement is relative to the step.
+        """Create the model of the window.
+
+        The displacement of the model is relative to the step.
 
         Parameters
         ----------
@@ -216,20 +255,23 @@ class FitWindow:
         free : collection of str
             Names of the free parameters.
         loading : {"steps", "recorded"}
-            Loading by steps, or by the recorded rows.
+            Loading by the steps of the record, or by its rows.
         accuracy : Accuracy
+            Accuracy of the simulated motions.
         meter : WorkMeter
-            Counter of the work of the motions.
+            Counter of right-hand-side evaluations.
 
         Returns
         -------
         WindowModel
+            Model of the rows in the window.
 
         Raises
         ------
         MotionStopped
-            If the window has too few rows or begins in a hold, if mean friction before the step is
-            not positive, or if normal stress varies by more than the loading of the model.
+            If the window has too few rows, if the window begins in a hold, if the mean friction
+            before the step is not positive, or if the recorded normal stress differs from the
+            normal stress of the model.
         """
         record, step, rows = self.record, self.step, self.rows
         time = record.time[rows]
@@ -248,7 +290,8 @@ class FitWindow:
         begins, ends = self._start_time(step), self._end_time()
         pieces = loading_history(record, begins, ends, from_rows=loading == "recorded")
         if scene.parts.normal_stress.name == "constant":
-            pieces[:, 2:] = 1.0, 0.0  # what was recorded is noise
+            # The scene treats variations of the recorded normal stress as noise.
+            pieces[:, 2:] = 1.0, 0.0
         moves = self._shifted_loadings(begins, ends) if loading == "steps" else []
         if "step_time" in free:
             for each in (pieces, *moves):
@@ -262,14 +305,18 @@ class FitWindow:
         return WindowModel(scene, time, moved, friction, pieces, accuracy, meter, moves)
 
     def _shifted_loadings(self, begins: float, ends: float) -> list[np.ndarray]:
-        """Return loading histories with steps that are shifted by their errors."""
+        """Return loading histories with steps shifted by their errors."""
         steps = steps_between(self.record, begins, ends)
         others = [step for step in steps if not step.changes_velocity]
         moved = shift_steps(self.record, [step for step in steps if step.changes_velocity])
         return [stepwise_loading(begins, sorted([*each, *others])) for each in moved]
 
     def _check_normal_stress(self, rows: np.ndarray, pieces: np.ndarray) -> None:
-        """Raise ``MotionStopped`` if recorded normal stress differs from the model loading."""
+        """Raise ``MotionStopped`` if the modelled normal stress is wrong.
+
+        The recorded normal stress may differ from the modelled normal stress by up to 2 % in
+        addition to noise.
+        """
         record = self.record
         if "normal_stress" not in record.columns:
             return
@@ -296,12 +343,18 @@ class FitWindow:
 def stiffness_factors(windows: Sequence[FitWindow]) -> tuple[float, ...]:
     """Compute the ratio of stiffness to normal stress in each window.
 
-    All windows belong to one machine, and the ratios are relative to the first window.
+    The stiffness of the machine is the same in all windows, and each ratio is relative to the ratio
+    in the first window.
+
+    Parameters
+    ----------
+    windows : sequence of FitWindow
+        Windows of a joint fit.
 
     Returns
     -------
     tuple of float
-        Empty if the normal stress of a window is unknown.
+        One ratio per window. The tuple is empty if the normal stress of a window is unknown.
     """
     stresses = np.array([window.normal_stress for window in windows])
     known = bool(np.isfinite(stresses).all() and stresses.all())
@@ -311,25 +364,34 @@ def stiffness_factors(windows: Sequence[FitWindow]) -> tuple[float, ...]:
 def guess_parameters(
     model: WindowModel, step: LoadingStep, free: Sequence[str], slip_distances: tuple[float, float]
 ) -> dict[str, float]:
-    """Estimate the initial parameters directly from a record.
+    r"""Estimate initial values of the parameters from a record.
 
-    Parameters that cannot be estimated keep the values of the scene. Let mu_0 be friction before a
-    step by a factor r, mu_p its extreme after the step, and mu_1 friction at the end. The estimates
-    are ``a = (mu_p - mu_0)/ln r`` and ``b = (mu_p - mu_1)/ln r``.
+    Parameters that cannot be estimated keep the values of the scene.
 
     Parameters
     ----------
     model : WindowModel
+        Model of a window.
     step : LoadingStep
+        Step of the window.
     free : sequence of str
-        Names of the free parameters. The other parameters have the values of the scene.
+        Names of the free parameters. The fixed parameters have the values of the scene.
     slip_distances : (float, float)
         Slip distances in um of the first and the second state. The first slip distance is the unit
         of slip in the scene.
 
     Returns
     -------
-    dict
+    dict of {str: float}
+        Initial values of all parameters.
+
+    Notes
+    -----
+    Let :math:`\mu_0` be the mean friction before a velocity step by a factor :math:`r`,
+    :math:`\mu_p` the extreme value of friction after the step, and :math:`\mu_1` the friction at
+    the end of the window. The estimates of the direct effect and the evolution effect are
+
+    .. math:: a = (\mu_p - \mu_0)/\ln r, \qquad b = (\mu_p - \mu_1)/\ln r.
     """
     scene, friction = model.scene, model.friction
     before, later = friction[model.time < step.start], friction[model.time >= step.end]

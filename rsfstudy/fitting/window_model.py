@@ -1,4 +1,9 @@
-"""The friction that a scene shows along the rows of a record, and its derivatives by parameters."""
+"""Model of the friction in a window of a record.
+
+A ``WindowModel`` simulates the motion of a scene under the loading of a record. The method
+``model_friction`` returns friction at each row, and ``jacobian`` returns the derivatives of
+friction with respect to the parameters.
+"""
 
 from __future__ import annotations
 
@@ -23,11 +28,13 @@ from rsfstudy.quantities import Quantity
 from rsfstudy.slider import Scene, history_from_table, replace_field_values
 from rsfstudy.status import Status
 
+#: Values of parameters by name.
 Values = Mapping[str, float]
-#: Step over the size of a parameter, and order.
+#: Step size of a finite difference relative to the scale of the parameter, and order of the
+#: difference (2 or 4).
 DifferenceScheme = tuple[float, int]
 
-#: What may be fitted.
+#: Parameters that a fit may determine, by name.
 PARAMETERS = {
     about.name: about
     for about in (
@@ -48,7 +55,7 @@ PARAMETERS = {
         ),
     )
 }
-#: What others call them.
+#: Names of parameters in other programs, with the corresponding names in rsfstudy.
 PARAMETER_SYNONYMS = {
     **dict.fromkeys(("Dc", "dc", "D_c", "d_c", "L", "dcrit"), "slip_distance"),
     **dict.fromkeys(("Dc1", "L1"), "slip_distance"),
@@ -60,32 +67,55 @@ PARAMETER_SYNONYMS = {
     **dict.fromkeys(("eps", "epsilon"), "law_exponent, with law='family'"),
     **dict.fromkeys(("t0", "step"), "step_time"),
 }
-#: Those that some laws have and others have not.
+#: Parameters that only some friction laws have.
 LAW_SPECIFIC_PARAMETERS = frozenset({"b", "b1", "b2", "slip_distance_2", "law_exponent"})
-#: Those whose logarithm is looked for.
+#: Parameters for which the search varies the logarithm.
 LOGARITHMIC_PARAMETERS = frozenset({"slip_distance", "slip_distance_2", "stiffness"})
-#: Step over the size of a parameter, and order of central differences. Friction repeats to 1e-11:
-#: those of second order then lose 1e-5 where motions are far from unstable, those of fourth order
-#: less than 1e-6 everywhere.
+#: Finite differences for the search and for the final solution. Simulated friction is reproducible
+#: to 1e-11. The relative error of second-order differences is then 1e-5 if the motion is far from
+#: unstable, and the relative error of fourth-order differences is always less than 1e-6.
 QUICK_DIFFERENCES, FINE_DIFFERENCES = (3e-4, 2), (5e-3, 4)
-#: Differences over a step and over two must be alike to this part of the largest, else the step
-#: shrinks, so often at most: the square of it is what fourth order loses.
+#: Largest relative difference between central differences with a single and a double step size, and
+#: largest number of step sizes that are tested. The relative error of the fourth-order difference
+#: is about the square of this tolerance.
 _DIFFERENCE_TOLERANCE, _MAX_STEP_REDUCTIONS = 2e-4, 4
-#: Standard deviations by which steps of the load point are moved: little enough for derivatives.
+#: Shift of a load point step in a finite difference, as a fraction of the standard error of the
+#: step.
 STEP_SHIFT_FRACTION = 0.01
-#: Beyond these a parameter has no meaning: differences next to them are to one side.
+#: Domains of bounded parameters. Near the end of a domain, the finite differences are one-sided.
 _PARAMETER_DOMAINS = {"law_exponent": (0.0, 1.0), "alpha": (0.0, math.inf)}
-#: Step of a over a, of b over the larger of both, of frictions and exponents, and of time over the
-#: time in which the load point moves by a micrometre.
+#: Scales of parameters for the step sizes of finite differences. The method
+#: ``WindowModel._parameter_scale`` computes the scales of the other parameters.
 _PARAMETER_SCALES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
-#: Right-hand sides of a motion, and of each piece of its loading, beyond which it fits no record:
-#: those that do take some thousands, and some twenty a piece. A spring that is stiff for its direct
-#: effect takes 2 k x/a, x being the displacement of the window: of twice that so many at most.
+#: Limits for the number of right-hand-side evaluations of a motion: a constant, an addition for
+#: each loading segment, and the largest addition for a stiff spring. A motion that fits a record
+#: needs a few thousand evaluations, and about 20 for each segment. A stiff spring needs about 2 k
+#: x/a evaluations for a displacement x of the window, and the limit is twice this number.
 _MAX_EVALUATIONS, _MAX_EVALUATIONS_PER_SEGMENT, _MAX_STIFFNESS_EVALUATIONS = 50_000, 60, 100_000
 
 
 def check_free_parameters(free: Sequence[str]) -> None:
-    """Raise InvalidValue for names that are no parameters, or not each once."""
+    """Raise ``InvalidValue`` if the names of free parameters are invalid.
+
+    Parameters
+    ----------
+    free : sequence of str
+        Names of the free parameters.
+
+    Raises
+    ------
+    InvalidValue
+        If there are no names, if a name is repeated, or if a name is not in ``PARAMETERS``.
+
+    Examples
+    --------
+    >>> from rsfstudy.fitting import check_free_parameters
+    >>> check_free_parameters(["a", "b", "slip_distance"])
+    >>> check_free_parameters(["a", "b", "Dc"])
+    Traceback (most recent call last):
+        ...
+    rsfstudy.errors.InvalidValue: ...
+    """
     if not free or len(set(free)) < len(free):
         raise InvalidValue("free", tuple(free), "must name parameters, each once")
     for name in free:
@@ -95,15 +125,47 @@ def check_free_parameters(free: Sequence[str]) -> None:
 
 
 def parameters_of_law(scene: Scene, free: Sequence[str]) -> tuple[str, ...]:
-    """Parameters, of those named, that a scene has: one state has b, two have b1, b2 and a second
-    slip distance, and a family of laws has an exponent.
+    """Select the parameters that the friction law of a scene uses.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with a friction law.
+    free : sequence of str
+        Names of parameters.
+
+    Returns
+    -------
+    tuple of str
+        Names from ``free`` without the parameters of other laws. For example, a law with one state
+        has ``b``, and a law with two states has ``b1``, ``b2`` and ``slip_distance_2``.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene
+    >>> from rsfstudy.fitting import parameters_of_law
+    >>> parameters_of_law(Scene(law="slip"), ("a", "b", "b1", "b2", "slip_distance"))
+    ('a', 'b', 'slip_distance')
     """
     own = scene_to_parameters(scene, 1.0, 1.0)
     return tuple(name for name in free if name in own or name.startswith(("trend", "step_time")))
 
 
 def check_positive(instance: object, *names: str) -> None:
-    """Raise InvalidValue for fields of something that are not positive and finite."""
+    """Raise ``InvalidValue`` if attributes of an object are not positive.
+
+    Parameters
+    ----------
+    instance : object
+        Object with the attributes.
+    *names : str
+        Names of the attributes.
+
+    Raises
+    ------
+    InvalidValue
+        If an attribute is not positive and finite.
+    """
     for name in names:
         if not 0.0 < getattr(instance, name) < math.inf:
             raise InvalidValue(name, getattr(instance, name), "must be positive and finite")
@@ -111,22 +173,26 @@ def check_positive(instance: object, *names: str) -> None:
 
 @dataclass(frozen=True)
 class WindowModel:
-    """The model of a window of a record.
+    """Model of a window of a record.
 
-    Attributes
+    Parameters
     ----------
     scene : Scene
-        The law and all that is not fitted.
-    time, displacement, friction : ndarray
-        Rows of the window: in s, in um from its first step, and 1.
-    loading : ndarray
-        Pieces as `loading_of` makes them.
+        Scene with the friction law and the parameters that are not fitted.
+    time, displacement, friction : ndarray, shape (rows,)
+        Times of the rows in s, load point displacement from the first step in um, and recorded
+        friction.
+    loading : ndarray, shape (segments, 4)
+        Loading history (see ``rsfstudy.fitting.record.loading_history``).
     accuracy : Accuracy
+        Accuracy of the simulated motions.
     meter : WorkMeter
-    shifted_loadings : sequence of ndarray
-        Pieces of loading by steps that are moved (see `moved_steps`).
+        Counter of right-hand-side evaluations.
+    shifted_loadings : sequence of ndarray, optional
+        Loading histories with shifted steps (see
+        ``rsfstudy.fitting.load_point_errors.shift_steps``).
     filter : Filter, optional
-        That friction passed before it was recorded.
+        Filter that was applied to friction before it was recorded.
     """
 
     scene: Scene
@@ -141,25 +207,54 @@ class WindowModel:
 
     @property
     def initial_velocity(self) -> float:
-        """Load point velocity at the beginning, in um/s."""
+        """Load point velocity in um/s at the beginning of the window."""
         return float(self.loading[0, 1])
 
     @cached_property
     def has_normal_stress_change(self) -> bool:
-        """True if normal stress changes."""
+        """True if the normal stress changes."""
         return bool(np.ptp(self.loading[:, 2]) > 0.0 or self.loading[:, 3].any())
 
     def is_linear(self, name: str) -> bool:
-        """True for a parameter in which friction is linear, whatever the others."""
+        """Return True if friction is a linear function of a parameter.
+
+        Friction must be linear in the parameter for all values of the other parameters.
+
+        Parameters
+        ----------
+        name : str
+            Name of the parameter.
+
+        Returns
+        -------
+        bool
+            True for trends, and for ``mu_star`` if the normal stress is constant.
+        """
         return name.startswith("trend") or (name == "mu_star" and not self.has_normal_stress_change)
 
     @property
     def max_delay(self) -> float:
-        """Time in s by which loading may come late."""
+        """Largest delay of the loading in s that the model supports."""
         return float(self.time[0] - self.loading[0, 0])
 
     def build_scene(self, values: Values) -> Scene:
-        """The scene with parameters of a record, in units of its slip distance and velocity."""
+        """Build a scene from parameters of a record.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of all parameters, in the units of ``PARAMETERS``.
+
+        Returns
+        -------
+        Scene
+            Scene in units of the slip distance and the initial load point velocity.
+
+        Raises
+        ------
+        InvalidValue
+            If a parameter is outside its domain.
+        """
         distance, velocity = values["slip_distance"], self.initial_velocity
         columns = np.empty((len(self.loading), 4))
         columns[:, 0] = (self.loading[:, 0] - self.loading[0, 0]) * velocity / distance
@@ -173,30 +268,32 @@ class WindowModel:
     def model_friction(
         self, values: Values, *, refined: bool = False, require_stable: bool = False
     ) -> np.ndarray:
-        """Friction along the rows, without trend; NaN where there is no such motion, or where it
-        takes far more work than those of records do.
+        """Compute the friction of the model at each row, without the trend.
 
-        It is spring stress over normal stress, as a rig reads it, of the motion that begins with
-        steady sliding before the first step, at the times of the rows less `step_time`.
+        The motion starts from steady sliding before the first step. Friction is the spring stress
+        divided by the normal stress, as measured in an experiment. If the loading is delayed by
+        ``step_time``, the motion is evaluated at correspondingly earlier times.
 
         Parameters
         ----------
         values : mapping of str to float
-            All parameters, in the units of `PARAMETERS`.
-        refined : bool
-            At a tenth of all tolerances.
-        require_stable : bool
-            No motion is followed on a spring softer than the critical stiffness, nor with the
-            longer of two slip distances first.
+            Values of all parameters, in the units of ``PARAMETERS``.
+        refined : bool, default: False
+            If True, all tolerances are reduced by a factor of ten.
+        require_stable : bool, default: False
+            If True, the motion is not computed if the stiffness is below the critical stiffness, or
+            if the second slip distance is not the longer one.
 
         Returns
         -------
         ndarray, shape (rows,)
+            Friction of the model. All values are NaN if the motion does not exist, or if the motion
+            requires far more evaluations than a motion that fits a record.
 
         Raises
         ------
         MotionStopped
-            Where the work budget of the meter is spent.
+            If the work budget of the meter is exhausted.
         """
         budget, nothing = self.meter.budget, np.full(len(self.time), math.nan)
         stiff = 4.0 * values["stiffness"] * float(np.ptp(self.displacement)) / values["a"]
@@ -235,15 +332,35 @@ class WindowModel:
         return self.filter.apply(self.time, found) if self.filter else found
 
     def trend(self, values: Values) -> np.ndarray:
-        """The trend along the rows, shape (rows,): ``c_1 x + c_2 x^2 + ...``, x being displacement
-        from the first step in um, and c_n in um^-n.
+        r"""Compute the trend at each row.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of all parameters. The coefficient ``trend<n>`` has the unit um^-n.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+            Trend :math:`c_1 x + c_2 x^2 + \dots` for the displacement :math:`x` from the first step
+            in um.
         """
         powers = [(int(name[5:]), c) for name, c in values.items() if name.startswith("trend")]
         return sum((c * self.displacement**n for n, c in powers), np.zeros(len(self.time)))
 
     def loading_sensitivity(self, values: Values) -> np.ndarray:
-        """By how much friction is off along the rows by each of the errors of its loading, shape
-        (rows, errors); NaN where there is no such motion.
+        """Compute the changes of friction due to errors of the loading.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of all parameters.
+
+        Returns
+        -------
+        ndarray, shape (rows, errors)
+            Changes of friction by one standard error of each independent error of the steps. The
+            values are NaN if a motion does not exist.
         """
         if not self.shifted_loadings:
             return np.zeros((len(self.time), 0))
@@ -258,31 +375,43 @@ class WindowModel:
         free: Sequence[str],
         difference_scheme: DifferenceScheme = FINE_DIFFERENCES,
     ) -> np.ndarray:
-        """Derivatives of friction along the rows by parameters, or by the logarithms of those in
-        `LOGARITHMIC_PARAMETERS`.
+        r"""Compute the derivatives of friction with respect to parameters.
 
-        Those by trends and, at constant normal stress, by `mu_star` are exact. All others are
-        central differences of motions, ``d(h) = [f(p + h) - f(p - h)]/(2 h)``, or of fourth order,
-        ``[4 d(h) - d(2 h)]/3``, whose step shrinks where d(h) and d(2 h) are not alike.
+        For the parameters in ``LOGARITHMIC_PARAMETERS``, the derivatives are with respect to the
+        logarithm of the parameter.
 
         Parameters
         ----------
         values : mapping of str to float
+            Values of all parameters.
         free : sequence of str
-        difference_scheme : (float, int)
-            Step over the size of a parameter, and order: `QUICK_DIFFERENCES` or `FINE_DIFFERENCES`.
+            Names of the free parameters.
+        difference_scheme : (float, int), optional
+            Step size relative to the scale of the parameter, and order of the finite difference.
+            The default is ``FINE_DIFFERENCES``.
 
         Returns
         -------
         ndarray, shape (rows, parameters)
-            NaN where motions close by cannot be followed.
+            Derivatives. A column is NaN if a motion of its finite difference fails.
+
+        Notes
+        -----
+        The derivatives with respect to trends are exact. If the normal stress is constant, the
+        derivative with respect to ``mu_star`` is also exact. All other derivatives are central
+        differences of simulated motions,
+
+        .. math:: d(h) = \frac{f(p + h) - f(p - h)}{2 h},
+
+        or the fourth-order combination :math:`[4 d(h) - d(2 h)]/3`. The step size :math:`h` is
+        reduced until :math:`d(h)` and :math:`d(2 h)` agree.
         """
         return np.column_stack([self._derivative(values, name, difference_scheme) for name in free])
 
     def _derivative(
         self, values: Values, name: str, difference_scheme: DifferenceScheme
     ) -> np.ndarray:
-        """Derivative of friction by one parameter along the rows, shape (rows,)."""
+        """Compute the derivative of friction with respect to a parameter."""
         if name.startswith("trend"):
             return np.asarray(self.displacement ** int(name[5:]))
         if self.is_linear(name):
@@ -297,7 +426,7 @@ class WindowModel:
             )
             largest = float(np.abs(near).max()) or 1.0
             apart = float(np.abs(far - near).max()) / largest
-            if apart >= least:  # the last digits of friction are told
+            if apart >= least:  # Rounding errors dominate the difference.
                 break
             if math.isfinite(apart):
                 best, least = (4.0 * near - far) / 3.0, apart
@@ -313,8 +442,10 @@ class WindowModel:
     def _central_difference(
         self, values: Values, name: str, step: float, margin_steps: float, *, refined: bool = True
     ) -> np.ndarray:
-        """Derivative by a difference of second order; to one side where a parameter is within so
-        many steps of the end of its domain.
+        """Compute a second-order finite difference.
+
+        The difference is one-sided if the parameter is within ``margin_steps`` steps of the end of
+        its domain.
         """
         low, high = _PARAMETER_DOMAINS.get(name, (-math.inf, math.inf))
         weights = {1.0: 0.5, -1.0: -0.5}
@@ -328,7 +459,7 @@ class WindowModel:
         return found
 
     def _parameter_scale(self, name: str, values: Values) -> float:
-        """Size of a parameter, of which the step of a difference is a part."""
+        """Return the scale of a parameter for finite differences."""
         if name in LOGARITHMIC_PARAMETERS:
             return 1.0
         if name == "a":
@@ -339,8 +470,30 @@ class WindowModel:
 
 
 def scene_to_parameters(scene: Scene, distance: float, distance_2: float) -> dict[str, float]:
-    """Parameters of a scene, in units of records, by its slip distance and that of the second of
-    two states in um.
+    """Convert the fields of a scene to parameters of a record.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with lengths in units of its slip distance.
+    distance : float
+        Slip distance of the scene in um.
+    distance_2 : float
+        Slip distance of the second state in um. It is ignored if the law has one state.
+
+    Returns
+    -------
+    dict of {str: float}
+        Values of the parameters, in the units of ``PARAMETERS``.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene
+    >>> from rsfstudy.fitting import scene_to_parameters
+    >>> scene = Scene(a=0.01, b_over_a=1.5, mu_star=0.6, stiffness=0.02)
+    >>> values = scene_to_parameters(scene, 10.0, 100.0)
+    >>> {name: round(values[name], 6) for name in ("a", "b", "stiffness")}
+    {'a': 0.01, 'b': 0.015, 'stiffness': 0.002}
     """
     stated = scene.as_dict()
     found = {
@@ -359,8 +512,27 @@ def scene_to_parameters(scene: Scene, distance: float, distance_2: float) -> dic
 
 
 def parameters_to_fields(values: Values, velocity: float) -> dict[str, float]:
-    """Fields of a scene with these parameters of a record, in units of its slip distance and of a
-    velocity in um/s.
+    """Convert parameters of a record to fields of a scene.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        Values of the parameters, in the units of ``PARAMETERS``.
+    velocity : float
+        Load point velocity in um/s that is the unit of velocity in the scene.
+
+    Returns
+    -------
+    dict of {str: float}
+        Fields of a scene in units of its slip distance and of ``velocity``.
+
+    Examples
+    --------
+    >>> from rsfstudy.fitting import parameters_to_fields
+    >>> values = {"a": 0.01, "b": 0.015, "slip_distance": 10.0, "mu_star": 0.6, "stiffness": 0.002}
+    >>> fields = parameters_to_fields(values, velocity=1.0)
+    >>> {name: round(fields[name], 6) for name in ("stiffness", "reference_rate", "b_over_a")}
+    {'stiffness': 0.02, 'reference_rate': 0.1, 'b_over_a': 1.5}
     """
     a, distance = values["a"], values["slip_distance"]
     fields = {
@@ -376,7 +548,22 @@ def parameters_to_fields(values: Values, velocity: float) -> dict[str, float]:
 
 
 def shift_parameter(values: Values, name: str, change: float) -> dict[str, float]:
-    """Values of which one, or its logarithm, is moved."""
+    """Shift the value of one parameter.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        Values of all parameters.
+    name : str
+        Name of the parameter to shift.
+    change : float
+        Change of the parameter, or of its logarithm for parameters in ``LOGARITHMIC_PARAMETERS``.
+
+    Returns
+    -------
+    dict of {str: float}
+        Values of all parameters, including the shifted parameter.
+    """
     moved = (
         values[name] * math.exp(change) if name in LOGARITHMIC_PARAMETERS else values[name] + change
     )
@@ -384,15 +571,56 @@ def shift_parameter(values: Values, name: str, change: float) -> dict[str, float
 
 
 def to_coordinate(name: str, value: float) -> float:
-    """Coordinate of a parameter in searches: itself, or its logarithm."""
+    """Convert the value of a parameter to the coordinate of the search.
+
+    Parameters
+    ----------
+    name : str
+        Name of the parameter.
+    value : float
+        Value of the parameter.
+
+    Returns
+    -------
+    float
+        Logarithm of the value for parameters in ``LOGARITHMIC_PARAMETERS``, and the value itself
+        for all other parameters.
+    """
     return math.log(value) if name in LOGARITHMIC_PARAMETERS else value
 
 
 def from_coordinate(name: str, coordinate: float) -> float:
-    """Value of a parameter, by its coordinate."""
+    """Convert a coordinate of the search to the value of a parameter.
+
+    Parameters
+    ----------
+    name : str
+        Name of the parameter.
+    coordinate : float
+        Coordinate of the search.
+
+    Returns
+    -------
+    float
+        Value of the parameter.
+    """
     return math.exp(coordinate) if name in LOGARITHMIC_PARAMETERS else coordinate
 
 
 def coordinate_derivative(name: str, value: float) -> float:
-    """Derivative of a parameter by its coordinate."""
+    """Compute the derivative of a parameter with respect to its coordinate.
+
+    Parameters
+    ----------
+    name : str
+        Name of the parameter.
+    value : float
+        Value of the parameter.
+
+    Returns
+    -------
+    float
+        Value of the parameter for parameters in ``LOGARITHMIC_PARAMETERS``, and 1 for all other
+        parameters.
+    """
     return value if name in LOGARITHMIC_PARAMETERS else 1.0
