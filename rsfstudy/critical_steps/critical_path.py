@@ -1,16 +1,16 @@
 """Critical paths, integrated backwards from the instability norm.
 
-The main class is ``CriticalPath``. At the end of a critical path, ln V equals the norm and its rate
-is zero, which leaves one scalar equation for the stress. From this tangency point, the path is
-integrated backwards in time. Neighbouring paths converge in this direction, so a few short
+The main class is ``CriticalPath``. At the end of a critical path, ln V equals the norm and its time
+derivative is zero, which leaves one scalar equation for the stress. From this tangency point, the
+path is integrated backwards in time. Neighbouring paths converge in this direction, so a few short
 integrations with a moderate tolerance yield many digits. An integration forwards in time would
 amplify every error. Gu et al. [1]_ derive the critical path under the slip law.
 
 The path has only two unknowns, spring stress and one state. Two unknowns are sufficient if the
-effect of inertia is small at the norm, because inertia has no effect when the rate of ln V is zero.
+effect of inertia is small at the norm, because inertia has no effect when ln V is stationary.
 
-Stresses are deviations from steady sliding at V_*, in units of sigma_*. Slip is in units of D_c,
-and slip rate in units of V_*.
+Stresses are deviations from steady sliding at V_* and are divided by sigma_*, slip is divided by
+D_c, and slip rate is divided by V_*.
 
 References
 ----------
@@ -55,7 +55,8 @@ from rsfstudy.status import Status
 #: Number of right-hand-side evaluations, at a tolerance of 1e-5, after which the search for the
 #: start of a path is abandoned.
 _PATH_BUDGET = 1_500
-_MIN_LOG_SLIP_RATE = -230.0  # ln(V/V_*): 10^-100
+#: ln(V/V_*) at which a path is abandoned, about 1e-100 V_*.
+_MIN_LOG_SLIP_RATE = -230.0
 #: Distance in ln V above the norm at which a path is known to touch the norm from above.
 _NORM_OFFSET = 1e-6
 
@@ -66,7 +67,7 @@ class CriticalPath(NamedTuple):
     Parameters
     ----------
     log_norm_rate : float
-        ln(V/V_*) at the norm.
+        Logarithm ln(V/V_*) at the norm.
     min_frictional_stress : float
         Frictional stress at which the normal stress vanishes, in units of sigma_*.
     radiated_stress : float
@@ -153,9 +154,9 @@ class CriticalPath(NamedTuple):
     def tangency_point(self) -> tuple[float, float] | None:
         """Spring stress f and state Psi at the tangency point.
 
-        At the tangency point, ln V equals the norm and its rate is zero. The spring stress is the
-        sum of frictional stress and radiated stress. The result is None if the scene has no
-        tangency point, or if the scene has several states.
+        At the tangency point, ln V equals the norm and its time derivative is zero. The spring
+        stress is the sum of frictional stress and radiated stress. The result is None if the scene
+        has no tangency point, or if the scene has several states.
         """
         if not self.is_planar:
             return None
@@ -211,7 +212,8 @@ class CriticalPath(NamedTuple):
         """Yield the events of the path, starting at the tangency point.
 
         The integration ends early if the path cannot continue, or if the path budget is spent. The
-        budget follows the work of a method of order eight.
+        path budget depends on the tolerance in the same way as the work of an integrator of order
+        eight.
         """
         start = self.tangency_point
         if start is None:
@@ -280,9 +282,9 @@ class CriticalPath(NamedTuple):
         return None
 
     def exceeds_norm_on_return(self, tolerance: float, meter: WorkMeter) -> bool:
-        """Return True if the motion exceeds the norm one orbit later.
+        """Return True if the next peak of the motion exceeds the norm.
 
-        Other motions may then reach the norm at their second peak.
+        If the next peak exceeds the norm, other motions may reach the norm at their second peak.
 
         Parameters
         ----------
@@ -330,7 +332,7 @@ def _build_tangency_solver(friction: FrictionFunctions) -> Function:
 
     The function ``(x, weakest, p) -> (g, Psi)`` returns the frictional stress and the state at
     which ln(V/V_*) = x is stationary. The results are NaN if ln V is never stationary at this slip
-    rate. The frictional stress is above ``weakest``.
+    rate. The argument ``weakest`` is a lower bound of the frictional stress.
 
     Notes
     -----

@@ -4,10 +4,10 @@ The step may be a change of load point velocity, load point displacement or norm
 critical if the peak slip rate of the motion that follows just reaches the instability norm.
 
 If the effect of inertia is small up to the norm, the end of the critical path is known, because ln
-V equals the norm and its rate is zero. The path is integrated backwards in time to the step at
-which it starts (see ``critical_path``). If inertia is important below the norm, the peak slip rate
-of motions is computed forwards in time (see ``forward_motion``). In both cases, the result is
-accepted only if motions on both sides of the critical step confirm it.
+V equals the norm and its time derivative is zero. The path is integrated backwards in time to the
+step at which it starts (see ``critical_path``). If inertia is important below the norm, the peak
+slip rate of motions is computed forwards in time (see ``forward_motion``). A critical step is
+accepted only if the motions after a slightly smaller and a slightly larger step confirm the result.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ STEP_FAMILIES: Mapping[str, type[StepFamily]] = {
     "normal_stress_step": NormalStressSteps,
 }
 DIRECTIONS = ("up", "down")
-#: Aliases of the quantities in `STEP_FAMILIES`, which are names of scene fields.
+#: Aliases of the quantities in ``STEP_FAMILIES``, which are names of scene fields.
 QUANTITY_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
 #: Largest relative accuracy of a boundary at which a limit cycle touches the norm.
@@ -86,8 +86,8 @@ def _outputs_for(of: str) -> tuple[Output, ...]:
 class CriticalStep(Measure):
     r"""Smallest step after which slip rate reaches the instability norm.
 
-    The critical step is a velocity ratio V_0/V_*, a displacement in units of D_c, or a change of
-    normal stress in units of sigma_*. The outputs include the sizes of two steps that confirm the
+    The critical step is a ratio of velocities, a displacement (in units of D_c), or a change of
+    normal stress (in units of sigma_*). The outputs include the sizes of two steps that confirm the
     critical step. The slider settles after the smaller step, and becomes unstable after the larger
     step.
 
@@ -145,7 +145,7 @@ class CriticalStep(Measure):
     needs_time: ClassVar[tuple[bool, ...]] = (False,)
 
     def __post_init__(self) -> None:
-        """Check the fields, and replace an alias of ``of``."""
+        """Check the fields, and replace aliases."""
         if isinstance(self.of, str):
             object.__setattr__(self, "of", QUANTITY_ALIASES.get(self.of, self.of))
         if not isinstance(self.of, str) or self.of not in STEP_FAMILIES:
@@ -179,7 +179,19 @@ class CriticalStep(Measure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of the critical step.
 
-        The scale is the size of the change. See ``Measure.error_scales`` for the parameters.
+        The scale is the size of the change.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the computation.
+        values : mapping of str to float or ndarray
+            Results by name.
+
+        Returns
+        -------
+        mapping of str to float
+            Scales by name of the result.
         """
         still = 1.0 if self.of == "load_velocity_ratio" else 0.0
         return {self.primary_output: abs(values[self.primary_output] - still)}
@@ -189,7 +201,21 @@ class CriticalStep(Measure):
 
         If the effect of inertia is small below the norm, the critical step follows from the
         critical path. If there is no critical path, or if inertia is important, the critical step
-        follows from forward motions. See ``Measure.compute`` for the parameters.
+        follows from forward motions.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
         """
         check_single_step(scene)
         if scene.starts_unsteady:
@@ -372,8 +398,8 @@ class CriticalStep(Measure):
     ) -> Outcome:
         """Return the outcome if no step up to the largest is critical.
 
-        The status depends on whether inertia keeps the slip rate below the norm, whether the
-        largest step itself reaches the norm, or whether all motions are stable.
+        The status is ``norm_unreachable`` if inertia keeps the slip rate below the norm, ``ok`` if
+        the largest step itself reaches the norm, and ``stable_for_all_steps`` otherwise.
         """
         if steps.scene.has_mass and _massless_estimate(steps, meter) is not None:
             return Outcome(

@@ -1,4 +1,4 @@
-"""Test if the motion after a step reaches the instability norm.
+"""Outcome of the motion after a step, relative to the instability norm.
 
 The main functions are ``reaches_norm`` and ``excess_over_norm``.
 """
@@ -67,7 +67,7 @@ class _SteadySliding(SteadySliding):
 
     At constant normal stress and critical stiffness, steady sliding is neutrally stable and every
     orbit is closed. Gu et al. (1984) show this for the slip law, and Ranjith and Rice (1999) for
-    the slowness law. Only numerical errors would make the peaks grow.
+    the slowness law. In this neutral case, only numerical errors change the height of the peaks.
     """
 
     stability_margin: float
@@ -90,7 +90,7 @@ class _Orbit:
     slow_growth_point : Point, optional
         Peak at which the orbit grows too slowly to integrate further.
     initial_log_slip_rate : float, default: -inf
-        ln V at the start, if the slip rate decreases from there.
+        Value of ln V at the start, if the slip rate decreases from there.
     """
 
     peaks: tuple[float, ...]
@@ -124,8 +124,8 @@ def excess_over_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> floa
 
     The excess is negative if the slip rate never reaches the instability norm. With inertia, the
     excess is the height of the highest peak of ln V above the norm. Without inertia, the excess is
-    the growth of ln V from one peak to the next. The excess is continuous at the boundary as far as
-    the motion permits.
+    the growth of ln V from one peak to the next. If possible, the excess is continuous at the
+    boundary between stable and unstable steps.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def may_have_closed_orbits(scene: Scene) -> bool:
     Returns
     -------
     bool
-        True if the law has closed orbits and friction is the only damping.
+        True if the law has closed orbits and friction is the only source of damping.
     """
     law = scene.parts.law
     return (
@@ -219,7 +219,8 @@ def may_have_closed_orbits(scene: Scene) -> bool:
 def stiffness_ratio_after_step(scene: Scene) -> float:
     """Return the stiffness ratio k/k_cr after a step.
 
-    The critical stiffness at V_* is proportional to normal stress if friction is the only damping.
+    If friction is the only source of damping, the critical stiffness at V_* is proportional to
+    normal stress.
 
     Parameters
     ----------
@@ -239,8 +240,8 @@ def is_neutral(scene: Scene, tolerance: float) -> bool:
     """Return True if growth and decay of perturbations are indistinguishable.
 
     The stiffness must be close to the critical stiffness, both at V_* and at the load point
-    velocity. Under most laws, a stiffness is critical at every slip rate or at no slip rate, if
-    friction is the only damping.
+    velocity. If friction is the only source of damping, the critical stiffness does not depend on
+    slip rate under most laws.
 
     Parameters
     ----------
@@ -252,8 +253,9 @@ def is_neutral(scene: Scene, tolerance: float) -> bool:
     Returns
     -------
     bool
-        False also if the load point is held, or if the stiffness is exactly critical and all orbits
-        are closed, because these cases are decided without a motion.
+        True if growth and decay are indistinguishable. The result is False if the load point is
+        held, or if the stiffness is exactly critical and all orbits are closed, because these cases
+        are decided without a motion.
     """
     off = abs(stiffness_ratio_after_step(scene) - 1.0)
     known = scene.log_load_velocity == -math.inf or (off == 0.0 and may_have_closed_orbits(scene))
@@ -337,9 +339,9 @@ def _max_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> 
 
 
 def _shrinks_at_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> bool:
-    """Return True if the orbit that touches the norm has a lower next peak.
+    """Return True if the orbit that touches the norm shrinks.
 
-    Paths in a plane cannot cross, so no orbit inside the touching orbit reaches the norm.
+    Paths in a plane cannot cross, so no orbit inside a shrinking orbit reaches the norm.
     """
     path = CriticalPath.of_scene(scene, meter.engine)
     misfit = path.cycle_misfit(accuracy.local_tolerance, meter)
@@ -357,8 +359,8 @@ def _grows_to_norm(
 ) -> bool:
     """Return True if a slowly growing orbit grows up to the norm.
 
-    The motion leaps from the orbit to larger orbits, until an orbit shrinks or reaches the norm. An
-    orbit has grown to the norm only if its first peak is below the norm.
+    The motion leaps from the orbit to larger orbits, until an orbit shrinks or reaches the norm. A
+    leap is shortened if the first peak of the new orbit is above the norm.
     """
     if not with_inertia and _shrinks_at_norm(scene, accuracy, meter):
         return False
@@ -391,7 +393,7 @@ def _follow_orbit(
     *,
     with_inertia: bool,
 ) -> _Orbit:
-    """Integrate an orbit until its further development is certain.
+    """Integrate an orbit until the outcome of the motion is certain.
 
     The integration also ends if the orbit grows too slowly.
     """
@@ -436,7 +438,7 @@ def _follow_orbit(
 
 
 class _RepetitionDetector:
-    """Detector of motions with several states that repeat.
+    """Detector of repeating motions in scenes with several states.
 
     A motion repeats if its unknowns are the same at several successive peaks, within numerical
     errors. A motion that is at rest within the tolerance also repeats. If steady sliding is
@@ -449,7 +451,7 @@ class _RepetitionDetector:
         self._previous, self._repeat_count = (math.inf,) * (1 + scene.state_count), 0
 
     def update(self, peak: Point) -> bool:
-        """Return True if the motion has repeated at this peak.
+        """Update the detector, and return True if the motion repeats.
 
         Parameters
         ----------
@@ -489,7 +491,7 @@ def _has_stopped_growing(
 def _compute_excess(orbit: _Orbit, norm: float, *, with_inertia: bool) -> float:
     """Compute an excess that changes sign at the boundary.
 
-    The excess is based on one orbit, which may not reveal the sign.
+    A single orbit may not reveal the sign of the excess.
     """
     if with_inertia:
         highest = max((orbit.initial_log_slip_rate, *orbit.peaks))

@@ -2,7 +2,7 @@
 
 The main function is ``peak_excess``. Spring stress can only decrease while the load point is held.
 With one state, the first peak of ln V is also the last peak. At the peak, friction weakens with
-slip, and the weakening then decreases, so ln V has no minimum.
+slip. The weakening decreases after the peak, so ln V has no minimum.
 
 With several states, friction may weaken repeatedly. States with b < 0, and pore pressure that
 dilatancy has lowered, weaken friction when the slip rate decreases. The motion is therefore
@@ -125,12 +125,11 @@ def _stays_below_norm(scene: Scene, point: Point) -> bool:
     """Return True if ln V provably stays below the norm.
 
     The slip rate is decreasing at the point. A state that strengthens friction approaches its
-    steady state at the present slip rate. The state continues to strengthen friction while this
-    steady state rises, which happens with decreasing ln V if b > 0.
+    steady state at the present slip rate. If b > 0, the steady state rises as ln V decreases, so
+    the state continues to strengthen friction.
 
-    Pore pressure may raise ln V at most by the resulting loss of strength divided by a. The proof
-    also requires that, at this higher ln V, a steady state weakens friction less than the
-    decreasing spring stress reduces ln V.
+    Pore pressure raises ln V by at most the loss of strength divided by a. The proof also requires
+    that, at the raised ln V, the states weaken friction more slowly than spring stress decreases.
     """
     _value, slope, shift, shift_slope = friction_relation(scene, point.psis)(
         point.frictional_stress
@@ -158,7 +157,7 @@ def _stays_below_norm(scene: Scene, point: Point) -> bool:
 def _bound_pressure_effect(scene: Scene, point: Point) -> tuple[float, float]:
     """Compute an upper bound of the increase of ln V by pore pressure.
 
-    The second result is the shift of the state due to stress at this bound. The first result is
+    The second result is the state shift due to stress at the upper bound. The first result is
     infinite if there is no bound. An increase of ln V is a bound if the highest pore pressure at
     the increased ln V reduces strength by less than a times the increase.
     """

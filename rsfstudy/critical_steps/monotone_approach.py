@@ -2,13 +2,12 @@
 
 If waves radiate most of the stress, V follows the spring over a slip of eta V_0/(K D_c), which is
 many times D_c, while the state stays close to its steady state. An explicit integrator would need
-steps of about D_c for the whole rise. The functions of this module therefore test if the motion can
-end early.
+steps of about D_c for the whole rise. The functions of this module test if the integration can end
+early, because the rest of the rise is monotonic.
 
 The test uses two curves in the plane of ln V and state, which meet only in steady sliding. The
-first curve is the steady state. The second curve is a lag behind the steady state at which the
-state catches up faster than the lag grows. Motions cross both curves inwards, and ln V rises
-everywhere between the curves.
+first curve is the steady state. The second curve is a lag behind the steady state that motions can
+cross only towards smaller lags. A motion between the curves remains there, and its slip rate rises.
 """
 
 from __future__ import annotations
@@ -120,7 +119,8 @@ def _build_change_function(scene: Scene) -> Callable[[float, float], tuple[float
     """Build a function that computes the changes of ln V and of the lag.
 
     The arguments of the function are ln(V/V_*) and the lag of the state behind the steady state.
-    The results are changes per D_c of slip, or NaN if friction cannot reach this value.
+    The results are changes per D_c of slip, or NaN if no stress corresponds to this value of
+    friction.
     """
     relation, evolution = friction_relation(scene), single_state_evolution(scene)
 

@@ -56,8 +56,8 @@ def find_by_critical_path(
 ) -> StepBoundary | None:
     """Find the boundary that corresponds to the critical path.
 
-    The boundary is rejected if smaller steps may be unstable, because steady sliding is unstable or
-    because the motion exceeds the norm one orbit later.
+    The boundary is rejected if smaller steps may be unstable. Smaller steps may be unstable if
+    steady sliding is unstable, or if the next peak of the motion exceeds the norm.
 
     Parameters
     ----------
@@ -94,8 +94,8 @@ def find_by_touching_cycle(
 ) -> StepBoundary | None:
     """Find the boundary at which a limit cycle touches the norm.
 
-    This boundary is possible if larger steps make steady sliding less stable and the largest step
-    makes steady sliding unstable.
+    A limit cycle can touch the norm if larger steps make steady sliding less stable, and if steady
+    sliding is unstable after the largest step.
 
     Parameters
     ----------

@@ -29,10 +29,10 @@ INERTIAL_LOG_RATE_MARGIN = 5.0
 INERTIA_TOLERANCE_FRACTION = 0.01
 #: Number of step sizes at which stability is tested, if stability may change repeatedly with size.
 _STABILITY_TEST_COUNT = 24
-#: Local tolerance of the loose root.
+#: Local tolerance of the approximate root.
 LOOSE_TOLERANCE = 1e-5
 #: Smallest and largest distance in log size over which the slope of the misfit is computed. If a
-#: correction of the loose root exceeds the largest distance, the refinement ends.
+#: correction of the approximate root exceeds the largest distance, the refinement ends.
 _MIN_SLOPE_DISTANCE, _MAX_SLOPE_DISTANCE = 1e-3, 0.05
 _MAX_CORRECTIONS = 8
 #: Largest stride and upper end of the search for a sign change, in logit(size/largest size).
@@ -124,8 +124,8 @@ class StepFamily:
     def size_tolerance(self, size: float, rtol: float) -> float:
         r"""Return the size tolerance for a tolerance of the step value.
 
-        The result is the relative error of the size at which the change of the step value, compared
-        with no step, has the relative error ``rtol``. The result is at most ``rtol``.
+        If the size has the returned relative error, the change of the step value has the relative
+        error ``rtol``. The size tolerance is at most ``rtol``.
 
         Parameters
         ----------
@@ -238,10 +238,10 @@ class StepFamily:
     def smaller_steps_decay(self, size: float) -> bool:
         """Return True if steady sliding is stable after every smaller step.
 
-        If steady sliding is unstable after a smaller step, small oscillations grow, and the
-        critical path is not the boundary. The critical stiffness decreases with the load point
-        velocity, so a test at the ends of the range is sufficient. If the law has a characteristic
-        slip rate, more sizes are tested.
+        If steady sliding is unstable after a smaller step, small oscillations grow, and the smaller
+        step may be critical. The critical stiffness decreases with the load point velocity, so a
+        test at the ends of the range is sufficient. If the law has a characteristic slip rate, more
+        sizes are tested.
 
         Parameters
         ----------
@@ -286,7 +286,7 @@ class ShootingSteps(StepFamily):
     """Base class of steps whose critical path depends on the step size.
 
     The critical path depends on the size if the step changes friction or the load point velocity.
-    The correct size then follows from a shooting method.
+    The critical size follows from a shooting method.
 
     Parameters
     ----------
@@ -314,9 +314,10 @@ class ShootingSteps(StepFamily):
     def find_path_sizes(self, tolerances: Iterable[float], meter: WorkMeter) -> Iterator[float]:
         """Yield sizes of the step at which the critical path starts.
 
-        The path of this step starts at the state before the step. A loose root and its slope are
-        computed first. Each smaller tolerance then needs one to three paths. With several states,
-        there are no critical paths. See the base class for the parameters.
+        The critical path of this step begins with the state before the step. An approximate root
+        and its slope are computed first, with a loose tolerance. Each smaller tolerance then needs
+        one to three paths. With several states, there are no critical paths. See the base class for
+        the parameters.
         """
         path_at = self.path_factory(meter.engine)
         loose = self._loose_root(path_at, meter) if self.scene.state_count == 1 else None
@@ -345,8 +346,8 @@ class ShootingSteps(StepFamily):
     def find_cycle_sizes(self, tolerances: Iterable[float], meter: WorkMeter) -> Iterator[float]:
         """Yield the size of the step whose limit cycle touches the norm.
 
-        The size is the smallest size at which the orbit that touches the norm stops shrinking. Each
-        misfit requires the integration of one orbit. See the base class for the parameters.
+        The step is the smallest step after which an orbit that touches the norm does not shrink.
+        Each misfit requires the integration of one orbit. See the base class for the parameters.
         """
         found, path_at = dict[float, float](), self.path_factory(meter.engine)
 
@@ -392,7 +393,7 @@ class ShootingSteps(StepFamily):
         """Return two log sizes between which the misfit changes sign.
 
         The search proceeds outwards from a guess, and first in the direction that the sign of the
-        misfit indicates. A misfit of NaN means that there is no critical path, and has no sign. The
+        misfit indicates. The misfit is NaN, and has no sign, if there is no critical path. The
         independent variable of the search is logit(size/largest size), which resolves both ends of
         the range. The result is None if the search finds no sign change.
         """
@@ -452,8 +453,9 @@ def _find_misfit_root(
 ) -> tuple[float, float] | None:
     """Find the log size at which a misfit vanishes, and its slope.
 
-    Some misfits are only signs. The root and the slope follow from the known misfits, whose
-    magnitudes are meaningful. The result is None if there are too few known misfits.
+    A misfit without a critical path has a sign but no magnitude. The root and the slope are
+    computed from misfits with a magnitude. The result is None if there are too few misfits with a
+    magnitude.
     """
     try:
         brentq(misfit, *bracket, xtol=1e-4)
@@ -490,9 +492,9 @@ def _refine_root(
 ) -> Iterator[float]:
     """Yield sizes at which a misfit vanishes, for decreasing local tolerances.
 
-    The refinement uses the secant method. It starts from a loose root and its slope with respect to
-    the log size, and continues until the residual is below thirty local tolerances. The iterator
-    ends early if the secant method does not converge.
+    The refinement uses the secant method, starting from an approximate root and its slope with
+    respect to the log size. The iteration for each tolerance ends when the residual is below thirty
+    local tolerances. The iterator ends early if the secant method does not converge.
     """
     if not math.isfinite(slope) or slope == 0.0:
         return

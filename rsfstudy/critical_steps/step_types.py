@@ -166,10 +166,10 @@ class DisplacementSteps(StepFamily):
     def inertia_shifts_size(self, size: float, rtol: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
-        With inertia, the slider lags behind on the same path. Two effects of the lag change the
-        critical size. The load point moves during the delay, and the state evolves less because the
-        slip rate is lower. The second effect is half of b times the lag. See the base class for the
-        parameters.
+        With inertia, the slider follows the critical path with a delay, which changes the critical
+        size in two ways. The load point moves during the delay, and the state evolves less because
+        the slip rate is lower. The effect on the state is half of b times the delay in slip. See
+        the base class for the parameters.
         """
         scene = self.scene
         if not scene.has_mass:
@@ -223,9 +223,9 @@ class DisplacementSteps(StepFamily):
     def _compute_max_size(self) -> float:
         """Return the largest size of the search.
 
-        The largest upward step itself raises the slip rate to the norm. With inertia, the largest
-        step is larger, because slip rate rises while stress relaxes. The largest downward step
-        removes the shear stress or the normal stress.
+        The largest upward step raises the slip rate to the norm immediately. With inertia, the
+        range is extended, because the slip rate rises with a delay while stress relaxes. The
+        largest downward step removes the shear stress or the normal stress.
         """
         scene = self.scene
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
@@ -288,7 +288,7 @@ class NormalStressSteps(ShootingSteps):
     def inertia_shifts_size(self, size: float, rtol: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
-        With inertia, the slider lags behind while the slip rate rises. The effect on the size
+        With inertia, the slip rate rises with a delay after the step. The effect on the size
         depends on the slip rate immediately after the step. See the base class for the parameters.
         """
         scene = self.scene
@@ -346,10 +346,11 @@ class NormalStressSteps(ShootingSteps):
     def _compute_max_size(self) -> float:
         """Return the largest size of the search.
 
-        The largest step itself raises the slip rate to the norm. With inertia, the largest step is
-        larger, because slip rate rises while stress relaxes. An increase of normal stress raises
-        the slip rate only if the effect on the state exceeds the effect on friction. If the load
-        point moves, the largest step is limited by the existence of steady sliding after the step.
+        The largest step raises the slip rate to the norm immediately. With inertia, the range is
+        extended, because the slip rate rises with a delay while stress relaxes. An increase of
+        normal stress raises the slip rate only if the effect on the state exceeds the effect on
+        friction. If the load point moves, the largest step is limited by the existence of steady
+        sliding after the step.
         """
         scene = self.scene
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
@@ -378,8 +379,9 @@ class NormalStressSteps(ShootingSteps):
     def _max_log_stress_ratio(self) -> float:
         """Return the largest size that leaves the normal stress positive.
 
-        If normal stress depends on shear stress, sigma_3 must remain positive after a decrease.
-        Otherwise friction decreases with slip faster than stress, at any slip rate.
+        If normal stress depends on shear stress, sigma_3 must remain positive after a decrease. If
+        sigma_3 were negative, friction would decrease with slip faster than spring stress, at any
+        slip rate.
         """
         follows, _alpha = self.scene.parts.normal_stress.coupling or (0.0, 0.0)
         if self.sign > 0 or not follows:
@@ -389,7 +391,8 @@ class NormalStressSteps(ShootingSteps):
     def _allows_steady_sliding(self, size: float) -> bool:
         """Return True if sliding can be steady after the step.
 
-        The result is also True if the load point is held, because no steady sliding is then needed.
+        The result is also True if the load point is held, because steady sliding is not required in
+        this case.
         """
         scene = self.scene_at(size)
         load = scene.log_load_velocity

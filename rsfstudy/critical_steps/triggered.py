@@ -1,4 +1,4 @@
-"""Test if the step of a scene triggers an instability."""
+"""Measure that tests if the step of a scene triggers an instability."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Triggered(Measure):
     the motion never reaches the norm. The motion is integrated until the result is certain. To find
     the smallest step that triggers an instability, use ``CriticalStep``.
 
-    The status is ``unverified`` if ten times smaller tolerances give the other result, or if the
-    difference between the stiffness and the critical stiffness is less than ten times the requested
-    accuracy.
+    The status is ``unverified`` if the result changes with ten times smaller tolerances, or if the
+    relative difference between the stiffness and the critical stiffness is less than ten times the
+    requested accuracy.
 
     Notes
     -----
@@ -66,7 +66,19 @@ class Triggered(Measure):
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the flag from motions with two different tolerances.
 
-        See ``Measure.compute`` for the parameters.
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
         """
         check_single_step(scene)
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:

@@ -1,9 +1,9 @@
 r"""Convergence of a motion to its limit cycle.
 
-If a scene has one state, use ``CycleSearch``. The spring stress at a rise of V through V_0 then
-determines the motion that follows, so two successive cycles determine the derivative of the return
-map. If the cycles converge slowly, the motion leaps to the fixed point that this derivative
-implies.
+If a scene has one state, use ``CycleSearch``. The spring stress at a rise of V through V_0
+determines the subsequent motion, so two successive cycles determine the derivative of the return
+map. If the cycles converge slowly, the search leaps to a fixed point that is extrapolated from the
+derivative.
 
 If a scene has several states, use ``follow_to_orbit``. The function follows the motion cycle by
 cycle, and compares the cycles to find the number of cycles after which the motion repeats.
@@ -51,9 +51,9 @@ from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
 from rsfstudy.slider import Scene, critical_stiffness
 from rsfstudy.status import Status
 
-#: Limits of the contraction ratio, by which the distance to the limit cycle decreases in one cycle.
-#: The motion leaps if the ratio is above the first limit, and does not converge if the ratio is
-#: above the second limit.
+#: Limits of the contraction ratio, the ratio of successive distances to the limit cycle. The motion
+#: leaps if the ratio is above the first limit, and does not converge if the ratio is above the
+#: second limit.
 _MIN_CONTRACTION_TO_LEAP, _MAX_CONTRACTION = 0.03, 0.98
 #: Largest leap, as a fraction of the range of ln V.
 _MAX_LEAP_FRACTION = 0.1
@@ -154,7 +154,7 @@ class CycleSearch:
     def _critical_stiffness_text(self) -> str:
         """Explanation for the message if the stiffness is nearly critical.
 
-        Otherwise the text is an empty string.
+        The text is empty if the stiffness is not close to critical.
         """
         critical = critical_stiffness(self._scene, self._scene.log_load_velocity)
         off = abs(self._scene.stiffness / critical - 1.0) if critical else math.inf
@@ -236,8 +236,8 @@ class CycleSearch:
     def _alternates(self) -> bool:
         """Return True if the last two cycles alternate around the limit cycle.
 
-        Only numerical errors cause the alternation. Trajectories in a plane cannot cross, so exact
-        cycles approach the limit cycle from one side.
+        An alternation around the limit cycle is caused by numerical errors. Trajectories in a plane
+        cannot cross, so exact cycles approach the limit cycle from one side.
         """
         before, last = (
             cycle.end_point.spring_stress - cycle.start_point.spring_stress
@@ -254,10 +254,9 @@ class CycleSearch:
     def _should_leap(self) -> bool:
         """Return True if the motion should leap to the fixed point.
 
-        The motion does not leap if the next cycle would come as close to the fixed point, or if the
-        fixed point is far away, because the motion may then settle to steady sliding. The motion
-        also does not leap if the last leap did not reduce the distance by half, because repeated
-        leaps may form a loop.
+        A leap is useless if the next cycle would come equally close to the fixed point. A long leap
+        is avoided, because the motion may settle to steady sliding after a long leap. A leap that
+        does not halve the distance is not repeated, because repeated leaps may form a loop.
         """
         cycle = self.cycles[-1]
         left = abs(cycle.end_point.spring_stress - cycle.start_point.spring_stress)
@@ -346,8 +345,8 @@ def follow_to_orbit(
 def _may_still_converge(cycles: Sequence[Cycle]) -> bool:
     """Return True if a motion may still approach a periodic orbit.
 
-    A motion with few cycles may still do so. A motion with many cycles may do so if the range of ln
-    V or a state increases, or decreases, from each cycle to the next.
+    The result is True for motions with few cycles. For longer motions, the result is True if the
+    range of ln V, or a state, increases or decreases monotonically from cycle to cycle.
     """
     if len(cycles) < _MIN_CYCLES_TO_TEST:
         return True
@@ -359,11 +358,11 @@ def _may_still_converge(cycles: Sequence[Cycle]) -> bool:
 
 
 def _compared_states(scene: Scene) -> tuple[tuple[int, ...], ...]:
-    """Return the sets of states that are compared to detect a period.
+    """Return the sets of states for the detection of a period.
 
-    The first set contains all states that contribute to the distance from steady sliding. The
-    second set contains only the states of the law, because a slow unknown of the fluid may converge
-    long after the states of the law.
+    The first set contains the states used for the distance from steady sliding. The second set
+    contains only the states of the law, because a slow unknown of the fluid may converge long after
+    the states of the law.
     """
     of_law = tuple(range(scene.parts.law.state_count))
     return tuple(dict.fromkeys((scene.functions.friction.distance_indices, of_law)))

@@ -5,8 +5,8 @@ maximum. Spring stress and states at one maximum determine their values at the n
 limit cycle is the fixed point of this return map.
 
 The motion is first integrated with a low accuracy until it approaches the limit cycle. The orbit is
-then closed in all unknowns, with the requested accuracy and again with smaller tolerances. The
-first cycle after the step is never accepted as the limit cycle.
+then refined until all unknowns repeat, first with the requested accuracy and then with smaller
+tolerances. The first cycle after the step is never accepted as the limit cycle.
 
 If the law or the fluid has several states, the motion may repeat only after 2, 4 or more cycles, or
 never. The results then describe the cycle with the highest slip rate, and the recorded orbit covers
@@ -170,8 +170,21 @@ class LimitCycle(RecordingMeasure):
         """Compute the limit cycle, with error estimates.
 
         The motion is integrated until it approaches the limit cycle. The cycle is then computed
-        twice, with the requested accuracy and with smaller tolerances. See ``Measure.compute`` for
-        the parameters.
+        twice, with the requested accuracy and with smaller tolerances.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
         """
         check_steady_loading(scene)
         if scene.log_load_velocity == -math.inf:
@@ -205,7 +218,7 @@ class LimitCycle(RecordingMeasure):
         """Compute the limit cycle of a scene with several states.
 
         The motion is integrated with a low accuracy until it approaches a periodic orbit. The orbit
-        is then closed, starting from the event with the highest slip rate.
+        is then refined, starting from the event with the highest slip rate.
         """
         motion = follow_to_orbit(
             scene, accuracy.with_rtol(max(accuracy.rtol, _SEARCH_RTOL)), meter, self.events
@@ -221,9 +234,9 @@ class LimitCycle(RecordingMeasure):
     def _close_orbit(
         self, scene: Scene, accuracy: Accuracy, meter: WorkMeter, orbit: Orbit, events: int
     ) -> Outcome:
-        """Close an orbit with the requested accuracy.
+        """Refine a periodic orbit to the requested accuracy.
 
-        The orbit is closed again with smaller tolerances, to estimate the errors and to record the
+        The orbit is refined again with smaller tolerances, to estimate the errors and to record the
         orbit.
         """
         one = ReturnMap(scene, accuracy, meter).refine(orbit)

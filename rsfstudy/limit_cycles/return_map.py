@@ -12,9 +12,10 @@ The eigenvalues of the derivative of this map are the Floquet multipliers, the f
 small perturbations grow during one orbit. The orbit repels if the absolute value of a multiplier
 exceeds 1. At a multiplier of -1, an orbit with twice the number of cycles branches off.
 
-If the effect of inertia is small, the motion forgets a perturbation along itself. Perturbations
-therefore have one direction fewer than the section has unknowns. A perturbation along the motion
-changes the states at constant spring stress, because spring stress has a maximum at a section.
+If the effect of inertia is small, a perturbation along the motion only shifts the time. The number
+of independent perturbations is therefore one less than the number of unknowns of a section. A
+perturbation along the motion changes the states at constant spring stress, because spring stress
+has a maximum at a section.
 
 Notes
 -----
@@ -222,8 +223,8 @@ class ReturnMap:
         If True, record the motions along an orbit. Otherwise only the ends of the cycles are
         stored.
     counted : sequence of int, optional
-        Indices of the states that contribute to the distance between two sections. By default, all
-        states contribute except states in the attribute ``excluded_from_distance`` of a part.
+        Indices of the states used for the distance between two sections. By default, all states are
+        used except states in the attribute ``excluded_from_distance`` of a part.
     """
 
     def __init__(
@@ -244,8 +245,8 @@ class ReturnMap:
     def point_at(self, section: np.ndarray) -> Point:
         """Return the point of the slider at a section.
 
-        The point is on the slow manifold. If inertia is important at the point, the slip rate is
-        V_0 instead.
+        The point is on the slow manifold, unless inertia is important. If inertia is important, the
+        slip rate of the point is V_0.
 
         Parameters
         ----------
@@ -369,10 +370,10 @@ class ReturnMap:
         return tuple(found)
 
     def motion_direction(self, point: Point) -> tuple[Numbers, Numbers]:
-        """Return the direction of the motion at a section, and its effect.
+        """Return the direction of the motion at a section.
 
-        If the effect of inertia is small, a displacement of the start along the motion changes only
-        the duration of the cycle.
+        The function also returns the effect of a displacement in this direction. If the effect of
+        inertia is small, a displacement along the motion changes only the duration of the cycle.
 
         Parameters
         ----------
@@ -485,7 +486,9 @@ class ReturnMap:
     def _close_orbit(
         self, start: np.ndarray, slopes: Sequence[np.ndarray], scale: float, max_distance: float
     ) -> Orbit | None:
-        r"""Solve for an orbit with as many cycles as there are derivatives.
+        r"""Solve for a periodic orbit with a given number of cycles.
+
+        The number of cycles is the number of arrays in ``slopes``.
 
         Returns
         -------
@@ -526,8 +529,8 @@ class ReturnMap:
     def _scaled_norm(self, move: np.ndarray, at: np.ndarray, scale: float) -> float:
         """Return the largest component of a change of a section.
 
-        The unknowns of a fluid may have large values. If such a value exceeds the scale of the
-        states, the change is divided by the ratio of the value to the scale.
+        The unknowns of a fluid may have large values. If the value of a fluid unknown exceeds the
+        scale of the states, its change is divided by the ratio of the value to the scale.
         """
         changes, first = np.abs(move), 1 + self.scene.parts.law.state_count
         changes[first:] /= np.maximum(1.0, np.abs(at[first:]) / scale)

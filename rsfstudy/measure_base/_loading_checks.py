@@ -37,7 +37,7 @@ def check_single_step(scene: Scene) -> None:
 
 
 def norm_below_loading_outcome(scene: Scene, load_velocity: float = 0.0) -> Outcome:
-    """Return the outcome for an instability norm that the loading reaches.
+    """Return the outcome if the loading itself reaches the instability norm.
 
     Steady sliding before the step, or the load point after the step, may already be faster than the
     instability norm.

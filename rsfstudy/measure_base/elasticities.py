@@ -168,7 +168,7 @@ class Elasticities(Measure):
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        """Names of the parameters, as coordinate values of ``parameter``."""
+        """Parameter names, which are the coordinate values."""
         return {"parameter": np.array(self.parameters, dtype=object)}
 
     @property

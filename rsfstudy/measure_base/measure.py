@@ -105,8 +105,8 @@ class Measure(CheckedKeywords):
 
         error_scales(self, scene, values) -> Mapping[str, float]
 
-    If a motion cannot continue, ``compute`` may let the exception ``MotionStopped`` pass. The base
-    class converts the exception into a status.
+    If a motion cannot continue, ``compute`` may raise ``MotionStopped``. The base class converts
+    the exception into a status.
 
     Examples
     --------
@@ -284,8 +284,8 @@ class Measure(CheckedKeywords):
 
         The requested accuracy is relative to this scale. If the error estimate of a result exceeds
         the requested error more than a hundredfold, the status of the cell becomes ``unverified``.
-        Results without a scale are not checked. Leave out statistical results, and results whose
-        resolution is an option of the measure.
+        Results without a scale are not checked. An override should omit statistical results, and
+        results whose resolution is an option of the measure.
 
         Parameters
         ----------

@@ -1,9 +1,9 @@
 """Measures, which compute named results of a scene.
 
-A measure is a frozen dataclass derived from ``Measure``. Each result has a status, and may have an
-error estimate. Use the measures of this package in studies, or derive your own measure from
-``Measure``. The package only exports names: each measure is defined in the package of its topic.
-Measures that only the named studies use are defined next to these studies.
+A measure is a frozen dataclass derived from ``Measure``. A measure returns an outcome with a
+status, named results and error estimates. Use the measures of this package in studies, or derive
+your own measure from ``Measure``. The package only exports names: each measure is defined in the
+package of its topic. Measures that only the named studies use are defined next to these studies.
 """
 
 from __future__ import annotations

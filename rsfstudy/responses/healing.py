@@ -139,9 +139,21 @@ class Healing(RecordingMeasure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of each result.
 
-        The scale of healing and relaxation is the absolute value plus ``a``, because friction
-        changes by ``a`` if ln V changes by 1. The scale of the peak displacement is the absolute
-        value plus D_c. See ``Measure.error_scales`` for the parameters.
+        The scale of healing and relaxation is the absolute value plus the direct effect parameter
+        ``a``, because friction changes by ``a`` if ln V changes by one. The scale of the peak
+        displacement is the absolute value plus D_c.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the computation.
+        values : mapping of str to float or ndarray
+            Results by name.
+
+        Returns
+        -------
+        mapping of str to float
+            Scales by name of the result.
         """
         least = {"healing": scene.a, "relaxation": scene.a, "peak_displacement": 1.0}
         return {name: abs(values[name]) + scale for name, scale in least.items()}
@@ -150,8 +162,21 @@ class Healing(RecordingMeasure):
         """Compute relaxation and healing, with error estimates.
 
         The motion is computed twice, with the requested accuracy and with smaller tolerances. The
-        difference between the two runs determines the error estimates. See ``Measure.compute`` for
-        the parameters.
+        difference between the two runs determines the error estimates.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
         """
         hold = _find_hold(scene)
         first = _record_hold(scene, hold, accuracy, meter)

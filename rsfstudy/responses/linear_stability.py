@@ -67,8 +67,8 @@ class LinearStability(Measure):
     perturbations of the assembled equations neither grow nor decay. The third result is the
     quasi-static closed form, corrected for inertia and radiation damping.
 
-    Stiffnesses are in units of sigma_*/D_c, and stresses are in units of sigma_*. The relative
-    critical stiffness is the ratio of the critical stiffness to the critical stiffness at V_*.
+    Stresses are in units of sigma_*, and stiffnesses are in units of sigma_*/D_c. The relative
+    critical stiffness is the critical stiffness divided by the critical stiffness at V_*.
 
     Notes
     -----
@@ -118,8 +118,21 @@ class LinearStability(Measure):
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the critical stiffness from friction and from growth rates.
 
-        The error estimate is the difference between the two results. See ``Measure.compute`` for
-        the parameters.
+        The error estimate is the difference between the two results.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
         """
         scene = scene.under_steady_loading
         load = scene.log_load_velocity

@@ -79,9 +79,9 @@ class RigidResponse(Measure):
     ln(V/V_*)`` at the step. The stress then evolves with slip towards steady sliding at V.
 
     ``evolution_distance`` is the slip at which 1/e of the stress change from the direct effect to
-    steady sliding remains. Under the slip law, the distance is D_c. Slip is in units of D_c, and
-    stresses are in units of sigma_*. ``shear_stress``, ``normal_stress_ratio`` and
-    ``state_variable`` have the shape (points,), along ``slip``.
+    steady sliding remains. Under the slip law, the distance is D_c. The outputs ``shear_stress``,
+    ``normal_stress_ratio`` and ``state_variable`` have the shape (points,), along ``slip``. Slip is
+    in units of D_c, and stresses are in units of sigma_*.
 
     Parameters
     ----------
@@ -150,8 +150,20 @@ class RigidResponse(Measure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of the evolution distance.
 
-        The scale includes the change of the distance if friction changes by ``a``. See
-        ``Measure.error_scales`` for the parameters.
+        The scale is the distance, plus the change of the distance if friction changes by the direct
+        effect parameter ``a``.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the computation.
+        values : mapping of str to float or ndarray
+            Results by name.
+
+        Returns
+        -------
+        mapping of str to float
+            Scales by name of the result.
         """
         evolution = abs(values["direct_stress_change"] - values["steady_stress_change"])
         part = 1.0 + math.e * scene.a / evolution
@@ -161,8 +173,21 @@ class RigidResponse(Measure):
         """Compute the response of the slider, with an error estimate.
 
         The response is computed twice, with the requested accuracy and with smaller tolerances. The
-        difference between the two runs determines the error estimate. See ``Measure.compute`` for
-        the parameters.
+        difference between the two runs determines the error estimate.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
         """
         log_slip_rate = scene.log_load_velocity
         if log_slip_rate == 0.0:
@@ -286,7 +311,7 @@ def friction_after_step(scene: Scene, log_slip_rate: float) -> float:
     scene : Scene
         Scene of the slider.
     log_slip_rate : float
-        ln(V/V_*) after the step.
+        Logarithm ln(V/V_*) after the step.
 
     Returns
     -------

@@ -132,7 +132,19 @@ class StepResponse(RecordingMeasure):
         """Return the scale of the numerical error of the highest peak.
 
         The scale is the absolute value plus one e-fold of slip rate, because the logarithm of V/V_*
-        may be zero. See ``Measure.error_scales`` for the parameters.
+        may be zero.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the computation.
+        values : mapping of str to float or ndarray
+            Results by name.
+
+        Returns
+        -------
+        mapping of str to float
+            Scales by name of the result.
         """
         return {"max_log10_slip_rate": abs(values["max_log10_slip_rate"]) + 1.0 / LN10}
 
@@ -140,8 +152,21 @@ class StepResponse(RecordingMeasure):
         """Compute the peaks and the path of the motion, with error estimates.
 
         The motion is computed twice, with the requested accuracy and with smaller tolerances. The
-        difference between the two runs determines the error estimate. See ``Measure.compute`` for
-        the parameters.
+        difference between the two runs determines the error estimate.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
         """
         check_steady_loading(scene)
         if scene.log_load_velocity == -math.inf:
@@ -206,7 +231,7 @@ def _has_initial_maximum(scene: Scene, event: Event) -> bool:
 def _neglected_rise_error(scene: Scene, accuracy: Accuracy) -> float:
     """Return the error of log10(V/V_*) caused by an initial rise of slip rate.
 
-    The error exists if inertia delays the rise and the motion starts after the rise.
+    The error is zero unless inertia delays the rise.
     """
     slip = accuracy.max_remaining_slip if _delays_initial_rise(scene) else 0.0
     return (1.0 + scene.stiffness / scene.a) * slip / LN10

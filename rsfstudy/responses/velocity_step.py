@@ -115,8 +115,8 @@ class VelocityStep(RecordingMeasure):
     is NaN.
 
     If there is no extremum, or if ``b`` is smaller than its error, the status is
-    ``not_applicable``. The outcome then contains the results that exist. Distances are in units of
-    D_c. The record begins at the step and has the shape (phases,).
+    ``not_applicable``, and the outcome contains only the available results. Distances are in units
+    of D_c. The record begins at the step and has the shape (phases,).
 
     Parameters
     ----------
@@ -192,7 +192,19 @@ class VelocityStep(RecordingMeasure):
         """Return the scale of the numerical error of each result.
 
         The scale is the absolute value of the result, plus the change of the result if friction
-        changes by ``a``. See ``Measure.error_scales`` for the parameters.
+        changes by the direct effect parameter ``a``.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the computation.
+        values : mapping of str to float or ndarray
+            Results by name.
+
+        Returns
+        -------
+        mapping of str to float
+            Scales by name of the result.
         """
         slopes = self._friction_derivatives(self._find_step(scene).log_velocity_ratio, values)
         return {name: abs(values[name]) + scene.a * abs(slopes[name]) for name in slopes}
@@ -218,8 +230,21 @@ class VelocityStep(RecordingMeasure):
 
         The motion is computed twice, with the requested accuracy and with smaller tolerances. The
         difference between the two runs determines the error estimates. Each run also integrates the
-        motion from the extremum until 1/e of the evolution remains. See ``Measure.compute`` for the
-        parameters.
+        motion from the extremum until 1/e of the evolution remains.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
         """
         check_steady_loading(scene)
         step = self._find_step(scene)
