@@ -54,7 +54,7 @@ _MIN_RELATIVE_FRICTION = 0.1
 
 
 class RateSteps(ShootingSteps):
-    """Steps of load point velocity with the size |ln(V_0/V_*)|.
+    """Steps of load point velocity with the size ``|ln(V_0/V_*)|``.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class RateSteps(ShootingSteps):
 
 
 class DisplacementSteps(StepFamily):
-    """Steps of load point displacement with the size |d| in units of D_c.
+    """Steps of load point displacement with the size ``|d|`` in units of D_c.
 
     The load point is held after the step, unless the scene specifies a load point velocity.
 
@@ -244,7 +244,7 @@ class DisplacementSteps(StepFamily):
 
 
 class NormalStressSteps(ShootingSteps):
-    """Steps of imposed normal stress with the size |ln(1 + step/sigma_*)|.
+    """Steps of imposed normal stress with the size ``|ln(1 + step/sigma_*)|``.
 
     The load point is held after the step, unless the scene specifies a load point velocity. The
     critical path depends on the size, because the step changes the normal stress that acts on

@@ -51,9 +51,9 @@ _TYPICAL_PARAMETER_COUNT = 8
 
 
 class _LogValue(NamedTuple):
-    """Value and error of ln|y|.
+    """Value and error of ``ln|y|``.
 
-    The error is the error of y divided by |y|.
+    The error is the error of y divided by ``|y|``.
     """
 
     value: float
@@ -305,7 +305,7 @@ class Elasticities(Measure):
     def _evaluate_at(
         self, scene: Scene, name: str, log_change: float, accuracy: Accuracy, meter: WorkMeter
     ) -> _LogValue | None:
-        """Compute ln|y| after a change of ln p.
+        """Compute ``ln|y|`` after a change of ln p.
 
         Parameters
         ----------
@@ -341,7 +341,7 @@ class Elasticities(Measure):
         return self._log_value(outcome)
 
     def _log_value(self, outcome: Outcome) -> _LogValue | None:
-        """Return ln|y| of an outcome, with an error that includes rounding.
+        """Return ``ln|y|`` of an outcome, with an error that includes rounding.
 
         Returns
         -------
@@ -361,7 +361,7 @@ class Elasticities(Measure):
 def _central_difference(
     centre: _LogValue, neighbours: Sequence[_LogValue | None], step: float
 ) -> tuple[float, float, float]:
-    """Compute the derivative of ln|y| with respect to ln p.
+    """Compute the derivative of ``ln|y|`` with respect to ln p.
 
     Parameters
     ----------

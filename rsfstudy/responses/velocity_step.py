@@ -140,8 +140,11 @@ class VelocityStep(RecordingMeasure):
     friction at the end of the record. The extremum is a maximum for a step up, and a minimum for a
     step down. The definitions of [1]_ are
 
-    .. math:: a = \frac{\mu_p - \mu_0}{\ln r}, \qquad b = \frac{\mu_p - \mu_1}{\ln r}, \qquad a - b
-    = \frac{\mu_1 - \mu_0}{\ln r}.
+    .. math::
+
+        a &= (\mu_p - \mu_0)/\ln r, \\
+        b &= (\mu_p - \mu_1)/\ln r, \\
+        a - b &= (\mu_1 - \mu_0)/\ln r.
 
     ``closed_form_departure`` is the largest difference from the friction of a rigid slider after
     the same slip :math:`x`,
