@@ -341,7 +341,7 @@ class Elasticities(Measure):
         return self._log_value(outcome)
 
     def _log_value(self, outcome: Outcome) -> _LogValue | None:
-        """Return ``ln|y|`` of an outcome, with an error that includes rounding.
+        """Return ``ln|y|`` of an outcome with an error that includes rounding.
 
         Returns
         -------
