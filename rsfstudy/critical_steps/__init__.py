@@ -1,7 +1,7 @@
-"""Critical steps: the smallest step that makes a slider unstable.
+"""Critical steps, the smallest steps of the load that trigger an instability.
 
-The package contains the measures ``CriticalStep`` and ``Triggered`` and their algorithms: the path
-that touches the stability boundary, the motion after a step, and a shooting method. It never
+The package contains the measures ``CriticalStep`` and ``Triggered`` and the algorithms that the
+measures use: the critical path, the motion after a step, and a shooting method. The package never
 computes limit cycles, and never reads or writes a file.
 """
 

@@ -1,18 +1,22 @@
-"""The critical path, followed back from where it touches the instability norm.
+"""Critical paths, integrated backwards from the instability norm.
 
-At the touching point ln V is at the norm and stationary, which leaves one scalar equation for the
-stress. From there the path is integrated against time. Its neighbours converge on it in that
-direction, so a few short integrations of moderate tolerance give many digits, where following
-motions forward would amplify every error.
+The main class is ``CriticalPath``. At the end of a critical path, ln V equals the norm and its time
+derivative is zero, which leaves one scalar equation for the stress. From this tangency point, the
+path is integrated backwards in time. Neighbouring paths converge in this direction, so a few short
+integrations with a moderate tolerance yield many digits. An integration forwards in time would
+amplify every error. Gu et al. [1]_ derive the critical path under the slip law.
 
-Two unknowns suffice as long as the norm is a slip rate at which mass hardly acts; it does not act
-at all where ln V is stationary.
+The path has only two unknowns, spring stress and one state. Two unknowns are sufficient if the
+effect of inertia is small at the norm, because inertia has no effect when ln V is stationary.
 
-Stresses are in sigma_*, above those of steady sliding at V_*; slip is in D_c, slip rate in V_*.
+Stresses are deviations from steady sliding at V_* and are divided by sigma_*, slip is divided by
+D_c, and slip rate is divided by V_*.
 
 References
 ----------
-Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196: the path by the slip law.
+.. [1] Gu, J.-C., Rice, J. R., Ruina, A. L., & Tse, S. T. (1984). Slip motion and stability of a
+   single degree of freedom elastic system with rate and state dependent friction. J. Mech. Phys.
+   Solids, 32, 167-196.
 """
 
 from __future__ import annotations
@@ -48,35 +52,40 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-#: Right-hand sides, at a tolerance of 1e-5, after which a path that has not come back to a start is
-#: given up.
+#: Number of right-hand-side evaluations, at a tolerance of 1e-5, after which the search for the
+#: start of a path is abandoned.
 _PATH_BUDGET = 1_500
-_MIN_LOG_SLIP_RATE = -230.0  # ln(V/V_*): 10^-100
-#: How far above the norm in ln V a path is that touches it from there.
+#: ln(V/V_*) at which a path is abandoned, about 1e-100 V_*.
+_MIN_LOG_SLIP_RATE = -230.0
+#: Distance in ln V above the norm at which a path is known to touch the norm from above.
 _NORM_OFFSET = 1e-6
 
 
 class CriticalPath(NamedTuple):
-    """Path that touches the instability norm, after the step of a scene with one state.
+    """Path that touches the instability norm, in a scene with one state.
 
-    Attributes
+    Parameters
     ----------
     log_norm_rate : float
-        ln(V/V_*) of the norm.
-    min_frictional_stress, radiated_stress : float
-        Frictional stress at which normal stress vanishes, and stress that waves carry away at the
-        norm, over sigma_*.
+        Logarithm ln(V/V_*) at the norm.
+    min_frictional_stress : float
+        Frictional stress at which the normal stress vanishes, in units of sigma_*.
+    radiated_stress : float
+        Stress that seismic waves radiate at the norm, in units of sigma_*.
     initial_state : tuple of float
-        Spring stress and state just after the step.
+        Spring stress and states immediately after the step.
     parameters : tuple of float
         Numbers of the scene.
-    solve_tangency, evaluate_point : callable
-        ``(x, weakest, p) -> (g, Psi)`` (see `_build_tangency_solver`); ``(state, p) -> Point``.
+    solve_tangency : callable
+        Function ``(x, weakest, p) -> (g, Psi)``. See ``_build_tangency_solver``.
+    evaluate_point : callable
+        Function ``(state, p) -> Point``.
     driver : MotionDriver
+        Driver that integrates the path.
     engine : str
-        What follows it.
+        Name of the engine of the driver.
     is_planar : bool
-        Whether there is one state, as there must be for a path that touches the norm.
+        True if the scene has one state. Scenes with several states have no critical path.
     """
 
     log_norm_rate: float
@@ -92,7 +101,20 @@ class CriticalPath(NamedTuple):
 
     @classmethod
     def of_scene(cls, scene: Scene, engine: str = SCIPY) -> CriticalPath:
-        """The critical path of a scene, followed by an engine."""
+        """Create the critical path of a scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene with the step.
+        engine : str, default: "scipy"
+            Name of the engine that integrates the path.
+
+        Returns
+        -------
+        CriticalPath
+            Path with the load point velocity of the scene.
+        """
         slow, x = equations_between_ruptures(scene, clock=False), scene.log_instability_rate
         weakest = scene.parts.normal_stress.min_frictional_stress(scene)
         begin = (scene.spring_stress_step, *(0.0,) * scene.state_count)
@@ -111,7 +133,18 @@ class CriticalPath(NamedTuple):
         )
 
     def with_load_velocity(self, load_velocity: float) -> CriticalPath:
-        """The critical path where the step is to another load point velocity, over V_*."""
+        """Return the critical path for another load point velocity.
+
+        Parameters
+        ----------
+        load_velocity : float
+            Load point velocity after the step, in units of V_*.
+
+        Returns
+        -------
+        CriticalPath
+            Path with the same norm and the same friction.
+        """
         p = list(self.parameters)
         p[LOAD_VELOCITY] = load_velocity
         p[LOG_LOAD_VELOCITY] = math.log(abs(load_velocity)) if load_velocity else -math.inf
@@ -119,10 +152,11 @@ class CriticalPath(NamedTuple):
 
     @property
     def tangency_point(self) -> tuple[float, float] | None:
-        """Spring stress over sigma_*, and state, (f, Psi), at which ln V rests at the norm; None
-        where it never can, or where there are several states and the path is none in a plane.
+        """Spring stress f and state Psi at the tangency point.
 
-        f is frictional stress there, and what waves carry away.
+        At the tangency point, ln V equals the norm and its time derivative is zero. The spring
+        stress is the sum of frictional stress and radiated stress. The result is None if the scene
+        has no tangency point, or if the scene has several states.
         """
         if not self.is_planar:
             return None
@@ -138,23 +172,24 @@ class CriticalPath(NamedTuple):
         crossing: tuple[str, float],
         is_start: Callable[[Point], bool],
     ) -> Point | None:
-        """Follow the path back to a start.
+        """Integrate the path backwards to the start of a step.
 
         Parameters
         ----------
         tolerance : float
-            Local error per step.
+            Local error tolerance of the integration.
         meter : WorkMeter
-            Charged with the work.
+            Counter of right-hand-side evaluations.
         crossing : tuple of str and float
-            Quantity and level that a start is at.
+            Quantity and level that define the start.
         is_start : callable
-            Whether a point there is a start of the kind sought.
+            Function that returns True if a point at this level is the start of the requested step.
 
         Returns
         -------
         Point or None
-            None where the path touches the norm from above or never comes by.
+            Start of the path. None if the path touches the norm from above, or does not reach a
+            start.
         """
         above = rise(
             "log_slip_rate", self.log_norm_rate + _NORM_OFFSET, terminal=True, may_defer=True
@@ -174,8 +209,11 @@ class CriticalPath(NamedTuple):
         *,
         backward: bool,
     ) -> Iterator[Event]:
-        """The path from where it touches the norm, as far as there is one; by a method of order
-        eight, which gets no more than what is left.
+        """Yield the events of the path, starting at the tangency point.
+
+        The integration ends early if the path cannot continue, or if the path budget is spent. The
+        path budget depends on the tolerance in the same way as the work of an integrator of order
+        eight.
         """
         start = self.tangency_point
         if start is None:
@@ -190,10 +228,23 @@ class CriticalPath(NamedTuple):
                 raise
 
     def start_misfit(self, tolerance: float, meter: WorkMeter) -> float | None:
-        """Psi/a on the path where it passes the slip rate of the start: zero after the critical
-        step, because a step that starts from steady sliding at V_* leaves Psi = 0.
+        """Compute the misfit of the state at the start of the path.
 
-        None where the path never passes that slip rate as the motion of this scene would.
+        The misfit is Psi/a at the slip rate at which the motion of the scene starts. The misfit is
+        zero for the critical step, because a step from steady sliding at V_* leaves Psi = 0.
+
+        Parameters
+        ----------
+        tolerance : float
+            Local error tolerance of the integration.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        float or None
+            Misfit, or None if the path does not pass this slip rate in the same direction as the
+            motion.
         """
         given = self.initial_state, self.parameters
         begin = scalar_function(self.evaluate_point, self.engine, *given)(*given)
@@ -208,10 +259,22 @@ class CriticalPath(NamedTuple):
         return None if start is None else start.psi / self.parameters[A]
 
     def cycle_misfit(self, tolerance: float, meter: WorkMeter) -> float | None:
-        """Height in ln V, above the norm, of the peak of the motion one orbit after it has touched
-        the norm; zero where a limit cycle touches it.
+        """Compute the height of the next peak of ln V above the norm.
 
-        None where the motion does not come back.
+        The motion starts at the tangency point and is integrated forwards for one orbit. The misfit
+        is zero if the orbit is a limit cycle that touches the norm.
+
+        Parameters
+        ----------
+        tolerance : float
+            Local error tolerance of the integration.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        float or None
+            Misfit, or None if ln V has no further peak.
         """
         for event in self._iterate_return_events(tolerance, meter):
             if event.kind is EventKind.MAXIMUM:
@@ -219,13 +282,26 @@ class CriticalPath(NamedTuple):
         return None
 
     def exceeds_norm_on_return(self, tolerance: float, meter: WorkMeter) -> bool:
-        """True if the motion that touches the norm goes beyond it when it comes back, so that
-        others may reach it by their second peak.
+        """Return True if the next peak of the motion exceeds the norm.
+
+        If the next peak exceeds the norm, other motions may reach the norm at their second peak.
+
+        Parameters
+        ----------
+        tolerance : float
+            Local error tolerance of the integration.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        bool
+            True if ln V rises above the norm after the motion has left the tangency point.
         """
         beyond = rise("log_slip_rate", self.log_norm_rate + _NORM_OFFSET)
         for event in self._iterate_return_events(tolerance, meter, beyond):
             if event.kind in (EventKind.RISE, EventKind.MAXIMUM):
-                # a step may pass the norm and come back
+                # A time step may contain the rise above the norm and the following peak.
                 return (
                     event.kind is EventKind.RISE or event.point.log_slip_rate > self.log_norm_rate
                 )
@@ -234,8 +310,9 @@ class CriticalPath(NamedTuple):
     def _iterate_return_events(
         self, tolerance: float, meter: WorkMeter, *specs: EventSpecification
     ) -> Iterator[Event]:
-        """Events, peaks among them, of the motion that has touched the norm and fallen below
-        V_0.
+        """Yield the events of the forward motion after V has fallen below V_0.
+
+        The motion starts at the tangency point, and the events include the peaks of ln V.
         """
         fallen = False
         asked = (
@@ -251,14 +328,21 @@ class CriticalPath(NamedTuple):
 
 @cache
 def _build_tangency_solver(friction: FrictionFunctions) -> Function:
-    """``(x, weakest, p) -> (g, Psi)``: frictional stress above the weakest, and the state, where
-    ln(V/V_*) = x is stationary; NaN where it never is.
+    r"""Build the function that solves for the tangency point.
 
-    From strength(g) = a x + Psi, whose derivative with respect to slip is taken at constant x,
+    The function ``(x, weakest, p) -> (g, Psi)`` returns the frictional stress and the state at
+    which ln(V/V_*) = x is stationary. The results are NaN if ln V is never stationary at this slip
+    rate. The argument ``weakest`` is a lower bound of the frictional stress.
 
-        strength'(g) K (V_0/V - 1) = dPsi/d(delta),
+    Notes
+    -----
+    With :math:`x = \ln(V/V_*)` and the frictional stress :math:`g`, friction satisfies
+    :math:`\mathrm{strength}(g) = a x + \Psi`. The derivative with respect to slip at constant
+    :math:`x` is
 
-    K being k D_c/sigma_*: one equation for g, which is solved by Brent's method.
+    .. math:: \mathrm{strength}'(g)\,K\,(V_0/V - 1) = d\Psi/d\delta
+
+    with :math:`K = k D_c/\sigma_*`. This equation for :math:`g` is solved by Brent's method.
     """
     strength, evolutions = friction.strength, friction.evolutions
 
@@ -276,8 +360,8 @@ def _build_tangency_solver(friction: FrictionFunctions) -> Function:
         highest = 2.0 * p[B] * abs(x) + p[STIFFNESS] * max(1.0, strength(0.0, (0.0,), p)[1])
         lowest = max(-highest, weakest)
         if acceleration(lowest, at) >= 0.0 and math.isfinite(weakest):
-            # where normal stress all but follows shear stress, the law asks for more than its own
-            # fall
+            # If normal stress changes almost as much as shear stress, the root is below the usual
+            # bracket.
             lowest = weakest
         at_lowest, at_highest = acceleration(lowest, at), acceleration(highest, at)
         if not at_lowest < 0.0 < at_highest:

@@ -1,12 +1,13 @@
-"""Critical step: the smallest step of the load that triggers instability.
+"""Critical step, the smallest step of the load that triggers instability.
 
 The step may be a change of load point velocity, load point displacement or normal stress. A step is
-critical if the peak slip rate of the motion that follows just reaches the instability norm. If the
-effect of inertia is small up to the norm, the end of this critical path is known: ln V equals the
-norm, and its rate is zero. The path is followed backwards in time, in which direction it attracts
-neighbouring paths, to the step at which it starts (see ``critical_path``). If inertia is important
-below the norm, the peak is followed forwards in time (see ``after_step``). In both cases, the
-result is accepted only if motions on both sides of the critical step confirm it.
+critical if the peak slip rate of the motion that follows just reaches the instability norm.
+
+If the effect of inertia is small up to the norm, the end of the critical path is known, because ln
+V equals the norm and its time derivative is zero. The path is integrated backwards in time to the
+step at which it starts (see ``critical_path``). If inertia is important below the norm, the peak
+slip rate of motions is computed forwards in time (see ``forward_motion``). A critical step is
+accepted only if the motions after a slightly smaller and a slightly larger step confirm the result.
 """
 
 from __future__ import annotations
@@ -54,24 +55,26 @@ STEP_FAMILIES: Mapping[str, type[StepFamily]] = {
     "normal_stress_step": NormalStressSteps,
 }
 DIRECTIONS = ("up", "down")
-#: Aliases of the quantities in `STEP_FAMILIES`, which are names of scene fields.
+#: Aliases of the quantities in ``STEP_FAMILIES``, which are names of scene fields.
 QUANTITY_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
-#: Accuracy of a boundary that is a limit cycle, whatever is asked for.
+#: Largest relative accuracy of a boundary at which a limit cycle touches the norm.
 _CYCLE_BOUNDARY_RTOL = 1e-8
 
-#: Widest bracket, over the size, that confirms a boundary.
+#: Largest width of a bracket that confirms a boundary, relative to the step size.
 _MAX_CONFIRMING_WIDTH = 0.02
 
-#: Excess of a motion whose first peak is beyond a limit cycle that touches the norm.
+#: Excess above which the first peak of a motion reaches the norm before the motion can approach a
+#: limit cycle.
 _FIRST_PEAK_EXCESS = 0.1
 
-#: A slip rate norm at which mass hardly acts.
+#: Slip rate norm at which the effect of inertia is negligible.
 _MASSLESS_NORM = 1e-3
 
 
 @cache
 def _outputs_for(of: str) -> tuple[Output, ...]:
+    """Return the outputs of a critical step of a given type."""
     critical = STEP_FAMILIES[of].quantity
     confirmed = (f"{critical}_stable", f"{critical}_unstable")
     beside = (*confirmed, *STEP_FAMILIES[of].extra_outputs, "critical_stiffness")
@@ -81,29 +84,58 @@ def _outputs_for(of: str) -> tuple[Output, ...]:
 @guard_methods
 @dataclass(frozen=True)
 class CriticalStep(Measure):
-    """Smallest step after which slip rate reaches the instability norm.
+    r"""Smallest step after which slip rate reaches the instability norm.
 
-    The norm is V T/(2 pi D_c). The critical step is a velocity ratio V_0/V_*, a displacement in
-    D_c, or a change of normal stress over sigma_*. The outputs include the sizes of two steps that
-    confirm the critical step: the slider settles after one of them, and becomes unstable after the
-    other. Under the slip law at constant normal stress, critical stiffness and an infinite norm,
-    the critical step is ``V_0/V_* = 1 + a/(b - a)``, or a displacement of ``D_c a/(b - a)``.
+    The critical step is a ratio of velocities, a displacement (in units of D_c), or a change of
+    normal stress (in units of sigma_*). The outputs include the sizes of two steps that confirm the
+    critical step. The slider settles after the smaller step, and becomes unstable after the larger
+    step.
 
     Parameters
     ----------
-    of : {"load_velocity_ratio", "displacement_step", "normal_stress_step"}
-        Type of the step. The value of this field in the scene is ignored. "velocity_step" is an
-        alias of "load_velocity_ratio". After a step of displacement or of normal stress, the load
-        point is held (V_0 = 0) unless the scene specifies ``load_velocity_ratio``. Steps of normal
-        stress require a normal stress that is not constant. A decrease of normal stress can trigger
-        an instability (direction "down", and a negative number).
-    direction : {"up", "down"}
+    of : str, default: "load_velocity_ratio"
+        Type of the step: "load_velocity_ratio", "displacement_step" or "normal_stress_step". The
+        value of this field in the scene is ignored. "velocity_step" is an alias of
+        "load_velocity_ratio". After a step of displacement or of normal stress, the load point is
+        held (V_0 = 0) unless the scene specifies ``load_velocity_ratio``. Steps of normal stress
+        require a normal stress that is not constant. If a decrease of normal stress triggers the
+        instability, the direction is "down" and the critical step is negative.
+    direction : {"up", "down"}, default: "up"
         Steps that increase or decrease the load.
+
+    Raises
+    ------
+    InvalidValue
+        If ``of`` or ``direction`` is not one of the choices.
+
+    Notes
+    -----
+    The norm limits the dimensionless slip rate :math:`V T/(2 \pi D_c)`, with the period :math:`T`
+    of the scene. Under the slip law at constant normal stress and critical stiffness, and with an
+    infinite norm, the critical step [1]_ is
+
+    .. math:: \frac{V_0}{V_*} = 1 + \frac{a}{b - a},
+
+    or a displacement of :math:`D_c\,a/(b - a)`. The measure computes the boundaries of eqs. 10, 11
+    and 14 of [2]_.
 
     References
     ----------
-    Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196; eqs. 10, 11 and 14 of
-    doi:10.1007/s11589-014-0098-4.
+    .. [1] Gu, J.-C., Rice, J. R., Ruina, A. L., & Tse, S. T. (1984). Slip motion and stability of a
+       single degree of freedom elastic system with rate and state dependent friction. J. Mech.
+       Phys. Solids, 32, 167-196.
+    .. [2] Effect of varying normal stress on stability and dynamic motion of a spring-slider system
+       with rate- and state-dependent friction. Earthquake Science (2014).
+       doi:10.1007/s11589-014-0098-4
+
+    Examples
+    --------
+    >>> from rsfstudy import Accuracy, Scene
+    >>> from rsfstudy.measures import CriticalStep
+    >>> scene = Scene(normal_stress="constant", a=0.0145, b_over_a=2.0)
+    >>> outcome = CriticalStep(of="displacement_step")(scene, Accuracy(rtol=1e-5))
+    >>> round(outcome.values["critical_displacement"], 4)
+    1.0
     """
 
     of: str = "load_velocity_ratio"
@@ -113,6 +145,7 @@ class CriticalStep(Measure):
     needs_time: ClassVar[tuple[bool, ...]] = (False,)
 
     def __post_init__(self) -> None:
+        """Check the fields, and replace aliases."""
         if isinstance(self.of, str):
             object.__setattr__(self, "of", QUANTITY_ALIASES.get(self.of, self.of))
         if not isinstance(self.of, str) or self.of not in STEP_FAMILIES:
@@ -122,35 +155,67 @@ class CriticalStep(Measure):
 
     @property
     def primary_output(self) -> str:
+        """Name of the critical step size."""
         return STEP_FAMILIES[self.of].quantity
 
     @property
     def outputs(self) -> Sequence[Output]:
+        """Critical step, the two confirming steps, and additional results."""
         return _outputs_for(self.of)
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
+        """Field of the step, which the measure ignores."""
         return (self.of,)
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Relative work by number of digits, as measured for velocity steps.
+        """Relative number of right-hand-side evaluations by number of digits.
 
-        The study accuracy_cost measured these ratios.
+        The values were measured for velocity steps in the study ``accuracy_cost``.
         """
         return {3.0: 0.59, 5.0: 0.74, 7.0: 1.0, 8.0: 1.21, 9.0: 1.58, 10.0: 1.89}
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """Return the scale of the numerical error, which is the size of the change."""
+        """Return the scale of the numerical error of the critical step.
+
+        The scale is the size of the change.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the computation.
+        values : mapping of str to float or ndarray
+            Results by name.
+
+        Returns
+        -------
+        mapping of str to float
+            Scales by name of the result.
+        """
         still = 1.0 if self.of == "load_velocity_ratio" else 0.0
         return {self.primary_output: abs(values[self.primary_output] - still)}
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Find the critical step, and confirm it with a motion on each side.
+        """Compute the critical step, and confirm it with two motions.
 
-        If the effect of inertia is small below the norm, the critical step follows from
-        ``critical_path``. If there is no such path, or if inertia is important, the critical step
-        is found from motions that are followed forwards in time.
+        If the effect of inertia is small below the norm, the critical step follows from the
+        critical path. If there is no critical path, or if inertia is important, the critical step
+        follows from forward motions.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
         """
         check_single_step(scene)
         if scene.starts_unsteady:
@@ -176,10 +241,10 @@ class CriticalStep(Measure):
                 message="stiffness is critical to within the accuracy: ask for a smaller rtol",
             )
         if not scene.critical_stiffness:
-            # nothing grows: only the step itself can reach the norm
+            # Perturbations do not grow, so only the step itself can reach the norm.
             return self._search_upward(steps, accuracy, meter)
         if not inertia_matters(scene, accuracy):
-            # a cycle attracts no path, and takes more care
+            # A limit cycle attracts nearby paths weakly, so its boundary needs a smaller tolerance.
             rtols = accuracy.rtol, min(accuracy.rtol, _CYCLE_BOUNDARY_RTOL)
             for find, rtol in zip(
                 (find_by_critical_path, find_by_touching_cycle), rtols, strict=True
@@ -203,11 +268,13 @@ class CriticalStep(Measure):
     def _verify_boundary(
         self, steps: StepFamily, boundary: StepBoundary, accuracy: Accuracy, meter: WorkMeter
     ) -> Outcome:
-        """Confirm a boundary by a motion on each side, as close to it as the motions can tell.
+        """Confirm a boundary with one motion on each side.
 
-        The width they confirm is the error of a boundary that motions found in the first place, and
-        of one that they do not confirm at once. A path is then none: where orbits grow that have
-        not reached the norm yet, a smaller step is critical.
+        The distance of the two motions from the boundary is the error of the boundary. If the
+        motions do not confirm a boundary that follows from forward motions or from a limit cycle,
+        the distance is increased tenfold, up to 2 %. The confirming distance is then the error of
+        the boundary. A boundary that follows from a critical path is rejected at the first failure,
+        because a smaller step may be critical if oscillations below the norm grow.
         """
         first = boundary.relative_error if boundary.from_motions else 3.0 * boundary.relative_error
         first = width = max(first, accuracy.rtol)
@@ -243,6 +310,7 @@ class CriticalStep(Measure):
         stable: float = math.nan,
         unstable: float = math.nan,
     ) -> dict[str, float]:
+        """Return the results by name, with NaN for missing results."""
         of = self.primary_output
         return {
             of: steps.step_value(size),
@@ -256,9 +324,8 @@ class CriticalStep(Measure):
     def _search_upward(self, steps: StepFamily, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Find the critical step from motions after steps of increasing size.
 
-        The search continues until a motion is unstable, and is then refined.
+        The search continues until a motion reaches the norm, and the bracket is then refined.
         """
-
         smallest, largest = math.log(steps.min_size), math.log(steps.max_size)
         spacing = (largest - smallest) / max(1, math.ceil((largest - smallest) / math.log(2.0)))
         stable: float | None = None
@@ -287,8 +354,10 @@ class CriticalStep(Measure):
     def _refine_bracket(
         self, steps: StepFamily, bracket: tuple[float, float], accuracy: Accuracy, meter: WorkMeter
     ) -> Outcome:
-        """Boundary between a stable and an unstable log size, where the excess of the motions
-        changes sign; the middle of what is left where a motion in between cannot go on.
+        """Find the boundary between a stable and an unstable log size.
+
+        The excess of the motions over the norm changes sign at the boundary. If a motion inside the
+        bracket cannot continue, the boundary is the centre of the remaining bracket.
         """
         stable, unstable = bracket
         rtol = max(steps.size_tolerance(math.exp(unstable), accuracy.rtol), MIN_RTOL)
@@ -315,7 +384,8 @@ class CriticalStep(Measure):
                     steps, math.exp(bracket[0]), meter, f", where {halt}"
                 )
             log_size = 0.5 * (stable + unstable)
-        # the motions that found it would confirm their own errors: the verdicts come from others
+        # Motions with the same tolerances would repeat the same errors, so the verification uses
+        # smaller tolerances.
         size = math.exp(log_size)
         error = max(
             accuracy.rtol + steps.neutral_size_error(size, accuracy.rtol), unstable - stable
@@ -326,8 +396,10 @@ class CriticalStep(Measure):
     def _no_critical_step_outcome(
         self, steps: StepFamily, largest: float, meter: WorkMeter, reason: str = ""
     ) -> Outcome:
-        """No step up to the largest reached the norm: because nothing is unstable, or because of
-        mass.
+        """Return the outcome if no step up to the largest is critical.
+
+        The status is ``norm_unreachable`` if inertia keeps the slip rate below the norm, ``ok`` if
+        the largest step itself reaches the norm, and ``stable_for_all_steps`` otherwise.
         """
         if steps.scene.has_mass and _massless_estimate(steps, meter) is not None:
             return Outcome(
@@ -366,7 +438,7 @@ def _motion_excess(
 def _massless_estimate(steps: StepFamily, meter: WorkMeter) -> float | None:
     """Compute the critical step for a norm at which inertia is negligible.
 
-    The result is an inexpensive approximation of the critical step.
+    The estimate takes little work. The result is None if there is no critical path.
     """
     norm = min(steps.scene.instability_norm, _MASSLESS_NORM)
     massless = type(steps)(steps.scene.without_mass().with_(instability_norm=norm), steps.sign)
@@ -378,9 +450,11 @@ def _massless_estimate(steps: StepFamily, meter: WorkMeter) -> float | None:
 def _find_bracket(
     steps: StepFamily, guess: float, accuracy: Accuracy, meter: WorkMeter
 ) -> tuple[float, float] | None:
-    """Find a stable and an unstable logarithm of size around a guess.
+    """Find a stable and an unstable log size around a guess.
 
-    The result is None if there are no such sizes within a factor of four.
+    If the guess is unstable, the search tests sizes down to 0.73 times the guess. If the guess is
+    stable, the search tests sizes up to 1.37 times the guess. The result is None if the search
+    finds no bracket.
     """
     middle = math.log(guess)
     reached = forward_motion.reaches_norm(steps.scene_at(guess), accuracy, meter)

@@ -1,4 +1,7 @@
-"""The motion after a step and its outcome: does the slip rate reach the instability norm?"""
+"""Outcome of the motion after a step, relative to the instability norm.
+
+The main functions are ``reaches_norm`` and ``excess_over_norm``.
+"""
 
 from __future__ import annotations
 
@@ -36,21 +39,23 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-#: Part of the critical stiffness below it, and decay per slip in D_c, that no motion can tell from
-#: none.
+#: Relative distance below the critical stiffness, and decay rate per D_c of slip, that cannot be
+#: distinguished from zero.
 _NEUTRAL_TOLERANCE = 1e-9
-#: Swings this small follow linear theory.
+#: Largest amplitude of ln V for which linear theory predicts the growth of oscillations.
 _MAX_LINEAR_AMPLITUDE = 0.05
-#: Factor from one orbit to the next larger one when growth is slow; limit cycles closer together
-#: than that may be leapt over. Leaps are shortened where they would land beyond the norm.
+#: Ratio of the sizes of successive orbits when growth is slow, and smallest such ratio. A leap may
+#: skip limit cycles whose sizes differ by less than this ratio. Leaps are shortened if they would
+#: end above the norm.
 _LEAP_FACTOR, _MIN_LEAP_FACTOR = 1.3, 1.002
 
-#: Peaks in a row that must be the same for a cycle of several states to repeat: next to a cycle
-#: that motions leave, they would not stay.
+#: Number of successive equal peaks after which a motion with several states repeats. Close to an
+#: unstable cycle, the peaks would not remain equal.
 _REQUIRED_REPEATS = 4
-#: How much higher in ln V a motion is taken to rise that is followed up to the norm only.
+#: Assumed height of the peak of ln V above the norm, if the motion is integrated only up to the
+#: norm.
 _OVERSHOOT_BEYOND_NORM = 1.0
-#: Part of the farthest distance from steady sliding at which a motion has come to it.
+#: Fraction of the largest distance from steady sliding below which a motion has settled.
 _STEADY_FRACTION = 1e-3
 
 _PEAK_EVENT = maximum("log_slip_rate")
@@ -58,11 +63,11 @@ _PEAK_EVENT = maximum("log_slip_rate")
 
 @dataclass(frozen=True)
 class _SteadySliding(SteadySliding):
-    """Steady sliding at the load point velocity, and the margin of its stability.
+    """Steady sliding at the load point velocity, with its stability margin.
 
-    It is neutral at constant normal stress and critical stiffness: every orbit then closes (Gu et
-    al. 1984 for the slip law, Ranjith and Rice 1999 for the slowness law), and only numerical
-    errors would make peaks grow.
+    At constant normal stress and critical stiffness, steady sliding is neutrally stable and every
+    orbit is closed. Gu et al. (1984) show this for the slip law, and Ranjith and Rice (1999) for
+    the slowness law. In this neutral case, only numerical errors change the height of the peaks.
     """
 
     stability_margin: float
@@ -74,8 +79,18 @@ class _SteadySliding(SteadySliding):
 
 @dataclass(frozen=True)
 class _Orbit:
-    """One orbit: its peaks of ln V, whether it reached the norm, where it grows too slowly to
-    follow, and ln V at its beginning where it slows down from there.
+    """One orbit of the motion after a step.
+
+    Parameters
+    ----------
+    peaks : tuple of float
+        Peaks of ln V.
+    reached_norm : bool
+        True if the motion has reached the norm.
+    slow_growth_point : Point, optional
+        Peak at which the orbit grows too slowly to integrate further.
+    initial_log_slip_rate : float, default: -inf
+        Value of ln V at the start, if the slip rate decreases from there.
     """
 
     peaks: tuple[float, ...]
@@ -85,29 +100,64 @@ class _Orbit:
 
 
 def reaches_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> bool:
-    """True if the slip rate reaches the norm after the step (see `excess_over_norm`)."""
+    """Return True if the slip rate reaches the norm after the step.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the step.
+    accuracy : Accuracy
+        Requested accuracy.
+    meter : WorkMeter
+        Counter of right-hand-side evaluations.
+
+    Returns
+    -------
+    bool
+        True if ``excess_over_norm`` is not negative.
+    """
     return excess_over_norm(scene, accuracy, meter) >= 0.0
 
 
 def excess_over_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> float:
-    """Excess of the motion after the step, which is followed until it is certain whether its slip
-    rate reaches the instability norm: negative where it does not.
+    """Compute the excess of the motion after the step over the norm.
 
-    It is continuous across the boundary as far as the motion allows: the distance of the peak of ln
-    V from the norm where mass acts, the growth from one peak to the next where it does not.
+    The excess is negative if the slip rate never reaches the instability norm. With inertia, the
+    excess is the height of the highest peak of ln V above the norm. Without inertia, the excess is
+    the growth of ln V from one peak to the next. If possible, the excess is continuous at the
+    boundary between stable and unstable steps.
 
-    Without mass the motion is planar and autonomous: paths cannot cross, so a peak no higher than
-    the one before means that none will ever be higher, and peaks that grow go on growing until they
-    reach the norm or a limit cycle. To see which without following a thousand orbits, the motion
-    leaps to a somewhat larger one: if that grows too, and so on up to the norm, so does the orbit
-    inside it. With mass, which acts during ruptures only, the same rules serve; with several states
-    only the norm, steady sliding itself or a cycle that repeats ends a motion. For load points that
-    are held see `held`.
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the step.
+    accuracy : Accuracy
+        Requested accuracy.
+    meter : WorkMeter
+        Counter of right-hand-side evaluations.
+
+    Returns
+    -------
+    float
+        Excess, which is positive or zero if the slip rate reaches the norm.
 
     Raises
     ------
     MotionStopped
-        With `no_steady_state` where the load point velocity has none, or as `motion` does.
+        With the status ``no_steady_state`` if sliding cannot be steady at the load point velocity,
+        or with another status if the motion cannot continue.
+
+    Notes
+    -----
+    Without inertia, the motion is planar and autonomous, so paths cannot cross. If a peak is not
+    higher than the previous peak, no later peak is higher. If peaks grow, they grow until they
+    reach the norm or a limit cycle.
+
+    If growth is slow, the motion leaps to a somewhat larger orbit instead of following a large
+    number of orbits. If all larger orbits grow up to the norm, the inner orbit also grows up to the
+    norm. The same rules apply with inertia, because inertia acts only during ruptures. With several
+    states, a motion ends only at the norm, in steady sliding or in a cycle that repeats. The module
+    ``held_load_point`` handles held load points.
     """
     if scene.log_load_velocity == -math.inf:
         return peak_excess(scene, accuracy, meter)
@@ -127,15 +177,39 @@ def excess_over_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> floa
 
 
 def has_frictional_damping_only(scene: Scene) -> bool:
-    """True if effective normal stress is constant once the loading has changed it, and only
-    friction damps.
+    """Return True if friction is the only source of damping.
+
+    The effective normal stress must also be constant. Sudden changes of normal stress by the
+    loading are permitted.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to test.
+
+    Returns
+    -------
+    bool
+        False if shear stress or pore pressure changes the effective normal stress, or if waves
+        radiate stress.
     """
     varies = scene.parts.normal_stress.depends_on_shear_stress or scene.parts.fluid.effects
     return not varies and not scene.dynamics.radiated_stress_slope(0.0)
 
 
 def may_have_closed_orbits(scene: Scene) -> bool:
-    """True if every orbit closes at critical stiffness."""
+    """Return True if every orbit is closed at the critical stiffness.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to test.
+
+    Returns
+    -------
+    bool
+        True if the law has closed orbits and friction is the only source of damping.
+    """
     law = scene.parts.law
     return (
         law.has_closed_orbits and not law.depends_on_stress and has_frictional_damping_only(scene)
@@ -143,18 +217,45 @@ def may_have_closed_orbits(scene: Scene) -> bool:
 
 
 def stiffness_ratio_after_step(scene: Scene) -> float:
-    """``k/[k_cr(V_*) sigma/sigma_*]``: stiffness over the critical one at V_* and at the normal
-    stress sigma after the step, where friction acts alone: critical stiffness is in proportion to
+    """Return the stiffness ratio k/k_cr after a step.
+
+    If friction is the only source of damping, the critical stiffness at V_* is proportional to
     normal stress.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the step.
+
+    Returns
+    -------
+    float
+        Ratio of the stiffness to the critical stiffness at V_* and at the normal stress after the
+        step.
     """
     return scene.stiffness_ratio / (1.0 + scene.imposed_normal_stress)
 
 
 def is_neutral(scene: Scene, tolerance: float) -> bool:
-    """True if stiffness is so close to the critical one, both at V_* and at the load point
-    velocity, that growth and decay cannot be told apart: by most laws it is critical at every rate
-    or at none, where friction acts alone. Where all orbits close at critical stiffness, that is
-    known; with the load point held there are none.
+    """Return True if growth and decay of perturbations are indistinguishable.
+
+    The stiffness must be close to the critical stiffness, both at V_* and at the load point
+    velocity. If friction is the only source of damping, the critical stiffness does not depend on
+    slip rate under most laws.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the step.
+    tolerance : float
+        Largest relative difference from the critical stiffness.
+
+    Returns
+    -------
+    bool
+        True if growth and decay are indistinguishable. The result is False if the load point is
+        held, or if the stiffness is exactly critical and all orbits are closed, because these cases
+        are decided without a motion.
     """
     off = abs(stiffness_ratio_after_step(scene) - 1.0)
     known = scene.log_load_velocity == -math.inf or (off == 0.0 and may_have_closed_orbits(scene))
@@ -163,20 +264,43 @@ def is_neutral(scene: Scene, tolerance: float) -> bool:
 
 
 def is_linearly_stable(scene: Scene) -> bool:
-    """True if steady sliding at the scene's load point velocity is linearly stable; a held load
-    point is.
+    """Return True if steady sliding at the load point velocity is stable.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the load point velocity.
+
+    Returns
+    -------
+    bool
+        True if small perturbations do not grow, or if the load point is held.
     """
     return stability_margin(scene) >= -_NEUTRAL_TOLERANCE
 
 
 def stability_margin(scene: Scene) -> float:
-    """``k/k_cr(V_0) - 1``: by how much stiffness exceeds the critical one at the scene's load point
-    velocity, over that; infinite where every stiffness is stable. Positive too where several states
-    are stable below it, by how far they are below.
+    """Compute the stability margin of steady sliding.
+
+    The margin is the relative excess of the stiffness over the critical stiffness at the load point
+    velocity.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the load point velocity.
+
+    Returns
+    -------
+    float
+        Margin :math:`k/k_{cr}(V_0) - 1`. The margin is infinite if steady sliding is stable at
+        every stiffness or if the load point is held. If steady sliding with several states is
+        stable below the critical stiffness, the margin is the absolute value.
 
     References
     ----------
-    Rice and Ruina (1983), J. Appl. Mech. 50, 343-349.
+    Rice, J. R., & Ruina, A. L. (1983). Stability of steady frictional slipping. J. Appl. Mech., 50,
+    343-349.
     """
     return (
         math.inf
@@ -186,11 +310,12 @@ def stability_margin(scene: Scene) -> float:
 
 
 def _max_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> float:
-    """Highest ln V of an orbit that closes: at the nearer of its peaks, before the start or after
-    it.
+    """Compute the largest ln V of a closed orbit.
 
-    A motion that starts slowing down comes from its peak; there it is followed against time,
-    instead of around an orbit that may lead down to 1e-40 V_* and lose all digits on the way.
+    The largest ln V is the peak closest to the start, before or after the start. If the motion
+    starts with a decreasing slip rate, the motion is integrated backwards in time to the previous
+    peak. The rest of the orbit may reach slip rates of 1e-40 V_*, at which an integration would
+    lose all digits.
     """
     begin = initial_point(scene)
     equations, start = equations_without_mass(scene, clock=False), (begin.spring_stress, begin.psi)
@@ -214,8 +339,9 @@ def _max_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> 
 
 
 def _shrinks_at_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> bool:
-    """True if the orbit that touches the norm peaks lower the next time: paths cannot cross, so
-    that none inside of it ever reaches the norm.
+    """Return True if the orbit that touches the norm shrinks.
+
+    Paths in a plane cannot cross, so no orbit inside a shrinking orbit reaches the norm.
     """
     path = CriticalPath.of_scene(scene, meter.engine)
     misfit = path.cycle_misfit(accuracy.local_tolerance, meter)
@@ -231,9 +357,10 @@ def _grows_to_norm(
     *,
     with_inertia: bool,
 ) -> bool:
-    """Leap from a slowly growing orbit to larger ones, until one shrinks or grows up to the norm.
+    """Return True if a slowly growing orbit grows up to the norm.
 
-    An orbit counts as grown to the norm only if its first peak was below it.
+    The motion leaps from the orbit to larger orbits, until an orbit shrinks or reaches the norm. A
+    leap is shortened if the first peak of the new orbit is above the norm.
     """
     if not with_inertia and _shrinks_at_norm(scene, accuracy, meter):
         return False
@@ -266,8 +393,9 @@ def _follow_orbit(
     *,
     with_inertia: bool,
 ) -> _Orbit:
-    """Follow one orbit until it is certain how it goes on, or found to grow too slowly to
-    follow.
+    """Integrate an orbit until the outcome of the motion is certain.
+
+    The integration also ends if the orbit grows too slowly.
     """
     norm = scene.log_instability_rate
     specs = [_PEAK_EVENT] if with_inertia else [_PEAK_EVENT, rise("log_slip_rate", norm)]
@@ -280,7 +408,7 @@ def _follow_orbit(
         top = event.point.log_slip_rate
         if event.kind is EventKind.START:
             if start is None and event.point.log_slip_rate_derivative <= 0.0:
-                # no peak of an orbit to compare others with
+                # The start is not a peak of an orbit, so later peaks are not compared with it.
                 at_start = top
                 if top >= norm:
                     return _Orbit((), reached_norm=True, initial_log_slip_rate=top)
@@ -310,9 +438,12 @@ def _follow_orbit(
 
 
 class _RepetitionDetector:
-    """True if a motion of several states has come to a cycle that repeats, or as close to rest as
-    the tolerance lets it: at some peaks in a row its unknowns are the same, as far as numbers tell.
-    Where steady sliding is unstable, and growth too small to be measured, the motion goes on.
+    """Detector of repeating motions in scenes with several states.
+
+    A motion repeats if its unknowns are the same at several successive peaks, within numerical
+    errors. A motion that is at rest within the tolerance also repeats. If steady sliding is
+    unstable and the oscillation is small, the motion continues, because the growth may be too small
+    to measure.
     """
 
     def __init__(self, scene: Scene, steady: _SteadySliding, accuracy: Accuracy) -> None:
@@ -320,7 +451,18 @@ class _RepetitionDetector:
         self._previous, self._repeat_count = (math.inf,) * (1 + scene.state_count), 0
 
     def update(self, peak: Point) -> bool:
-        """True if it has at this peak."""
+        """Update the detector, and return True if the motion repeats.
+
+        Parameters
+        ----------
+        peak : Point
+            Point at the latest peak of ln V.
+
+        Returns
+        -------
+        bool
+            True if the required number of successive peaks are equal.
+        """
         current = (peak.spring_stress, *peak.psis)
         change = max(abs(x - y) for x, y in zip(current, self._previous, strict=True))
         linear = (
@@ -337,8 +479,9 @@ class _RepetitionDetector:
 def _has_stopped_growing(
     peaks: Sequence[float], steady: _SteadySliding, accuracy: Accuracy
 ) -> bool:
-    """True if the last peak is no higher than the one before, as far as numbers tell. Too small to
-    be measured, growth has the sign that linear theory gives it.
+    """Return True if the last peak is not higher than the previous peak.
+
+    If the growth is too small to measure, linear theory determines the sign of the growth.
     """
     slack = 100.0 * accuracy.local_tolerance
     linear = peaks[-1] - steady.log_slip_rate < _MAX_LINEAR_AMPLITUDE and not steady.is_stable
@@ -346,7 +489,10 @@ def _has_stopped_growing(
 
 
 def _compute_excess(orbit: _Orbit, norm: float, *, with_inertia: bool) -> float:
-    """Excess that changes sign at the boundary, as far as this orbit shows it."""
+    """Compute an excess that changes sign at the boundary.
+
+    A single orbit may not reveal the sign of the excess.
+    """
     if with_inertia:
         highest = max((orbit.initial_log_slip_rate, *orbit.peaks))
         return highest - norm if highest > -math.inf else -norm
@@ -361,7 +507,7 @@ def _steady_sliding(scene: Scene) -> _SteadySliding:
     Raises
     ------
     MotionStopped
-        If there is no steady state.
+        If sliding cannot be steady at the load point velocity.
     """
     load = scene.log_load_velocity
     sliding = steady_sliding(scene, load)
@@ -387,7 +533,8 @@ def _steady_sliding(scene: Scene) -> _SteadySliding:
 
 
 def _is_stable_to_small_perturbations(scene: Scene) -> bool:
-    """True if small changes of steady sliding decay, which those of several states may do below the
-    critical stiffness.
+    """Return True if small perturbations of steady sliding decay.
+
+    With several states, perturbations may decay below the critical stiffness.
     """
     return bool(growth_rates(scene, scene.log_load_velocity)[0].real < -_NEUTRAL_TOLERANCE)

@@ -1,9 +1,12 @@
-"""Highest slip rate of a motion under a load point at rest, as after a step of displacement.
+"""Peak slip rate of a motion with a held load point.
 
-Spring stress can only fall there. With one state the first peak of ln V is the last: where ln V is
-stationary slip weakens, and goes on to weaken less, so that ln V has no minimum. Several states may
-weaken one after the other: those with b < 0, and pore pressure that dilatant slip has lowered, do
-so because slip rate falls. Such a motion is followed until nothing can weaken enough any more.
+The main function is ``peak_excess``. Spring stress can only decrease while the load point is held.
+With one state, the first peak of ln V is also the last peak. At the peak, friction weakens with
+slip. The weakening decreases after the peak, so ln V has no minimum.
+
+With several states, friction may weaken repeatedly. States with b < 0, and pore pressure that
+dilatancy has lowered, weaken friction when the slip rate decreases. The motion is therefore
+integrated until no state can weaken friction enough for another peak above the norm.
 """
 
 from __future__ import annotations
@@ -34,22 +37,41 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-#: Distance in ln V between levels at which it is asked whether a peak was the last, and the part of
-#: their distance from the norm that it is where that is more.
+#: Spacing in ln V of the levels at which the motion is tested for further peaks: an absolute
+#: minimum, and a fraction of the distance from the norm.
 _MIN_LEVEL_SPACING, _RELATIVE_LEVEL_SPACING = 1.0, 0.12
-#: Distances in ln V below the present one at which no state must weaken.
+#: Decreases of ln V at which the weakening of the states is tested.
 _TESTED_LOG_RATE_DECREASES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
-#: Changes of ln V that pore pressure is tried to be too low for.
+#: Increases of ln V that are tested as upper bounds of the effect of pore pressure.
 _TESTED_LOG_RATE_INCREASES = (1e-4, 1e-3, 1e-2, 0.1, 1.0)
-#: Part of what falling spring stress takes from ln V that weakening may give back.
+#: Largest weakening of friction, as a fraction of the decrease of spring stress.
 _MAX_WEAKENING_FRACTION = 0.5
 
 
 def peak_excess(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> float:
-    """Highest ln V of the motion above the instability norm.
+    """Compute the height of the highest peak of ln V above the norm.
 
-    Where mass does not act the motion is followed up to the norm only: the square of the growth of
-    ln V there, which vanishes with the excess, takes its place.
+    If the effect of inertia is small, the motion is integrated only up to the norm. The excess is
+    then the square of the rate of ln V at the norm, which vanishes at the boundary.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with a held load point.
+    accuracy : Accuracy
+        Requested accuracy.
+    meter : WorkMeter
+        Counter of right-hand-side evaluations.
+
+    Returns
+    -------
+    float
+        Excess, which is negative if the slip rate does not reach the norm.
+
+    Raises
+    ------
+    MotionStopped
+        If the motion cannot continue. A motion that stops slipping does not raise the exception.
     """
     norm, heavy, highest = scene.log_instability_rate, inertia_matters(scene, accuracy), -math.inf
     try:
@@ -72,7 +94,11 @@ def peak_excess(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> float:
 def _event_specifications(
     scene: Scene, norm: float, *, with_inertia: bool
 ) -> list[EventSpecification]:
-    """Peaks, the norm, the end of shear stress, and levels of ln V ever farther below the norm."""
+    """Return the events at which the motion is tested.
+
+    The events are the peaks of ln V, the norm, the loss of shear stress, and decreasing levels of
+    ln V below the norm.
+    """
     specs = [maximum("log_slip_rate")]
     if not with_inertia:
         specs.append(rise("log_slip_rate", norm))
@@ -86,7 +112,7 @@ def _event_specifications(
 
 
 def _is_last_peak(scene: Scene, event: Event) -> bool:
-    """True if no peak comes after an event, or none that reaches the norm."""
+    """Return True if no later peak can reach the norm."""
     slows = event.kind is EventKind.START and event.point.log_slip_rate_derivative <= 0.0
     if scene.state_count == 1:
         return slows or event.kind is EventKind.MAXIMUM
@@ -96,12 +122,14 @@ def _is_last_peak(scene: Scene, event: Event) -> bool:
 
 
 def _stays_below_norm(scene: Scene, point: Point) -> bool:
-    """True if it can be proved that ln V, which falls, will not reach the norm.
+    """Return True if ln V provably stays below the norm.
 
-    A state that strengthens tends to where it would rest at the present slip rate, and goes on to
-    strengthen while that rises, which it does with falling ln V where b > 0. Pore pressure may
-    raise ln V by what it takes from strength, over a, and no farther, if as much above its rest a
-    state weakens less than falling spring stress takes.
+    The slip rate is decreasing at the point. A state that strengthens friction approaches its
+    steady state at the present slip rate. If b > 0, the steady state rises as ln V decreases, so
+    the state continues to strengthen friction.
+
+    Pore pressure raises ln V by at most the loss of strength divided by a. The proof also requires
+    that, at the raised ln V, the states weaken friction more slowly than spring stress decreases.
     """
     _value, slope, shift, shift_slope = friction_relation(scene, point.psis)(
         point.frictional_stress
@@ -127,10 +155,11 @@ def _stays_below_norm(scene: Scene, point: Point) -> bool:
 
 
 def _bound_pressure_effect(scene: Scene, point: Point) -> tuple[float, float]:
-    """Bound of what pore pressure raises ln V by from now on, and of the state lost to stress; the
-    first is infinite where there is no bound.
+    """Compute an upper bound of the increase of ln V by pore pressure.
 
-    No higher than such a bound, ln V allows of no pressure that would take it as high.
+    The second result is the state shift due to stress at the upper bound. The first result is
+    infinite if there is no bound. An increase of ln V is a bound if the highest pore pressure at
+    the increased ln V reduces strength by less than a times the increase.
     """
     fluid, psis = scene.parts.fluid, point.psis
     value, _slope, shift, _ = friction_relation(scene, psis)(point.frictional_stress)

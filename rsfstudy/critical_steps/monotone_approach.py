@@ -1,10 +1,13 @@
-"""Slip rate that rises to that of a fast load point and not beyond: waves carry stress away.
+"""Monotonic rise of slip rate to a fast load point velocity.
 
-Where radiation takes most of the stress, V follows the spring, over a slip of eta V_0/(K D_c): many
-times D_c, while the state stays as close behind as D_c lets it. An explicit integrator steps by D_c
-all the way. So the motion ends where it has come between two curves in the plane of ln V and state
-that only meet in steady sliding: the state at rest, and a lag behind that which the state makes up
-for faster than it grows. Both are crossed inwards, and between them ln V rises.
+If waves radiate most of the stress, V follows the spring over a slip of eta V_0/(K D_c), which is
+many times D_c, while the state stays close to its steady state. An explicit integrator would need
+steps of about D_c for the whole rise. The functions of this module test if the integration can end
+early, because the rest of the rise is monotonic.
+
+The test uses two curves in the plane of ln V and state, which meet only in steady sliding. The
+first curve is the steady state. The second curve is a lag behind the steady state that motions can
+cross only towards smaller lags. A motion between the curves remains there, and its slip rate rises.
 """
 
 from __future__ import annotations
@@ -25,12 +28,14 @@ from rsfstudy.slider import (
     stress_for_friction,
 )
 
-#: Distances in ln V below the load point at which it is asked whether the motion is between them.
+#: Distances of ln V below the load point velocity at which the motion is tested.
 _TESTED_DISTANCES = (10.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0, 0.5, 0.2)
-#: The farther curve, over the lag at which a state that rested would be after a slip of D_c; part
-#: of the evolution there that is left to cross it; the nearest place to the load point at which
-#: the curves are looked at, the most apart that such places are, and the step of differences. All
-#: changes are in proportion to the distance where that is small.
+#: The first number is the lag of the second curve, relative to the lag that a state at rest would
+#: have after a slip of D_c. The second number is the fraction of the evolution that must remain to
+#: cross the curve. The third number is the smallest distance in ln V from the load point velocity
+#: at which the curves are tested, because all changes are proportional to the distance if the
+#: distance is small. The last two numbers are the largest spacing of the logarithms of the
+#: distances, and the step of the finite differences.
 (
     _LAG_FACTOR,
     _REQUIRED_EVOLUTION_FRACTION,
@@ -38,14 +43,24 @@ _TESTED_DISTANCES = (10.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0, 0.5
     _MAX_TEST_SPACING,
     _DIFFERENCE_STEP,
 ) = 2.0, 0.25, 1e-4, 0.25, 1e-5
-#: Change of ln V over a slip of D_c, over its distance from the load point, up to which a motion is
-#: as slow as that: to follow it takes hundreds of steps.
+#: Largest change of ln V over a slip of D_c, relative to the distance from the load point velocity,
+#: at which the test is worthwhile. Such a slow motion would take hundreds of steps.
 _MAX_RELATIVE_GROWTH = 0.02
 
 
 def monotone_rise_events(scene: Scene) -> list[EventSpecification]:
-    """Event specifications that are needed to ask `rises_monotonically`: nothing where the motion
-    is not slow there, or there are several states or mass, of which it knows nothing.
+    """Return the events at which ``rises_monotonically`` should be called.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+
+    Returns
+    -------
+    list of EventSpecification
+        Levels of ln V below the load point velocity. The list is empty if the rise is not slow, or
+        if the scene has several states or inertia, for which the test is not valid.
     """
     load = scene.log_load_velocity
     if scene.state_count > 1 or scene.has_mass:
@@ -58,8 +73,23 @@ def monotone_rise_events(scene: Scene) -> list[EventSpecification]:
 
 
 def rises_monotonically(scene: Scene, point: Point) -> bool:
-    """True if ln V rises from a point to that of the load point and not beyond, as far as places on
-    the way tell.
+    """Return True if ln V rises to the load point velocity and not beyond.
+
+    The test is based on a finite number of points between the present slip rate and the load point
+    velocity.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    point : Point
+        Present point of the motion.
+
+    Returns
+    -------
+    bool
+        True if the motion is between the two curves, and if motions at all tested points cross the
+        curves inwards.
     """
     change, load = _build_change_function(scene), scene.log_load_velocity
     distance = load - point.log_slip_rate
@@ -68,7 +98,7 @@ def rises_monotonically(scene: Scene, point: Point) -> bool:
         return _LAG_FACTOR * change(x, 0.0)[1]
 
     lag = point.state - compute_steady_states(scene, point.log_slip_rate, 0.0)[0]
-    # it lags on the side of b
+    # The sign of the lag is the sign of b.
     side = math.copysign(1.0, scene.b)
     if not 0.0 <= side * lag <= side * farthest(point.log_slip_rate):
         return False
@@ -86,7 +116,12 @@ def rises_monotonically(scene: Scene, point: Point) -> bool:
 
 
 def _build_change_function(scene: Scene) -> Callable[[float, float], tuple[float, float]]:
-    """Per slip of D_c, at ln(V/V_*) and a lag of the state behind its rest: the changes of both."""
+    """Build a function that computes the changes of ln V and of the lag.
+
+    The arguments of the function are ln(V/V_*) and the lag of the state behind the steady state.
+    The results are changes per D_c of slip, or NaN if no stress corresponds to this value of
+    friction.
+    """
     relation, evolution = friction_relation(scene), single_state_evolution(scene)
 
     def at(x: float, lag: float) -> tuple[float, float]:

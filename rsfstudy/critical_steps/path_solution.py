@@ -1,5 +1,7 @@
-"""A boundary among steps by the critical path that starts it, or by the limit cycle that touches
-the norm, with its numerical error.
+"""Boundary between stable and unstable steps, with its numerical error.
+
+The function ``find_by_critical_path`` computes the boundary from the critical path. The function
+``find_by_touching_cycle`` computes the boundary at which a limit cycle touches the norm.
 """
 
 from __future__ import annotations
@@ -20,23 +22,27 @@ from rsfstudy.motion import (
     slow_manifold_error,
 )
 
-#: Part of the accuracy asked for to which the errors of two paths may agree by chance.
+#: Error that two paths may share by chance, as a fraction of the requested relative accuracy.
 _COINCIDENCE_FLOOR = 0.004
 
-#: Most local tolerances by which a path is followed.
+#: Largest number of local tolerances with which a path is integrated.
 _MAX_PATHS = 5
 
 
 @dataclass(frozen=True)
 class StepBoundary:
-    """A boundary in step size with its numerical error, both before verification.
+    """Boundary in step size before verification, with its numerical error.
 
-    Attributes
+    Parameters
     ----------
-    size, relative_error : float
-        Size of the step (see `Steps`), and its error over that.
-    from_motions, from_cycle : bool
-        Whether motions have found it, or whether a limit cycle is what touches the norm.
+    size : float
+        Size of the step. See ``StepFamily``.
+    relative_error : float
+        Relative error of the size.
+    from_motions : bool, default: False
+        True if the boundary follows from forward motions.
+    from_cycle : bool, default: False
+        True if a limit cycle touches the norm at the boundary.
     """
 
     size: float
@@ -48,13 +54,29 @@ class StepBoundary:
 def find_by_critical_path(
     steps: StepFamily, accuracy: Accuracy, meter: WorkMeter
 ) -> StepBoundary | None:
-    """Boundary from the critical path, unless smaller steps may be unstable, at once or when the
-    motion comes back; None where there is no such path.
+    """Find the boundary that corresponds to the critical path.
+
+    The boundary is rejected if smaller steps may be unstable. Smaller steps may be unstable if
+    steady sliding is unstable, or if the next peak of the motion exceeds the norm.
+
+    Parameters
+    ----------
+    steps : StepFamily
+        Steps among which the boundary is sought.
+    accuracy : Accuracy
+        Requested accuracy.
+    meter : WorkMeter
+        Counter of right-hand-side evaluations.
+
+    Returns
+    -------
+    StepBoundary or None
+        The boundary, or None if there is no critical path or if smaller steps may be unstable.
     """
     boundary = _find_boundary(steps, steps.find_path_sizes, accuracy, meter)
     if boundary is None or not steps.smaller_steps_decay(boundary.size):
         return None
-    # by laws whose orbits close at critical stiffness no motion goes beyond where it comes back
+    # If all orbits are closed at the critical stiffness, a motion never returns to a higher peak.
     if steps.scene.parts.law.has_closed_orbits:
         return boundary
     scene = steps.scene_at(boundary.size)
@@ -70,8 +92,24 @@ def find_by_critical_path(
 def find_by_touching_cycle(
     steps: StepFamily, accuracy: Accuracy, meter: WorkMeter
 ) -> StepBoundary | None:
-    """Boundary where the motion ends in a limit cycle that touches the norm: where larger steps
-    make steady sliding less stable, and the largest unstable.
+    """Find the boundary at which a limit cycle touches the norm.
+
+    A limit cycle can touch the norm if larger steps make steady sliding less stable, and if steady
+    sliding is unstable after the largest step.
+
+    Parameters
+    ----------
+    steps : StepFamily
+        Steps among which the boundary is sought.
+    accuracy : Accuracy
+        Requested accuracy.
+    meter : WorkMeter
+        Counter of right-hand-side evaluations.
+
+    Returns
+    -------
+    StepBoundary or None
+        The boundary, or None if there is no such limit cycle.
     """
     small, large = (
         stability_margin(steps.scene_at(size)) for size in (steps.min_size, steps.max_size)
@@ -79,7 +117,7 @@ def find_by_touching_cycle(
     if large >= 0.0 or small - large < 10.0 * accuracy.rtol:
         return None
     boundary = _find_boundary(steps, steps.find_cycle_sizes, accuracy, meter)
-    # a cycle attracts little: the two errors may have much in common
+    # A limit cycle attracts nearby motions weakly, so the errors of two runs may be similar.
     error = 5.0 * boundary.relative_error if boundary else math.nan
     return boundary and replace(boundary, relative_error=error, from_cycle=True)
 
@@ -90,9 +128,12 @@ def _find_boundary(
     accuracy: Accuracy,
     meter: WorkMeter,
 ) -> StepBoundary | None:
-    """A boundary with the error that a second, smaller tolerance tells, and a third where that is
-    more than asked for: a path takes so few steps that one whose error is taken for too small
-    decides. None where there is none within the steps of the search.
+    """Find a boundary, and estimate its error from several tolerances.
+
+    The path is integrated with decreasing tolerances until the difference between two runs is
+    within the requested accuracy. A path has so few steps that a single underestimated local error
+    may dominate the result. The result is None if the search finds no size between the smallest and
+    the largest step.
     """
     boundary = None
     of_path = slow_manifold_error(steps.scene) if steps.scene.has_mass else 0.0
@@ -107,7 +148,7 @@ def _find_boundary(
 
 
 def _decreasing_tolerances(accuracy: Accuracy) -> Iterator[float]:
-    """Local tolerances of paths, one a tenth of the other."""
+    """Yield local tolerances, each a tenth of the previous tolerance."""
     for _ in range(_MAX_PATHS):
         if accuracy.local_tolerance > MIN_LOCAL_TOLERANCE:
             yield accuracy.local_tolerance

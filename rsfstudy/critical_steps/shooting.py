@@ -1,4 +1,9 @@
-"""Base of the kinds of steps among which a critical one is sought, and of those shot for."""
+"""Families of steps, and the shooting method that finds critical steps.
+
+The base class ``StepFamily`` describes all steps of one type and direction, ordered by size. The
+class ``ShootingSteps`` adds the shooting method. The module ``step_types`` contains the concrete
+classes.
+"""
 
 from __future__ import annotations
 
@@ -16,48 +21,52 @@ from rsfstudy.critical_steps.forward_motion import is_linearly_stable
 from rsfstudy.motion import WorkMeter
 from rsfstudy.slider import Scene, log_slip_rate_at
 
-#: Smallest step the search tries, and the part of the largest that it is at most.
+#: Smallest step size of the search, and its upper limit as a fraction of the largest step size.
 MIN_STEP_SIZE, _MIN_SIZE_FRACTION = 1e-3, 0.1
-#: How much farther in ln V a step may jump where mass delays the rise of slip rate.
+#: Extension of the largest step, in ln V, if inertia delays the rise of slip rate.
 INERTIAL_LOG_RATE_MARGIN = 5.0
-#: Part of the accuracy asked for to which what mass delays goes unseen.
+#: Largest effect of a delay by inertia that is neglected, as a fraction of the requested accuracy.
 INERTIA_TOLERANCE_FRACTION = 0.01
-#: Sizes that are looked at where stability may come and go between them.
+#: Number of step sizes at which stability is tested, if stability may change repeatedly with size.
 _STABILITY_TEST_COUNT = 24
-#: Local tolerance of the first root.
+#: Local tolerance of the approximate root.
 LOOSE_TOLERANCE = 1e-5
-#: Distances in log size over which the slope of the misfit is taken; what corrects a loose root by
-#: more leads nowhere.
+#: Smallest and largest distance in log size over which the slope of the misfit is computed. If a
+#: correction of the approximate root exceeds the largest distance, the refinement ends.
 _MIN_SLOPE_DISTANCE, _MAX_SLOPE_DISTANCE = 1e-3, 0.05
 _MAX_CORRECTIONS = 8
-#: Longest stride, and end, of the search for a sign change in logit(size/largest).
+#: Largest stride and upper end of the search for a sign change, in logit(size/largest size).
 _MAX_STRIDE, _MAX_POSITION = 0.7, 4.0
-#: Strides without a critical path on either side after which shooting is given up.
+#: Number of successive strides without a critical path after which the search is abandoned.
 _MAX_FAILURES = 3
 
 
 class StepFamily:
-    """Steps of one kind and direction on one scene, by size: a positive number that grows with the
-    step.
+    """Base class of families of steps with one type and one direction.
+
+    The size of a step is a positive number that increases with the step.
 
     Parameters
     ----------
     scene : Scene
-        The scene the steps are imposed on.
+        Scene on which the steps are imposed.
     sign : {1, -1}
-        Upward or downward.
+        Direction of the steps, 1 for upward and -1 for downward.
 
     Attributes
     ----------
-    min_size, max_size : float
-        Sizes the search covers; there is none to search where the loading alone reaches the norm.
+    min_size : float
+        Smallest size of the search.
+    max_size : float
+        Largest size of the search. If the loading itself reaches the norm, there are no sizes to
+        search, and the largest size does not exceed the smallest size.
     """
 
-    #: Name of the critical value in results.
+    #: Name of the critical step in the results.
     quantity: ClassVar[str]
-    #: What else is told of a critical step.
+    #: Names of additional results for the critical step.
     extra_outputs: ClassVar[tuple[str, ...]] = ()
-    #: Whether the largest step takes the slip rate to the norm by itself, at once.
+    #: True if the largest step itself raises the slip rate to the norm immediately.
     largest_step_reaches_norm = False
 
     def __init__(self, scene: Scene, sign: int) -> None:
@@ -66,60 +75,183 @@ class StepFamily:
         self.min_size = min(MIN_STEP_SIZE, _MIN_SIZE_FRACTION * self.max_size)
 
     def scene_at(self, size: float) -> Scene:
-        """The scene with a step of this size."""
+        """Return the scene with a step of a given size.
+
+        Parameters
+        ----------
+        size : float
+            Size of the step.
+
+        Returns
+        -------
+        Scene
+            Scene with the step.
+        """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
     def step_value(self, size: float) -> float:
-        """The number a user knows the step by."""
+        """Return the value of the scene field for a step of a given size.
+
+        Parameters
+        ----------
+        size : float
+            Size of the step.
+
+        Returns
+        -------
+        float
+            Value of the field.
+        """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
     def value_error(self, size: float, relative_error: float) -> float:
-        """Error of `value` where the size has this relative error."""
+        """Return the error of the step value.
+
+        Parameters
+        ----------
+        size : float
+            Size of the step.
+        relative_error : float
+            Relative error of the size.
+
+        Returns
+        -------
+        float
+            Absolute error of ``step_value(size)``.
+        """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
     def size_tolerance(self, size: float, rtol: float) -> float:
-        """Relative error of a size at which `value`, less what it is without a step, has this one;
-        no more than that: ``rtol |value(size) - value(0)|/(d value/d ln size)``.
+        r"""Return the size tolerance for a tolerance of the step value.
+
+        If the size has the returned relative error, the change of the step value has the relative
+        error ``rtol``. The size tolerance is at most ``rtol``.
+
+        Parameters
+        ----------
+        size : float
+            Size of the step.
+        rtol : float
+            Relative tolerance of the change of the step value.
+
+        Returns
+        -------
+        float
+            Relative tolerance of the size.
+
+        Notes
+        -----
+        With the step value :math:`v(s)` for the size :math:`s`, the tolerance of the size is
+
+        .. math:: \mathrm{rtol}\,\frac{|v(s) - v(0)|}{dv/d\ln s}.
         """
         change = abs(self.step_value(size) - self.step_value(0.0))
         return min(rtol, rtol * change / self.value_error(size, 1.0))
 
     def extra_values(self, size: float) -> dict[str, float]:
-        """The numbers named in `beside`, for a critical step of this size (NaN where there is
-        none).
+        """Return the additional results for a critical step.
+
+        Parameters
+        ----------
+        size : float
+            Size of the critical step, or NaN if there is no critical step.
+
+        Returns
+        -------
+        dict of str to float
+            Values of the results in ``extra_outputs``.
         """
         return {}
 
     def find_path_sizes(self, tolerances: Iterable[float], meter: WorkMeter) -> Iterator[float]:
-        """Size of the step that starts the critical path, by one local tolerance after the other,
-        each found when it is asked for; none where there is no such path.
+        """Yield sizes of the step at which the critical path starts.
+
+        Parameters
+        ----------
+        tolerances : iterable of float
+            Local tolerances, in decreasing order.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Yields
+        ------
+        float
+            Size for the next tolerance. The iterator ends early if there is no critical path.
         """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
     def find_cycle_sizes(self, tolerances: Iterable[float], meter: WorkMeter) -> Iterator[float]:
-        """Size of the step after which the motion ends in a limit cycle that touches the norm, by
-        one local tolerance after the other; none where there is no such step.
+        """Yield sizes of the step whose limit cycle touches the norm.
+
+        Parameters
+        ----------
+        tolerances : iterable of float
+            Local tolerances, in decreasing order.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        iterator of float
+            Size for each tolerance. The iterator is empty if there is no such step.
         """
         return iter(())
 
     def inertia_shifts_size(self, size: float, rtol: float) -> bool:
-        """True if the critical size is not that of the critical path's start, because slip rate
-        takes time to rise to that after the step.
+        """Return True if inertia changes the critical size significantly.
+
+        With inertia, the slip rate after the step rises to the critical path only after a delay.
+
+        Parameters
+        ----------
+        size : float
+            Size at which the critical path starts.
+        rtol : float
+            Requested relative accuracy of the size.
+
+        Returns
+        -------
+        bool
+            True if the start of the critical path is not the critical step within the accuracy.
         """
         return False
 
     def neutral_size_error(self, size: float, rtol: float) -> float:
-        """Relative error of a size that motions find where sliding is neutral after the step, which
-        they take it for a little on either side.
+        """Return the size error if steady sliding is nearly neutral.
+
+        Close to neutral stability, forward motions cannot distinguish growth from decay.
+
+        Parameters
+        ----------
+        size : float
+            Size of the step.
+        rtol : float
+            Relative accuracy of the forward motions.
+
+        Returns
+        -------
+        float
+            Additional relative error of the size.
         """
         return 0.0
 
     def smaller_steps_decay(self, size: float) -> bool:
-        """True if steady sliding is linearly stable after every smaller step.
+        """Return True if steady sliding is stable after every smaller step.
 
-        Where it is not, smaller steps grow, and a critical path says nothing about them. Critical
-        stiffness falls with the load point velocity, so the ends of the range decide, unless the
-        law has a slip rate of its own: then it may rise between them.
+        If steady sliding is unstable after a smaller step, small oscillations grow, and the smaller
+        step may be critical. The critical stiffness decreases with the load point velocity, so a
+        test at the ends of the range is sufficient. If the law has a characteristic slip rate, more
+        sizes are tested.
+
+        Parameters
+        ----------
+        size : float
+            Size of the largest step.
+
+        Returns
+        -------
+        bool
+            True if all tested steps are linearly stable.
         """
         sizes = [self.min_size, size]
         if self.scene.parts.law.steady_states is not None:
@@ -131,35 +263,61 @@ class StepFamily:
 
 
 def inertial_slip_lag(scene: Scene) -> tuple[float, float]:
-    """Slip (D_c) by which a slider with mass falls behind one without after a step, and the slip
-    rate (V_*) it rises to: less than (K/a) w**2 of slip, w = V T/(2 pi D_c) being the norm just
-    after the step.
+    r"""Compute the delay of a slider with inertia after a step.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the step.
+
+    Returns
+    -------
+    lag : float
+        Upper bound :math:`(K/a) w^2` of the slip by which inertia delays the slider, in units of
+        D_c, with :math:`w = V T/(2 \pi D_c)` immediately after the step.
+    rate : float
+        Slip rate immediately after the step without inertia, in units of V_*.
     """
     rate = math.exp(log_slip_rate_at(scene, scene.spring_stress_step, 0.0))
     return scene.stiffness / scene.a * (scene.inertial_time * rate) ** 2, rate
 
 
 class ShootingSteps(StepFamily):
-    """Steps after which the critical path is another for each size, so that the right one is shot
-    for: those that change what friction balances, or what moves the spring.
+    """Base class of steps whose critical path depends on the step size.
+
+    The critical path depends on the size if the step changes friction or the load point velocity.
+    The critical size follows from a shooting method.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene on which the steps are imposed.
+    sign : {1, -1}
+        Direction of the steps, 1 for upward and -1 for downward.
 
     Attributes
     ----------
     trigger_sign : int
-        Sign of the steps whose misfit is positive where they are too small to trigger.
+        Direction of the steps whose misfit is positive if the step is too small to trigger an
+        instability.
     """
 
     trigger_sign: ClassVar[int]
 
     def value_error(self, size: float, relative_error: float) -> float:
-        """As the size is a logarithm of what is stepped."""
+        """Return the error of the step value, whose logarithm is the size.
+
+        See the base class for the parameters.
+        """
         return math.exp(self.sign * size) * size * relative_error
 
     def find_path_sizes(self, tolerances: Iterable[float], meter: WorkMeter) -> Iterator[float]:
-        """Shoot: find the step whose critical path comes from the state before it.
+        """Yield sizes of the step at which the critical path starts.
 
-        A loose root and its slope come first; from there the tighter tolerances take one to three
-        paths each. With several states there are no such paths.
+        The critical path of this step begins with the state before the step. An approximate root
+        and its slope are computed first, with a loose tolerance. Each smaller tolerance then needs
+        one to three paths. With several states, there are no critical paths. See the base class for
+        the parameters.
         """
         path_at = self.path_factory(meter.engine)
         loose = self._loose_root(path_at, meter) if self.scene.state_count == 1 else None
@@ -171,12 +329,25 @@ class ShootingSteps(StepFamily):
             )
 
     def path_factory(self, engine: str) -> Callable[[float], CriticalPath]:
-        """Gives the critical path after a step of a size, which an engine follows."""
+        """Return a function that computes the critical path after a step.
+
+        Parameters
+        ----------
+        engine : str
+            Name of the engine that integrates the paths.
+
+        Returns
+        -------
+        callable
+            Function ``size -> CriticalPath``.
+        """
         return lambda size: CriticalPath.of_scene(self.scene_at(size), engine)
 
     def find_cycle_sizes(self, tolerances: Iterable[float], meter: WorkMeter) -> Iterator[float]:
-        """Find the step whose limit cycle touches the norm, from one orbit each: the smallest after
-        which that orbit stops shrinking.
+        """Yield the size of the step whose limit cycle touches the norm.
+
+        The step is the smallest step after which an orbit that touches the norm does not shrink.
+        Each misfit requires the integration of one orbit. See the base class for the parameters.
         """
         found, path_at = dict[float, float](), self.path_factory(meter.engine)
 
@@ -200,8 +371,9 @@ class ShootingSteps(StepFamily):
     def _loose_root(
         self, path_at: Callable[[float], CriticalPath], meter: WorkMeter
     ) -> tuple[float, float] | None:
-        """Log size at which the loosely integrated misfit vanishes, and the slope of the misfit
-        there.
+        """Return the log size at which the misfit vanishes, and its slope.
+
+        The misfit is computed with a loose tolerance. The result is None if there is no root.
         """
         found = dict[float, float]()
 
@@ -218,11 +390,12 @@ class ShootingSteps(StepFamily):
         return None if bracket is None else _find_misfit_root(misfit, found, *bracket)
 
     def _bracket(self, misfit: Callable[[float], float]) -> tuple[float, float] | None:
-        """Two neighbouring log sizes between which the misfit changes sign, sought outwards from a
-        guess: where its sign tells which way, that way first.
+        """Return two log sizes between which the misfit changes sign.
 
-        A misfit of NaN (no critical path) has no sign. The search runs in logit(size/largest),
-        which resolves both ends of the range.
+        The search proceeds outwards from a guess, and first in the direction that the sign of the
+        misfit indicates. The misfit is NaN, and has no sign, if there is no critical path. The
+        independent variable of the search is logit(size/largest size), which resolves both ends of
+        the range. The result is None if the search finds no sign change.
         """
 
         def log_size(position: float) -> float:
@@ -253,20 +426,24 @@ class ShootingSteps(StepFamily):
         return outwards(way) or outwards(-way) if way else outwards(1, -1)
 
     def _search_direction(self, misfit: float) -> int:
-        """True if a misfit tells that the critical size is larger (1) or smaller (-1); 0 where it
-        does not.
+        """Return the direction in which the critical size is expected.
+
+        The result is 1 for larger sizes, -1 for smaller sizes, and 0 if the misfit does not
+        indicate a direction.
         """
         if self.sign != self.trigger_sign or math.isnan(misfit):
             return 0
         return int(math.copysign(1.0, misfit))
 
     def _guess_size(self) -> float:
-        """A size to search from."""
+        """Return a size at which the search starts."""
         raise TypeError(f"{type(self).__name__} steps nothing")
 
     def _misfit_without_path(self, scene: Scene, meter: WorkMeter) -> float:
-        """Sign of the misfit where there is no critical path: positive where the step is stable,
-        NaN where that cannot be told.
+        """Return the sign of the misfit if there is no critical path.
+
+        The sign is positive if the motion after the step is stable. The result is NaN if the sign
+        is unknown.
         """
         return math.nan
 
@@ -274,12 +451,16 @@ class ShootingSteps(StepFamily):
 def _find_misfit_root(
     misfit: Callable[[float], float], known_misfits: Mapping[float, float], *bracket: float
 ) -> tuple[float, float] | None:
-    """Log size at which a misfit vanishes, and its slope there, from the misfits of paths that are
-    found on the way: a mere verdict has no size. None where it has no value on the way.
+    """Find the log size at which a misfit vanishes, and its slope.
+
+    A misfit without a critical path has a sign but no magnitude. The root and the slope are
+    computed from misfits with a magnitude. The result is None if there are too few misfits with a
+    magnitude.
     """
     try:
         brentq(misfit, *bracket, xtol=1e-4)
-    except ValueError:  # of NaN
+    except ValueError:
+        # The misfit is NaN somewhere in the bracket.
         return None
     if not known_misfits:
         return None
@@ -309,16 +490,18 @@ def _refine_root(
     tolerances: Iterable[float],
     misfit: Callable[[float, float], float | None],
 ) -> Iterator[float]:
-    """Sizes at which a misfit vanishes, by one local tolerance after the other, from a loose root
-    and its slope (per change of the logarithm of size), by the secant method: until what is left is
-    below thirty local tolerances. None from where that leads nowhere.
+    """Yield sizes at which a misfit vanishes, for decreasing local tolerances.
+
+    The refinement uses the secant method, starting from an approximate root and its slope with
+    respect to the log size. The iteration for each tolerance ends when the residual is below thirty
+    local tolerances. The iterator ends early if the secant method does not converge.
     """
     if not math.isfinite(slope) or slope == 0.0:
         return
     for tolerance in tolerances:
         previous: tuple[float, float] | None = None
         for _ in range(_MAX_CORRECTIONS):
-            # the error of V_0 itself is that of its logarithm times V_0
+            # The error of V_0 is the error of its logarithm times V_0.
             value = misfit(math.exp(log_size), tolerance / max(1.0, math.exp(log_size)))
             if value is None or not math.isfinite(value):
                 return

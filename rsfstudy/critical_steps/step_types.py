@@ -1,4 +1,4 @@
-"""Kinds of steps: of load point velocity, of load point displacement, and of normal stress."""
+"""Steps of load point velocity, load point displacement and normal stress."""
 
 from __future__ import annotations
 
@@ -37,50 +37,82 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-#: Slowest load point velocity over V_* that the search goes down to.
+#: Smallest load point velocity of the search, in units of V_*.
 MIN_LOAD_VELOCITY = 1e-20
-#: b/a - 1 that is guessed from at least: some laws weaken without it.
+#: Smallest b/a - 1 in the formula of the first guess, because some laws weaken friction with b < a.
 _MIN_GUESSED_WEAKENING = 1e-6
-#: Spring stress over sigma_* that no step goes beyond.
+#: Largest spring stress after a step, in units of sigma_*.
 _MAX_SPRING_STRESS = 1e6
 _MAX_FLOAT_LOGARITHM = math.log(sys.float_info.max)
-#: |ln(sigma/sigma_*)| that no step goes beyond.
+#: Largest |ln(sigma/sigma_*)| after a step.
 _MAX_LOG_STRESS_CHANGE = math.log(1e3)
-#: Part of the largest step to which it is found.
+#: Relative accuracy of the largest step size.
 _MAX_SIZE_RTOL = 1e-6
-#: Effective friction over mu_* that is guessed from at least: the state may take all of it.
+#: Smallest effective friction in the formula of the first guess, as a fraction of mu_*. The effect
+#: of normal stress on the state may cancel friction completely.
 _MIN_RELATIVE_FRICTION = 0.1
 
 
 class RateSteps(ShootingSteps):
-    """Steps of load point velocity; the size is |ln(V_0/V_*)|."""
+    """Steps of load point velocity with the size ``|ln(V_0/V_*)|``.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene on which the steps are imposed.
+    sign : {1, -1}
+        Direction of the steps, 1 for upward and -1 for downward.
+    """
 
     quantity = "critical_velocity_ratio"
     trigger_sign = 1
 
     def scene_at(self, size: float) -> Scene:
+        """Return the scene with a step of a given size.
+
+        See the base class for the parameters.
+        """
         return self.scene.with_(load_velocity_ratio=self.step_value(size))
 
     def path_factory(self, engine: str) -> Callable[[float], CriticalPath]:
+        """Return a function that computes the critical path after a step.
+
+        Only the load point velocity of the path depends on the size. See the base class for the
+        parameters.
+        """
         path = CriticalPath.of_scene(self.scene, engine)
         return lambda size: path.with_load_velocity(self.step_value(size))
 
     def step_value(self, size: float) -> float:
+        """Return the velocity ratio V_0/V_* of a step of a given size.
+
+        See the base class for the parameters.
+        """
         return math.exp(self.sign * size)
 
     def _guess_size(self) -> float:
-        """Of the size of the closed forms for the slip law (Gu et al. 1984)."""
+        """Return a guess based on the closed forms of Gu et al. (1984).
+
+        The closed forms apply to the slip law.
+        """
         weakening = max(self.scene.parts.law.b_over_a - 1.0, _MIN_GUESSED_WEAKENING)
         return float(np.logaddexp(0.0, self.scene.stiffness_ratio - 1.0 - math.log(weakening)))
 
     def _misfit_without_path(self, scene: Scene, meter: WorkMeter) -> float:
-        """Far from the boundary an upward step still has a verdict."""
+        """Return the sign of the misfit from a forward motion.
+
+        The result is NaN for downward steps.
+        """
         if self.sign != self.trigger_sign:
             return math.nan
         return -1.0 if reaches_norm(scene, Accuracy(LOOSE_TOLERANCE), meter) else 1.0
 
     def _compute_max_size(self) -> float:
-        """Up: V_0 at the norm itself. Down: the slowest V_0 that has a steady state."""
+        """Return the largest size of the search.
+
+        The largest upward step leads to a load point velocity at the norm. The largest downward
+        step leads to the smallest load point velocity with steady sliding.
+        """
         if self.sign > 0:
             return self.scene.log_instability_rate
         scene, slowest = self.scene, min_steady_log_slip_rate(self.scene)
@@ -90,8 +122,16 @@ class RateSteps(ShootingSteps):
 
 
 class DisplacementSteps(StepFamily):
-    """Steps of load point displacement; the size is |d| in D_c. The load point is then held, unless
-    the scene moves it.
+    """Steps of load point displacement with the size ``|d|`` in units of D_c.
+
+    The load point is held after the step, unless the scene specifies a load point velocity.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene on which the steps are imposed.
+    sign : {1, -1}
+        Direction of the steps, 1 for upward and -1 for downward.
     """
 
     quantity = "critical_displacement"
@@ -103,17 +143,33 @@ class DisplacementSteps(StepFamily):
         super().__init__(scene, sign)
 
     def scene_at(self, size: float) -> Scene:
+        """Return the scene with a step of a given size.
+
+        See the base class for the parameters.
+        """
         return self.scene.with_(displacement_step=self.step_value(size))
 
     def step_value(self, size: float) -> float:
+        """Return the displacement of a step of a given size, in units of D_c.
+
+        See the base class for the parameters.
+        """
         return self.sign * size
 
     def value_error(self, size: float, relative_error: float) -> float:
+        """Return the error of the displacement, in units of D_c.
+
+        See the base class for the parameters.
+        """
         return size * relative_error
 
     def inertia_shifts_size(self, size: float, rtol: float) -> bool:
-        """The slider falls behind on the same path, but for what the load point moves meanwhile,
-        and for half of b times that slip, which the state misses because slip rate is lower.
+        """Return True if inertia changes the critical size significantly.
+
+        With inertia, the slider follows the critical path with a delay, which changes the critical
+        size in two ways. The load point moves during the delay, and the state evolves less because
+        the slip rate is lower. The effect on the state is half of b times the delay in slip. See
+        the base class for the parameters.
         """
         scene = self.scene
         if not scene.has_mass:
@@ -124,12 +180,19 @@ class DisplacementSteps(StepFamily):
         return behind * (loaded + missed) > INERTIA_TOLERANCE_FRACTION * rtol * size
 
     def smaller_steps_decay(self, size: float) -> bool:
-        """They move nothing that steady sliding depends on."""
+        """Return True if steady sliding is stable after every smaller step.
+
+        A displacement step does not change the stability of steady sliding. See the base class for
+        the parameters.
+        """
         return is_linearly_stable(self.scene)
 
     def extra_values(self, size: float) -> dict[str, float]:
-        """Slip rates just after the critical step, and after one of D_c a/(b-a) (eq. 13), which
-        by a stiff spring is beyond the largest number: infinite.
+        """Return the slip rates immediately after two steps, in units of V_*.
+
+        The first step is the critical step. The second step is the displacement D_c a/(b - a) of
+        the closed form (eq. 13 of doi:10.1007/s11589-014-0098-4). The slip rate is infinite if it
+        exceeds the floating-point range. See the base class for the parameters.
         """
 
         def after(step: float) -> float:
@@ -142,8 +205,11 @@ class DisplacementSteps(StepFamily):
         return dict(zip(self.extra_outputs, (critical, closed_form), strict=True))
 
     def find_path_sizes(self, tolerances: Iterable[float], meter: WorkMeter) -> Iterator[float]:
-        """One integration each: a displacement step leaves Psi = 0 and moves the spring stress
-        alone, so that it starts wherever the critical path has Psi = 0.
+        """Yield the size of the step at which the critical path starts.
+
+        A displacement step changes only spring stress and leaves Psi = 0. The critical step is
+        therefore the point of the path at which Psi = 0, and each tolerance needs only one
+        integration. See the base class for the parameters.
         """
         path, sign = CriticalPath.of_scene(self.scene, meter.engine), self.sign
         for tolerance in tolerances:
@@ -155,8 +221,11 @@ class DisplacementSteps(StepFamily):
             yield abs(start.spring_stress / self.scene.stiffness)
 
     def _compute_max_size(self) -> float:
-        """Up: the step that itself takes the slip rate to the norm, and somewhat farther with mass,
-        because slip rate rises to that while stress relaxes. Down: the step that ends shear stress.
+        """Return the largest size of the search.
+
+        The largest upward step raises the slip rate to the norm immediately. With inertia, the
+        range is extended, because the slip rate rises with a delay while stress relaxes. The
+        largest downward step removes the shear stress or the normal stress.
         """
         scene = self.scene
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
@@ -175,10 +244,18 @@ class DisplacementSteps(StepFamily):
 
 
 class NormalStressSteps(ShootingSteps):
-    """Steps of imposed normal stress; the size is |ln(1 + step/sigma_*)|. The load point is then
-    held, unless the scene moves it.
+    """Steps of imposed normal stress with the size ``|ln(1 + step/sigma_*)|``.
 
-    Friction after the step is that of other normal stress, and so is the critical path.
+    The load point is held after the step, unless the scene specifies a load point velocity. The
+    critical path depends on the size, because the step changes the normal stress that acts on
+    friction.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene on which the steps are imposed.
+    sign : {1, -1}
+        Direction of the steps, 1 for upward and -1 for downward.
     """
 
     quantity = "critical_normal_stress_step"
@@ -188,21 +265,31 @@ class NormalStressSteps(ShootingSteps):
     def __init__(self, scene: Scene, sign: int) -> None:
         held = 0.0 if scene.load_velocity_ratio is None else scene.load_velocity_ratio
         scene = scene.with_(load_velocity_ratio=held, normal_stress_step=0.0)
-        # a slider whose normal stress nothing can change says so here
+        # If the normal stress of the slider is constant, this call raises InvalidValue.
         scene.with_(normal_stress_step=sign * MIN_STEP_SIZE)
         super().__init__(scene, sign)
-        # what such a step does to ln V is larger by mu_*/a
+        # The change of ln V is larger than the size by a factor of mu_*/a.
         self.min_size = min(self.min_size, MIN_STEP_SIZE * scene.a / scene.mu_star)
 
     def scene_at(self, size: float) -> Scene:
+        """Return the scene with a step of a given size.
+
+        See the base class for the parameters.
+        """
         return self.scene.with_(normal_stress_step=self.step_value(size))
 
     def step_value(self, size: float) -> float:
+        """Return the change of normal stress of a step, in units of sigma_*.
+
+        See the base class for the parameters.
+        """
         return math.expm1(self.sign * size)
 
     def inertia_shifts_size(self, size: float, rtol: float) -> bool:
-        """The slider falls behind while slip rate rises; by how much of the size is a matter of
-        what slip rate the step leads to.
+        """Return True if inertia changes the critical size significantly.
+
+        With inertia, the slip rate rises with a delay after the step. The effect on the size
+        depends on the slip rate immediately after the step. See the base class for the parameters.
         """
         scene = self.scene
         behind = inertial_slip_lag(self.scene_at(size))[0] if scene.has_mass else 0.0
@@ -210,19 +297,29 @@ class NormalStressSteps(ShootingSteps):
         return missed > INERTIA_TOLERANCE_FRACTION * rtol * size * scene.mu_star / scene.a
 
     def neutral_size_error(self, size: float, rtol: float) -> float:
-        """Critical stiffness goes with normal stress, and its logarithm with the size."""
+        """Return the size error if steady sliding is nearly neutral.
+
+        The critical stiffness is proportional to normal stress, and the size is the logarithm of
+        normal stress. See the base class for the parameters.
+        """
         scene = self.scene_at(size)
         near = may_have_closed_orbits(scene) and abs(stability_margin(scene)) < 10.0 * rtol
         return 2.0 * rtol / size if near else 0.0
 
     def extra_values(self, size: float) -> dict[str, float]:
-        """Slip rate just after the critical step."""
+        """Return the slip rate immediately after the critical step.
+
+        The slip rate is in units of V_*. See the base class for the parameters.
+        """
         rate = math.nan if math.isnan(size) else math.exp(self._log_slip_rate_after(size))
         return dict(zip(self.extra_outputs, (rate,), strict=True))
 
     def _guess_size(self) -> float:
-        """A Coulomb stress change that takes the slip law to its threshold; a rise to where sliding
-        comes to be unstable.
+        """Return a guess of the critical size.
+
+        For a decrease of normal stress, the guess is the change of Coulomb stress that reaches the
+        threshold of the slip law. For an increase, the guess is the step after which steady sliding
+        becomes unstable.
         """
         scene, law = self.scene, self.scene.parts.law
         if self.sign > 0 and 1.0 < scene.stiffness_ratio < math.inf:
@@ -233,7 +330,10 @@ class NormalStressSteps(ShootingSteps):
         return scene.a * scene.stiffness_ratio / friction
 
     def _misfit_without_path(self, scene: Scene, meter: WorkMeter) -> float:
-        """Far from the boundary a fall still has a verdict, unless its motion cannot go on."""
+        """Return the sign of the misfit from a forward motion.
+
+        The result is NaN for increases of normal stress, or if the motion cannot continue.
+        """
         if self.sign != self.trigger_sign:
             return math.nan
         try:
@@ -244,9 +344,13 @@ class NormalStressSteps(ShootingSteps):
             return math.nan
 
     def _compute_max_size(self) -> float:
-        """The step that itself takes the slip rate to the norm, and somewhat farther with mass; a
-        rise does so only where it takes more from the state than it gives to friction. Under a load
-        point that moves, the last after which there is steady sliding.
+        """Return the largest size of the search.
+
+        The largest step raises the slip rate to the norm immediately. With inertia, the range is
+        extended, because the slip rate rises with a delay while stress relaxes. An increase of
+        normal stress raises the slip rate only if the effect on the state exceeds the effect on
+        friction. If the load point moves, the largest step is limited by the existence of steady
+        sliding after the step.
         """
         scene = self.scene
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
@@ -273,8 +377,11 @@ class NormalStressSteps(ShootingSteps):
         return smaller
 
     def _max_log_stress_ratio(self) -> float:
-        """A fall leaves sigma_3 positive where normal stress follows shear stress: beyond, friction
-        falls faster with slip than stress does, however slow that is.
+        """Return the largest size that leaves the normal stress positive.
+
+        If normal stress depends on shear stress, sigma_3 must remain positive after a decrease. If
+        sigma_3 were negative, friction would decrease with slip faster than spring stress, at any
+        slip rate.
         """
         follows, _alpha = self.scene.parts.normal_stress.coupling or (0.0, 0.0)
         if self.sign > 0 or not follows:
@@ -282,13 +389,17 @@ class NormalStressSteps(ShootingSteps):
         return min(_MAX_LOG_STRESS_CHANGE, (1.0 - 1e-6) * -math.log(self.scene.mu_star * follows))
 
     def _allows_steady_sliding(self, size: float) -> bool:
-        """True if sliding can be steady after a step, or needs not because the load point rests."""
+        """Return True if sliding can be steady after the step.
+
+        The result is also True if the load point is held, because steady sliding is not required in
+        this case.
+        """
         scene = self.scene_at(size)
         load = scene.log_load_velocity
         return load == -math.inf or steady_sliding(scene, load) is not None
 
     def _log_slip_rate_after(self, size: float) -> float:
-        """ln(V/V_*) just after a step, without mass."""
+        """Return ln(V/V_*) immediately after the step, without inertia."""
         scene = self.scene_at(size).without_mass()
         steady_states = compute_steady_states(scene, 0.0, 0.0)
         return manifold_point(scene, scene.spring_stress_step, steady_states).log_slip_rate

@@ -1,4 +1,4 @@
-"""True if the step of a scene triggers instability: yes or no."""
+"""Measure that tests if the step of a scene triggers an instability."""
 
 from __future__ import annotations
 
@@ -23,17 +23,38 @@ from rsfstudy.status import Status
 @guard_methods
 @dataclass(frozen=True)
 class Triggered(Measure):
-    """1 where the motion after the step reaches the instability norm of the scene, a slip rate over
-    2 pi D_c/T, and 0 where it never does.
+    r"""Flag that is 1 if the step of a scene triggers an instability.
 
-    The motion is followed until it has reached the norm, or it is certain that it will not. The
-    measure `critical_step` seeks the smallest step that does. `unverified` where ten times smaller
-    tolerances give the other answer, or where stiffness is critical to within ten times the
-    accuracy.
+    The flag is 1 if the motion after the step reaches the instability norm of the scene, and 0 if
+    the motion never reaches the norm. The motion is integrated until the result is certain. To find
+    the smallest step that triggers an instability, use ``CriticalStep``.
+
+    The status is ``unverified`` if the result changes with ten times smaller tolerances, or if the
+    relative difference between the stiffness and the critical stiffness is less than ten times the
+    requested accuracy.
+
+    Notes
+    -----
+    The slip rate :math:`V` reaches the norm if :math:`V T/(2 \pi D_c)` equals ``instability_norm``,
+    with the period :math:`T` of the scene. A norm of 5e-4 reproduces the results in section 4 of
+    [1]_.
 
     References
     ----------
-    Section 4 of doi:10.1007/s11589-014-0098-4, whose numbers come out with a norm of 5e-4.
+    .. [1] Effect of varying normal stress on stability and dynamic motion of a spring-slider system
+       with rate- and state-dependent friction. Earthquake Science (2014).
+       doi:10.1007/s11589-014-0098-4
+
+    Examples
+    --------
+    >>> from rsfstudy import Accuracy, Scene
+    >>> from rsfstudy.measures import Triggered
+    >>> scene = Scene(normal_stress="constant", b_over_a=2.0)
+    >>> for ratio in (1.5, 2.5):
+    ...     stepped = scene.with_(load_velocity_ratio=ratio)
+    ...     print(ratio, Triggered()(stepped, Accuracy(rtol=1e-4)).values["unstable"])
+    1.5 0.0
+    2.5 1.0
     """
 
     name: ClassVar[str] = "triggered"
@@ -43,7 +64,22 @@ class Triggered(Measure):
     needs_time: ClassVar[tuple[bool, ...]] = (False,)
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """The answer, from motions followed at two tolerances until each is certain."""
+        """Compute the flag from motions with two different tolerances.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
+        """
         check_single_step(scene)
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
             return norm_below_loading_outcome(scene, scene.load_velocity)
@@ -51,7 +87,8 @@ class Triggered(Measure):
             return Outcome(Status.OK, {"unstable": 0.0, "unstable_error": 0.0}, "there is no step")
         accuracies = accuracy, accuracy.refined()
         answer, again = (reaches_norm(scene, asked, meter) for asked in accuracies)
-        # closer to critical stiffness than the tolerance, growth and decay cannot be told apart
+        # If the stiffness is critical within the tolerance, growth and decay of perturbations are
+        # indistinguishable.
         if answer != again or is_neutral(scene, 10.0 * accuracy.rtol):
             return Outcome(
                 Status.UNVERIFIED, message="the tolerance decides: ask for a smaller rtol"

@@ -1,8 +1,8 @@
-"""Limit cycles: periodic stick-slip at a constant load point velocity.
+"""Limit cycles of stick-slip at a constant load point velocity.
 
-The package contains the measure ``LimitCycle`` and its algorithms: detection of cycles along a
-motion, the return map, and the search for the periodic orbit. It never computes the response to a
-single step, and never reads or writes a file.
+The package contains the measure ``LimitCycle`` and the algorithms that the measure uses: the
+detection of cycles along a motion, the return map, and the search for a periodic orbit. The package
+never computes the response to a single step, and never reads or writes a file.
 """
 
 from __future__ import annotations

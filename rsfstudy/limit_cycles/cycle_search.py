@@ -1,29 +1,33 @@
-"""Convergence of a motion to its limit cycle.
+r"""Convergence of a motion to its limit cycle.
 
-If a scene has one state, the spring stress at a rise of V through V_0 determines the motion that
-follows. The map from one rise to the next has one dimension less than the motion, because a
-perturbation along the motion only shifts the time. Two successive cycles therefore determine the
-derivative of the map. If the cycles converge slowly, the motion leaps to the fixed point that this
-derivative implies.
+If a scene has one state, use ``CycleSearch``. The spring stress at a rise of V through V_0
+determines the subsequent motion, so two successive cycles determine the derivative of the return
+map. If the cycles converge slowly, the search leaps to a fixed point that is extrapolated from the
+derivative.
 
-The section of a motion at a rise of V through V_0 is s = (f, Psi), the spring stress and the state.
-The image P(s) holds the section one cycle later, followed by the headline numbers of that cycle.
-The derivative P' has a column b for f and a column c for Psi. Spring stress is highest at a
-section, so the motion passes the section in the direction (0, dPsi/dt). If the motion starts a time
-dt later, the cycle is shorter by dt, and nothing else changes. Therefore c is -1/(dPsi/dt) in the
-row of the recurrence interval, and 0 in all other rows. If the sections of two cycles differ by
-(df, dPsi) and their images by dP, the other column is
+If a scene has several states, use ``follow_to_orbit``. The function follows the motion cycle by
+cycle, and compares the cycles to find the number of cycles after which the motion repeats.
 
-    b = (dP - c dPsi)/df.
+Notes
+-----
+The section of a motion at a rise of V through V_0 is :math:`s = (f, \Psi)`, with the spring stress
+:math:`f` and the state :math:`\Psi`. The image :math:`P(s)` contains the section one cycle later,
+followed by the main results of the cycle. The derivative :math:`P'` has a column :math:`b` for
+:math:`f` and a column :math:`c` for :math:`\Psi`.
 
-The first two rows of P' are the derivative A of the next section. Column c of A is zero, so A has
-rank one, and its nonzero eigenvalue is its trace. Therefore A**2 = (tr A) A, and the vector from s
-to the fixed point is
+Spring stress has a maximum at a section, so the motion passes the section in the direction
+:math:`(0, d\Psi/dt)`. If the motion starts a time :math:`dt` later, the cycle is shorter by
+:math:`dt`, and nothing else changes. Therefore :math:`c` is :math:`-1/(d\Psi/dt)` in the row of the
+recurrence interval, and 0 in all other rows. If the sections of two cycles differ by :math:`(df,
+d\Psi)` and their images differ by :math:`dP`, the other column is
 
-    (1 - A)^-1 (P(s) - s) = P(s) - s + A (P(s) - s)/(1 - tr A).
+.. math:: b = (dP - c\,d\Psi)/df.
 
-If a scene has several states, the motion is followed cycle by cycle. The cycles are then compared
-to find the number of cycles after which the motion repeats, if it does.
+The first two rows of :math:`P'` are the derivative :math:`A` of the next section. Column :math:`c`
+of :math:`A` is zero, so :math:`A` has rank one, and its nonzero eigenvalue is its trace. Therefore
+:math:`A^2 = (\mathrm{tr} A) A`, and the vector from :math:`s` to the fixed point is
+
+.. math:: (1 - A)^{-1} (P(s) - s) = P(s) - s + \frac{A (P(s) - s)}{1 - \mathrm{tr} A}.
 """
 
 from __future__ import annotations
@@ -47,39 +51,42 @@ from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
 from rsfstudy.slider import Scene, critical_stiffness
 from rsfstudy.status import Status
 
-#: Part of their distance to the limit that cycles keep each time: above the first they are leapt
-#: ahead of, above the second they approach none.
+#: Limits of the contraction ratio, the ratio of successive distances to the limit cycle. The motion
+#: leaps if the ratio is above the first limit, and does not converge if the ratio is above the
+#: second limit.
 _MIN_CONTRACTION_TO_LEAP, _MAX_CONTRACTION = 0.03, 0.98
-#: Longest leap, as a part of the swing of ln V.
+#: Largest leap, as a fraction of the range of ln V.
 _MAX_LEAP_FRACTION = 0.1
-#: Most cycles of a period that is looked for.
+#: Largest number of cycles in a period.
 MAX_PERIOD = 16
-#: Accuracy at which cycles are closed, where no better one is asked for: differences lose digits.
+#: Largest relative accuracy with which orbits are closed, because finite differences lose digits.
 _MAX_CLOSING_RTOL = 1e-7
-#: Cycles after which a motion is first looked at.
+#: Number of cycles after which a motion is first tested for a period.
 _MIN_CYCLES_TO_TEST = 8
-#: Size of a multiplier from which an orbit repels beyond doubt, and how far off its like a cycle is
-#: that repeats none, over how far ln V swings.
+#: Absolute value of a Floquet multiplier above which an orbit certainly repels, and largest
+#: difference between cycles that repeat, relative to a times the range of ln V.
 _REPELLING_MULTIPLIER, _MAX_RECURRENCE_MISFIT = 1.01, 0.02
-#: Part by which stiffness differs from the critical one where swings take for ever to grow or to
-#: die out.
+#: Relative difference from the critical stiffness below which oscillations grow or decay so slowly
+#: that the search cannot converge.
 _CRITICAL_STIFFNESS_TOLERANCE = 1e-5
 
 
 class CycleSearch:
-    """Convergence to the limit cycle of a scene with one state.
+    """Search for the limit cycle of a scene with one state.
 
     Parameters
     ----------
     scene : Scene
+        Scene with one state and a moving load point.
     accuracy : Accuracy
+        Requested accuracy.
     meter : WorkMeter
-        Counter of the work of the motion.
+        Counter of right-hand-side evaluations.
 
     Attributes
     ----------
     cycles : list of Cycle
-        Cycles so far. The last one is the limit cycle after ``run`` has returned True.
+        Cycles that were computed. If ``run`` has returned True, the last cycle is the limit cycle.
     """
 
     def __init__(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> None:
@@ -88,30 +95,36 @@ class CycleSearch:
         self._noise = accuracy.local_tolerance * scene.a
         self._work = 0
         self.cycles: list[Cycle] = []
-        #: The columns b and c of P', derivatives of the image by spring stress and by state; and
-        #: whether they are known.
+        #: Columns b and c of P', the derivatives of the image with respect to spring stress and
+        #: state, and True if the derivatives are known.
         self._derivatives, self._has_derivatives = 2 * ([0.0] * (2 + PRIMARY_OUTPUT_COUNT),), False
-        #: The section s where the last cycle begins, its image P(s), and dP, by how much that
-        #: differs from the image before.
+        #: Section s at which the last cycle begins, its image P(s), and the difference dP from the
+        #: previous image.
         self._section, self._image = (0.0, 0.0), [0.0] * (2 + PRIMARY_OUTPUT_COUNT)
         self._image_change = self._image
-        #: What is left from s to the fixed point, and P' times that: what it changes of the image.
+        #: Vector from s to the fixed point, and the resulting change of the image.
         self._correction, self._image_correction = self._section, self._image
-        #: What was left to go along the map where the motion leapt last.
+        #: Change of spring stress over the cycle before the last leap.
         self._distance_at_leap = np.inf
 
     def run(self, max_events: int) -> bool:
-        """Follow cycles until the motion reaches the limit cycle.
+        """Compute cycles until the motion reaches the limit cycle.
+
+        Parameters
+        ----------
+        max_events : int
+            Largest number of cycles.
 
         Returns
         -------
         bool
-            False if the motion settles to steady sliding.
+            True if the motion has reached the limit cycle, and False if the motion settles to
+            steady sliding.
 
         Raises
         ------
         MotionStopped
-            With ``work_budget_spent`` if no cycle repeats within ``events`` cycles.
+            With the status ``work_budget_spent`` if no cycle repeats within ``max_events`` cycles.
         """
         start = None
         while True:
@@ -139,7 +152,10 @@ class CycleSearch:
 
     @property
     def _critical_stiffness_text(self) -> str:
-        """Explanation if the stiffness is critical; otherwise an empty string."""
+        """Explanation for the message if the stiffness is nearly critical.
+
+        The text is empty if the stiffness is not close to critical.
+        """
         critical = critical_stiffness(self._scene, self._scene.log_load_velocity)
         off = abs(self._scene.stiffness / critical - 1.0) if critical else math.inf
         if off > _CRITICAL_STIFFNESS_TOLERANCE:
@@ -148,7 +164,7 @@ class CycleSearch:
 
     @property
     def orbit(self) -> Orbit:
-        """The last cycle and its correction to the limit cycle."""
+        """Last cycle, with its correction to the limit cycle."""
         last, slopes = self.cycles[-1:], np.array(self._derivatives).T
         return Orbit(tuple(last), (slopes,), np.array(self._correction), self._accuracy, self._work)
 
@@ -157,15 +173,16 @@ class CycleSearch:
         """Trace of the derivative A of the map.
 
         The trace is the ratio of successive distances to the limit cycle. The other eigenvalue of A
-        is zero, because the motion forgets one direction.
+        is zero, because a displacement of the section along the motion has no effect on the next
+        section.
         """
         return self._derivatives[0][0] + self._derivatives[1][1]
 
     def _update_derivatives(self) -> None:
-        """Update the derivatives and the distance to the fixed point.
+        """Update the derivatives and the vector to the fixed point.
 
-        The derivatives follow from the last two cycles, unless numerical errors dominate their
-        difference. The module docstring contains the formulas.
+        The derivatives follow from the last two cycles, unless numerical errors dominate the
+        difference between the cycles. The module docstring contains the formulas.
         """
         last = self.cycles[-1]
         begin, end = last.start_point, last.end_point
@@ -176,7 +193,7 @@ class CycleSearch:
             by_stress, by_state = map(sub, start, self._section)
             if abs(by_stress) > (1000.0 if self._has_derivatives else 1.0) * self._noise:
                 self._has_derivatives = True
-                # the motion passes a section without a change of spring stress
+                # Spring stress does not change when the motion passes a section.
                 (_none, way), passed = self._return_map.motion_direction(begin)
                 along = [change / way for change in passed]
                 pairs = zip(changes, along, strict=True)
@@ -191,14 +208,15 @@ class CycleSearch:
         self._image_correction = self._predict_image_change(self._correction)
 
     def _predict_image_change(self, move: Sequence[float]) -> list[float]:
-        """Compute the change of the image due to a change of the section."""
+        """Compute the image change caused by a change of the section."""
         by_stress, by_state = move
         return [x * by_stress + y * by_state for x, y in zip(*self._derivatives, strict=True)]
 
     def _has_converged(self) -> bool:
-        """Return True if all further cycles would be the same.
+        """Return True if all further cycles would be equal to the last cycle.
 
-        The cycles repeat if the derivatives imply so, or if the last two cycles agree.
+        The cycles have converged if the derivatives predict a sufficiently small change, or if the
+        last two cycles agree.
         """
         allowed = [0.3 * self._accuracy.rtol * abs(number) for number in self._image[2:]]
         if (
@@ -218,8 +236,8 @@ class CycleSearch:
     def _alternates(self) -> bool:
         """Return True if the last two cycles alternate around the limit cycle.
 
-        Only numerical errors cause such an alternation. In a plane, trajectories cannot cross, so
-        exact cycles approach the limit cycle from one side.
+        An alternation around the limit cycle is caused by numerical errors. Trajectories in a plane
+        cannot cross, so exact cycles approach the limit cycle from one side.
         """
         before, last = (
             cycle.end_point.spring_stress - cycle.start_point.spring_stress
@@ -236,9 +254,9 @@ class CycleSearch:
     def _should_leap(self) -> bool:
         """Return True if the motion should leap to the fixed point.
 
-        The motion does not leap if the next cycle would come as close, or if the fixed point is far
-        away, because the motion may then settle to steady sliding. It does not leap again if the
-        last leap did not reduce the distance, because leaps may repeat in a loop.
+        A leap is useless if the next cycle would come equally close to the fixed point. A long leap
+        is avoided, because the motion may settle to steady sliding after a long leap. A leap that
+        does not halve the distance is not repeated, because repeated leaps may form a loop.
         """
         cycle = self.cycles[-1]
         left = abs(cycle.end_point.spring_stress - cycle.start_point.spring_stress)
@@ -259,14 +277,14 @@ def _are_within_tolerance(changes: Sequence[float], tolerances: Sequence[float])
 class EventSequence:
     """Cycles of a motion, and the orbit that the motion approaches.
 
-    Attributes
+    Parameters
     ----------
     cycles : list of Cycle
-        Cycles of the motion (the events of ``measures.limit_cycle``).
+        Cycles of the motion. A cycle is an event in the results of ``LimitCycle``.
     orbit : Orbit or None
-        Periodic orbit that the motion approaches. None if no orbit was found.
+        Periodic orbit that the motion approaches, or None if no orbit was found.
     may_still_converge : bool
-        True if the motion may still approach a periodic orbit, as far as its cycles show.
+        True if the motion may still approach a periodic orbit.
     """
 
     cycles: list[Cycle]
@@ -277,22 +295,25 @@ class EventSequence:
 def follow_to_orbit(
     scene: Scene, accuracy: Accuracy, meter: WorkMeter, max_events: int, *, follow_all: bool = False
 ) -> EventSequence | None:
-    """Follow a motion until it approaches an attracting periodic orbit.
+    """Integrate a motion until it approaches an attracting periodic orbit.
 
     Parameters
     ----------
     scene : Scene
+        Scene with a moving load point.
     accuracy : Accuracy
+        Requested accuracy.
     meter : WorkMeter
+        Counter of right-hand-side evaluations.
     max_events : int
         Largest number of cycles.
-    follow_all : bool
-        If True, follow all ``max_events`` cycles even if an orbit is found earlier.
+    follow_all : bool, default: False
+        If True, compute ``max_events`` cycles even if an orbit is found earlier.
 
     Returns
     -------
-    Course or None
-        None if the motion settles to steady sliding.
+    EventSequence or None
+        Cycles and orbit, or None if the motion settles to steady sliding.
     """
     seen, orbit, repels = list[Cycle](), None, False
     fine = accuracy.with_rtol(min(accuracy.rtol, _MAX_CLOSING_RTOL))
@@ -324,8 +345,8 @@ def follow_to_orbit(
 def _may_still_converge(cycles: Sequence[Cycle]) -> bool:
     """Return True if a motion may still approach a periodic orbit.
 
-    A motion with few cycles may still do so. A motion with many cycles may do so if the range of ln
-    V or a state increases, or decreases, from each cycle to the next.
+    The result is True for motions with few cycles. For longer motions, the result is True if the
+    range of ln V, or a state, increases or decreases monotonically from cycle to cycle.
     """
     if len(cycles) < _MIN_CYCLES_TO_TEST:
         return True
@@ -337,11 +358,11 @@ def _may_still_converge(cycles: Sequence[Cycle]) -> bool:
 
 
 def _compared_states(scene: Scene) -> tuple[tuple[int, ...], ...]:
-    """Return the sets of states that are compared to detect a repeating cycle.
+    """Return the sets of states for the detection of a period.
 
-    The first set contains all states that count for the distance from steady sliding. The second
-    set contains the states of the law only, because a slow unknown of the fluid may approach its
-    cycle long after the law has.
+    The first set contains the states used for the distance from steady sliding. The second set
+    contains only the states of the law, because a slow unknown of the fluid may converge long after
+    the states of the law.
     """
     of_law = tuple(range(scene.parts.law.state_count))
     return tuple(dict.fromkeys((scene.functions.friction.distance_indices, of_law)))
@@ -350,26 +371,31 @@ def _compared_states(scene: Scene) -> tuple[tuple[int, ...], ...]:
 def find_recurrence(
     scene: Scene, cycles: Sequence[Cycle], compared_states: Sequence[int] | None = None
 ) -> tuple[int, float]:
-    """Find the number of cycles after which a motion nearly repeats itself.
+    r"""Find the number of cycles after which a motion nearly repeats itself.
 
     The states at the ends of cycles i and i + n are compared over the second half of the motion.
-    The difference for n cycles is the largest ``|Psi(i + n) - Psi(i)|`` of any state, divided by
-    ``a`` times the range of ln V.
 
     Parameters
     ----------
     scene : Scene
+        Scene of the motion.
     cycles : sequence of Cycle
+        Successive cycles.
     compared_states : sequence of int, optional
-        Indices of the states to compare. By default, all states are compared except those that a
-        part lists in ``excluded_from_distance``.
+        Indices of the states to compare. By default, all states are compared except states in the
+        attribute ``excluded_from_distance`` of a part.
 
     Returns
     -------
     period : int
-        The smallest n whose difference is at most twice the smallest difference.
+        Smallest n with a difference of at most twice the smallest difference.
     off : float
-        The difference after ``period`` cycles, or infinity if there are too few cycles.
+        Difference after ``period`` cycles, or infinity if there are too few cycles.
+
+    Notes
+    -----
+    The difference after :math:`n` cycles is the largest :math:`|\Psi_{i+n} - \Psi_i|` of any state,
+    divided by :math:`a` times the range of :math:`\ln V`.
     """
     if len(cycles) < 4:
         return 1, math.inf

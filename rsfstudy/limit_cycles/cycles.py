@@ -1,6 +1,7 @@
 """Stick-slip cycles of a motion, assembled from its events.
 
-A cycle extends from one maximum of spring stress, at which V rises through V_0, to the next.
+A cycle extends from one maximum of spring stress, at which V rises through V_0, to the next
+maximum. The main function is ``iterate_cycles``.
 """
 
 from __future__ import annotations
@@ -35,40 +36,51 @@ from rsfstudy.motion import (
 from rsfstudy.slider import RUPTURE_REGIME, Point, Scene
 
 LN10 = math.log(10.0)
-#: How many headline numbers a cycle has.
+#: Number of main results of a cycle.
 PRIMARY_OUTPUT_COUNT = 5
-#: Kinds of events, of which names take as long to look up as all else that an event asks for.
+#: Kinds of events. Module variables avoid the attribute lookup, which would take as long as the
+#: rest of the work per event.
 _START, _RISE, _FALL = EventKind.START, EventKind.RISE, EventKind.FALL
 _SEGMENT, _SETTLED = EventKind.SEGMENT, EventKind.SETTLED
 _get_log_slip_rate, _get_spring_stress = attrgetter("log_slip_rate"), attrgetter("spring_stress")
 
-#: Swings of ln V below this are steady sliding; those that shrink this often may be on their way to
-#: it.
+#: Range of ln V below which a cycle is treated as steady sliding, and number of successive cycles
+#: with decreasing ranges after which a motion may be approaching steady sliding.
 MIN_LOG_SLIP_RATE_RANGE, _MIN_SHRINKING_CYCLES = 1e-3, 30
-#: Part of the farthest distance from steady sliding at which a motion has settled to it.
+#: Fraction of the largest distance from steady sliding below which a motion has settled.
 _STEADY_FRACTION = 1e-6
 
 
 class Cycle(NamedTuple):
     """One stick-slip cycle.
 
-    Times are in D_c/V_*, stresses in sigma_*, and slip rates in V_*.
+    Times are in units of D_c/V_*, and stresses are in units of sigma_*.
 
-    Attributes
+    Parameters
     ----------
     recurrence_interval : float
-        Time from one maximum of spring stress to the next.
-    max_spring_stress, min_spring_stress, spring_stress_at_peak : float
-        Deviation of spring stress at its maximum, at its minimum, and at the peak slip rate.
+        Time from the first to the second maximum of spring stress.
+    max_spring_stress : float
+        Deviation of spring stress from steady sliding at V_*, at the second maximum.
+    min_spring_stress : float
+        Deviation of spring stress at its minimum.
+    spring_stress_at_peak : float
+        Deviation of spring stress at the peak slip rate.
     friction_at_peak : float
         Friction coefficient at the peak slip rate.
-    min_log_slip_rate, max_log_slip_rate : float
-        Extremes of ln(V/V_*).
-    arrest_point, slowest_point : Point
-        Point below V_0 at which friction balances the spring again after the rupture, and point
-        with the lowest slip rate.
-    start_point, end_point : Point
-        Maxima of spring stress at which the cycle begins and ends.
+    min_log_slip_rate : float
+        Smallest ln(V/V_*).
+    max_log_slip_rate : float
+        Largest ln(V/V_*).
+    arrest_point : Point
+        First point after the rupture at which V is below V_0 and friction balances the spring. If
+        there is no such point, the point with the lowest slip rate.
+    slowest_point : Point
+        Point with the lowest slip rate.
+    start_point : Point
+        Maximum of spring stress at which the cycle begins.
+    end_point : Point
+        Maximum of spring stress at which the cycle ends.
     """
 
     recurrence_interval: float
@@ -89,17 +101,18 @@ class Cycle(NamedTuple):
         return self.max_log_slip_rate - self.min_log_slip_rate
 
     def primary_outputs(self) -> tuple[float, ...]:
-        """Return the headline numbers in the order of their names.
+        """Return the main results of the cycle.
 
-        Stress drops are measured from the spring stress at the beginning of the event, because the
-        next event may begin at a different stress.
+        Stress drops are measured from the spring stress at the beginning of the cycle, because the
+        next cycle may begin at a different stress. The static stress drop extends to the lowest
+        spring stress, and the dynamic stress drop extends to the spring stress at the peak slip
+        rate.
 
         Returns
         -------
         tuple of float
-            Recurrence interval (D_c/V_*), static and dynamic stress drops (sigma_*), and the
-            decimal logarithms of the extremes of V/V_*. The static drop extends to the lowest
-            spring stress, and the dynamic drop to the spring stress at the peak slip rate.
+            Recurrence interval, static stress drop, dynamic stress drop, and decimal logarithms of
+            the smallest and of the largest V/V_*.
         """
         highest = self.start_point.spring_stress
         drops = highest - self.min_spring_stress, highest - self.spring_stress_at_peak
@@ -123,12 +136,16 @@ def iterate_cycles(
     Parameters
     ----------
     scene : Scene
+        Scene with a moving load point.
     accuracy : Accuracy
+        Requested accuracy.
     meter : WorkMeter
+        Counter of right-hand-side evaluations.
     start : Point or None
         Point at which the motion starts. If None, the motion starts with the step of the scene, and
-        everything before the first maximum of spring stress is skipped.
+        the part of the motion before the first maximum of spring stress is skipped.
     recording : Recording, optional
+        Recording to which the motion is added.
 
     Yields
     ------
@@ -170,16 +187,46 @@ def iterate_cycles(
 
 
 def more_events_remedy(events: int, name: str = "events") -> str:
-    """Return the advice to wait for more events, for use in a message."""
+    """Return the advice to allow more events, for use in a message.
+
+    Parameters
+    ----------
+    events : int
+        Present limit of the number of events.
+    name : str, default: "events"
+        Name of the field that holds the limit.
+
+    Returns
+    -------
+    str
+        Advice with the command-line option and the field.
+    """
     return f"--set {name}={2 * events} ({name}=) waits for more"
 
 
 def cycle_record(scene: Scene, cycles: Sequence[Cycle], recording: Recording | None) -> np.ndarray:
-    """Return the record of successive cycles, one row per sample.
+    """Return the record of successive cycles.
 
-    If nothing was recorded, the record holds the ends of the cycles. The slip of the cycles is the
-    displacement of the load point minus the extension of the spring: ``V_0 T - (f_end -
-    f_begin)/K`` (see ``Recording.seen`` for the columns).
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    cycles : sequence of Cycle
+        Successive cycles.
+    recording : Recording or None
+        Recording of the cycles. If None, the record contains only the beginning and the end of the
+        cycles.
+
+    Returns
+    -------
+    ndarray, shape (n, columns)
+        Recorded samples. The columns are documented in ``Recording.table``.
+
+    Notes
+    -----
+    The slip during the cycles is the load point displacement minus the increase of the spring
+    elongation, :math:`V_0 T - (f_1 - f_0)/K`, with the duration :math:`T` of the cycles and the
+    spring stresses :math:`f_0` and :math:`f_1` at the beginning and at the end.
     """
     begin, end = cycles[0].start_point, cycles[-1].end_point
     passed = math.fsum(cycle.recurrence_interval for cycle in cycles)
@@ -189,13 +236,13 @@ def cycle_record(scene: Scene, cycles: Sequence[Cycle], recording: Recording | N
     last = to_recorded_units(scene, np.array(pack_row(passed, slip, end, 0)))
     if recording is None:
         return np.stack([to_recorded_units(scene, np.array(pack_row(0.0, 0.0, begin, 0))), last])
-    # the last step goes beyond the end
+    # The last integration step extends beyond the end of the last cycle.
     return truncate_table(recording.table(scene), last)
 
 
 @lru_cache(maxsize=256)
 def _event_specifications(log_load_rate: float) -> tuple[EventSpecification, ...]:
-    """Return the event specifications that delimit the cycles at ln(V_0/V_*)."""
+    """Return the events that delimit the cycles at ln(V_0/V_*)."""
     return (
         maximum("log_slip_rate", may_defer=True),
         minimum("log_slip_rate", may_defer=True),
@@ -206,11 +253,11 @@ def _event_specifications(log_load_rate: float) -> tuple[EventSpecification, ...
 
 
 def _amplitudes_vanish(ranges: list[float]) -> bool:
-    """Return True if shrinking swings of ln V approach zero.
+    """Return True if the decreasing ranges of ln V approach zero.
 
-    The last three swings, with differences d_1 and d_2, are extrapolated geometrically. Their
-    remaining decrease is d_2**2/(d_1 - d_2). Near the onset of stick-slip, the swings shrink slowly
-    towards a finite limit instead.
+    The last three ranges, with differences d_1 and d_2, are extrapolated as a geometric series. The
+    extrapolated decrease is d_2**2/(d_1 - d_2). Near the onset of stick-slip, the ranges decrease
+    slowly towards a positive limit instead.
     """
     if len(ranges) <= _MIN_SHRINKING_CYCLES or not all(
         y < x for x, y in pairwise(ranges[-_MIN_SHRINKING_CYCLES:])
@@ -241,7 +288,10 @@ def _assemble_cycle(start_point: Point, start_time: float, events: Sequence[Even
 
 
 def _find_arrest_point(events: Sequence[Event]) -> Point | None:
-    """Return the first point after the rupture at which friction balances the spring."""
+    """Return the point at which friction balances the spring after rupture.
+
+    The result is None if the cycle has no such point.
+    """
     fallen = False
     for event in events:
         fallen = fallen or event.kind is _FALL

@@ -1,15 +1,16 @@
-"""Stick-slip limit cycle: recurrence interval, stress drops and slip rates.
+"""Limit cycle of stick-slip: recurrence interval, stress drops and slip rates.
 
-A cycle extends from one maximum of spring stress, at which V rises through V_0, to the next. Spring
-stress and states at one maximum determine their values at the next maximum. This return map has a
-fixed point, the limit cycle. The motion is followed with a low accuracy until it approaches the
-limit cycle. The cycle is then closed in all unknowns, first with the requested accuracy and then
-with smaller tolerances. The first event after the step is never taken as the limit cycle. If an
-error estimate exceeds the requested error more than a hundredfold, the status is ``unverified``.
+A cycle extends from one maximum of spring stress, at which V rises through V_0, to the next
+maximum. Spring stress and states at one maximum determine their values at the next maximum. The
+limit cycle is the fixed point of this return map.
 
-If the law or the fluid has several states, the motion may repeat only after 2, 4 or more events, or
-never. The results then describe the event with the highest slip rate, and are not averages. The
-recorded orbit covers the whole period.
+The motion is first integrated with a low accuracy until it approaches the limit cycle. The orbit is
+then refined until all unknowns repeat, first with the requested accuracy and then with smaller
+tolerances. The first cycle after the step is never accepted as the limit cycle.
+
+If the law or the fluid has several states, the motion may repeat only after 2, 4 or more cycles, or
+never. The results then describe the cycle with the highest slip rate, and the recorded orbit covers
+the whole period.
 """
 
 from __future__ import annotations
@@ -40,13 +41,14 @@ from rsfstudy.quantities import Output
 from rsfstudy.slider import Scene, growth_rates
 from rsfstudy.status import Status
 
-#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
+#: Error that two runs may share by chance, as a fraction of the requested relative accuracy.
 _COINCIDENCE_FLOOR = 0.06
-#: Displacement in D_c that sets off a motion where the scene has no step.
+#: Displacement of the load point that starts a motion if the scene has no step, in units of D_c.
 PERTURBATION_DISPLACEMENT = 0.1
-#: Points of an orbit that are no more than its ends, of which no recording has to be made.
+#: Number of points of an orbit that consists only of its ends and needs no recording.
 _END_POINT_COUNT = 2
-#: Relative accuracy with which a limit cycle is looked for, before it is followed as asked.
+#: Relative accuracy of the search for the limit cycle. The orbit is then closed with the requested
+#: accuracy.
 _SEARCH_RTOL = 1e-4
 
 _PRIMARY_OUTPUTS = (
@@ -56,15 +58,15 @@ _PRIMARY_OUTPUTS = (
     "min_log10_slip_rate",
     "max_log10_slip_rate",
 )
-#: Place of the peak slip rate among them.
+#: Index of the peak slip rate in the main results.
 PEAK_INDEX = 4
 
-#: How many events a motion takes to repeat itself.
+#: Number of events after which a motion repeats itself.
 PERIOD_OUTPUT = Output(
     "period_events", "", "1", "number of events after which a motion repeats itself"
 )
-#: What a slider does in the end: it slides steadily, which it comes to without or with oscillation,
-#: or it cycles, with a slower or a faster peak than what `LimitCycle` says.
+#: Final behaviour of a slider: steady sliding that is approached without or with oscillations, or
+#: cycles with a peak slip rate below or above the limit of ``LimitCycle``.
 SLIP_MODES = ("steady", "damped_oscillation", "slow_slip", "stick_slip")
 _STEADY_CODE, _DAMPED_OSCILLATION_CODE, _SLOW_SLIP_CODE, _STICK_SLIP_CODE = map(
     float, range(len(SLIP_MODES))
@@ -102,29 +104,53 @@ _OUTPUTS = (
 @guard_methods
 @dataclass(frozen=True)
 class LimitCycle(RecordingMeasure):
-    """Limit cycle of stick-slip under a steady load point velocity.
+    r"""Limit cycle of stick-slip under a constant load point velocity.
 
-    If a motion with several states repeats only after ``period_events`` events, the results
-    describe the event with the highest slip rate, from one maximum of spring stress to the next. If
-    the motion never repeats, the status is ``not_periodic``, and the message reports the range of
-    the events.
+    The results include the recurrence interval, the stress drops and the extremes of slip rate. If
+    a motion with several states repeats only after ``period_events`` events, the results describe
+    the event with the highest slip rate. If the motion never repeats, the status is
+    ``not_periodic``, and the message reports the range of the events.
 
-    ``slip_mode`` is stick-slip if the peak slip rate reaches a limit, and slow slip otherwise. With
-    radiation damping, the limit is a sigma_*/eta, at which the radiated stress responds to slip
-    rate as strongly as the direct effect. Without radiation damping, the limit is the instability
-    norm. If a motion settles and the slowest-decaying eigenvalues of steady sliding are a complex
-    pair, ``slip_mode`` is damped oscillation. Otherwise a motion that settles is steady.
+    ``slip_mode`` is ``stick_slip`` if the peak slip rate reaches a limit, and ``slow_slip``
+    otherwise. If a motion settles with decaying oscillations, ``slip_mode`` is
+    ``damped_oscillation``. If a motion settles without oscillations, ``slip_mode`` is ``steady``.
 
     The status is ``no_limit_cycle`` only if small perturbations of steady sliding decay. If the
-    growth rate of small perturbations is zero within its error, the status is ``unverified``.
+    largest growth rate of small perturbations is zero within its error, the status is
+    ``unverified``. The status is also ``unverified`` if an error estimate exceeds the requested
+    error more than a hundredfold.
 
     Parameters
     ----------
-    phases : int
-        Number of points of the orbit along ``phase``, distributed over its slow part and its
+    phases : int, default: 400
+        Number of points of the orbit along ``phase``, distributed over the slow part and the
         rupture.
-    events : int
-        Largest number of events to wait for a cycle that repeats.
+    events : int, default: 300
+        Largest number of events until the motion repeats.
+
+    Raises
+    ------
+    InvalidValue
+        If ``events`` is not a positive integer, or if ``phases`` is less than 2.
+
+    Notes
+    -----
+    With radiation damping, the limit of the peak slip rate is :math:`a \sigma_*/\eta`. At this slip
+    rate, a change of slip rate changes the radiated stress as much as the direct effect. Without
+    radiation damping, the limit is the instability norm. A motion settles with oscillations if the
+    slowest-decaying eigenvalues of steady sliding are a complex pair.
+
+    The error estimates are based on two computations of the cycle with different tolerances. The
+    estimates also include the correction of each result for the closure error.
+
+    Examples
+    --------
+    >>> from rsfstudy import Accuracy, Scene
+    >>> from rsfstudy.measures import LimitCycle
+    >>> scene = Scene(normal_stress="constant", stiffness_ratio=0.8, radiation_damping=1e-3)
+    >>> outcome = LimitCycle(phases=2)(scene, Accuracy(rtol=1e-4))
+    >>> round(outcome.values["recurrence_interval"], 3)
+    9.061
     """
 
     phases: int = 400
@@ -135,21 +161,36 @@ class LimitCycle(RecordingMeasure):
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         super().__post_init__()
         if isinstance(self.events, bool) or not self.events >= 1 or self.events % 1:
             raise InvalidValue("events", self.events, "must be a whole number from 1")
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Compute the limit cycle of a scene.
+        """Compute the limit cycle, with error estimates.
 
-        The motion is followed until an event repeats. The cycle is then recomputed with smaller
-        tolerances, to estimate the error and to record the orbit.
+        The motion is integrated until it approaches the limit cycle. The cycle is then computed
+        twice, with the requested accuracy and with smaller tolerances.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
         """
         check_steady_loading(scene)
         if scene.log_load_velocity == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
         if not scene.is_perturbed:
-            # steady sliding left alone never leaves its steady state, stable or not
+            # Without a step, the slider would remain in steady sliding, even if it is unstable.
             scene = scene.with_segment(Segment(1.0, PERTURBATION_DISPLACEMENT))
         if scene.state_count > 1:
             return self._find_multi_state_cycle(scene, accuracy, meter)
@@ -159,7 +200,7 @@ class LimitCycle(RecordingMeasure):
             try:
                 found = approach.run(self.events)
             except MotionStopped:
-                # what cannot go on loosely, or does not repeat so within its events, may as asked
+                # The search may fail with the low accuracy and succeed with the requested accuracy.
                 if rtol == accuracy.rtol or meter.evaluations > meter.budget:
                     raise
                 continue
@@ -176,8 +217,8 @@ class LimitCycle(RecordingMeasure):
     ) -> Outcome:
         """Compute the limit cycle of a scene with several states.
 
-        The motion is followed with a low accuracy until it approaches a periodic orbit. The orbit
-        is then closed, starting from its largest event.
+        The motion is integrated with a low accuracy until it approaches a periodic orbit. The orbit
+        is then refined, starting from the event with the highest slip rate.
         """
         motion = follow_to_orbit(
             scene, accuracy.with_rtol(max(accuracy.rtol, _SEARCH_RTOL)), meter, self.events
@@ -193,9 +234,9 @@ class LimitCycle(RecordingMeasure):
     def _close_orbit(
         self, scene: Scene, accuracy: Accuracy, meter: WorkMeter, orbit: Orbit, events: int
     ) -> Outcome:
-        """Close a known cycle with the requested accuracy.
+        """Refine a periodic orbit to the requested accuracy.
 
-        The cycle is closed again with smaller tolerances, to estimate the error and to record the
+        The orbit is refined again with smaller tolerances, to estimate the errors and to record the
         orbit.
         """
         one = ReturnMap(scene, accuracy, meter).refine(orbit)
@@ -246,10 +287,22 @@ STEADY_SLIDING_OUTCOME = Outcome(
 
 
 def no_cycle_outcome(scene: Scene) -> Outcome:
-    """Return the outcome of a motion that settles to steady sliding."""
+    """Return the outcome of a motion that settles to steady sliding.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+
+    Returns
+    -------
+    Outcome
+        Outcome with the status ``no_limit_cycle`` and the slip mode.
+    """
     try:
         last = growth_rates(scene, scene.log_load_velocity)[0]
-    except ValueError:  # there is none in closed form
+    except ValueError:
+        # The growth rates have no closed form.
         return STEADY_SLIDING_OUTCOME
     return replace(
         STEADY_SLIDING_OUTCOME,
@@ -258,7 +311,7 @@ def no_cycle_outcome(scene: Scene) -> Outcome:
 
 
 def _classify_slip_mode(scene: Scene, log_peak: float) -> float:
-    """Return slow slip or stick-slip, depending on the peak of ln V."""
+    """Return the code of slow slip or stick-slip for a peak of ln V."""
     damping = scene.parts.dynamics.radiated_stress_slope(0.0)
     limit = math.log(scene.a / damping) if damping else scene.log_instability_rate
     return _STICK_SLIP_CODE if log_peak >= limit else _SLOW_SLIP_CODE
@@ -268,6 +321,20 @@ def aperiodic_outcome(scene: Scene, sequence: EventSequence, remedy: str) -> Out
     """Return the outcome of a motion that has not reached a periodic orbit.
 
     The status depends on whether the motion may still reach a periodic orbit.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    sequence : EventSequence
+        Events of the motion.
+    remedy : str
+        Advice for the message if the motion may still reach a periodic orbit.
+
+    Returns
+    -------
+    Outcome
+        Outcome with the status ``work_budget_spent`` or ``not_periodic``.
     """
     latest = sequence.cycles[len(sequence.cycles) // 2 :]
     peaks = [cycle.max_log_slip_rate / LN10 for cycle in latest]
@@ -286,13 +353,25 @@ def aperiodic_outcome(scene: Scene, sequence: EventSequence, remedy: str) -> Out
 def check_errors(
     accuracy: Accuracy, orbit: Orbit, errors: np.ndarray, outputs: slice = slice(None)
 ) -> tuple[Status, str]:
-    """Return the status that follows from the errors of the headline numbers.
+    """Return the status that follows from the errors of the main results.
+
+    Parameters
+    ----------
+    accuracy : Accuracy
+        Requested accuracy.
+    orbit : Orbit
+        Orbit with the main results.
+    errors : ndarray
+        Error estimates of the main results.
+    outputs : slice, optional
+        Main results to check. By default, all main results are checked.
 
     Returns
     -------
     status : Status
         OK, or ``unverified`` if an error is too large.
     message : str
+        Largest relative error, or an empty string.
     """
     worst = float((errors / _error_scales(orbit))[outputs].max())
     if worst <= MAX_ERROR_RATIO * accuracy.rtol:
@@ -302,7 +381,7 @@ def check_errors(
 
 
 def _error_scales(orbit: Orbit) -> list[float]:
-    """Return the scales of the errors of the headline numbers.
+    """Return the scales of the errors of the main results.
 
     The scale of a logarithm of slip rate is at least half of the range of the logarithms, because
     the logarithm is zero at V_*.
@@ -313,10 +392,24 @@ def _error_scales(orbit: Orbit) -> list[float]:
 
 
 def estimate_cycle_errors(accuracy: Accuracy, orbit: Orbit, refined_orbit: Orbit) -> np.ndarray:
-    """Estimate the errors of the headline numbers.
+    """Estimate the errors of the main results.
 
     The estimate includes the difference between two runs, and the corrections for the closure
     error, which both runs share.
+
+    Parameters
+    ----------
+    accuracy : Accuracy
+        Requested accuracy.
+    orbit : Orbit
+        Orbit of the first run.
+    refined_orbit : Orbit
+        Orbit of the refined run.
+
+    Returns
+    -------
+    ndarray
+        Error estimates in the order of the main results.
     """
     chance, scales = _COINCIDENCE_FLOOR * accuracy.rtol, _error_scales(orbit)
     pairs = zip(
@@ -337,9 +430,9 @@ def _cycle_properties(scene: Scene, cycle: Cycle) -> dict[str, float]:
 
 
 def _healing_exponent(scene: Scene, cycle: Cycle) -> float:
-    """Return d ln(theta)/d ln(V), where Theta = b ln(theta/theta_*).
+    """Return d ln(theta)/d ln(V) between the arrest and the slowest point.
 
-    The result is NaN if the law has no such theta.
+    The result is NaN if the law has no state variable Theta = b ln(theta/theta_*).
     """
     slowed = cycle.slowest_point.log_slip_rate - cycle.arrest_point.log_slip_rate
     law = scene.parts.law

@@ -1,26 +1,34 @@
-"""Periodic orbits, computed as fixed points of a return map.
+r"""Periodic orbits, computed as fixed points of a return map.
 
-A cycle (an event of ``measures.limit_cycle``) extends from one rise of V through V_0 to the next. V
-is known at such a rise, so spring stress and the states determine the motion. With inertia, the
-spring stress also includes the stress that accelerates the slider. The motion is therefore a map of
-spring stress and states from one section to the next, and an orbit of n cycles is a fixed point of
-the n-th power of this map. The eigenvalues of its derivative are the Floquet multipliers, the
-factors by which small perturbations grow during one orbit. The orbit repels if the absolute value
-of a multiplier exceeds 1. At a multiplier of -1, an orbit with twice the number of cycles branches
-off.
+The main methods are ``ReturnMap.find_orbit``, which searches for an orbit, and
+``ReturnMap.refine``, which computes a known orbit with another accuracy.
 
-If the effect of inertia is small, perturbations have one direction fewer than the section has
-unknowns. The motion forgets a perturbation along itself. This direction is a change of the states
-at constant spring stress, because spring stress is highest at a section.
+A cycle extends from one rise of V through V_0 to the next. The slip rate is known at a rise, so
+spring stress and the states determine the motion. With inertia, the spring stress also includes the
+stress that accelerates the slider. The motion is therefore a map of spring stress and states from
+one section to the next, and an orbit of n cycles is a fixed point of the n-th power of this map.
 
-Sections are arrays (f, Psi_1, ...) of shape (1 + states,), which contain spring stress over sigma_*
-and the states. If P is the map of n cycles, an orbit solves P(s) - s = 0. The equation is solved by
-Newton's method. The Jacobian dP - 1 is computed by finite differences of order four, and updated
-after each step by Broyden's method.
+The eigenvalues of the derivative of this map are the Floquet multipliers, the factors by which
+small perturbations grow during one orbit. The orbit repels if the absolute value of a multiplier
+exceeds 1. At a multiplier of -1, an orbit with twice the number of cycles branches off.
+
+If the effect of inertia is small, a perturbation along the motion only shifts the time. The number
+of independent perturbations is therefore one less than the number of unknowns of a section. A
+perturbation along the motion changes the states at constant spring stress, because spring stress
+has a maximum at a section.
+
+Notes
+-----
+Sections are arrays :math:`(f, \Psi_1, \ldots)` of shape (1 + states,), with the spring stress
+:math:`f` in units of :math:`\sigma_*` and the states :math:`\Psi_i`. If :math:`P` is the map of n
+cycles, an orbit solves :math:`P(s) - s = 0`. The equation is solved by Newton's method. The
+Jacobian :math:`P' - 1` is computed by finite differences of order four, and is updated after each
+step by Broyden's method [1]_.
 
 References
 ----------
-Broyden (1965), Math. Comp. 19, 577-593.
+.. [1] Broyden, C. G. (1965). A class of methods for solving nonlinear simultaneous equations. Math.
+   Comp., 19, 577-593.
 """
 
 from __future__ import annotations
@@ -53,14 +61,15 @@ from rsfstudy.motion import (
 from rsfstudy.slider import Numbers, Point, Scene, equations_without_mass
 from rsfstudy.status import Status
 
-#: Step of the differences that give the derivative of the map, over how far ln V swings: its slopes
-#: bend over a hundredth of a swing.
+#: Step of the finite differences of the map, relative to a times the range of ln V. The derivatives
+#: of the map change over a hundredth of this range.
 DIFFERENCE_STEP = 1e-4
 _DIFFERENCE_WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
-#: How far off an orbit is looked for, over how far ln V swings, and most steps to it.
+#: Largest distance of an orbit from the starting point of the search, relative to a times the range
+#: of ln V, and largest number of Newton steps.
 _MAX_ORBIT_DISTANCE, _MAX_ITERATIONS = 0.1, 12
-#: How nearly its cycles must close an orbit, in the accuracy asked for: what they do not is
-#: corrected to first order.
+#: Largest closure error of an orbit, relative to the requested accuracy. The results are corrected
+#: for the closure error to first order.
 CLOSURE_TOLERANCE = 0.3
 
 
@@ -68,21 +77,22 @@ CLOSURE_TOLERANCE = 0.3
 class Orbit:
     """Closed orbit of one or several cycles.
 
-    Attributes
+    Parameters
     ----------
     cycles : tuple of Cycle
         Successive cycles.
     derivatives : tuple of ndarray
-        For each cycle, the derivatives of the section at its end and of its headline numbers with
-        respect to the section at its beginning, of shape (1 + states + numbers, 1 + states).
-    section_correction : ndarray
+        Derivatives of each cycle, of shape (1 + states + results, 1 + states). The rows are the
+        section at the end of the cycle and the main results. The columns are the section at the
+        beginning of the cycle.
+    section_correction : ndarray, shape (1 + states,)
         Vector from the section at which the cycles begin to the section of the closed orbit.
     accuracy : Accuracy
         Accuracy with which the cycles were computed.
     evaluations : int
         Number of right-hand-side evaluations.
-    recording : Recording or None
-        Recording along the cycles, which may extend beyond their end.
+    recording : Recording, optional
+        Recording along the cycles. The recording may extend beyond the end of the cycles.
     """
 
     cycles: tuple[Cycle, ...]
@@ -99,24 +109,24 @@ class Orbit:
 
     @property
     def start_section(self) -> np.ndarray:
-        """Section at which the orbit begins."""
+        """Section at which the closed orbit begins."""
         return np.asarray(section_at(self.cycles[0].start_point) + self.section_correction)
 
     @cached_property
     def output_corrections(self) -> np.ndarray:
-        """Corrections of the numbers of the first cycle for the closure error."""
+        """Corrections of the main results for the closure error."""
         return np.asarray(
             self.derivatives[0][len(self.section_correction) :] @ self.section_correction
         )
 
     @cached_property
     def primary_outputs(self) -> np.ndarray:
-        """Headline numbers of the first cycle, corrected for the closure error."""
+        """Main results of the first cycle, corrected for the closure error."""
         return np.asarray(np.array(self.cycles[0].primary_outputs()) + self.output_corrections)
 
     @property
     def multipliers(self) -> np.ndarray:
-        """Complex Floquet multipliers in order of decreasing absolute value."""
+        """Complex Floquet multipliers by decreasing absolute value."""
         found = np.linalg.eigvals(chain_derivatives(self.derivatives)).astype(complex)
         return np.asarray(found[np.argsort(-np.abs(found), kind="stable")])
 
@@ -127,7 +137,7 @@ class Orbit:
 
     @property
     def from_largest_event(self) -> Orbit:
-        """The same orbit, starting with the cycle that has the highest slip rate."""
+        """Orbit that starts with the cycle with the highest slip rate."""
         at = max(range(self.period), key=lambda place: self.cycles[place].max_log_slip_rate)
         if not at:
             return self
@@ -140,12 +150,34 @@ class Orbit:
 
 
 def section_at(point: Point) -> np.ndarray:
-    """Return the section at a point: spring stress and states."""
+    """Return the section at a point.
+
+    Parameters
+    ----------
+    point : Point
+        Point of a motion.
+
+    Returns
+    -------
+    ndarray, shape (1 + states,)
+        Spring stress and states.
+    """
     return np.array((point.spring_stress, *point.psis))
 
 
 def cycle_image(cycle: Cycle) -> np.ndarray:
-    """Return the section at the end of a cycle, followed by its headline numbers."""
+    """Return the image of the section at which a cycle begins.
+
+    Parameters
+    ----------
+    cycle : Cycle
+        Cycle of a motion.
+
+    Returns
+    -------
+    ndarray, shape (1 + states + results,)
+        Section at the end of the cycle, followed by the main results.
+    """
     return np.array(
         (cycle.end_point.spring_stress, *cycle.end_point.psis, *cycle.primary_outputs())
     )
@@ -154,10 +186,15 @@ def cycle_image(cycle: Cycle) -> np.ndarray:
 def chain_derivatives(slopes: Sequence[np.ndarray]) -> np.ndarray:
     """Return the derivative of the section over several successive cycles.
 
+    Parameters
+    ----------
+    slopes : sequence of ndarray
+        Derivatives of each cycle.
+
     Returns
     -------
     ndarray, shape (1 + states, 1 + states)
-        Product of the derivatives of the cycles.
+        Product of the derivatives.
     """
     size = slopes[0].shape[1]
     together = slopes[0][:size]
@@ -170,20 +207,24 @@ _identity_matrix = lru_cache(np.eye)
 
 
 class ReturnMap:
-    """Map of spring stress and states from one rise of V through V_0 to the next.
+    """Map of spring stress and states from one section to the next.
+
+    A section is the point of a motion at which V rises through V_0.
 
     Parameters
     ----------
     scene : Scene
-        A scene with a moving load point.
+        Scene with a moving load point.
     accuracy : Accuracy
+        Requested accuracy.
     meter : WorkMeter
-        Counter of the work of the motions.
-    recorded : bool
-        If True, record the motions along an orbit. Otherwise only the ends of the cycles are kept.
+        Counter of right-hand-side evaluations.
+    recorded : bool, default: False
+        If True, record the motions along an orbit. Otherwise only the ends of the cycles are
+        stored.
     counted : sequence of int, optional
-        Indices of the states that count for the distance between two sections. By default, all
-        states count except those that a part lists in ``excluded_from_distance``.
+        Indices of the states used for the distance between two sections. By default, all states are
+        used except states in the attribute ``excluded_from_distance`` of a part.
     """
 
     def __init__(
@@ -198,18 +239,29 @@ class ReturnMap:
         self.scene, self.accuracy, self._meter = scene, accuracy, meter
         self._with_recording = recorded
         places = scene.functions.friction.distance_indices if counted is None else counted
-        #: Places in a section of the unknowns that count for the distance.
+        #: Indices of the unknowns of a section that contribute to the distance.
         self._compared_unknowns = [0, *(1 + place for place in places)]
 
     def point_at(self, section: np.ndarray) -> Point:
         """Return the point of the slider at a section.
 
-        The point lies on the slow manifold, or at V_0 if inertia is important there.
+        The point is on the slow manifold, unless inertia is important. If inertia is important, the
+        slip rate of the point is V_0.
+
+        Parameters
+        ----------
+        section : ndarray, shape (1 + states,)
+            Spring stress and states.
+
+        Returns
+        -------
+        Point
+            Point at which a motion can start.
 
         Raises
         ------
         MotionStopped
-            If the spring stress is incompatible with friction of forward slip.
+            If forward slip is impossible at this spring stress.
         """
         spring_stress, *psis = section.tolist()
         scene, states = self.scene, tuple(psis)
@@ -223,7 +275,7 @@ class ReturnMap:
         )
 
     def _inertia_matters_at(self, point: Point) -> bool:
-        """Return True if the effect of inertia exceeds that on the slow manifold."""
+        """Return True if inertia is too important for the slow manifold."""
         if not self.scene.has_mass:
             return False
         inertial_stress = point.spring_stress - point.frictional_stress
@@ -233,13 +285,23 @@ class ReturnMap:
     def follow_cycles(
         self, start: np.ndarray, count: int, recording: Recording | None = None
     ) -> list[Cycle]:
-        """Follow a number of cycles from a section.
+        """Compute successive cycles from a section.
+
+        Parameters
+        ----------
+        start : ndarray, shape (1 + states,)
+            Section at which the first cycle begins.
+        count : int
+            Number of cycles.
+        recording : Recording, optional
+            Recording to which the motion is added.
 
         Returns
         -------
         list of Cycle
-            The list is shorter than ``count`` if the motion settles, stays close to unstable
-            steady sliding, which is a fixed point of the map but not a cycle, or cannot continue.
+            Successive cycles. The list is shorter than ``count`` if the motion settles, stays close
+            to unstable steady sliding, or cannot continue. Unstable steady sliding is a fixed point
+            of the map, but not a cycle.
         """
         seen = list[Cycle]()
         try:
@@ -258,12 +320,17 @@ class ReturnMap:
         return seen
 
     def compute_image(self, start: np.ndarray) -> np.ndarray | None:
-        """Return the section one cycle later, and the numbers of the cycle.
+        """Compute the section one cycle later, and the main results.
+
+        Parameters
+        ----------
+        start : ndarray, shape (1 + states,)
+            Section at which the cycle begins.
 
         Returns
         -------
-        ndarray, shape (1 + states + numbers,), or None
-            None if the motion does not complete a cycle.
+        ndarray, shape (1 + states + results,), or None
+            Image of the section, or None if the motion does not complete a cycle.
         """
         seen = self.follow_cycles(start, 1)
         return cycle_image(seen[0]) if seen else None
@@ -275,7 +342,7 @@ class ReturnMap:
 
         Parameters
         ----------
-        start : ndarray
+        start : ndarray, shape (1 + states,)
             Section at which the first cycle begins.
         count : int
             Number of cycles.
@@ -285,7 +352,8 @@ class ReturnMap:
         Returns
         -------
         tuple of ndarray
-            The tuple is shorter than ``count`` if the motion does not complete all cycles.
+            Derivatives of each cycle. The tuple is shorter than ``count`` if the motion does not
+            complete all cycles.
         """
         found, step = (
             list[np.ndarray](),
@@ -302,17 +370,22 @@ class ReturnMap:
         return tuple(found)
 
     def motion_direction(self, point: Point) -> tuple[Numbers, Numbers]:
-        """Return the direction of the motion at a section, and its effect.
+        """Return the direction of the motion at a section.
 
-        A displacement of the start along the motion changes only the time of the cycle, if the
-        effect of inertia is small.
+        The function also returns the effect of a displacement in this direction. If the effect of
+        inertia is small, a displacement along the motion changes only the duration of the cycle.
+
+        Parameters
+        ----------
+        point : Point
+            Point of the slider at the section.
 
         Returns
         -------
         way : tuple of float
             Rates of change of the section.
         passed : tuple of float
-            Corresponding change of the section and of the numbers of the cycle.
+            Corresponding change of the image.
         """
         scene, states = self.scene, len(point.psis)
         spring_stress = point.frictional_stress + scene.dynamics.radiated_stress(
@@ -327,7 +400,8 @@ class ReturnMap:
     def _differentiate_cycle(self, start: np.ndarray, step: float) -> np.ndarray | None:
         """Compute the derivatives of one cycle by differences of order four.
 
-        The derivative along the motion follows from the rates of the motion.
+        The derivative along the motion follows from the rates of the motion. The result is None if
+        a motion does not complete the cycle.
         """
         point = self.point_at(start)
         way, passed = self.motion_direction(point)
@@ -358,20 +432,20 @@ class ReturnMap:
 
         Parameters
         ----------
-        start : ndarray
+        start : ndarray, shape (1 + states,)
             Section at which the search starts.
         count : int
-            Number of cycles of the orbit. The orbit that is found may repeat after a divisor of
+            Number of cycles of the orbit. The period of the orbit that is found may be a divisor of
             this number.
         log_slip_rate_range : float
             Range of ln V.
-        max_distance : float
+        max_distance : float, default: 0.1
             Largest distance of the orbit from ``start``, relative to ``a`` times the range of ln V.
 
         Returns
         -------
         Orbit or None
-            None if no orbit is found.
+            The orbit, or None if no orbit is found.
         """
         scale = self.scene.a * log_slip_rate_range
         slopes = self.compute_derivatives(start, count, scale)
@@ -388,12 +462,17 @@ class ReturnMap:
         return replace(found, cycles=found.cycles[:count], derivatives=slopes[:count])
 
     def refine(self, orbit: Orbit) -> Orbit | None:
-        """Compute a known orbit at the accuracy of this map.
+        """Compute a known orbit with the accuracy of this map.
+
+        Parameters
+        ----------
+        orbit : Orbit
+            Orbit that was computed with any accuracy.
 
         Returns
         -------
         Orbit or None
-            None if the orbit does not close.
+            The refined orbit, or None if the orbit does not close.
         """
         if orbit.accuracy == self.accuracy:
             return orbit
@@ -407,15 +486,20 @@ class ReturnMap:
     def _close_orbit(
         self, start: np.ndarray, slopes: Sequence[np.ndarray], scale: float, max_distance: float
     ) -> Orbit | None:
-        """Solve for an orbit with as many cycles as there are derivatives.
+        r"""Solve for a periodic orbit with a given number of cycles.
 
-        The equation ``J move = -(P(s) - s)`` is solved by Newton's method with Broyden's updates.
-        If ``off`` is the value of P(s) - s after a move, J changes by ``off move^T/(move . move)``.
+        The number of cycles is the number of arrays in ``slopes``.
 
         Returns
         -------
         Orbit or None
-            None if there is no orbit within ``max_distance`` of the section.
+            The orbit, or None if there is no orbit within ``max_distance`` of the section.
+
+        Notes
+        -----
+        The equation :math:`J\,ds = -(P(s) - s)` is solved by Newton's method with Broyden's
+        updates. If :math:`r` is the value of :math:`P(s) - s` after a step :math:`ds`, the update
+        of :math:`J` is :math:`r\,ds^T/(ds^T ds)`.
         """
         at, enough, last = start, CLOSURE_TOLERANCE * self.accuracy.rtol * scale, math.inf
         jacobian, move = chain_derivatives(slopes) - _identity_matrix(len(start)), None
@@ -432,7 +516,8 @@ class ReturnMap:
                 jacobian += off[:, None] * move / (move @ move)
             move = -dgesv(jacobian, off)[2]
             size = self._scaled_norm(move, at, scale)
-            # as close as asked for, or as errors of the motion let it come
+            # The iteration ends at the requested accuracy, or if numerical errors of the motion
+            # prevent further progress.
             if size <= enough or 0.5 * last <= size <= 100.0 * enough:
                 work = self._meter.evaluations - spent
                 return Orbit(tuple(seen), tuple(slopes), move, self.accuracy, work, recording)
@@ -444,8 +529,8 @@ class ReturnMap:
     def _scaled_norm(self, move: np.ndarray, at: np.ndarray, scale: float) -> float:
         """Return the largest component of a change of a section.
 
-        The unknowns of a fluid may have large values. If such a value exceeds the scale of the
-        states, the change is divided by the ratio of the value to the scale.
+        The unknowns of a fluid may have large values. If the value of a fluid unknown exceeds the
+        scale of the states, its change is divided by the ratio of the value to the scale.
         """
         changes, first = np.abs(move), 1 + self.scene.parts.law.state_count
         changes[first:] /= np.maximum(1.0, np.abs(at[first:]) / scale)

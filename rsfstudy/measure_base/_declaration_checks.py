@@ -1,4 +1,7 @@
-"""Checks of the values of a measure, so that a lattice and a file can store them."""
+"""Checks of the results and options that a measure declares.
+
+The checks ensure that a lattice and a NetCDF file can store all values.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +15,27 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion import DEFAULT_RTOL, MAX_RTOL, MIN_RTOL, Accuracy
 
+#: Type of a result: a number, or an array along inner dimensions.
 OutputValue = float | np.ndarray
-#: What an axis can hold.
+#: Type of the values of an axis.
 PlainValue = int | float | str | bool
 
 
 def check_cost(work: object, expected_work: Callable[[Accuracy], float]) -> None:
-    """Raise ``InvalidValue`` if the typical or the expected work is not a positive number."""
+    """Check that the typical and the expected work are positive numbers.
+
+    Parameters
+    ----------
+    work : object
+        Typical number of right-hand-side evaluations.
+    expected_work : callable
+        Function that returns the expected number of evaluations at an accuracy.
+
+    Raises
+    ------
+    InvalidValue
+        If a number is not positive and finite.
+    """
     if not isinstance(work, int | float) or not 0 < work < np.inf:
         raise InvalidValue("typical_work", work, "must be a number greater than 0")
     for rtol in (MIN_RTOL, DEFAULT_RTOL, MAX_RTOL):
@@ -28,7 +45,20 @@ def check_cost(work: object, expected_work: Callable[[Accuracy], float]) -> None
 
 
 def check_description(measure: str, describe: Callable[[], Mapping[str, Any]]) -> None:
-    """Raise ``InvalidValue`` if a file could not store the description of a measure."""
+    """Check that a file can store the description of a measure.
+
+    Parameters
+    ----------
+    measure : str
+        Name of the measure.
+    describe : callable
+        Function that returns the description as a dictionary.
+
+    Raises
+    ------
+    InvalidValue
+        If the description is not plain data, or if its name is not a string.
+    """
     try:
         name: object = json.loads(json.dumps(describe()))["name"]
     except (TypeError, ValueError) as error:
@@ -40,14 +70,26 @@ def check_description(measure: str, describe: Callable[[], Mapping[str, Any]]) -
 
 
 def check_coordinate(name: str, values: Any) -> None:
-    """Raise InvalidValue for coordinate values that do not tell points apart, or that no file can
-    hold.
+    """Check the coordinate values of an inner dimension.
+
+    Parameters
+    ----------
+    name : str
+        Name of the dimension.
+    values : array_like
+        Coordinate values.
+
+    Raises
+    ------
+    InvalidValue
+        If the values are not one-dimensional, not finite or not unique, or if a file could not
+        store them.
     """
     array = np.asarray(values)
     if isinstance(values, np.ma.MaskedArray) or array.ndim != 1 or not array.size:
         raise InvalidValue(name, values, "must be a list of coordinate values")
     texts = array.dtype.kind in "OU" and all(isinstance(text, str) for text in array)
-    # no file holds the half and the long floats of NumPy
+    # NetCDF has no half-precision and no extended-precision floats.
     numbers = array.dtype.kind in "iufb" and array.dtype.char not in "eg"
     if texts:
         texts = "\0" not in "".join(array).encode().decode()
@@ -63,7 +105,29 @@ def check_output(
     name: str,
     value: Any,
 ) -> OutputValue:
-    """A measured number, or an array of them, as NumPy's or Python's own."""
+    """Check one result of a measure.
+
+    Parameters
+    ----------
+    declared : mapping of str to tuple of str
+        Inner dimensions of each declared result.
+    coordinates : mapping of str to ndarray
+        Coordinate values of each inner dimension.
+    name : str
+        Name of the result.
+    value : object
+        Value of the result.
+
+    Returns
+    -------
+    float, int, bool or ndarray
+        A Python number if the result is scalar, and otherwise an array.
+
+    Raises
+    ------
+    InvalidValue
+        If the result is undeclared, is not a real number, or has the wrong shape.
+    """
     if name not in declared:
         raise InvalidValue("measured", name, "is not declared", choices=declared)
     if isinstance(value, np.ma.MaskedArray):
@@ -79,7 +143,30 @@ def check_output(
 
 
 def check_field_value(name: str, value: Any, current: PlainValue, is_integer: bool) -> Any:
-    """A value of the kind that a field holds at present; axes hold whole numbers as float."""
+    """Check a new value of a field of a measure.
+
+    Parameters
+    ----------
+    name : str
+        Name of the field.
+    value : object
+        New value.
+    current : int, float, str or bool
+        Present value, which must have the same type as the new value.
+    is_integer : bool
+        True if the field holds an integer. The new value may still be a float, because axes store
+        integers as floats.
+
+    Returns
+    -------
+    int, float, str or bool
+        The new value, as an integer if ``is_integer`` is True.
+
+    Raises
+    ------
+    InvalidValue
+        If the new value has another type, is not finite, or is not an integer.
+    """
     if _describe_kind(value) != _describe_kind(current):
         raise InvalidValue(name, value, f"must be {_describe_kind(current)}, as {current!r} is")
     if isinstance(value, float) and not math.isfinite(value):
@@ -98,7 +185,23 @@ def _describe_kind(value: object) -> str:
 
 
 def check_evaluations(spent: Any) -> int:
-    """Right-hand sides as a file can hold them."""
+    """Check that a file can store a number of right-hand-side evaluations.
+
+    Parameters
+    ----------
+    spent : object
+        Number of evaluations.
+
+    Returns
+    -------
+    int
+        Number of evaluations as a Python integer.
+
+    Raises
+    ------
+    InvalidValue
+        If the number is not an integer from 0 to 2**63 - 1.
+    """
     if not isinstance(spent, int | np.integer) or not 0 <= spent < 2**63:
         raise InvalidValue("rhs_evaluations", spent, "must be a whole number from 0 to 2**63 - 1")
     return int(spent)

@@ -1,4 +1,4 @@
-"""Checks of scenes: of one step, after which a motion decides, and of what settles or repeats."""
+"""Checks of the loading and of the instability norm of a scene."""
 
 from __future__ import annotations
 
@@ -9,14 +9,25 @@ from rsfstudy.measure_base.measure import Outcome
 from rsfstudy.slider import Scene, SliderParameters
 from rsfstudy.status import Status
 
-#: Slip rate over that of the load point from which on a norm is that of an instability.
+#: Ratio of the norm, as a slip rate, to the load point velocity below which a warning is issued.
 _MIN_NORM_TO_LOAD_RATIO = 1e3
-#: How a text begins that tells of a slower one.
+#: Beginning of the warning about a slow instability norm.
 SLOW_NORM_PREFIX = "the instability norm "
 
 
 def check_single_step(scene: Scene) -> None:
-    """Refuse a loading of several segments, and one that changes normal stress all along."""
+    """Check that the loading is a single step.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the loading has several segments, or changes stress continuously.
+    """
     check_steady_loading(scene)
     loading = scene.parts.loading
     if len(loading.segments) > 1:
@@ -26,14 +37,22 @@ def check_single_step(scene: Scene) -> None:
 
 
 def norm_below_loading_outcome(scene: Scene, load_velocity: float = 0.0) -> Outcome:
-    """The outcome where steady sliding before the step, or the load point after it, has the norm
-    already.
+    """Return the outcome if the loading itself reaches the instability norm.
+
+    Steady sliding before the step, or the load point after the step, may already be faster than the
+    instability norm.
 
     Parameters
     ----------
     scene : Scene
-    load_velocity : float
-        That after the step, over V_*.
+        Scene with the instability norm.
+    load_velocity : float, default: 0.0
+        Load point velocity after the step, in units of V_*.
+
+    Returns
+    -------
+    Outcome
+        Outcome with the status ``norm_below_loading_rate`` and a remedy.
     """
     norm, least = scene.instability_norm, scene.inertial_time * max(1.0, abs(load_velocity))
     return Outcome(
@@ -45,14 +64,23 @@ def norm_below_loading_outcome(scene: Scene, load_velocity: float = 0.0) -> Outc
 
 
 def slow_norm_warning(scene: Scene, load_velocity: float) -> str:
-    """A text where the norm is so slow that it tells little: within a thousand times the load point
-    velocity. Scenes at the default reference rate are those of published studies, and of no rig.
+    """Return a warning if the instability norm is a slow slip rate.
+
+    The norm is slow if it is less than a thousand times the load point velocity, because a slip
+    rate may then reach the norm without an instability. There is no warning for scenes with the
+    default reference rate, because they represent published studies and not a rig.
 
     Parameters
     ----------
     scene : Scene
+        Scene with the instability norm.
     load_velocity : float
-        That after the step, over V_*.
+        Load point velocity after the step, in units of V_*.
+
+    Returns
+    -------
+    str
+        The warning, or an empty string.
     """
     rate, load = math.exp(scene.log_instability_rate), max(1.0, abs(load_velocity))
     if (
@@ -69,8 +97,19 @@ def slow_norm_warning(scene: Scene, load_velocity: float) -> str:
 
 
 def check_steady_loading(scene: Scene) -> None:
-    """Refuse a loading that changes stress other than at once: nothing settles or repeats by
-    itself under it.
+    """Check that the loading changes stress only in sudden steps.
+
+    A motion cannot settle or repeat if the loading changes stress continuously.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the load point velocity or the normal stress changes continuously.
     """
     loading = scene.parts.loading
     if loading.unknowns:

@@ -1,4 +1,8 @@
-"""Records of motions, shared by measures that store or evaluate a motion."""
+"""Recording of motions, and error estimates of results read from a record.
+
+Measures call ``record_motion`` twice, with two accuracies, and compare the results of the two runs
+with ``estimate_instant_errors``.
+"""
 
 from __future__ import annotations
 
@@ -31,14 +35,15 @@ from rsfstudy.motion import (
 from rsfstudy.quantities import Output
 from rsfstudy.slider import Scene, cached_attribute
 
-#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
+#: Error that two runs may share by chance, as a fraction of the requested relative accuracy.
 COINCIDENCE_FLOOR = 0.01
-#: Part of the same, times a, by which the friction coefficient of two runs may agree by chance at
-#: an instant: of 7,071 numbers of random holds 22 err by up to 22 times their estimates without it,
-#: and four by up to 1.7 times with it (study coverage).
+#: Error of the friction coefficient that two runs may share by chance at a single instant, as a
+#: fraction of a times the requested accuracy. In the study ``coverage``, with 7,071 results of
+#: random holds, 22 errors exceed their estimates without this term, by a factor of up to 22. With
+#: the term, four errors exceed their estimates, by a factor of up to 1.7.
 _INSTANT_FRICTION_ERROR = 0.1
 
-#: What is kept of a record while normal stress changes.
+#: Variables along ``phase`` that are recorded if normal stress changes.
 PHASE_VARIABLES = (
     "time",
     "load_point_displacement",
@@ -50,30 +55,41 @@ PHASE_VARIABLES = (
 
 
 def phase_outputs(*names: str) -> tuple[Output, ...]:
-    """Return the outputs along ``phase`` for some quantities of the vocabulary."""
+    """Return outputs along the dimension ``phase``.
+
+    Parameters
+    ----------
+    *names : str
+        Names of quantities in the common vocabulary.
+
+    Returns
+    -------
+    tuple of Output
+        One output per name.
+    """
     return tuple(Output(name, dims=("phase",)) for name in names)
 
 
 class RecordedMotion(NamedTuple):
-    """A motion from the beginning of a loading segment.
+    """Record of a motion from the beginning of a loading segment.
 
-    Attributes
+    Parameters
     ----------
     segment_starts : list of Event
         Beginnings of this segment and of all later segments.
     friction_before_starts : list of float
-        Friction coefficient immediately before each beginning. With inertia, the friction
-        coefficient immediately after a beginning is the value on the slow manifold, which the
-        motion approaches within the inertial time.
+        Friction coefficient immediately before each beginning. With inertia, the motion approaches
+        the slow manifold after a beginning within the inertial time, and the value immediately
+        after the beginning is the value on the slow manifold.
     peak : Event or None
-        The requested extremum. None if there is no extremum.
+        Requested extremum, or None if the motion has no extremum.
     last_event : Event
-        The last event.
-    rows : ndarray
-        Recorded samples, shape (rows, columns). See ``motion.recording`` for the columns.
-    neglected_inertia_error : ndarray
-        Error of ln V due to inertia that is neglected up to each row (see
-        ``motion.neglected_inertia``).
+        Last event of the motion.
+    rows : ndarray, shape (n, columns)
+        Recorded samples. The columns are documented in ``rsfstudy.motion.recording``.
+    neglected_inertia_error : ndarray, shape (n,)
+        Error of ln V up to each row that is caused by neglected inertia. See
+        ``rsfstudy.motion.neglected_inertia``.
     """
 
     segment_starts: list[Event]
@@ -89,7 +105,18 @@ class RecordedMotion(NamedTuple):
         return self.segment_starts[0]
 
     def neglected_error_until(self, time: float) -> float:
-        """Return the error of ln V due to inertia neglected up to a given time."""
+        """Return the error of ln V that is caused by neglected inertia.
+
+        Parameters
+        ----------
+        time : float
+            Time up to which the error accumulates, in units of D_c/V_*.
+
+        Returns
+        -------
+        float
+            Error of ln V at this time, or at the end of the record if the record ends earlier.
+        """
         row = min(int(np.searchsorted(self.rows[:, 0], time)), len(self.rows) - 1)
         return float(self.neglected_inertia_error[row])
 
@@ -113,21 +140,26 @@ def record_motion(
     Parameters
     ----------
     scene : Scene
+        Scene of the motion.
     accuracy : Accuracy
+        Requested accuracy.
     meter : WorkMeter
+        Counter of right-hand-side evaluations.
     specifications : sequence of EventSpecification
-        The extremum, followed by other events that may end the motion.
-    first_segment, peak_segment : int
-        Indices of the segment at which the record begins, and of the segment that contains the
-        extremum.
-    end_time : float
-        End time in D_c/V_*.
-    allow_early_stop : bool
+        Specification of the extremum, followed by other events that may end the motion.
+    first_segment : int
+        Index of the loading segment at which the record begins.
+    peak_segment : int
+        Index of the loading segment that contains the extremum.
+    end_time : float, default: inf
+        End time in units of D_c/V_*.
+    allow_early_stop : bool, default: False
         If True, ignore a ``MotionStopped`` after the extremum.
 
     Returns
     -------
     RecordedMotion
+        The record and its extremum.
 
     Raises
     ------
@@ -163,7 +195,8 @@ def record_motion(
     neglected = estimate_neglected_inertia(scene, rows, slow, start.log_slip_rate)
     shown = rows[:, 0] >= begun[first_segment].time
     rows, neglected = rows[shown], neglected[shown]
-    rows[0, SAMPLE_COLUMN] = 0.0  # of the step that ends there, no other rows are left
+    # The other samples of the step that ends at the first row are not part of the record.
+    rows[0, SAMPLE_COLUMN] = 0.0
     friction, later = friction_coefficient(rows), begun[max(first_segment, 1) :]
     before = [float(friction[rows[:, 0] == each.time][0]) for each in later]
     if first_segment == 0:
@@ -172,7 +205,20 @@ def record_motion(
 
 
 def relative_to_start(start: Event, path: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the quantities along a record, with time and slip from its start."""
+    """Return the quantities along a record relative to its beginning.
+
+    Parameters
+    ----------
+    start : Event
+        Beginning of the record.
+    path : mapping of str to ndarray
+        Quantities along the record.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Time and slip since the beginning, friction coefficient, and logarithm of the slip rate.
+    """
     found = {name: path[name] for name in ("friction_coefficient", "log10_slip_rate")}
     return {"time": path["time"] - start.time, "slip": path["slip"] - path["slip"][0], **found}
 
@@ -180,22 +226,24 @@ def relative_to_start(start: Event, path: Mapping[str, np.ndarray]) -> dict[str,
 @guard_methods
 @dataclass(frozen=True)
 class RecordingMeasure(Measure):
-    """Base class of measures that keep a record along ``phase``.
+    """Base class of measures that store a record along ``phase``.
 
-    The field ``phases`` sets the number of points of the record.
+    A subclass defines the field ``phases``, which sets the number of points of the record.
     """
 
     def __post_init__(self) -> None:
+        """Check the number of points of the record."""
         if self.point_count < 2:
             raise InvalidValue("phases", self.point_count, "must be at least 2")
 
     @property
     def point_count(self) -> int:
-        """Number of points of the record that are kept."""
+        """Number of points of the record that are stored."""
         return int(self.plain_fields["phases"])
 
     @cached_attribute
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        """Coordinate values of ``phase``, from 0 to 1."""
         return {"phase": np.linspace(0.0, 1.0, self.point_count)}
 
 
@@ -207,31 +255,42 @@ def estimate_instant_error(
     accuracy: Accuracy,
     neglected_error: float = 0.0,
 ) -> float:
-    """Estimate the error of a result that is read at a single instant.
+    r"""Estimate the error of a result that is read at a single instant.
 
-    If the machine is stiff, stability limits the time steps. The errors of two runs may then agree
-    at an instant by chance. The estimate therefore includes two additional terms: a fraction of the
-    result, and a fraction of the friction from which the result is read. Let y and y' be the
-    results of the first and the refined run, eps the requested accuracy, and e the error of ln V
-    due to neglected inertia. The error is ``3 |y - y'| + 0.01 eps |y| + (0.1 eps + e) a |dy/dmu|``,
-    because friction changes by ``a`` if ln V changes by 1.
+    If the machine is stiff, stability limits the time steps, so the errors of two runs may agree by
+    chance at a single instant. The estimate therefore includes a fraction of the result, and a
+    fraction of the friction from which the result is read.
 
     Parameters
     ----------
-    value, refined : float
-        Results of the first run and of the refined run.
+    value : float
+        Result of the first run.
+    refined : float
+        Result of the refined run.
     friction_derivative : float
-        Derivative dy/dmu of the result with respect to the friction coefficient from which the
-        result is read.
+        Derivative of the result with respect to the friction coefficient from which the result is
+        read.
     scene : Scene
+        Scene of the motion.
     accuracy : Accuracy
-    neglected_error : float
-        Error of ln V that both runs share, because both neglect the same part of inertia.
+        Accuracy of the first run.
+    neglected_error : float, default: 0.0
+        Error of ln V that both runs share, because both runs neglect the same part of inertia.
 
     Returns
     -------
     float
         Error in the units of the result.
+
+    Notes
+    -----
+    Let :math:`y` and :math:`y'` be the results of the first and of the refined run,
+    :math:`\epsilon` the requested accuracy, and :math:`e` the error of :math:`\ln V` due to
+    neglected inertia. The error is
+
+    .. math:: 3\,|y - y'| + 0.01\,\epsilon\,|y| + (0.1\,\epsilon + e)\,a\,|dy/d\mu|,
+
+    because friction changes by :math:`a` if :math:`\ln V` changes by 1.
     """
     friction = (_INSTANT_FRICTION_ERROR * accuracy.rtol + neglected_error) * scene.a
     chance = COINCIDENCE_FLOOR * accuracy.rtol
@@ -248,11 +307,26 @@ def estimate_instant_errors(
 ) -> dict[str, float]:
     """Estimate the errors of several results that are read at single instants.
 
-    See ``estimate_instant_error`` for the estimate.
+    The function ``estimate_instant_error`` documents the estimate.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        Results of the first run by name.
+    refined : mapping of str to float
+        Results of the refined run by name.
+    friction_derivatives : mapping of str to float
+        Derivatives of the results with respect to the friction coefficient.
+    scene : Scene
+        Scene of the motion.
+    accuracy : Accuracy
+        Accuracy of the first run.
+    neglected_errors : mapping of str to float, optional
+        Errors of ln V by name of the result. By default, all errors are zero.
 
     Returns
     -------
-    dict
+    dict of str to float
         Errors by name, as ``<name>_error``.
     """
     shared = neglected_errors or dict.fromkeys(values, 0.0)

@@ -1,4 +1,4 @@
-"""Elasticities: relative sensitivities of a result to the scene parameters."""
+"""Elasticities, the relative sensitivities of a result to scene parameters."""
 
 from __future__ import annotations
 
@@ -23,33 +23,38 @@ from rsfstudy.status import Status
 NUMERIC_SCENE_FIELDS = tuple(
     name for name, kind in FIELD_TYPES.items() if kind in (float, float | None)
 )
-#: What a rig has, and a scene has not; and how elasticities by that follow.
+#: Parameters of a rig that are not fields of a scene, and advice on computing elasticities with
+#: respect to these parameters.
 _RIG_QUANTITIES = ("b", "slip_distance", "normal_stress", "sigma_star", "reference_velocity")
 _RIG_ELASTICITIES_REMEDY = (
     "b at constant a is b_over_a; of a time in s, D_c is 1 + stiffness - reference_rate, normal "
     "stress is -stiffness, and V_* is reference_rate - 1."
 )
-#: Longest step of ln p, of which the formula spans four.
+#: Largest step of ln p. The finite-difference formula spans four steps.
 _MAX_LOG_STEP = 0.05
-#: Places of the levels of a derivative, in steps; and weights of their fourth difference.
+#: Points of the finite-difference formula in units of the step, and weights of the fourth
+#: difference.
 _STENCIL, _FOURTH_DIFFERENCE_WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0, -4.0, 6.0, -4.0, 1.0)
-#: Part of the correction from the second to the fourth order that counts as an error; at most 0.14
-#: of it is left in random scenes, by the longest steps.
+#: Truncation error as a fraction of the difference between the fourth-order and the second-order
+#: formula. In random scenes, the largest fraction is 0.14, for the largest steps.
 _CORRECTION_ERROR_FRACTION = 0.25
-#: Parts of a step that are tried where there is no number on one side of it, or an error of more
-#: than a part of the slope; and right-hand sides that a measurement takes then at most, over those
-#: of the number itself.
+#: Fractions of the step that are tried in turn if the result does not exist on one side, or if the
+#: relative error of the derivative exceeds the second number. The third number limits the work of
+#: an evaluation with a shorter step, relative to the work at the scene itself.
 _STEP_FRACTIONS, _MAX_RELATIVE_ERROR, _MAX_EVALUATION_RATIO = (
     (1.0, 0.125, 0.125**2, 0.125**3),
     0.1,
     4,
 )
-#: How many numbers a scene usually has that are not zero.
+#: Typical number of nonzero parameters of a scene.
 _TYPICAL_PARAMETER_COUNT = 8
 
 
 class _LogValue(NamedTuple):
-    """Value and error of ln|y|. The error is the error of y divided by |y|."""
+    """Value and error of ``ln|y|``.
+
+    The error is the error of y divided by ``|y|``.
+    """
 
     value: float
     error: float
@@ -58,31 +63,58 @@ class _LogValue(NamedTuple):
 @guard_methods
 @dataclass(frozen=True)
 class Elasticities(Measure):
-    """Elasticities d ln|y|/d ln p of the headline y of a measure.
+    r"""Elasticities of the main result of a measure.
 
-    Each elasticity is a partial derivative with respect to a scene parameter p. All other
-    parameters remain fixed. If y is proportional to p squared, for example, the elasticity is 2.
-    The elasticities and their errors are dimensionless and have the shape (parameters,).
+    An elasticity is the relative change of a result divided by the relative change of a scene
+    parameter. If a result is proportional to the square of a parameter, for example, the elasticity
+    is 2. All other parameters remain fixed. The elasticities and their errors are dimensionless and
+    have the shape (parameters,).
 
-    The derivatives are fourth-order central differences with points at ln p = -2h, -h, h and 2h,
-    relative to the scene. The measure is therefore evaluated four times per parameter, and once for
-    the scene. The step h = (e/2)^(1/3) depends on the relative error estimate e of y. The error
-    estimate of an elasticity is the sum of three terms. The first term, 1.5 e/h, accounts for the
-    errors of y. The second term is a quarter of the difference between the fourth-order and the
-    second-order formula. The third term is a bound computed from the fourth difference.
-
-    If y has no value on one side, for example near a stability boundary, up to three shorter steps
-    are tried. Each of these steps is an eighth of the previous step. If the scene is exactly at a
-    boundary, such as the critical stiffness, the derivative is a one-sided difference.
+    The elasticities are finite differences, so the measure is evaluated four times per parameter
+    and once for the scene itself. If the result does not exist on one side, for example near a
+    stability boundary, up to three shorter steps are tried. If the scene is exactly at a boundary,
+    such as the critical stiffness, the derivative is a one-sided difference.
 
     Parameters
     ----------
     measure : Measure
-        A measure whose headline is a single number.
-    parameters : sequence of str
+        A measure whose main result is a single number.
+    parameters : tuple of str, optional
         Scene parameters, along the dimension ``parameter``. By default, all parameters that the
-        measure does not solve for. The elasticity is NaN if the scene does not have the parameter,
-        or if the parameter is zero.
+        measure does not solve for. If the scene does not have a parameter, or if the parameter is
+        zero, the elasticity is NaN.
+
+    Raises
+    ------
+    InvalidValue
+        If the main result is not a single number, or if a parameter is not a number of the scene.
+
+    Notes
+    -----
+    The elasticity of the result :math:`y` with respect to the parameter :math:`p` is
+
+    .. math:: E = \frac{\partial \ln |y|}{\partial \ln p}.
+
+    With the central differences :math:`D(h)` of :math:`\ln |y|` at :math:`\ln p \pm h`, the
+    fourth-order formula is
+
+    .. math:: E \approx \frac{4 D(h) - D(2h)}{3}.
+
+    The step :math:`h = (e/2)^{1/3}`, but at most 0.05, depends on the relative error estimate
+    :math:`e` of :math:`y`. The error estimate of an elasticity is the sum of three terms. The first
+    term, about :math:`1.5\,e/h`, is the effect of the errors of :math:`y`. The second term is a
+    quarter of the difference between the fourth-order and the second-order formula. The third term
+    is a bound that follows from the fourth difference of :math:`\ln |y|`. Each shorter step is an
+    eighth of the previous step.
+
+    Examples
+    --------
+    >>> from rsfstudy import Accuracy, Scene
+    >>> from rsfstudy.measures import Elasticities, LinearStability
+    >>> measure = Elasticities(LinearStability(), ("b_over_a", "a"))
+    >>> outcome = measure(Scene(normal_stress="constant"), Accuracy())
+    >>> outcome.values["elasticity"].round(3).tolist()
+    [2.0, 1.0]
     """
 
     measure: Measure
@@ -94,6 +126,7 @@ class Elasticities(Measure):
     )
 
     def __post_init__(self) -> None:
+        """Check the measure and the parameters."""
         if (
             not isinstance(self.measure, Measure)
             or self.measure.variables[self.measure.primary_output]
@@ -119,10 +152,12 @@ class Elasticities(Measure):
 
     @property
     def primary_output(self) -> str:
+        """Name of the main result of the inner measure."""
         return self.measure.primary_output
 
     @property
     def outputs(self) -> Sequence[Output]:
+        """Main result of the inner measure, and its elasticities."""
         given = {about.name: about for about in self.measure.outputs}
         headline = given.get(self.primary_output, Output(self.primary_output))
         text = f"d ln|y|/d ln p of {self.primary_output.replace('_', ' ')}"
@@ -133,24 +168,34 @@ class Elasticities(Measure):
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        """Parameter names, which are the coordinate values."""
         return {"parameter": np.array(self.parameters, dtype=object)}
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
+        """Scene fields that the inner measure solves for."""
         return self.measure.solved_fields
 
     @property
     def typical_work(self) -> int:
+        """Typical number of right-hand-side evaluations per cell."""
         return self.measure.typical_work * (
             4 * min(_TYPICAL_PARAMETER_COUNT, len(self.parameters)) + 1
         )
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
+        """Relative work of the inner measure by number of digits."""
         return self.measure.work_by_digits
 
     def describe(self) -> dict[str, Any]:
-        """Return a description of the measure as plain data."""
+        """Return the definition of the measure as plain data.
+
+        Returns
+        -------
+        dict
+            Name of the measure, definition of the inner measure, and parameters.
+        """
         return {
             "name": self.name,
             "measure": self.measure.describe(),
@@ -158,7 +203,25 @@ class Elasticities(Measure):
         }
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Compute the headline and its elasticities."""
+        """Compute the main result of the inner measure and its elasticities.
+
+        If the main result is zero, the status is ``not_applicable``, because zero has no logarithm.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene at which the derivatives are computed.
+        accuracy : Accuracy
+            Requested accuracy of the inner measure.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Main result, elasticities and error estimates. The message lists the parameters without
+            an elasticity.
+        """
         outcome = self.measure.run_nested(scene, accuracy, meter)
         if outcome.status is not Status.OK:
             return Outcome(outcome.status, message=outcome.message)
@@ -194,25 +257,28 @@ class Elasticities(Measure):
     ) -> tuple[float, float]:
         """Compute the derivative with respect to one parameter, and its error.
 
-        If the headline has no value on one side, or if the error is large, the derivative is
-        recomputed with shorter steps.
+        If the result does not exist on one side, or if the error is large, the derivative is
+        computed again with shorter steps.
 
         Parameters
         ----------
         scene : Scene
+            Scene at which the derivative is computed.
         name : str
             Name of the parameter.
-        centre : _Level
-            Value at the scene.
+        centre : _LogValue
+            Value at the scene itself.
         step : float
-            Longest step of ln p.
+            Largest step of ln p.
         accuracies : sequence of Accuracy
             Accuracy for each step.
         meter : WorkMeter
+            Counter of right-hand-side evaluations.
 
         Returns
         -------
         slope, error : float
+            The derivative and its error. Both are NaN if the result does not exist on either side.
         """
         found: list[tuple[bool, float, float]] = []
         for part, accuracy in zip(_STEP_FRACTIONS, accuracies, strict=True):
@@ -224,9 +290,10 @@ class Elasticities(Measure):
             except MotionStopped:
                 if not found:
                     raise
-                break  # beside the end of answers some take long
+                break  # Near the end of the solution branch, some evaluations exceed the budget.
             slope, error, of_levels = _central_difference(centre, sides, size)
-            if found and not all(sides):  # the longer step leaves out eight times as much
+            if found and not all(sides):
+                # The truncation error of the previous step is eight times as large.
                 error += 2.0 * abs(slope - found[-1][2])
             found.append((not all(sides), error, slope))
             told = error < max(2.0 * of_levels, _MAX_RELATIVE_ERROR * abs(slope))
@@ -238,17 +305,30 @@ class Elasticities(Measure):
     def _evaluate_at(
         self, scene: Scene, name: str, log_change: float, accuracy: Accuracy, meter: WorkMeter
     ) -> _LogValue | None:
-        """Compute ln|y| after a change of ln p.
+        """Compute ``ln|y|`` after a change of ln p.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene before the change.
+        name : str
+            Name of the parameter.
+        log_change : float
+            Change of ln p.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
 
         Returns
         -------
-        _Level or None
-            None if the measure has no numerical result there.
+        _LogValue or None
+            None if the changed scene is invalid or has no numerical result.
 
         Raises
         ------
         MotionStopped
-            If the measure fails.
+            If the computation fails.
         """
         try:
             beside = scene.with_(**{name: getattr(scene, name) * math.exp(log_change)})
@@ -261,12 +341,12 @@ class Elasticities(Measure):
         return self._log_value(outcome)
 
     def _log_value(self, outcome: Outcome) -> _LogValue | None:
-        """Return ln|y| and its error, including rounding errors.
+        """Return ``ln|y|`` of an outcome with an error that includes rounding.
 
         Returns
         -------
-        _Level or None
-            None if the outcome has no headline, or if the headline is zero.
+        _LogValue or None
+            None if the outcome has no main result, or if the main result is zero.
         """
         y = float(outcome.values[self.primary_output]) if outcome.status is Status.OK else 0.0
         if not y:
@@ -281,22 +361,22 @@ class Elasticities(Measure):
 def _central_difference(
     centre: _LogValue, neighbours: Sequence[_LogValue | None], step: float
 ) -> tuple[float, float, float]:
-    """Compute the derivative of ln|y| with respect to ln p.
+    """Compute the derivative of ``ln|y|`` with respect to ln p.
 
     Parameters
     ----------
-    centre : _Level
-        Value at the scene.
-    neighbours : sequence of _Level or None
-        Values at ``_STENCIL``, or None for missing values.
+    centre : _LogValue
+        Value at the scene itself.
+    neighbours : sequence of _LogValue or None
+        Values at the points of ``_STENCIL``, or None for missing values.
     step : float
         Step of ln p.
 
     Returns
     -------
     slope, error, of_levels : float
-        The derivative, its error, and the contribution of the errors of y to this error. All are
-        NaN if the values on both sides are missing.
+        The derivative, its error, and the contribution of the errors of y to this error. All three
+        are NaN if the values on both sides are missing.
     """
     far_below, below, above, far_above = neighbours
     if far_below and below and above and far_above:
@@ -311,7 +391,8 @@ def _central_difference(
                 w * level.value for w, level in zip(_FOURTH_DIFFERENCE_WEIGHTS, levels, strict=True)
             )
         )
-        # the fifth derivative is at most the fourth one over the span of the levels
+        # The bound assumes that the fifth derivative is at most the fourth derivative divided by
+        # the distance of the outer points.
         left = _CORRECTION_ERROR_FRACTION * abs(correction) + fourth / (12.0 * step)
         return near + correction, left + of_levels, of_levels
     if below and above:
@@ -322,7 +403,8 @@ def _central_difference(
     for beside, sign in ((below, -1.0), (above, 1.0)):
         if beside:
             slope = sign * (beside.value - centre.value) / step
-            # how it curves is not known: twice as much as a logarithm of that slope
+            # The curvature is unknown. The estimate assumes twice the curvature of a logarithm
+            # with this slope.
             of_levels = (beside.error + centre.error) / step
             return slope, step * max(1.0, slope**2) + of_levels, of_levels
     return math.nan, math.nan, math.nan

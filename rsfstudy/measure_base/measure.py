@@ -1,13 +1,13 @@
-"""Measures: named results of a scene, with a status, error estimates and cost.
+"""Base class of measures, and the outcome of a measure.
 
-Each measure has its own module and is looked up by its name. Measures that only the studies use are
-kept with the studies.
+A measure computes named results of one scene. Each result has a unit, and may have an error
+estimate. The class ``Measure`` runs the computation, checks the results, and counts the work. To
+define a measure, derive a frozen dataclass from ``Measure``.
 
-A measure is a frozen dataclass derived from ``Measure`` that implements the physics. Measures are
-picklable, so Dask can distribute them. A measure describes itself as plain data, so the description
-can be stored in a NetCDF file. Fields that hold a number, a flag or a string may vary along an
-axis, in the same way as the fields of a scene. Fields that determine the names of the results may
-not vary.
+Instances of measures are picklable, so Dask can send them to its workers. A measure also converts
+itself to plain data, so that a NetCDF file can store the definition of the measure. Fields that
+hold a number, a flag or a string may vary along an axis, in the same way as the fields of a scene.
+A field must not vary along an axis if the names of the results depend on the field.
 """
 
 from __future__ import annotations
@@ -44,15 +44,23 @@ from rsfstudy.vocabulary import DERIVED_COORDINATES
 class Outcome:
     """Results of a measure for one scene.
 
-    Attributes
+    Parameters
     ----------
     status : Status
-    values : mapping of str to float or 1-d array
-        Named results. Missing names become NaN in the lattice.
-    message : str
+        Status of the computation.
+    values : mapping of str to float or ndarray, optional
+        Results by name. If a result is missing, its value in the lattice is NaN.
+    message : str, default: ""
         Details about the status.
-    rhs_evaluations : int
+    rhs_evaluations : int, default: 0
         Number of right-hand-side evaluations.
+
+    Examples
+    --------
+    >>> from rsfstudy.measures import Outcome, Status
+    >>> outcome = Outcome(Status.OK, {"critical_stiffness": 0.0145})
+    >>> outcome.status.label
+    'ok'
     """
 
     status: Status
@@ -61,7 +69,7 @@ class Outcome:
     rhs_evaluations: int = 0
 
 
-#: Names that every lattice uses already.
+#: Variable names of every lattice, which are not available as names of results.
 RESERVED_NAMES = frozenset(
     {"status", "message", "rhs_evaluations", "wall_time", *FIELD_NAMES, *DERIVED_COORDINATES}
 )
@@ -73,36 +81,62 @@ RESERVED_NAMES = frozenset(
 class Measure(CheckedKeywords):
     """Base class of all measures.
 
-    A measure runs ``compute`` with a work budget, and converts a ``MotionStopped`` into a status.
     To define a measure, write a frozen dataclass with the following members. The fields of the
     dataclass are the options of the measure::
 
         name: ClassVar[str]                       # name of the measure
         primary_output: str                       # name of the main result
         outputs: Sequence[Output]                 # results, with units and error estimates
-        typical_work: int                         # right-hand sides of a cell
+        typical_work: int                         # right-hand-side evaluations per cell
         compute(self, scene, accuracy, meter) -> Outcome
 
-    ``compute`` returns ``Outcome(status, values)``. ``values`` contains a number for each name in
-    ``outputs``, and a number called ``<name>_error`` for each output with ``error=True``. The
-    argument ``accuracy`` contains the requested relative accuracy, ``accuracy.rtol``. The argument
-    ``meter`` counts right-hand-side evaluations, and stops a motion that exceeds the work budget.
-    To compute a motion, pass both arguments to ``rsfstudy.simulate``: ``rsfstudy.simulate(scene,
-    accuracy=accuracy, meter=meter)``. To use the results of another measure, call the
-    ``run_nested`` method of that measure. Override ``error_scales`` to report a cell as
-    ``unverified`` if its error estimates are far too large::
+    The method ``compute`` returns ``Outcome(status, values)``. The mapping ``values`` contains one
+    number for each name in ``outputs``. For each output with ``error=True``, the mapping also
+    contains an error estimate with the name ``<name>_error``.
+
+    The argument ``accuracy`` contains the requested relative accuracy, ``accuracy.rtol``. The
+    argument ``meter`` counts right-hand-side evaluations, and stops a motion that exceeds the work
+    budget. To compute a motion, pass both arguments to ``rsfstudy.simulate``:
+    ``rsfstudy.simulate(scene, accuracy=accuracy, meter=meter)``. To use the results of another
+    measure, call the ``run_nested`` method of that measure.
+
+    Override ``error_scales`` to report a cell as ``unverified`` if its error estimates are far too
+    large::
 
         error_scales(self, scene, values) -> Mapping[str, float]
+
+    If a motion cannot continue, ``compute`` may raise ``MotionStopped``. The base class converts
+    the exception into a status.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> from rsfstudy import Accuracy, Scene
+    >>> from rsfstudy.measures import Measure, Outcome, Output, Status
+    >>> @dataclass(frozen=True)
+    ... class RateWeakening(Measure):
+    ...     name = "rate_weakening"
+    ...     primary_output = "b_minus_a"
+    ...     outputs = (Output("b_minus_a", "$b-a$", "1", "rate weakening"),)
+    ...     typical_work = 1
+    ...
+    ...     def compute(self, scene, accuracy, meter):
+    ...         return Outcome(Status.OK, {"b_minus_a": scene.b - scene.a})
+    >>> outcome = RateWeakening()(Scene(a=0.01, b_over_a=1.5), Accuracy())
+    >>> round(outcome.values["b_minus_a"], 6)
+    0.005
     """
 
-    #: File and registry name.
+    #: Name of the measure in files and in the registry.
     name: ClassVar[str]
-    #: What its inner dimensions and its fields mean, where the vocabulary does not say.
+    #: Meanings of inner dimensions and fields that are not in the common vocabulary.
     dimensions: ClassVar[Sequence[Quantity]] = ()
-    #: Whether its motions carry time along: what is compiled before any cell is.
+    #: Variants of the equations that are compiled before the first cell is computed: True for
+    #: motions with time, False for motions without time. Empty without motions.
     needs_time: ClassVar[tuple[bool, ...]] = (True,)
 
     def __init_subclass__(cls) -> None:
+        """Adopt former names of members that the subclass defines."""
         super().__init_subclass__()
         adopt_former_members(cls)
 
@@ -113,22 +147,22 @@ class Measure(CheckedKeywords):
 
     @property
     def outputs(self) -> Sequence[Output]:
-        """Results of the measure."""
+        """Results of the measure, with their units and error estimates."""
         return ()
 
     @cached_attribute
     def variables(self) -> Mapping[str, tuple[str, ...]]:
-        """Names of results and error estimates, with their inner dimensions.
+        """Inner dimensions of each result and error estimate, by name.
 
-        Scalar results have no inner dimensions.
+        The dimensions of a scalar result are an empty tuple.
         """
         return {name: about.dims for about in self.outputs for name in about.variable_names}
 
     @cached_attribute
     def optional_outputs(self) -> Sequence[str]:
-        """Names of results that may be missing from a successful outcome.
+        """Names of the results that a successful outcome may omit.
 
-        If such a result is missing, the message of the outcome explains why.
+        If such a result is missing, the message of the outcome contains the reason.
         """
         return tuple(about.name for about in self.outputs if about.optional)
 
@@ -140,60 +174,88 @@ class Measure(CheckedKeywords):
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        """Coordinate values of the inner dimensions."""
+        """Coordinate values of the inner dimensions, by dimension."""
         return {}
 
     @property
     def quantities(self) -> Sequence[Quantity]:
         """Meanings and units of results, inner dimensions and fields.
 
-        Quantities in the common vocabulary are not included.
+        Quantities of the common vocabulary are not included.
         """
         return (*(about for about in self.outputs if about.long_name), *self.dimensions)
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
-        """Fields of the scene that the measure solves for.
+        """Scene fields that the measure solves for.
 
-        The values of these fields in the scene are ignored.
+        The measure ignores the values of these fields in the scene.
         """
         return ()
 
     @property
     def code_classes(self) -> tuple[type[Measure], ...]:
-        """Class of this measure, and classes of measures in its fields.
+        """Classes whose code determines the results of the measure.
 
-        The code of these classes determines the results.
+        The tuple contains the class of this measure and the classes of all measures in its fields.
         """
         held = (getattr(self, f.name) for f in fields(self))
         return (type(self), *(c for m in held if isinstance(m, Measure) for c in m.code_classes))
 
     @property
     def typical_work(self) -> int:
-        """Typical number of right-hand sides per cell at the default accuracy."""
+        """Typical number of right-hand-side evaluations per cell.
+
+        The number applies to the default accuracy.
+        """
         raise TypeError(f"{type(self).__name__} states no typical work")
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Number of right-hand sides by number of digits, relative to the default.
+        """Relative number of right-hand-side evaluations by number of digits.
 
-        The study accuracy_cost measured these ratios. The default values apply to a limit cycle,
-        the most demanding measure.
+        The number of digits is ``-log10(rtol)``, and the work is relative to the work at the
+        default accuracy. The default values were measured for limit cycles, the most demanding
+        measure, in the study ``accuracy_cost``.
         """
         return {2.0: 0.3, 3.0: 0.33, 5.0: 0.55, 7.0: 1.0, 8.0: 1.35, 9.0: 1.97, 10.0: 3.5}
 
     def expected_work(self, accuracy: Accuracy) -> float:
-        """Return the typical number of right-hand sides per cell at an accuracy."""
+        """Return the expected number of right-hand-side evaluations per cell.
+
+        Parameters
+        ----------
+        accuracy : Accuracy
+            Accuracy of the computation.
+
+        Returns
+        -------
+        float
+            The typical work, scaled to the given accuracy.
+        """
         return self.typical_work * relative_work(accuracy.rtol, self.work_by_digits)
 
     @property
     def plain_fields(self) -> dict[str, PlainValue]:
-        """Fields that hold a number, a flag or a string, which an axis may vary."""
+        """Fields that hold a number, a flag or a string, by name.
+
+        Only these fields may vary along an axis.
+        """
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.init}
         return {name: value for name, value in values.items() if isinstance(value, PlainValue)}
 
     def with_(self, **changes: Any) -> Measure:
-        """Return a copy with other values of plain fields.
+        """Return a copy of the measure with other values of plain fields.
+
+        Parameters
+        ----------
+        **changes : int, float, str or bool
+            New values of fields, by name.
+
+        Returns
+        -------
+        Measure
+            The copy, or the measure itself if there are no changes.
 
         Raises
         ------
@@ -221,18 +283,56 @@ class Measure(CheckedKeywords):
         """Return the scale of the numerical error of each result.
 
         The requested accuracy is relative to this scale. If the error estimate of a result exceeds
-        the requested error more than a hundredfold, the status becomes ``unverified``. Results that
-        are not included are not checked, such as statistical results, or results whose resolution
-        is an option of the measure.
+        the requested error more than a hundredfold, the status of the cell becomes ``unverified``.
+        Results without a scale are not checked. An override should omit statistical results, and
+        results whose resolution is an option of the measure.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the computation.
+        values : mapping of str to float or ndarray
+            Results by name.
+
+        Returns
+        -------
+        mapping of str to float
+            Scales by name of the result. The base class returns an empty mapping.
         """
         return {}
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Compute the results for one scene, and count the work in ``meter``."""
+        """Compute the results for one scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
+
+        Raises
+        ------
+        MotionStopped
+            If the motion cannot continue. The caller converts the exception into a status.
+        """
         raise TypeError(f"{type(self).__name__} measures nothing")
 
     def check(self) -> None:
-        """Raise ``InvalidValue`` if a lattice cannot hold the declared results."""
+        """Check the declarations of the measure.
+
+        Raises
+        ------
+        InvalidValue
+            If a lattice or a file could not store the declared results.
+        """
         try:
             for name in ("__call__", "run_nested", "run_metered"):
                 if getattr(type(self), name) is not getattr(Measure, name):
@@ -254,6 +354,18 @@ class Measure(CheckedKeywords):
         """Compute the results for one scene.
 
         If a motion cannot continue, the reason becomes the status of the outcome.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy and work budget.
+
+        Returns
+        -------
+        Outcome
+            Status, results, message and number of right-hand-side evaluations.
         """
         outcome, meter = self.run_metered(scene, accuracy)
         if outcome.status is Status.WORK_BUDGET_SPENT and meter.evaluations > meter.budget:
@@ -261,10 +373,23 @@ class Measure(CheckedKeywords):
         return outcome
 
     def run_nested(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Compute the results for another measure.
+        """Compute the results for use in another measure.
 
-        The outcome is the same as that of ``__call__``. The work is added to the meter of the other
-        measure.
+        The work is added to the meter of the other measure.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy and work budget.
+        meter : WorkMeter
+            Meter of the other measure.
+
+        Returns
+        -------
+        Outcome
+            Outcome of ``__call__``, without the advice on a larger budget.
         """
         outcome, own = self.run_metered(scene, accuracy)
         for regime, spent in own.evaluations_by_regime.items():
@@ -272,7 +397,22 @@ class Measure(CheckedKeywords):
         return outcome
 
     def run_metered(self, scene: Scene, accuracy: Accuracy) -> tuple[Outcome, WorkMeter]:
-        """Compute the results for one scene, and count the right-hand side evaluations."""
+        """Compute the results for one scene, and return the work meter.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy and work budget.
+
+        Returns
+        -------
+        outcome : Outcome
+            Outcome after all checks.
+        meter : WorkMeter
+            Right-hand-side evaluations by regime.
+        """
         meter = WorkMeter(accuracy.budget, dict(accuracy.methods), accuracy.engine)
         try:
             outcome = self._validate_outcome(self.compute(scene, accuracy, meter))
@@ -284,15 +424,15 @@ class Measure(CheckedKeywords):
         return Outcome(outcome.status, outcome.values, outcome.message, spent), meter
 
     def _validate_outcome(self, outcome: Outcome) -> Outcome:
-        """Check that the results of an outcome agree with their declarations.
+        """Check that the results of an outcome match their declarations.
 
-        The status becomes ``not_finite`` if a required result of a successful outcome is missing.
+        If a required result of a successful outcome is missing, the status becomes ``not_finite``.
 
         Raises
         ------
         InvalidValue
-            If the argument is not an outcome, or if a result is not declared, not real, or has the
-            wrong shape.
+            If the argument is not an outcome, or if a result is undeclared, is not a real number,
+            or has the wrong shape.
         """
         if not isinstance(outcome, Outcome) or not isinstance(outcome.status, Status):
             raise InvalidValue("measured", outcome, "must be an Outcome with a Status")
@@ -305,7 +445,7 @@ class Measure(CheckedKeywords):
         declared, inner = self.variables, self.inner_coordinates
         given = outcome.values.items()
         values = {
-            # most are plain numbers
+            # Most results are plain floats, for which the full check would take too long.
             name: value
             if isinstance(value, float) and declared.get(name) == ()
             else _declaration_checks.check_output(declared, inner, name, value)
@@ -318,10 +458,10 @@ class Measure(CheckedKeywords):
         return Outcome(outcome.status, values, outcome.message)
 
     def _find_missing_output(self, values: Mapping[str, OutputValue]) -> str | None:
-        """Return the first required result that is missing or not finite.
+        """Return the name of the first required result that is not finite.
 
-        Required results are the primary output, and all results with an error estimate, including
-        the error. Optional results are required only if they are present.
+        The primary output is required, and so is each result with an error estimate, including the
+        error. Optional results are required only if they are present.
         """
         known = [
             n for n in self.outputs_with_error if n in values or n not in self.optional_outputs
@@ -334,7 +474,7 @@ class Measure(CheckedKeywords):
         return None
 
     def _flag_large_errors(self, rtol: float, scene: Scene, outcome: Outcome) -> Outcome:
-        """Change the status to ``unverified`` if an error estimate is too large."""
+        """Set the status to ``unverified`` if an error is too large."""
         values, doubts = outcome.values, []
         for name, scale in self.error_scales(scene, values).items():
             error, asked = values.get(f"{name}_error", 0.0), rtol * scale
@@ -347,20 +487,42 @@ class Measure(CheckedKeywords):
         return Outcome(Status.UNVERIFIED, values, message)
 
     def describe(self) -> dict[str, Any]:
-        """Return a description of the measure as plain data."""
+        """Return the definition of the measure as plain data.
+
+        Returns
+        -------
+        dict
+            Name of the measure, and values of its fields.
+        """
         return {"name": self.name, **asdict(self)}
 
     @classmethod
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Return the fields that are not plain data from a description.
+        """Rebuild the fields that are not plain data from a description.
 
-        The argument ``path`` is the location of the description.
+        Parameters
+        ----------
+        described : dict
+            Description of a measure, as returned by ``describe``.
+        path : str
+            Location of the description in the file, for use in error messages.
+
+        Returns
+        -------
+        dict
+            Field values by name. The base class returns an empty dictionary.
         """
         return {}
 
 
 def _check_names(measure: Measure) -> None:
-    """Raise InvalidValue for numbers, dimensions or quantities that are none, or named twice."""
+    """Check the names of results, dimensions, quantities and solved fields.
+
+    Raises
+    ------
+    InvalidValue
+        If a name is invalid, unknown or duplicated.
+    """
     stated = [name for about in measure.outputs for name in about.variable_names]
     variables = measure.variables
     names = [*(stated or variables), *measure.inner_coordinates]

@@ -1,4 +1,4 @@
-"""Test whether a motion close to steady sliding settles."""
+"""Tests for the stability of steady sliding at the end of a motion."""
 
 from __future__ import annotations
 
@@ -15,13 +15,18 @@ def settles_to_steady_sliding(scene: Scene) -> bool:
     Parameters
     ----------
     scene : Scene
-        A scene with a moving load point.
+        Scene with a moving load point.
+
+    Returns
+    -------
+    bool
+        True if the largest growth rate of small perturbations is negative.
 
     Raises
     ------
     MotionStopped
-        With ``unverified`` if the largest growth rate of small perturbations is zero within its
-        error, and with ``no_steady_state`` if steady sliding does not exist.
+        With the status ``no_steady_state`` if steady sliding does not exist, and with the status
+        ``unverified`` if the largest growth rate is zero within its error.
     """
     growth = largest_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
     if growth is None:
@@ -40,18 +45,20 @@ def settles_to_steady_sliding(scene: Scene) -> bool:
 def settled_flag(scene: Scene, *, is_flat: bool) -> float:
     """Return 1 if friction has settled at the end of a record, and 0 if not.
 
+    Friction has settled if it is nearly constant and if small perturbations of steady sliding do
+    not grow.
+
     Parameters
     ----------
     scene : Scene
-        A scene under the last loading segment of the record.
+        Scene with the last loading segment of the record.
     is_flat : bool
         True if friction is nearly constant at the end of the record.
 
     Returns
     -------
     float
-        0 if friction is not constant, or if small perturbations of steady sliding grow. NaN if the
-        growth rate of small perturbations is zero within its error. Otherwise 1.
+        1, 0, or NaN if the growth rate of small perturbations is zero within its error.
     """
     if not is_flat:
         return 0.0

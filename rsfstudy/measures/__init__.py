@@ -1,8 +1,9 @@
-"""Measures: named results of a scene, with a status, error estimates and cost.
+"""Measures, which compute named results of a scene.
 
-A measure is a frozen dataclass derived from ``Measure`` that implements the physics. This package
-only exports names, for studies and for user-defined measures. Each measure is defined in the
-package of its topic. Measures that only the named studies use are defined there.
+A measure is a frozen dataclass derived from ``Measure``. A measure returns an outcome with a
+status, named results and error estimates. Use the measures of this package in studies, or derive
+your own measure from ``Measure``. The package only exports names: each measure is defined in the
+package of its topic. Measures that only the named studies use are defined next to these studies.
 """
 
 from __future__ import annotations

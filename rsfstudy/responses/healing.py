@@ -1,4 +1,4 @@
-"""Healing: what a hold of the load point does to friction, as an experimenter reads it."""
+"""Frictional healing and relaxation caused by a hold of the load point."""
 
 from __future__ import annotations
 
@@ -42,12 +42,14 @@ from rsfstudy.quantities import Output
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
-#: Distance from steady sliding within which a hold begins in it, in ln V or in the state over b.
+#: Largest distance from steady sliding, in ln V or in the state divided by b, at which the motion
+#: before a hold is treated as steady.
 _STEADY_TOLERANCE = 1e-3
-#: How far friction may turn beside steady sliding, over the local tolerance: up to 1.9 in 7,000
-#: random motions at 1e-2 to 1e-6.
+#: Largest height of a peak, relative to the local tolerance, that is attributed to numerical errors
+#: near steady sliding. In 7,000 random motions with rtol from 1e-2 to 1e-6, the largest such height
+#: is 1.9.
 _PEAK_NOISE_FACTOR = 3.0
-#: Part of the largest distance from steady sliding at which there is no more peak to come.
+#: Fraction of the largest distance from steady sliding below which no further peak is expected.
 _STEADY_FRACTION = 1e-6
 
 _PEAK_DISPLACEMENT_MEANING = "load point displacement from reloading to the peak of friction"
@@ -68,27 +70,57 @@ _OUTPUTS = (
 @guard_methods
 @dataclass(frozen=True)
 class Healing(RecordingMeasure):
-    """Relaxation and healing by the first hold of a loading, by the definitions of the laboratory.
+    r"""Relaxation and healing of friction by the first hold of a loading.
 
-    With mu_0 before the hold, mu_h at its end and mu_p at the peak on reloading, relaxation is mu_h
-    - mu_0 (below 0) and healing mu_p - mu_0, neither corrected for the stiffness of the rig.
-    `peak_displacement` is that of the load point from reloading to the peak, in D_c. By the
-    slowness law and b > a, healing grows by b as the logarithm of a long hold's time by 1, at every
-    stiffness; by the slip law it falls with stiffness. Where a hold does not begin in steady
-    sliding the message says so. A peak that stands above the end of the record by no more than its
-    own error is none. The record, from the beginning of the hold on, has the shape (phases,), with
-    times in D_c/V_*.
+    The definitions are the same as in laboratory studies. Relaxation is the change of friction
+    during the hold, and is usually negative. Healing is the peak friction after reloading minus the
+    friction before the hold. ``peak_displacement`` is the load point displacement from reloading to
+    the peak, in units of D_c. The results are not corrected for the stiffness of the machine.
+
+    If the hold does not begin in steady sliding, the message of the outcome reports the distance
+    from steady sliding. If the peak exceeds friction at the end of the record by less than its
+    error, the status is ``not_applicable``. The record begins with the hold and has the shape
+    (phases,). Times are in units of D_c/V_*.
 
     Parameters
     ----------
-    record : float
-        Load point displacement after the peak that is recorded, in D_c.
-    phases : int
-        Points of the record that are kept along `phase`.
+    record : float, default: 10.0
+        Load point displacement after the peak that is recorded, in units of D_c.
+    phases : int, default: 300
+        Number of points of the record along ``phase``.
+
+    Raises
+    ------
+    InvalidValue
+        If ``record`` is not positive and finite, or if ``phases`` is less than 2.
+
+    Notes
+    -----
+    Let :math:`\mu_0` be friction before the hold, :math:`\mu_h` friction at the end of the hold,
+    and :math:`\mu_p` the peak friction after reloading [1]_. Then
+
+    .. math:: \Delta\mu_c = \mu_h - \mu_0, \qquad \Delta\mu = \mu_p - \mu_0.
+
+    Under the slowness law with :math:`b > a`, healing after long holds increases by :math:`b` if
+    the logarithm of the hold time increases by 1, and does not depend on the stiffness. Under the
+    slip law, healing decreases with increasing stiffness. The increase of static friction with the
+    logarithm of time was first measured by Dieterich [2]_.
 
     References
     ----------
-    Dieterich (1972), J. Geophys. Res. 77, 3690-3697; Marone (1998), Nature 391, 69-72.
+    .. [1] Marone, C. (1998). The effect of loading rate on static friction and the rate of fault
+       healing during the earthquake cycle. Nature, 391, 69-72.
+    .. [2] Dieterich, J. H. (1972). Time-dependent friction in rocks. J. Geophys. Res., 77,
+       3690-3697.
+
+    Examples
+    --------
+    >>> from rsfstudy import Accuracy, Scene
+    >>> from rsfstudy.measures import Healing
+    >>> scene = Scene(normal_stress="constant", hold_time=1000, stiffness_ratio=10)
+    >>> outcome = Healing()(scene, Accuracy(rtol=1e-4))
+    >>> round(outcome.values["healing"], 4)
+    0.0554
     """
 
     record: float = 10.0
@@ -99,19 +131,53 @@ class Healing(RecordingMeasure):
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         super().__post_init__()
         if not 0.0 < self.record < math.inf:
             raise InvalidValue("record", self.record, "must be positive and finite")
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """Differences of friction, and a, which is what ln V is in it; the displacement, and D_c,
-        over which friction turns.
+        """Return the scale of the numerical error of each result.
+
+        The scale of healing and relaxation is the absolute value plus the direct effect parameter
+        ``a``, because friction changes by ``a`` if ln V changes by one. The scale of the peak
+        displacement is the absolute value plus D_c.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the computation.
+        values : mapping of str to float or ndarray
+            Results by name.
+
+        Returns
+        -------
+        mapping of str to float
+            Scales by name of the result.
         """
         least = {"healing": scene.a, "relaxation": scene.a, "peak_displacement": 1.0}
         return {name: abs(values[name]) + scale for name, scale in least.items()}
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Numbers read off a motion, and once more with smaller tolerances for the errors."""
+        """Compute relaxation and healing, with error estimates.
+
+        The motion is computed twice, with the requested accuracy and with smaller tolerances. The
+        difference between the two runs determines the error estimates.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
+        """
         hold = _find_hold(scene)
         first = _record_hold(scene, hold, accuracy, meter)
         said = _describe_initial_state(
@@ -124,7 +190,8 @@ class Healing(RecordingMeasure):
         )
         if first.peak is None:
             if first.last_event.kind is EventKind.SETTLED:
-                settles_to_steady_sliding(scene)  # halts if that is undecided
+                # The call raises MotionStopped if the stability is undecided.
+                settles_to_steady_sliding(scene)
             return peakless
         again = _record_hold(
             scene, hold, accuracy.refined(), meter, self._record_end_time(scene, hold, first.peak)
@@ -136,17 +203,19 @@ class Healing(RecordingMeasure):
             for record, peak in ((first, first.peak), (again, again.peak))
         )
         history = scene.parts.loading.segments
-        # friction peaks where slip rate passes that of the load point, ln V being friction over a
+        # Friction peaks when the slip rate passes the load point velocity. A change of ln V by 1
+        # changes friction by a.
         growth = growth_rate_along_path(scene, first.peak, history[hold + 1].load_velocity)
         turning = 1.0 / (scene.a * growth) if growth else math.inf
         by_friction = {"healing": 1.0, "relaxation": 1.0, "peak_displacement": turning}
         neglected = dict.fromkeys(values, first.neglected_error_until(first.peak.time))
         neglected["relaxation"] = first.neglected_error_until(first.segment_starts[1].time)
-        # the displacement depends on the growth of friction there, whose error rises earlier
+        # The displacement depends on the growth of friction at the peak, and the error of the
+        # growth rises earlier.
         neglected["peak_displacement"] = first.neglected_error_until(math.inf)
         errors = estimate_instant_errors(values, refined, by_friction, scene, accuracy, neglected)
         above = again.peak.point.apparent_friction - float(friction_coefficient(again.rows)[-1])
-        # beside steady sliding friction turns within the tolerance, where two runs may agree
+        # Near steady sliding, friction may have spurious peaks on which both runs agree.
         if above <= max(
             errors["healing_error"], _PEAK_NOISE_FACTOR * accuracy.refined().local_tolerance
         ):
@@ -154,13 +223,13 @@ class Healing(RecordingMeasure):
         return Outcome(Status.OK, {**values, **errors, **self._record_values(scene, again)}, said)
 
     def _record_end_time(self, scene: Scene, hold: int, peak: Event) -> float:
-        """Time at which the record ends."""
+        """Return the time at which the record ends, in units of D_c/V_*."""
         history = scene.parts.loading.segments
         goes_on = self.record / history[hold + 1].load_velocity
         return min(peak.time + goes_on, math.fsum(s.duration for s in history[: hold + 2]))
 
     def _record_values(self, scene: Scene, record: RecordedMotion) -> dict[str, np.ndarray]:
-        """The record itself, from the beginning of the hold on."""
+        """Return the quantities along the record, beginning with the hold."""
         path = sample_along_path(record.rows, self.phases, RECORDED_VARIABLES)
         moved = load_point_displacement(scene, np.column_stack([*path.values()]))
         return {
@@ -170,8 +239,13 @@ class Healing(RecordingMeasure):
 
 
 def _find_hold(scene: Scene) -> int:
-    """The number of the segment in which the load point is held first; `MotionStopped` says why
-    there is none.
+    """Return the index of the first loading segment with a held load point.
+
+    Raises
+    ------
+    MotionStopped
+        If there is no such segment, if the load point does not move forward after the hold, or if a
+        displacement step or a normal stress step occurs at an end of the hold.
     """
     history = scene.parts.loading.segments
     holds = [n for n, segment in enumerate(history[:-1]) if segment.load_velocity == 0.0]
@@ -189,7 +263,7 @@ def _find_hold(scene: Scene) -> int:
 
 
 def _describe_initial_state(scene: Scene, hold: int, begin: Event, tolerance: float) -> str:
-    """Distance from steady sliding at which a hold begins, in words; empty where it is none."""
+    """Return a message if a hold does not begin in steady sliding."""
     before = (Segment(1.0), *scene.parts.loading.segments)[hold]
     away = distance_from_steady(scene, begin.point, before.load_velocity)
     if away <= tolerance:
@@ -200,8 +274,11 @@ def _describe_initial_state(scene: Scene, hold: int, begin: Event, tolerance: fl
 def _record_hold(
     scene: Scene, hold: int, accuracy: Accuracy, meter: WorkMeter, until: float = math.inf
 ) -> RecordedMotion:
-    """From before the hold to the peak, or to where friction has settled or the next segment begins
-    without one; or as long as told, or as the motion can go on after the peak.
+    """Record a motion from the state before the hold to the peak of friction.
+
+    If there is no peak, the record ends when friction has settled or when the next segment begins.
+    If ``until`` is finite, the record ends at this time, or earlier if the motion cannot continue
+    after the peak.
     """
     peak, settled = (
         maximum(friction_event_quantity(scene)[0]),
@@ -214,7 +291,7 @@ def _record_hold(
 
 
 def _read_values(scene: Scene, record: RecordedMotion, peak: Event) -> dict[str, float]:
-    """Healing, relaxation and the displacement from reloading to the peak."""
+    """Return healing, relaxation and the peak displacement."""
     (before, held), reload = record.friction_before_starts[:2], record.segment_starts[1]
     longer = (peak.point.spring_stress - reload.point.spring_stress) / scene.stiffness
     return {

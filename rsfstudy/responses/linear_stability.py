@@ -1,7 +1,7 @@
 """Linear stability of steady sliding.
 
-The critical stiffness is computed from the friction relation, from the growth of perturbations of
-the assembled equations, and in closed form.
+The critical stiffness is computed in three ways: from the friction relation, from the growth rates
+of the assembled equations, and in closed form.
 """
 
 from __future__ import annotations
@@ -32,13 +32,15 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-#: Step of the central differences in units of the scale of an unknown: rounding and truncation
-#: balance there.
+#: Step of the central differences, in units of the scale of an unknown. Rounding and truncation
+#: errors are of the same size at this step.
 _RELATIVE_DIFFERENCE_STEP = 1e-4
-#: Slip rate norm from which growth is found from the full equations; below, double precision does
-#: not see mass in them, and the slow manifold, of second order in mass, is exact enough.
+#: Slip rate norm above which growth rates are computed from the full equations. Below this norm,
+#: inertia is smaller than the rounding errors of the full equations, and the slow manifold, which
+#: is of second order in the mass, is accurate enough.
 _MIN_INERTIAL_NORM = 1e-3
-#: Rise of the critical stiffness by mass beyond which no spring counts as stiff enough.
+#: Relative increase of the critical stiffness by inertia above which steady sliding is treated as
+#: unstable at any stiffness.
 _MAX_STIFFNESS_RISE = 1e6
 
 _OUTPUTS = (
@@ -58,26 +60,48 @@ _OUTPUTS = (
 @guard_methods
 @dataclass(frozen=True)
 class LinearStability(Measure):
-    """Critical stiffness of steady sliding at the load point velocity of the scene.
+    r"""Critical stiffness of steady sliding at the load point velocity.
 
     The critical stiffness is computed in three ways, which verify each other. The first result
     follows from the friction relation. The second result is the stiffness at which small
     perturbations of the assembled equations neither grow nor decay. The third result is the
     quasi-static closed form, corrected for inertia and radiation damping.
 
-    Let s be slip over D_c. A perturbation of slip that grows as exp(p s) changes frictional stress
-    by G(p) times the perturbation. The growth rate p satisfies ``K (1 + w**2 p**2) + eta V p + G(p)
-    = 0`` with the stiffness K over sigma_*/D_c and w = V T/(2 pi D_c). K is critical if p is
-    imaginary (see ``rsfstudy.slider.stability``). Under the slip and the slowness law, the critical
-    stiffness of quasi-static and drained motion at V_* is ``K = (b - a)/[1 - (mu_* - alpha)
-    cot(phi)]``. If normal stress is constant, the term with cot(phi) is absent.
+    Stresses are in units of sigma_*, and stiffnesses are in units of sigma_*/D_c. The relative
+    critical stiffness is the critical stiffness divided by the critical stiffness at V_*.
 
-    Stiffnesses are relative to sigma_*/D_c, and stresses are relative to sigma_*. The relative
-    critical stiffness is the ratio of the critical stiffness to its value at V_*.
+    Notes
+    -----
+    Let :math:`s` be slip divided by :math:`D_c`. A perturbation of slip that grows as :math:`\exp(p
+    s)` changes frictional stress by the perturbation times :math:`G(p)`. With the stiffness
+    :math:`K = k D_c/\sigma_*` and :math:`w = V T/(2 \pi D_c)`, the growth rate :math:`p` satisfies
+
+    .. math:: K (1 + w^2 p^2) + \eta V p + G(p) = 0.
+
+    The stiffness is critical if :math:`p` is imaginary [1]_. Under the slip law and the slowness
+    law, the critical stiffness of quasi-static, drained motion at :math:`V_*` is
+
+    .. math:: K = \frac{b - a}{1 - (\mu_* - \alpha) \cot\varphi},
+
+    which is eq. 7 of [2]_. Eq. 8 of [2]_ is the critical stiffness at other slip rates. If normal
+    stress is constant, the term with :math:`\cot\varphi` is absent.
 
     References
     ----------
-    Ruina (1983), J. Geophys. Res. 88, 10359-10370; eqs. 7 and 8 of doi:10.1007/s11589-014-0098-4.
+    .. [1] Ruina, A. (1983). Slip instability and state variable friction laws. J. Geophys. Res.,
+       88, 10359-10370.
+    .. [2] Effect of varying normal stress on stability and dynamic motion of a spring-slider system
+       with rate- and state-dependent friction. Earthquake Science (2014).
+       doi:10.1007/s11589-014-0098-4
+
+    Examples
+    --------
+    >>> from rsfstudy import Accuracy, Scene
+    >>> from rsfstudy.measures import LinearStability
+    >>> scene = Scene(normal_stress="constant", a=0.01, b_over_a=1.5)
+    >>> outcome = LinearStability()(scene, Accuracy())
+    >>> round(outcome.values["critical_stiffness"], 6)
+    0.005
     """
 
     name: ClassVar[str] = "linear_stability"
@@ -88,12 +112,27 @@ class LinearStability(Measure):
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
+        """Stiffness of the scene, which the measure ignores."""
         return ("stiffness_ratio",)
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the critical stiffness from friction and from growth rates.
 
-        The error estimate is the difference between both results.
+        The error estimate is the difference between the two results.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
         """
         scene = scene.under_steady_loading
         load = scene.log_load_velocity
@@ -154,10 +193,7 @@ class LinearStability(Measure):
 def _closed_form_stiffness(scene: Scene) -> float:
     """Compute the critical stiffness from the published formula.
 
-    Returns
-    -------
-    float
-        NaN if the formula does not apply to the scene.
+    The result is NaN if the formula does not apply to the scene.
     """
     law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
     others = law.steady_states or law.depends_on_stress or scene.parts.fluid.effects
@@ -173,10 +209,7 @@ def _stiffness_at_zero_growth(
 ) -> float:
     """Find the stiffness at which the largest growth rate is zero.
 
-    Returns
-    -------
-    float
-        NaN if perturbations do not grow below this stiffness, or do not decay above it.
+    The result is NaN if perturbations do not grow below this stiffness, or do not decay above it.
     """
     with_mass = scene.dynamics.slip_rate_norm(scene, steady.log_slip_rate) > _MIN_INERTIAL_NORM
 
@@ -192,7 +225,7 @@ def _stiffness_at_zero_growth(
         meter.charge(equations.regime, 2 * len(state))
         return max_growth_rate(compute_jacobian(equations, state))
 
-    # softer than at the root before it, several states may be stable again
+    # With several states, sliding may be stable again below the next smaller critical stiffness.
     before = [k for k in critical_stiffnesses(scene, steady.log_slip_rate) if k < guess]
     softer = max(0.5 * guess, math.sqrt(guess * before[-1]) if before else 0.0)
     if not growth_at(softer) > 0.0 > growth_at(2.0 * guess):
@@ -203,7 +236,15 @@ def _stiffness_at_zero_growth(
 def max_growth_rate(jacobian: np.ndarray) -> float:
     """Return the growth rate of the fastest-growing perturbation.
 
-    The unit is the inverse of the independent variable of the equations.
+    Parameters
+    ----------
+    jacobian : ndarray, shape (n, n)
+        Jacobian of the rates.
+
+    Returns
+    -------
+    float
+        Growth rate per unit of the independent variable of the equations.
     """
     return float(np.linalg.eigvals(jacobian).real.max())
 
@@ -211,7 +252,17 @@ def max_growth_rate(jacobian: np.ndarray) -> float:
 def compute_jacobian(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
     """Compute the Jacobian of the rates by central differences.
 
-    Rows are rates, and columns are unknowns.
+    Parameters
+    ----------
+    equations : Equations
+        Equations of motion.
+    state : tuple of float
+        Unknowns at which the Jacobian is computed.
+
+    Returns
+    -------
+    ndarray, shape (n, n)
+        Derivatives of the rates (rows) with respect to the unknowns (columns).
     """
     columns = []
     for number, scale in enumerate(equations.scales):

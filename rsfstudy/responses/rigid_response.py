@@ -1,6 +1,4 @@
-"""The response of a rigid slider to a step of its slip rate: direct effect, evolution, and how much
-slip it takes.
-"""
+"""Response of a rigid slider to a step of its slip rate."""
 
 from __future__ import annotations
 
@@ -35,10 +33,11 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-#: Part of a by which friction evolves after a step, at least: less is lost to rounding.
+#: Smallest evolution of friction after a step, as a fraction of a. Smaller changes are dominated by
+#: rounding errors.
 _MIN_RELATIVE_EVOLUTION = 1e-9
 
-#: Stress changes over sigma_*, and their quotients.
+#: Names, scales and meanings of stress changes and of their ratios.
 _STRESS_CHANGE_OUTPUTS = (
     ("direct_stress_change", "sigma_*", "stress change just after a rate step"),
     ("direct_asymmetry", "", "direct stress change of the step over that of its inverse, less 1"),
@@ -73,30 +72,59 @@ _OUTPUTS = (
 @guard_methods
 @dataclass(frozen=True)
 class RigidResponse(Measure):
-    """Stress against slip of a rigid slider whose slip rate steps from V_* to V, the
-    `load_velocity_ratio` of the scene.
+    r"""Stress as a function of slip after a slip rate step of a rigid slider.
 
-    At once stress changes by a sigma ln(V/V_*), the direct effect; then its state evolves over
-    slip. At constant normal stress, with r = V/V_* and x slip over D_c, friction less mu_* is
+    The slip rate of the slider changes suddenly from V_* to V, and the ratio V/V_* is the field
+    ``load_velocity_ratio`` of the scene. The direct effect changes the stress by ``a sigma
+    ln(V/V_*)`` at the step. The stress then evolves with slip towards steady sliding at V.
 
-        a ln r - b ln r [1 - exp(-x)]                       (slip law),
-        (a - b) ln r + b ln[1 + (r - 1) exp(-x)]            (slowness law).
-
-    `evolution_distance` is the slip in D_c at which 1/e of the change from just after the step to
-    steady sliding is left: 1 by the slip law. Stresses are over sigma_*. `shear_stress`,
-    `normal_stress_ratio` and `state_variable` have the shape (points,), along `slip`.
+    ``evolution_distance`` is the slip at which 1/e of the stress change from the direct effect to
+    steady sliding remains. Under the slip law, the distance is D_c. The outputs ``shear_stress``,
+    ``normal_stress_ratio`` and ``state_variable`` have the shape (points,), along ``slip``. Slip is
+    in units of D_c, and stresses are in units of sigma_*.
 
     Parameters
     ----------
-    slip : float
-        How far to follow it, in D_c.
-    points : int
-        Points of the response that are kept, evenly spaced along `slip`.
+    slip : float, default: 10.0
+        Length of the response, in units of D_c.
+    points : int, default: 201
+        Number of points of the response, evenly spaced along ``slip``.
+
+    Raises
+    ------
+    InvalidValue
+        If ``slip`` is less than 1 or infinite, or if ``points`` is less than 2.
+
+    Notes
+    -----
+    With :math:`r = V/V_*` and the slip :math:`x` in units of :math:`D_c`, friction at constant
+    normal stress is
+
+    .. math:: \mu - \mu_* = a \ln r - b \ln r\,[1 - e^{-x}]
+
+    under the slip law [1]_, and
+
+    .. math:: \mu - \mu_* = (a - b) \ln r + b \ln[1 + (r - 1) e^{-x}]
+
+    under the slowness law. The formulas are eqs. 16 and 17 of [2]_, and the measure follows section
+    2.3 of [2]_.
 
     References
     ----------
-    Section 2.3 and eqs. 16 and 17 of doi:10.1007/s11589-014-0098-4; Ruina (1983), J. Geophys. Res.
-    88, 10359-10370.
+    .. [1] Ruina, A. (1983). Slip instability and state variable friction laws. J. Geophys. Res.,
+       88, 10359-10370.
+    .. [2] Effect of varying normal stress on stability and dynamic motion of a spring-slider system
+       with rate- and state-dependent friction. Earthquake Science (2014).
+       doi:10.1007/s11589-014-0098-4
+
+    Examples
+    --------
+    >>> from rsfstudy import Accuracy, Scene
+    >>> from rsfstudy.measures import RigidResponse
+    >>> scene = Scene(normal_stress="constant", load_velocity_ratio=10)
+    >>> outcome = RigidResponse()(scene, Accuracy())
+    >>> round(outcome.values["evolution_distance"], 6)
+    1.0
     """
 
     slip: float = 10.0
@@ -108,6 +136,7 @@ class RigidResponse(Measure):
     needs_time: ClassVar[tuple[bool, ...]] = ()
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         if not 1.0 <= self.slip < math.inf:
             raise InvalidValue("slip", self.slip, "must be at least 1 D_c")
         if self.points < 2:
@@ -115,16 +144,51 @@ class RigidResponse(Measure):
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        """Slip at the points of the response, in units of D_c."""
         return {"slip": np.linspace(0.0, self.slip, self.points)}
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """The distance itself, that ends where stress falls by 1/e of its evolution over D_c."""
+        """Return the scale of the numerical error of the evolution distance.
+
+        The scale is the distance, plus the change of the distance if friction changes by the direct
+        effect parameter ``a``.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the computation.
+        values : mapping of str to float or ndarray
+            Results by name.
+
+        Returns
+        -------
+        mapping of str to float
+            Scales by name of the result.
+        """
         evolution = abs(values["direct_stress_change"] - values["steady_stress_change"])
         part = 1.0 + math.e * scene.a / evolution
         return {"evolution_distance": part * abs(values["evolution_distance"])}
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """The response, followed over slip at two tolerances: their difference is the error."""
+        """Compute the response of the slider, with an error estimate.
+
+        The response is computed twice, with the requested accuracy and with smaller tolerances. The
+        difference between the two runs determines the error estimate.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
+        """
         log_slip_rate = scene.log_load_velocity
         if log_slip_rate == 0.0:
             return Outcome(Status.NO_STEP, message="V = V_* is no step")
@@ -139,7 +203,7 @@ class RigidResponse(Measure):
         level = steady + (start - steady) / math.e
         distance, left, rows = self._follow_response(scene, start, level, accuracy, meter)
         again, _left, _rows = self._follow_response(scene, start, level, accuracy.refined(), meter)
-        # where an exponential has 1/e left
+        # Derivative of the distance with respect to friction, for an exponential decay.
         by_friction = math.e * distance / (start - steady)
         slip = self.inner_coordinates["slip"]
         exponential = steady + (start - steady) * np.exp(-slip)
@@ -166,14 +230,22 @@ class RigidResponse(Measure):
     def _follow_response(
         self, scene: Scene, start: float, level: float, accuracy: Accuracy, meter: WorkMeter
     ) -> tuple[float, float, np.ndarray]:
-        """Slip at which stress passes the level, stress after D_c, and (stress, state, normal
-        stress) at the points.
+        """Integrate the response of the slider over slip.
+
+        Returns
+        -------
+        distance : float
+            Slip at which the stress passes ``level``.
+        stress_left : float
+            Stress after a slip of D_c.
+        rows : ndarray, shape (points, 3)
+            Stress, state variable and normal stress ratio at the points.
         """
         at, distance = self.inner_coordinates["slip"], math.nan
         recording = Recording(sample_times=np.union1d(at, [1.0]))
         equations = equations_of_rigid_slider(scene, scene.log_load_velocity)
         watches = (rise("frictional_stress", level), fall("frictional_stress", level))
-        # states freed of stress are still those of steady sliding at V_* before the step
+        # The step does not change the states Psi, which have their values of steady sliding at V_*.
         state = (start, *compute_steady_states(scene, 0.0, 0.0)[1:])
         tolerance, complete = accuracy.local_tolerance, False
         for event in events_along(equations, state, tolerance, meter, watches, recording=recording):
@@ -191,9 +263,15 @@ class RigidResponse(Measure):
 
 
 def _closed_form_misfit(scene: Scene, steady: float, slip: np.ndarray, stress: np.ndarray) -> float:
-    """Largest departure of the stress change from the closed form of the law at normal stress that
-    is constant after the step (eqs. 17a and 17b of the paper, less mu_* sigma + a sigma ln(V/V_*),
-    which they leave out), over sigma_*; NaN where there is none.
+    r"""Compute the largest difference between stress and its closed form.
+
+    The closed form applies if normal stress is constant after the step. The result is in units of
+    sigma_*, and is NaN if the law or the scene has no closed form.
+
+    Notes
+    -----
+    The closed form corresponds to eqs. 17a and 17b of doi:10.1007/s11589-014-0098-4, which omit the
+    level :math:`\mu_* \sigma + a \sigma \ln(V/V_*)` at which the evolution starts.
     """
     law, parts = scene.parts.law, scene.parts
     stress_acts = parts.normal_stress.effects or parts.fluid.effects or law.depends_on_stress
@@ -205,10 +283,11 @@ def _closed_form_misfit(scene: Scene, steady: float, slip: np.ndarray, stress: n
 
 
 def _compute_asymmetries(scene: Scene, log_slip_rate: float) -> dict[str, float]:
-    """Relative excess of the change by a step over that by its inverse: at once, and over its
-    evolution to the new steady state.
+    """Compute the asymmetries between a step and the inverse step.
 
-    Empty where the inverse step has no steady state to go to.
+    An asymmetry is the ratio of the magnitudes of the two stress changes minus 1. The dictionary
+    contains the asymmetries of the direct effect and of the evolution to steady sliding. If sliding
+    cannot be steady after one of the two steps, the dictionary is empty.
     """
     steady, inverse_steady = (steady_sliding(scene, x) for x in (log_slip_rate, -log_slip_rate))
     if steady is None or inverse_steady is None:
@@ -223,14 +302,27 @@ def _compute_asymmetries(scene: Scene, log_slip_rate: float) -> dict[str, float]
 
 
 def friction_after_step(scene: Scene, log_slip_rate: float) -> float:
-    """Deviation of frictional stress just after a step to ln(V/V_*), the state freed of normal
-    stress unchanged.
+    """Compute the frictional stress immediately after a slip rate step.
+
+    The step changes the slip rate from V_* to V and does not change the state Psi.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the slider.
+    log_slip_rate : float
+        Logarithm ln(V/V_*) after the step.
+
+    Returns
+    -------
+    float
+        Deviation of frictional stress from steady sliding at V_*, in units of sigma_*.
 
     Raises
     ------
     MotionStopped
-        With `normal_stress_lost` where no stress above the fault's opening is that weak, and
-        `locked` where none is that strong.
+        With the status ``normal_stress_lost`` if a decrease of friction would open the fault, and
+        with the status ``locked`` if no stress balances an increase of friction.
     """
     friction = stress_after_jump(scene, scene.a * log_slip_rate)
     if friction is None and log_slip_rate < 0.0:

@@ -1,4 +1,4 @@
-"""Motion after a step: the peaks of slip rate, and the recorded path."""
+"""Oscillations of slip rate after a step, with the recorded path."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from rsfstudy.status import Status
 
 LN10 = math.log(10.0)
 
-#: Part of the largest distance from steady sliding at which an oscillation counts as over.
+#: Fraction of the largest distance from steady sliding below which an oscillation has ended.
 _STEADY_FRACTION = 1e-3
 
 _OUTPUTS = (
@@ -57,28 +57,56 @@ _OUTPUTS = (
 @guard_methods
 @dataclass(frozen=True)
 class StepResponse(RecordingMeasure):
-    """Oscillations of slip rate after a step: peaks of log10(V/V_*) and the path.
+    """Peaks of slip rate after a step, and the path of the motion.
 
-    The motion is followed until it has the requested number of peaks, or until it settles. A motion
-    has settled if the distance of ln V and the states from steady sliding is less than a thousandth
-    of the largest distance. Let V_1 and V_2 be the slip rates of the first two peaks, and V_0 the
-    load point velocity. ``peak_ratio`` is ln(V_2/V_0) over ln(V_1/V_0). The ratio is 1 if
-    oscillations repeat, as small oscillations do at the critical stiffness, and 0 if there is no
-    second peak. ``peak_log10_slip_rate`` has the shape (peaks,), with NaN for missing peaks. The
-    path, in units of D_c, D_c/V_* and sigma_*, has the shape (phases,).
+    The motion is integrated until it has the requested number of peaks, or until it settles. A
+    motion has settled if the distance of ln V and of the states from steady sliding is less than a
+    thousandth of the largest distance. The results include the peaks of log10(V/V_*), with NaN for
+    missing peaks. ``peak_log10_slip_rate`` has the shape (peaks,).
+
+    ``peak_ratio`` is the height of the second peak divided by the height of the first peak. The
+    height of a peak is the difference of ln V from the logarithm of the load point velocity. The
+    ratio is 1 if oscillations repeat, as small oscillations do at the critical stiffness, and 0 if
+    there is no second peak. The path has the shape (phases,), and is in units of D_c, D_c/V_* and
+    sigma_*.
 
     Parameters
     ----------
-    peaks : int
-        Largest number of peaks of slip rate to follow.
-    phases : int
-        Number of points of the path along ``phase``, distributed over its slow parts and its
-        ruptures.
+    peaks : int, default: 8
+        Largest number of peaks of slip rate.
+    phases : int, default: 2000
+        Number of points of the path along ``phase``, distributed over slow parts and ruptures of
+        the motion.
+
+    Raises
+    ------
+    InvalidValue
+        If ``peaks`` or ``phases`` is less than 2.
+
+    Notes
+    -----
+    Gu et al. [1]_ analyse the oscillations in the phase plane. Figs. 8 and 12 of [2]_ show motions
+    after steps of load point velocity.
 
     References
     ----------
-    Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196; Figs. 8 and 12 of
-    doi:10.1007/s11589-014-0098-4.
+    .. [1] Gu, J.-C., Rice, J. R., Ruina, A. L., & Tse, S. T. (1984). Slip motion and stability of a
+       single degree of freedom elastic system with rate and state dependent friction. J. Mech.
+       Phys. Solids, 32, 167-196.
+    .. [2] Effect of varying normal stress on stability and dynamic motion of a spring-slider system
+       with rate- and state-dependent friction. Earthquake Science (2014).
+       doi:10.1007/s11589-014-0098-4
+
+    Examples
+    --------
+    >>> from rsfstudy import Accuracy, Scene
+    >>> from rsfstudy.measures import StepResponse
+    >>> scene = Scene(normal_stress="constant", load_velocity_ratio=1.1, stiffness_ratio=1.1)
+    >>> outcome = StepResponse(peaks=2)(scene, Accuracy(rtol=1e-5))
+    >>> outcome.values["peak_log10_slip_rate"].round(4).tolist()
+    [0.0973, 0.0826]
+    >>> round(outcome.values["peak_ratio"], 3)
+    0.737
     """
 
     peaks: int = 8
@@ -90,25 +118,55 @@ class StepResponse(RecordingMeasure):
     dimensions = (Quantity("peak", "", "1", "number of the peak of slip rate after the step"),)
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         super().__post_init__()
         if self.peaks < 2:
             raise InvalidValue("peaks", self.peaks, "must be at least 2")
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        """Numbers of the peaks, from 1, and coordinate values of ``phase``."""
         return {"peak": np.arange(1, self.peaks + 1), **super().inner_coordinates}
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """Return the scale of the numerical error of the largest logarithm.
+        """Return the scale of the numerical error of the highest peak.
 
-        The scale includes an e-fold of slip rate, because the logarithm of V_* is zero.
+        The scale is the absolute value plus one e-fold of slip rate, because the logarithm of V/V_*
+        may be zero.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the computation.
+        values : mapping of str to float or ndarray
+            Results by name.
+
+        Returns
+        -------
+        mapping of str to float
+            Scales by name of the result.
         """
         return {"max_log10_slip_rate": abs(values["max_log10_slip_rate"]) + 1.0 / LN10}
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the peaks and the path of the motion, with error estimates.
 
-        The errors are estimated from a second motion with smaller tolerances.
+        The motion is computed twice, with the requested accuracy and with smaller tolerances. The
+        difference between the two runs determines the error estimate.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
         """
         check_steady_loading(scene)
         if scene.log_load_velocity == -math.inf:
@@ -137,7 +195,7 @@ class StepResponse(RecordingMeasure):
     def _follow_oscillations(
         self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Follow the motion, and return the peaks of log10(V/V_*) and the record."""
+        """Integrate the motion, and return its peaks and the record."""
         peaks: list[float] = []
         recording, asked = (
             Recording(),
@@ -158,10 +216,10 @@ class StepResponse(RecordingMeasure):
 
 
 def _has_initial_maximum(scene: Scene, event: Event) -> bool:
-    """Return True if the slip rate has a maximum at the start due to inertia.
+    """Return True if the motion starts with a maximum of slip rate.
 
-    If the motion starts on the slow manifold, the initial rise of the slip rate is a jump. The rise
-    is followed only if the tolerance requires it.
+    With inertia, the slip rate may rise within the inertial time after the step. If this rise is
+    not integrated, the start of the motion is a maximum.
     """
     return (
         _delays_initial_rise(scene)
@@ -171,11 +229,14 @@ def _has_initial_maximum(scene: Scene, event: Event) -> bool:
 
 
 def _neglected_rise_error(scene: Scene, accuracy: Accuracy) -> float:
-    """Return the error of log10(V/V_*) due to a rise that is not followed."""
+    """Return the error of log10(V/V_*) caused by an initial rise of slip rate.
+
+    The error is zero unless inertia delays the rise.
+    """
     slip = accuracy.max_remaining_slip if _delays_initial_rise(scene) else 0.0
     return (1.0 + scene.stiffness / scene.a) * slip / LN10
 
 
 def _delays_initial_rise(scene: Scene) -> bool:
-    """Return True if inertia delays an initial rise of the slip rate from V_*."""
+    """Return True if inertia delays an initial rise of slip rate."""
     return scene.has_mass and (scene.starts_unsteady or scene.spring_stress_step > 0.0)

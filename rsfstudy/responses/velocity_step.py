@@ -44,13 +44,13 @@ from rsfstudy.quantities import Output
 from rsfstudy.slider import Scene, steady_friction_excess
 from rsfstudy.status import Status
 
-#: Part of the record, at its end, over which friction must stay, and within which part of the
-#: direct effect.
+#: Fraction of the record, at its end, over which friction must be constant, and largest variation
+#: of constant friction as a fraction of the direct effect.
 _SETTLING_WINDOW_FRACTION, _SETTLING_TOLERANCE = 0.1, 0.01
-#: Part of ln r within which slip is steady before the step.
+#: Largest distance from steady sliding before the step, as a fraction of ln r.
 _STEADY_TOLERANCE = 1e-3
 
-#: What is read off: name, symbol, scale and meaning.
+#: Names, symbols, scales and meanings of the results.
 _APPARENT_QUANTITIES = (
     ("apparent_a", "$a$", "", "direct effect parameter as read off"),
     ("apparent_b", "$b$", "", "evolution effect parameter as read off"),
@@ -81,9 +81,9 @@ _OUTPUTS = (
 
 
 class _EvaluatedStep(NamedTuple):
-    """The step that is evaluated.
+    """The velocity step that the measure evaluates.
 
-    Velocities are in V_*, and times in D_c/V_*.
+    Velocities are in units of V_*, and times are in units of D_c/V_*.
     """
 
     velocity_before: float
@@ -93,48 +93,86 @@ class _EvaluatedStep(NamedTuple):
 
     @property
     def log_velocity_ratio(self) -> float:
-        """Logarithm ln r of the ratio of the velocities after and before the step."""
+        """Logarithm ln r of the velocity ratio of the step."""
         return math.log(self.velocity_after / self.velocity_before)
 
 
 @guard_methods
 @dataclass(frozen=True)
 class VelocityStep(RecordingMeasure):
-    """Response to one step of load point velocity, as read from a record.
+    r"""Friction parameters read from the response to a velocity step.
 
-    The definitions are those used in the laboratory. Let mu_0 be friction before a step by a factor
-    r, mu_p friction at the first extremum after the step, and mu_1 friction at the end of the
-    record. The extremum is a peak for a step up, and a trough for a step down. Then
+    The definitions are the same as in laboratory studies. The parameter ``a`` follows from the
+    extremum of friction after the step, and ``a - b`` follows from friction at the end of the
+    record. The slip distance is the displacement from the extremum until 1/e of the evolution of
+    friction remains. The slip distance is reported as load point displacement and as slip, which
+    excludes the elongation of the spring. The results are not corrected for the stiffness of the
+    machine, and therefore show the effect of a soft machine.
 
-        a = (mu_p - mu_0)/ln r,   b = (mu_p - mu_1)/ln r,   a - b = (mu_1 - mu_0)/ln r.
+    ``settled`` is 1 if friction varies by less than a hundredth of the direct effect over the last
+    tenth of the record, and if small perturbations of steady sliding do not grow. Otherwise
+    ``settled`` is 0. If the stability of steady sliding is undecided within its error, ``settled``
+    is NaN.
 
-    D_c is the displacement from the extremum until friction reaches mu_1 + (mu_p - mu_1)/e. D_c is
-    reported as load point displacement and as slip, which excludes the change of length of the
-    spring. The results are not corrected for the stiffness of the machine, so they show the effect
-    of a soft spring. Friction has settled if it varies by less than a hundredth of mu_p - mu_0 over
-    the last tenth of the record, and if small perturbations of steady sliding do not grow. If the
-    stability is undecided within its error, ``settled`` is NaN. If there is no extremum, or if b is
-    smaller than its error, the status is ``not_applicable``, and the results that exist are
-    included. Distances are in D_c. The record begins at the step and has the shape (phases,).
-
-    ``closed_form_departure`` is the largest difference from the friction of a rigid slider at the
-    same slip x, ``(a - b) ln r + b g(ln r, x)``. The function g is ``ln r exp(-x)`` for the slip
-    law and ``ln[1 + (r - 1) exp(-x)]`` for the slowness law. The result is NaN if normal stress or
-    a fluid affects friction, or if the law has no closed form.
+    If there is no extremum, or if ``b`` is smaller than its error, the status is
+    ``not_applicable``, and the outcome contains only the available results. Distances are in units
+    of D_c. The record begins at the step and has the shape (phases,).
 
     Parameters
     ----------
-    step_number : int
-        Number of the loading segment to read, from 1.
-    record : float
-        Longest load point displacement after the step to record, in D_c. The record also ends at
-        the next step.
-    phases : int
+    step_number : int, default: 1
+        Number of the loading segment that begins with the step, counted from 1.
+    record : float, default: 20.0
+        Longest load point displacement after the step that is recorded, in units of D_c. The record
+        also ends at the next step.
+    phases : int, default: 400
         Number of points of the record along ``phase``.
+
+    Raises
+    ------
+    InvalidValue
+        If ``step_number`` or ``record`` is less than 1, or if ``phases`` is less than 2.
+
+    Notes
+    -----
+    Let :math:`r` be the ratio of the velocities after and before the step, :math:`\mu_0` friction
+    before the step, :math:`\mu_p` friction at the first extremum after the step, and :math:`\mu_1`
+    friction at the end of the record. The extremum is a maximum for a step up, and a minimum for a
+    step down. The definitions of [1]_ are
+
+    .. math::
+
+        a &= (\mu_p - \mu_0)/\ln r, \\
+        b &= (\mu_p - \mu_1)/\ln r, \\
+        a - b &= (\mu_1 - \mu_0)/\ln r.
+
+    ``closed_form_departure`` is the largest difference from the friction of a rigid slider after
+    the same slip :math:`x`,
+
+    .. math:: \mu - \mu_0 = (a - b) \ln r + b\,g(\ln r, x),
+
+    with :math:`g = e^{-x} \ln r` under the slip law and :math:`g = \ln[1 + (r - 1) e^{-x}]` under
+    the slowness law. If normal stress or pore pressure affects friction, or if the law has no
+    closed form, the result is NaN.
 
     References
     ----------
-    Marone (1998), Annu. Rev. Earth Planet. Sci. 26, 643-696, Fig. 3.
+    .. [1] Marone, C. (1998). Laboratory-derived friction laws and their application to seismic
+       faulting. Annu. Rev. Earth Planet. Sci., 26, 643-696, Fig. 3.
+
+    Examples
+    --------
+    >>> from rsfstudy import Accuracy, Scene
+    >>> from rsfstudy.measures import VelocityStep
+    >>> scene = Scene(normal_stress="constant", load_velocity_ratio=10, stiffness_ratio=10)
+    >>> outcome = VelocityStep(record=10.0)(scene, Accuracy(rtol=1e-4))
+    >>> round(scene.a - scene.b, 4), round(outcome.values["apparent_a_minus_b"], 4)
+    (-0.0145, -0.0145)
+
+    The machine is soft, so the direct effect appears smaller than it is:
+
+    >>> round(scene.a, 4), round(outcome.values["apparent_a"], 4)
+    (0.0145, 0.0116)
     """
 
     step_number: int = 1
@@ -146,6 +184,7 @@ class VelocityStep(RecordingMeasure):
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         super().__post_init__()
         if self.step_number < 1:
             raise InvalidValue("step_number", self.step_number, "must be at least 1")
@@ -155,18 +194,30 @@ class VelocityStep(RecordingMeasure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of each result.
 
-        The scale is the sum of the absolute value of the result, and of its change if friction
-        changes by ``a``.
+        The scale is the absolute value of the result, plus the change of the result if friction
+        changes by the direct effect parameter ``a``.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the computation.
+        values : mapping of str to float or ndarray
+            Results by name.
+
+        Returns
+        -------
+        mapping of str to float
+            Scales by name of the result.
         """
         slopes = self._friction_derivatives(self._find_step(scene).log_velocity_ratio, values)
         return {name: abs(values[name]) + scene.a * abs(slopes[name]) for name in slopes}
 
     def _friction_derivatives(self, ratio: float, values: Mapping[str, Any]) -> dict[str, float]:
-        """Return the derivative of each result with respect to friction.
+        """Return the derivatives of the results with respect to friction.
 
-        The derivative is 1/ln r for a, b and a - b. For slip distances, friction changes by b ln
-        r/(e D_c) per displacement, because 1/e of the evolution b ln r remains at this point of an
-        exponential.
+        The derivative is 1/ln r for a, b and a - b. For slip distances, the evolution of friction
+        is approximated by an exponential. When 1/e of the evolution b ln r remains, friction
+        changes by b ln r/(e D_c) per unit of slip.
         """
         evolved = values["apparent_b"] * ratio
         over_friction = math.e / evolved if evolved else math.nan
@@ -178,10 +229,25 @@ class VelocityStep(RecordingMeasure):
         }
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Compute the response to the step, and the errors of the results.
+        """Compute the response to the step, with error estimates.
 
-        The motion is computed again with smaller tolerances to estimate the errors. In each run,
-        the motion is also followed from its peak until 1/e of the evolution remains.
+        The motion is computed twice, with the requested accuracy and with smaller tolerances. The
+        difference between the two runs determines the error estimates. Each run also integrates the
+        motion from the extremum until 1/e of the evolution remains.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
         """
         check_steady_loading(scene)
         step = self._find_step(scene)
@@ -199,7 +265,13 @@ class VelocityStep(RecordingMeasure):
         return Outcome(Status.OK, found)
 
     def _find_step(self, scene: Scene) -> _EvaluatedStep:
-        """Return the step to read, or raise ``MotionStopped`` if the segment is not a step."""
+        """Return the step that the measure evaluates.
+
+        Raises
+        ------
+        MotionStopped
+            If the loading segment does not exist or does not begin with a velocity step.
+        """
         history = scene.parts.loading.segments
         if self.step_number > len(history):
             raise MotionStopped(Status.NOT_APPLICABLE, f"the loading has {len(history)} segments")
@@ -232,7 +304,7 @@ class VelocityStep(RecordingMeasure):
     ) -> dict[str, float]:
         """Return the results that are read from a record.
 
-        Results that depend on the peak are NaN if there is no peak.
+        Results that depend on the extremum are NaN if there is no extremum.
         """
         before, after = record.friction_before_starts[0], record.last_event.point.apparent_friction
         top = record.peak.point.apparent_friction if record.peak else math.nan
@@ -252,9 +324,9 @@ class VelocityStep(RecordingMeasure):
     ) -> Event | None:
         """Return the event at which 1/e of the evolution remains.
 
-        The time and slip of the event are relative to the peak. The motion is followed from the
-        peak, because the integration step that contains the peak may contain a crossing of the
-        level on either side.
+        The time and slip of the event are relative to the extremum. A separate integration starts
+        at the extremum, because the recorded integration step with the extremum may contain a
+        crossing of the level on either side.
         """
         peak = record.peak
         if peak is None or not peak.time < record.last_event.time:
@@ -262,7 +334,7 @@ class VelocityStep(RecordingMeasure):
         after, top = (e.point.apparent_friction for e in (record.last_event, peak))
         of, above = friction_event_quantity(scene)
         level = after + (top - after) / math.e - above
-        # with a state that strengthens, evolution may go the way of the direct effect
+        # If a state strengthens friction, the evolution may have the sign of the direct effect.
         watch = fall(of, level, terminal=True) if top > after else rise(of, level, terminal=True)
         stepped = scene.segment_scene(self.step_number - 1)
         rest = record.last_event.time - peak.time
@@ -272,10 +344,10 @@ class VelocityStep(RecordingMeasure):
     def _record_values(
         self, scene: Scene, step: _EvaluatedStep, record: RecordedMotion
     ) -> dict[str, float | np.ndarray]:
-        """Return the record, the flag ``settled`` and the closed-form departure."""
+        """Return the record, ``settled`` and the closed-form departure."""
         rows, friction = record.rows, friction_coefficient(record.rows)
         late = record.last_event.time - _SETTLING_WINDOW_FRACTION * step.duration
-        # there may be few samples, in long steps
+        # The last tenth of the record may contain few samples, because time steps may be long.
         last = [np.interp(late, rows[:, 0], friction), *friction[rows[:, 0] >= late]]
         turned = record.peak or record.last_event
         direct = turned.point.apparent_friction - record.friction_before_starts[0]
@@ -295,13 +367,7 @@ class VelocityStep(RecordingMeasure):
 def _closed_form_departure(scene: Scene, step: _EvaluatedStep, record: RecordedMotion) -> float:
     """Compute the largest difference from the friction of a rigid slider.
 
-    Only friction after the peak is compared. A rigid slider with the same slip shows the steady
-    change, ``(a - b) ln r`` for most laws, plus ``b relaxation(ln r, slip)``.
-
-    Returns
-    -------
-    float
-        NaN if there is no closed form.
+    Only friction after the extremum is compared. The result is NaN if there is no closed form.
     """
     relaxation = scene.parts.law.relaxation
     if relaxation is None or record.peak is None or not _has_closed_form(scene, step, record):
@@ -322,8 +388,9 @@ def _closed_form_departure(scene: Scene, step: _EvaluatedStep, record: RecordedM
 def _has_closed_form(scene: Scene, step: _EvaluatedStep, record: RecordedMotion) -> bool:
     """Return True if the closed form of a rigid slider applies.
 
-    The closed form applies if friction is the only effect and if sliding before the step is steady.
-    If the law has a characteristic slip rate, the velocity before the step must also be V_*.
+    The closed form requires steady sliding before the step, and a friction coefficient that does
+    not depend on normal stress or pore pressure. If the law has a characteristic slip rate, the
+    velocity before the step must also be V_*.
     """
     law, stress, fluid = scene.parts.law, scene.parts.normal_stress, scene.parts.fluid
     stress_acts = stress.normal_stress or stress.state_effect or law.depends_on_stress
