@@ -1,8 +1,9 @@
-"""Responses of a rigid slider to steps of slip rate, both laws (Figs. 3 and 4).
+"""Response of a rigid slider to steps of slip rate (Figs. 3 and 4).
 
-Stress against slip after the slip rate of a rigid slider steps from V_* to V. Variable normal
-stress slows the evolution to the new steady state and makes upward and downward steps unequal; with
-the slowness law it separates the responses to large downward steps.
+The figures show stress against slip after the slip rate of a rigid slider changes from V_* to V.
+Variable normal stress slows down the evolution to the new steady state and makes the responses to
+steps up and steps down unequal. Under the slowness law, variable normal stress also separates the
+responses to large steps down.
 """
 
 import math
@@ -17,12 +18,30 @@ from rsfstudy.study.figure_declarations import horizontal_line
 
 from ._paper import PAPER, REFERENCE
 
-#: Steps of 1 to 4 decades; a small one, and the one of section 3.4.
+#: Slip rates V/V_* after the step: steps of 1 to 4 decades, a small step, and the step of section
+#: 3.4.
 STEPS = [1e-4, 1e-3, 1e-2, 1e-1, 1.05, 1e1, 1e2, 200.0, 1e3, 1e4]
 
 
 def slower_evolution_claim(law: str, rate: float, figure: str, claim: str) -> Claim:
-    """C3, C4: variable normal stress slows the evolution."""
+    """Return the claim that variable normal stress slows evolution (C3, C4).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    rate : float
+        Slip rate V/V_* after the step.
+    figure : str
+        Figure of the paper.
+    claim : str
+        Identifier of the claim.
+
+    Returns
+    -------
+    Claim
+        Claim on the relative difference of the evolution distances.
+    """
     return Claim.below(
         id=claim,
         statement=f"{law} law, V = {rate:g} V_*: slower evolution with variable sigma",
@@ -35,20 +54,55 @@ def slower_evolution_claim(law: str, rate: float, figure: str, claim: str) -> Cl
 
 
 def remaining_stress(row: xr.Dataset) -> xr.DataArray:
-    """Stress less its future steady value; steps between decades are there for their numbers."""
+    """Return the difference between stress and its final steady value.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    xarray.DataArray
+        Difference in a sigma_*. NaN if the step is not a whole number of decades.
+    """
     future = row["mu_star"] + row["steady_stress_change"]
     return ((row["shear_stress"] - future) / row["a"]).where(step_in_decades(row) is not None)
 
 
 def step_in_decades(row: xr.Dataset) -> int | None:
-    """Decades of the step, if it is of whole ones."""
+    """Return the size of the step in decades.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    int or None
+        None if the step is not a whole number of decades.
+    """
     decades = math.log10(row["load_velocity_ratio"]) if row["load_velocity_ratio"] > 0.0 else 0.0
     whole = round(decades)
     return whole if whole and abs(decades - whole) < 1e-9 else None
 
 
 def curve_style(row: xr.Dataset) -> dict[str, Any]:
-    """Steps up solid, and steps down dashed."""
+    """Return the line style of a step.
+
+    Steps up are solid, and steps down are dashed.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    dict
+        Keyword arguments for ``matplotlib.axes.Axes.plot``.
+    """
     from rsfstudy.plots import cycle_style
 
     decades = step_in_decades(row) or 1

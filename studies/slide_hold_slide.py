@@ -1,10 +1,10 @@
-"""Slide-hold-slide: healing and relaxation against hold time and stiffness.
+"""Healing and relaxation in slide-hold-slide tests.
 
-The load point is held, from steady sliding at V_*, and moves on at V_*. With the slowness law and b
-> a relaxation comes to an end that depends on stiffness, and healing grows by b ln 10 a decade at
-every stiffness; without rate weakening relaxation never ends. With the slip law healing per decade
-falls with stiffness, and relaxation never ends either, so that what is read off says as much of the
-machine as of the fault.
+The load point is held after steady sliding at V_*, and then moves again at V_*. Under the slowness
+law with b > a, relaxation approaches a limit that depends on stiffness. Healing increases by b ln
+10 per decade of hold time at every stiffness. Without rate weakening, relaxation continues without
+limit. Under the slip law, relaxation continues without limit as well, and healing per decade
+decreases with stiffness. The measured values then depend on the machine as much as on the fault.
 """
 
 import math
@@ -22,9 +22,9 @@ CASES: dict[str, dict[str, str | float]] = {
     SLOWNESS: {"law": "slowness"},
     STRENGTHENING: {"law": "slowness", "b_over_a": 0.2},
 }
-#: Stiffness over a; with b/a = 2 over critical stiffness.
+#: Ratios of stiffness to a sigma_*/D_c. At b/a = 2, this unit equals the critical stiffness.
 STIFFNESS_OVER_A = (1.5, 3.0, 10.0, 30.0)
-#: Hold times over which slopes are fitted, and the longest.
+#: Range of hold times over which slopes are fitted, and the longest hold time.
 FITTED_HOLD_TIMES, LONGEST_HOLD_TIME = (1e4, 1e8), 1e8
 
 base = Scene(normal_stress="constant", b_over_a=2.0, stiffness=0.0145)
@@ -33,7 +33,18 @@ CLOSED_FORM_SOURCE = "stationary contact in closed form: slowness law, quasi-sta
 
 
 def relaxation_claim(ratio: float) -> Claim:
-    """P1: the limit of relaxation."""
+    """Return a claim on the limit of relaxation (P1).
+
+    Parameters
+    ----------
+    ratio : float
+        Stiffness relative to the critical stiffness.
+
+    Returns
+    -------
+    Claim
+        Claim on relaxation after the longest hold.
+    """
     return Claim(
         id="P1",
         statement=f"slowness law, b > a, k = {ratio:g} k_cr: relaxation ends",
@@ -47,7 +58,18 @@ def relaxation_claim(ratio: float) -> Claim:
 
 
 def reloading_peak_claim(ratio: float) -> Claim:
-    """P3: the peak on reloading after a long hold."""
+    """Return a claim on the friction peak after a long hold (P3).
+
+    Parameters
+    ----------
+    ratio : float
+        Stiffness relative to the critical stiffness.
+
+    Returns
+    -------
+    Claim
+        Claim on healing after the longest hold.
+    """
     stiffness = ratio * a
     late = a * b * math.log(stiffness / b) / (stiffness - b)
     return Claim(
@@ -64,7 +86,18 @@ def reloading_peak_claim(ratio: float) -> Claim:
 
 
 def healing_claim(ratio: float) -> Claim:
-    """P4: healing per decade."""
+    """Return the claim that healing per decade is b ln 10 (P4).
+
+    Parameters
+    ----------
+    ratio : float
+        Stiffness relative to the critical stiffness.
+
+    Returns
+    -------
+    Claim
+        Claim on the slope of healing.
+    """
     return Claim(
         id="P4",
         statement=f"slowness law, k = {ratio:g} k_cr: heals by b ln 10 a decade",
@@ -79,7 +112,18 @@ def healing_claim(ratio: float) -> Claim:
 
 
 def friction_change(row: xr.Dataset) -> xr.DataArray:
-    """Change of friction since steady sliding."""
+    """Return the change of friction relative to steady sliding.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    xarray.DataArray
+        Change of friction.
+    """
     return row["friction_coefficient"] - row["mu_star"]
 
 
