@@ -392,7 +392,7 @@ def proportionality_claim(label: str) -> Claim:
         where={"problem": label, "integrator": "DOP853"},
         published=1.0,
         tolerance=0.3,
-        reason="the band a user can plan with",
+        reason="a range that is narrow enough to predict the error from the tolerance",
     )
 
 
@@ -420,7 +420,8 @@ def cheapest_claim(label: str, digits: float) -> Claim:
         variable="cheapest_ratio",
         where={"problem": label, "digits": digits},
         published=1.25,
-        reason="right-hand sides over those of the cheapest for the same error",
+        reason="ratio of right-hand-side evaluations to the most efficient integrator at the same "
+        "error",
     )
 
 

@@ -316,7 +316,7 @@ def repeating_peaks_claim(rate: float) -> Claim:
         },
         published=1.0,
         tolerance=1e-7,
-        reason="a theorem; the accuracy asked for",
+        reason="exact result; the tolerance is the requested accuracy",
     )
 
 
@@ -372,8 +372,8 @@ study = Study(
             minus={**LARGEST_STEP, "peak": 2, "inertia": False},
             published=0.0,
             tolerance=5e-5,
-            reason="0.05 of the offset of stress, as with other masses, and paths count as merged "
-            "within 2e-3 of its range, 0.6 sigma_*",
+            reason="5 % of the difference in stress, as for other masses; paths are considered "
+            "merged if they differ by less than 2e-3 of the range of stress, 0.6 sigma_*",
         ),
         Claim.above(
             id="C18",
@@ -382,7 +382,8 @@ study = Study(
             variable="paths_merging",
             where=LARGEST_STEP,
             published=0.0,
-            reason="an inequality: the segment leads from there to 10^-6 V_*; NaN if they did not",
+            reason="an inequality: the segment extends to 10^-6 V_*; the result is NaN if the "
+            "paths do not merge",
         ),
         Claim.above(
             id="C18",

@@ -309,8 +309,8 @@ COVERAGE_CLAIMS: tuple[tuple[str, str, dict[str, Any]], ...] = (
             "relation": "above",
             "published": 0.995,
             "tolerance": 0.005,
-            "reason": "over 250 numbers the share scatters by a half of that, and a last bit moves "
-            "it",
+            "reason": "the standard deviation of the fraction over 250 numbers is half of the "
+            "tolerance, and rounding changes the fraction",
         },
     ),
     (
@@ -325,7 +325,7 @@ COVERAGE_CLAIMS: tuple[tuple[str, str, dict[str, Any]], ...] = (
             "relation": "below",
             "published": 10.0,
             "tolerance": 4.0,
-            "reason": "two standard errors of a median over 290 numbers, by resampling them",
+            "reason": "two standard errors of the median of 290 numbers, from resampling",
         },
     ),
 )

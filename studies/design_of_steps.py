@@ -118,7 +118,8 @@ def expected_error_claim(design: str, k: float, published: float) -> Claim:
         },
         published=published,
         tolerance=0.1 * published,
-        reason="rows before the step are not told; 10 to 100 um of them move it by as much",
+        reason="the length of the record before the step is not specified; lengths from 10 to 100 "
+        "um change the standard error by this amount",
     )
 
 
@@ -145,7 +146,7 @@ def fit_error_claim(k: float, parameter: str) -> Claim:
         where={"stiffness": k * SLIP_DISTANCE, "parameter": parameter},
         published=0.0,
         tolerance=MAX_CHANCE_DEVIATION,
-        reason="standard deviations of a standard deviation",
+        reason="in standard deviations of the estimated standard deviation",
     )
 
 

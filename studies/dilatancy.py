@@ -106,7 +106,7 @@ def growth_threshold_claim(dilatancy: float, drainage: float) -> Claim:
         where={"dilatancy": dilatancy, "drainage": drainage},
         published=0.0,
         tolerance=3e-11,
-        reason="central differences of the assembled equations, to 1e-8 of it",
+        reason="central differences of the assembled equations have a relative error of 1e-8",
     )
 
 
@@ -197,7 +197,7 @@ study = Study(
             variable="critical_stiffness",
             where={"dilatancy": 0.012, "drainage": 1e-3},
             published=1e-4,
-            reason="an inequality: a fiftieth of b - a",
+            reason="an inequality; the bound is 2 % of b - a",
         ),
         Claim.above(
             id="D4",

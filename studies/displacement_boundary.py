@@ -194,7 +194,8 @@ study = Study(
             },
             published=2.697,
             tolerance=6e-4,
-            reason="printed to three decimals; ours is 2.6975, and theirs cut rather than rounded",
+            reason="the paper has three decimals; our result is 2.6975, so the published value is "
+            "truncated instead of rounded",
         ),
     ],
     plot=figure,

@@ -294,7 +294,8 @@ study = Study(
             variable="unknowns",
             where={"law": "slip", **FULL_SCENE_PLACE},
             published=2.0,
-            reason="spring stress and state; mass adds its unknown in ruptures only",
+            reason="the unknowns are spring stress and state; inertia adds an unknown only during "
+            "ruptures",
         ),
         Claim.below(
             id="E2",

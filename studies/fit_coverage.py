@@ -202,7 +202,7 @@ def coverage_claims(series: str, words: str, **where: str) -> list[Claim]:
             where=where,
             published=0.0,
             tolerance=MAX_BINOMIAL_DEVIATION,
-            reason="binomial standard deviations, of the parameter covered least",
+            reason="in binomial standard deviations, for the parameter with the lowest coverage",
         )
         for number, (name, share) in enumerate(NOMINAL_COVERAGE.items(), start=1)
     ]
@@ -232,7 +232,7 @@ def flagged_claim(process: str, law: str, least: float) -> Claim:
         variable="flagged_share",
         where={"process": process, "law": law},
         published=least,
-        reason="the least share of such records",
+        reason="smallest acceptable fraction of records",
     )
 
 
@@ -259,7 +259,7 @@ def seldom_flagged_claim(process: str, law: str) -> Claim:
         where={"process": process, "law": law},
         published=0.05,
         tolerance=0.08,
-        reason="two of 24 records by chance",
+        reason="two of 24 records may be flagged by chance",
     )
 
 
@@ -285,7 +285,7 @@ def naive_errors_claim(process: str, law: str) -> Claim:
         variable="naive_share_one_least",
         where={"process": process, "law": law},
         published=-MAX_BINOMIAL_DEVIATION,
-        reason="beyond chance",
+        reason="the difference is too large to be due to chance",
     )
 
 

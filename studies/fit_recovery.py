@@ -350,9 +350,9 @@ def recovery_claim(case: str, source: str) -> Claim:
         Claim on the largest deviation.
     """
     reasons = {
-        "the model": "what the end of the search leaves, and rounding",
-        "other code": "a hundred times the errors of both motions, 1e-11, over the 5e-3 by which a "
-        "slip distance moves friction: parameters trade off",
+        "the model": "termination of the fit, and rounding",
+        "other code": "a hundred times the ratio of the errors of both motions (1e-11) to the "
+        "effect of the slip distance on friction (5e-3), because the parameters are correlated",
     }
     return Claim.below(
         id="F4",

@@ -496,7 +496,7 @@ study = Study(
             variable="measured_error",
             where={"hard_case": label},
             published=1e-7,
-            reason="an inequality, against an independent computation",
+            reason="an inequality; the reference is an independent computation",
         )
         for label in CASES
         if label.startswith(("cycle at", "cycle from", "cycle, T"))

@@ -358,7 +358,8 @@ def critical_stiffness_claim(at: str, law: str, case: str) -> Claim:
         where={"law": law, "case": case, "record": SLOWEST_RECORD},
         published=1.0,
         tolerance=2.0 * max_pressure_rate(RECORD_DURATIONS[-1]),
-        reason="by how much pressure changes within 2 D_c/V_*, in which contact and pores evolve",
+        reason="the pressure change within 2 D_c/V_*, the time in which the state and the porosity "
+        "evolve",
     )
 
 
@@ -402,10 +403,11 @@ def critical_pressure_claim(at: str, law: str, case: str, within: float, reason:
 #: Maximum increase of the slip rate relative to V_*. Shear stress follows mu_* P, so the slip rate
 #: is highest when pressure changes fastest.
 MAX_SLIP_RATE_EXCESS = base.mu_star * max_pressure_rate(RECORD_DURATIONS[-1]) / base.stiffness
-CHANGE_REASON = "by how much pressure changes within 2 D_c/V_*"
+CHANGE_REASON = "the pressure change within 2 D_c/V_*"
 RATE_REASON = (
-    "slip is faster or slower by mu_* dP/dt over K, which changes c* D_c/V by as much and k_cr by "
-    "a fifth of that at most: it falls by 0.21 of itself from drained to undrained"
+    "the slip rate changes by (mu_*/K) dP/dt; c* D_c/V has the same relative change, and k_cr has "
+    "at most a fifth of this change, because k_cr decreases by 21 % from drained to undrained "
+    "conditions"
 )
 
 

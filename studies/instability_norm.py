@@ -157,7 +157,7 @@ study = Study(
             where={"boundary": STIFF_BOUNDARY},
             published=5e-4,
             tolerance=1.3e-7,
-            reason="half a unit of the printed 2361 is 1.3e-7 in the norm",
+            reason="half a unit of the last digit of 2361 corresponds to 1.3e-7 in the norm",
         ),
         Claim(
             id="C17",
@@ -168,7 +168,8 @@ study = Study(
             minus={"boundary": STIFF_BOUNDARY},
             published=0.0,
             tolerance=7.9e-6,
-            reason="half a unit of each printed number: 7.7e-6 and 1.3e-7 in the norm",
+            reason="half a unit of the last digit of each value corresponds to 7.7e-6 and 1.3e-7 "
+            "in the norm",
         ),
     ],
     plot=figure,

@@ -149,7 +149,7 @@ def all_records_decide_claim(law: str, design: str, size: float) -> Claim:
         variable="chosen_right",
         where={"law": law, "design": design, "noise_size": size},
         published=1.0,
-        reason="ten standard errors lie between the laws",
+        reason="the exponents of the laws differ by ten standard errors",
     )
 
 
@@ -173,7 +173,7 @@ def seldom_wrong_claim(law: str) -> Claim:
         variable="chosen_wrong",
         where={"law": law, "design": "one step up", "noise_size": 5e-3},
         published=0.5,
-        reason="four of six mislead by chance once in 500",
+        reason="the probability that four of six choices are wrong by chance is 1/500",
     )
 
 

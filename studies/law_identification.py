@@ -175,7 +175,7 @@ def design_claims(design: str) -> list[Claim]:
             where={**where, "seed": 0},
             published=EXPECTED_STDERRS[design],
             tolerance=0.02 * EXPECTED_STDERRS[design],
-            reason="two digits are told",
+            reason="the expected value has two digits",
         ),
         Claim(
             id="I2",
@@ -185,7 +185,7 @@ def design_claims(design: str) -> list[Claim]:
             where=where,
             published=0.0,
             tolerance=MAX_CHANCE_DEVIATION,
-            reason="standard deviations of a standard deviation",
+            reason="in standard deviations of the estimated standard deviation",
         ),
     ]
 

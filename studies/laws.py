@@ -68,7 +68,8 @@ def critical_stiffness_claim(law: str, published: float, source: str) -> Claim:
         where={"evolution": law, **CRITICAL_STIFFNESS_FIELDS},
         published=published * (base.b - base.a),
         tolerance=1e-12 * base.b,
-        reason="exact; slopes of the law are taken by differences of order eight",
+        reason="exact, except for the derivatives of the law, which are finite differences of "
+        "order eight",
     )
 
 
@@ -103,8 +104,8 @@ def critical_displacement_claim(
         where={"evolution": law, "normal_stress": "constant", "stiffness_ratio": ratio},
         published=published,
         tolerance=tolerance,
-        reason="exact for an infinite norm: 1e6 leaves exp(-32) of it; exp(-16) = 1e-7 at 2 k_cr "
-        "or halfway to the slowness law; its error estimate is 5e-10",
+        reason="exact for an infinite norm; a norm of 1e6 causes a relative error of exp(-32), or "
+        "exp(-16) = 1e-7 at 2 k_cr and for eps = 0.5; the error estimate is 5e-10",
     )
 
 
@@ -213,7 +214,8 @@ study = Study(
             where={"evolution": SLOWNESS_END, "normal_stress": "constant", "stiffness_ratio": 2.0},
             published=0.5 * base.log_instability_rate,
             tolerance=1e-7,
-            reason="exact: a ln(V/V_*)/K at the norm; to a tenth of the accuracy asked for",
+            reason="exact: a ln(V/V_*)/K at the norm; the tolerance is a tenth of the requested "
+            "accuracy",
         ),
         variable_normal_stress_claim(SLIP_END, 0.0),
         variable_normal_stress_claim(PERRIN_RICE_ZHENG, 0.0),

@@ -82,7 +82,8 @@ def dynamic_drop_claim(law: str) -> Claim:
         where={"evolution": law, "normal_stress": "constant"},
         published=1.0,
         tolerance=0.5,
-        reason="'scales with' a whole multiple, no error stated: half of (a-b) sigma_*",
+        reason="the paper reports an integer multiple ('scales with') without an error; the "
+        "tolerance is half of (a-b) sigma_*",
     )
 
 

@@ -81,7 +81,7 @@ def variable_normal_stress_claim(law: str) -> Claim:
         variable="lowering",
         where={"evolution": law, **STIFF_FIELDS, "normal_stress": "variable"},
         published=0.1,
-        reason="an inequality; ours are 0.12 to 0.48",
+        reason="an inequality; our results are 0.12 to 0.48",
     )
 
 
@@ -122,7 +122,7 @@ study = Study(
             variable="lowering",
             where={"evolution": SLOWNESS_END, "normal_stress": "variable", "stiffness_ratio": 1.75},
             published=0.0,
-            reason="an inequality; ours is -0.03",
+            reason="an inequality; our result is -0.03",
         ),
     ],
     plot=figure,

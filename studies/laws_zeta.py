@@ -41,8 +41,8 @@ def zeta_claim(exponent: float) -> Claim:
         where={"law_exponent": exponent, "normal_stress": "constant"},
         published=1.0 / (1.0 - exponent),
         tolerance=1.5e-7,
-        reason="exact for an infinite norm, and 1e6 lowers it by 1e-7 at eps = 0.5; and numerical "
-        "errors of the steps, which allow 7e-8",
+        reason="exact for an infinite norm; a norm of 1e6 lowers zeta by 1e-7 at eps = 0.5, and "
+        "numerical errors of the critical steps contribute up to 7e-8",
     )
 
 

@@ -254,7 +254,7 @@ study = Study(
             minus=cycle_place("slowness", "constant"),
             published=0.0,
             tolerance=0.5,
-            reason="'similar', beside ten decades for the slip law",
+            reason="'similar', compared with ten decades for the slip law",
         ),
         *(
             Claim(
@@ -265,7 +265,8 @@ study = Study(
                 where=cycle_place("slowness", stress),
                 published=-0.5,
                 tolerance=0.05,
-                reason="'approximately': stress is not quite constant, the spring is loaded",
+                reason="'approximately': stress is not exactly constant, because the spring is "
+                "loaded",
             )
             for stress in ("constant", "variable")
         ),
@@ -277,7 +278,7 @@ study = Study(
                 variable="drop_asymmetry",
                 where=cycle_place("slowness", stress),
                 published=1.5,
-                reason="'strongly asymmetrical'; 1 is symmetrical",
+                reason="'strongly asymmetrical'; symmetrical drops have a ratio of 1",
             )
             for stress in ("constant", "variable")
         ),
@@ -289,7 +290,8 @@ study = Study(
             where=cycle_place("slowness", "constant"),
             minus=cycle_place("slip", "constant"),
             published=1.0,
-            reason="'different to the slip law', whose two drops are within a quarter of equal",
+            reason="'different to the slip law', under which the two drops differ by less than 25 "
+            "%",
         ),
     ],
     plot=figure,

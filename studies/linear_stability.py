@@ -58,7 +58,7 @@ def growth_threshold_claim(mass: str, phi: float, rate: float) -> Claim:
         where={"mass": mass, "phi": phi, "load_velocity_ratio": rate},
         published=0.0,
         tolerance=3e-10,
-        reason="central differences of the assembled equations, to 1e-8 of it",
+        reason="central differences of the assembled equations have a relative error of 1e-8",
     )
 
 
@@ -259,7 +259,7 @@ study = Study(
             minus={"mass": NO_MASS, "phi": 50.0, "load_velocity_ratio": 100.0},
             published=0.0,
             tolerance=1e-15,
-            reason="an identity; rounding",
+            reason="an identity; the tolerance covers rounding",
         ),
         growth_threshold_claim(NO_MASS, 60.0, 1.0),
         growth_threshold_claim(PUBLISHED_PERIOD, 60.0, 1e6),
@@ -272,7 +272,8 @@ study = Study(
             variable="steady_friction",
             where={"mass": NO_MASS, "phi": 40.0, "load_velocity_ratio": 1e-4},
             published=0.8391,
-            reason="an inequality: no steady state there, while faster sliding has one",
+            reason="an inequality: there is no steady state at this slip rate, but there is one at "
+            "faster slip rates",
         ),
         Claim.below(
             id="C2",
@@ -281,7 +282,7 @@ study = Study(
             variable="stabilising_velocity",
             where={"mass": NO_MASS, "phi": 50.0},
             published=1000.0,
-            reason="an inequality; the limit cycles of that spring end there too",
+            reason="an inequality; the limit cycles of this spring end at the same velocity",
         ),
         Claim.above(
             id="C2",

@@ -142,7 +142,8 @@ def rigid_limit_claim(law: str, step: float) -> Claim:
         where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFFEST},
         published=read,
         tolerance=0.2 * abs(read - rigid) + 1e-3 * alpha,
-        reason="second order in a/K: a fifth of the first; and 1e-3 of alpha",
+        reason="the second order in a/K is less than a fifth of the first order; 1e-3 of alpha is "
+        "added",
     )
 
 
@@ -172,8 +173,8 @@ def slip_distance_claim(law: str, step: float) -> Claim:
         where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFFEST},
         published=read,
         tolerance=(0.1 * max(quicker, 0.0) + 0.06) * b / (STIFFEST * (b - a)),
-        reason="second order, over b/K: 0.06, and 0.1 for each e-fold by which the slider is first "
-        "faster (slip law) or slower (slowness law) and its state evolves otherwise",
+        reason="the second order relative to b/K is 0.06, plus 0.1 for each factor of e by which "
+        "the slider is initially faster (slip law) or slower (slowness law)",
     )
 
 
@@ -200,7 +201,7 @@ def direct_change_claim(law: str, step: float) -> Claim:
         where={"law": law, "normal_stress_step": step, "stiffness_ratio": RATIOS[0]},
         published=-alpha * math.log(1.0 + step),
         tolerance=1e-15,
-        reason="an identity: rounding",
+        reason="an identity; the tolerance covers rounding",
     )
 
 

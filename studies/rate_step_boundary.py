@@ -110,7 +110,8 @@ def variable_normal_stress_claim(inverse: float, published: float) -> Claim:
         where={"case": STRONG_NORMAL_STRESS_EFFECT, "b_over_a": 1.0 + 1.0 / inverse},
         published=published,
         tolerance=0.013,
-        reason="whole per cent (0.5), and the paper's error of 0.4 % in each of two velocities",
+        reason="rounding of the published value (0.5 %), and the error of the paper (0.4 %) in "
+        "each of two velocities",
     )
 
 

@@ -76,7 +76,7 @@ study = Study(
             where={"case": CONSTANT_NORMAL_STRESS, "stiffness_ratio": 1.0},
             published=1.0 + 1.0 / (math.e - 1.0),
             tolerance=0.0309,
-            reason="half of the spacing of the lattice there",
+            reason="half of the spacing of the lattice at this point",
         )
     ],
     plot=figure,

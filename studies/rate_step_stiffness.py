@@ -62,7 +62,7 @@ def section_4_claim(
         },
         published=published,
         tolerance=tolerance,
-        reason=f"printed to {digits}; our norm is inferred from it, see instability_norm",
+        reason=f"printed to {digits}; our norm is derived from this value (see instability_norm)",
     )
 
 
@@ -98,7 +98,7 @@ def eq_11_claim(stiffness_ratio: float, published: float, tolerance: float, reas
 
 
 PAPER_WORDS_ON_UNDERESTIMATE = (
-    "'underestimates by 1-2 %', which the paper takes for its procedure's error"
+    "'underestimates by 1-2 %', which the paper attributes to an error of its procedure"
 )
 
 
@@ -174,7 +174,8 @@ study = Study(
             where={"law": "slip", "case": WEAK_NORMAL_STRESS_EFFECT, "stiffness_ratio": 1.0},
             published=0.0,
             tolerance=0.02,
-            reason="'very close'; about the width of the symbols of the figure",
+            reason="'very close'; the tolerance is approximately the size of the symbols in the "
+            "figure",
             expected="differs",
             because="it is lower by 5.7 %, half of that at alpha = 0.56; by 6 % above k_cr",
         ),

@@ -114,7 +114,8 @@ def linear_limit_claim(law: str, ratio: float, period: float) -> Claim:
         },
         published=gain,
         tolerance=gain * (log_rate_amplitude(ratio, period, SMALL_AMPLITUDE) ** 2 + 1e-6),
-        reason="linear theory leaves out the square of the amplitude of ln V, up to 5e-4; and 1e-6",
+        reason="linear theory neglects the square of the amplitude of ln V, which is up to 5e-4; "
+        "1e-6 is added",
     )
 
 

@@ -33,8 +33,8 @@ weakening = base.b - base.a
 
 CLOSED_FORM_SOURCE = "steady friction at the load point velocity and at the fastest slip rate"
 TOLERANCE_REASON = (
-    "the fastest slip rate goes with the drop, which makes the slope steeper by (b-a) sigma over "
-    "the dynamic drop, 6 to 9 % to first order"
+    "the peak slip rate is proportional to the stress drop, so the slope is steeper by the ratio "
+    "of (b-a) sigma to the dynamic drop, 6 to 9 % to first order"
 )
 
 

@@ -49,7 +49,8 @@ def slower_evolution_claim(law: str, rate: float, figure: str, claim: str) -> Cl
         variable="slowing",
         where={"law": law, "normal_stress": "variable", "load_velocity_ratio": rate},
         published=0.0,
-        reason="an inequality on 1 - (slip to 1/e, variable)/(constant)",
+        reason="an inequality; the result is 1 minus the ratio of the slip to 1/e at variable "
+        "normal stress to the slip to 1/e at constant normal stress",
     )
 
 
@@ -160,7 +161,8 @@ study = Study(
             variable="evolution_asymmetry",
             where={"law": "slip", "normal_stress": "variable", "load_velocity_ratio": 1e-4},
             published=0.0,
-            reason="an inequality, on stress less its future steady value, as the figure plots it",
+            reason="an inequality; the figure of the paper shows stress relative to its final "
+            "steady value",
         ),
         Claim.above(
             id="C3",
@@ -183,7 +185,8 @@ study = Study(
             where={"law": "slowness", "normal_stress": "constant"},
             published=0.0,
             tolerance=2.9e-4,
-            reason="less than a line's width in the figure: 0.02 of its 37 a sigma_*",
+            reason="less than the width of a line in the figure, which is 0.02 of a range of 37 a "
+            "sigma_*",
         ),
         Claim.above(
             id="C4",
@@ -192,7 +195,7 @@ study = Study(
             variable="separation",
             where={"law": "slowness", "normal_stress": "variable"},
             published=0.5 * 0.0145,
-            reason="25 times that width",
+            reason="25 times the width of a line in the figure",
         ),
         Claim(
             id="C5",
@@ -202,7 +205,7 @@ study = Study(
             where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 200.0},
             published=0.0,
             tolerance=1e-8,
-            reason="the accuracy asked for, 1e-7 of the stress that evolves (0.15 sigma_*)",
+            reason="the requested accuracy, 1e-7 of the evolution of stress (0.15 sigma_*)",
         ),
         Claim(
             id="C5",
@@ -212,7 +215,8 @@ study = Study(
             where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 1.05},
             published=0.0,
             tolerance=0.01,
-            reason="ln(1 + x) = x to x/2, over ln 1.05: a quarter of it at most",
+            reason="ln(1 + x) differs from x by a relative error of x/2; the largest difference is "
+            "a quarter of this error, relative to ln 1.05",
         ),
         Claim.above(
             id="C5",
@@ -221,7 +225,8 @@ study = Study(
             variable="exponential_misfit",
             where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 200.0},
             published=0.3,
-            reason="an inequality: at some slip, over 0.3 of the change is left beyond eq. 17b",
+            reason="an inequality: at some slip, the remaining stress exceeds eq. 17b by more than "
+            "0.3 of the stress change",
         ),
         Claim(
             id="C5",

@@ -53,7 +53,7 @@ def relaxation_claim(ratio: float) -> Claim:
         where={"case": SLOWNESS, "stiffness": ratio * a, "hold_time": LONGEST_HOLD_TIME},
         published=-a * ratio * math.log(ratio) / (ratio - 1.0),
         tolerance=1e-7 * a,
-        reason="the accuracy asked for; what is left of it goes as 1/t",
+        reason="the requested accuracy; the remaining relaxation decreases as 1/t",
     )
 
 
@@ -80,8 +80,9 @@ def reloading_peak_claim(ratio: float) -> Claim:
         where={"case": SLOWNESS, "stiffness": stiffness, "hold_time": LONGEST_HOLD_TIME},
         published=b * math.log(LONGEST_HOLD_TIME) - late,
         tolerance=2e-5 * b,
-        reason="2e-5 of b: most peaks come within 2e-7, and 3 of 100 neighbours in the last bit, "
-        "whose steps to the peak fall otherwise, within 1.2e-5, as their errors say",
+        reason="2e-5 of b: most peaks are accurate to 2e-7, but if parameters are changed in the "
+        "last bit, 3 of 100 peaks have different integration steps and are accurate to 1.2e-5, in "
+        "agreement with their error estimates",
     )
 
 
@@ -106,8 +107,8 @@ def healing_claim(ratio: float) -> Claim:
         where={"case": SLOWNESS, "stiffness": ratio * a},
         published=b * math.log(10.0),
         tolerance=2.5e-4 * b,
-        reason="what the form leaves out goes as 1/t, up to 10/t of b: 1e-3 of it at 1e4, the "
-        "first of the points, which weighs a fifth",
+        reason="terms that the closed form neglects are up to 10 b/t, which is 1e-3 b at the first "
+        "point, t = 1e4; the weight of this point is a fifth",
     )
 
 
@@ -199,8 +200,8 @@ study = Study(
                 where={"case": STRENGTHENING, "stiffness": ratio * a},
                 published=-0.8 * a * math.log(10.0),
                 tolerance=1.5e-4 * a,
-                reason="what the form leaves out is a t^(b/a - 1): 6e-4 of a at the first of the "
-                "points, which weighs a fifth",
+                reason="the closed form neglects a t^(b/a - 1), which is 6e-4 a at the first "
+                "point; the weight of this point is a fifth",
             )
             for ratio in STIFFNESS_OVER_A
         ),

@@ -301,7 +301,8 @@ EDGE_CLAIM: dict[str, Any] = {
     "says": "limit cycles end where the eigenvalues say",
     "variable": "cycling_edge_farthest",
     "tolerance": 0.5,
-    "reason": "half a spacing of the cells in stiffness: the boundary is within the bracket",
+    "reason": "half of the spacing of the cells in stiffness, because the boundary lies within the "
+    "bracket",
 }
 MISPLACED_CELLS_CLAIM: dict[str, Any] = {
     "says": "no cell cycles above it or settles below it",

@@ -71,7 +71,8 @@ def slip_law_slope_claim(drop: str, case: str, multiple: float, unit: float, law
         where={"law": "slip", "case": case, "stiffness_ratio": 0.8},
         published=multiple * unit,
         tolerance=0.5 * abs(unit),
-        reason="'scales with' a whole multiple, no error stated: half of the next",
+        reason="the paper reports an integer multiple ('scales with') without an error; the "
+        "tolerance is half of the unit",
     )
 
 
@@ -305,7 +306,7 @@ study = Study(
             where={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.4},
             minus={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.8},
             published=0.05,
-            reason="an inequality, well above the standard errors",
+            reason="an inequality; the bound is much larger than the standard errors",
         ),
         Claim(
             id="C2",
@@ -328,7 +329,7 @@ study = Study(
             variable="static_slope_points",
             where={"law": "slip", "case": STEEP_CASE, "stiffness_ratio": 0.8},
             published=10.0,
-            reason="an inequality: cells without stick-slip are left out",
+            reason="an inequality: cells without stick-slip are ignored",
         ),
     ],
     plot=figure,

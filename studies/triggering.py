@@ -123,7 +123,7 @@ def coulomb_limit_claim(law: str, case: str) -> Claim:
         where={"law": law, "case": case, "stiffness_ratio": 0.05},
         published=1.0,
         tolerance=1e-3,
-        reason="the second order: less than 0.02 k/k_cr in all of them",
+        reason="the second order is less than 0.02 k/k_cr in all cases",
     )
 
 
@@ -151,12 +151,13 @@ def normal_stress_effect_claim(law: str) -> Claim:
         where={**where, "case": IMPOSED_WITH_ALPHA},
         minus={**where, "case": IMPOSED_WITHOUT_ALPHA},
         published=-0.5 * base.a * (0.5 / EFFECTIVE_FRICTION - 0.5 / base.mu_star),
-        reason="an inequality: by more than half of what the first order says",
+        reason="an inequality: the bound is half of the first-order result",
     )
 
 
 TOLERANCE_REASON = (
-    "its error estimate, to 1.2e-9 of it, and what a finite norm leaves, no more than that"
+    "the error estimate, which is up to 1.2e-9 of the step, and the effect of a finite norm, which "
+    "is not larger"
 )
 
 
@@ -295,7 +296,7 @@ study = Study(
             where={"law": "slip", "case": IMPOSED_WITH_ALPHA},
             published=-FRICTION_REDUCTION * base.a / (2.0 * EFFECTIVE_FRICTION**2),
             tolerance=0.02 * FRICTION_REDUCTION * base.a / (2.0 * EFFECTIVE_FRICTION**2),
-            reason="the third order, over stiffnesses up to 0.5 k_cr",
+            reason="effect of the third order for stiffness up to 0.5 k_cr",
         ),
         *map(normal_stress_effect_claim, EXPONENTS),
         Claim(
@@ -306,7 +307,8 @@ study = Study(
             where={"law": "slip", "case": IMPOSED_WITHOUT_ALPHA, "stiffness_ratio": 1.0},
             published=1.0,
             tolerance=1e-5,
-            reason="a finite norm takes 2e-5 of either, and about the same",
+            reason="a finite norm changes both steps by approximately the same relative amount, "
+            "2e-5",
         ),
         Claim.above(
             id="N5",
@@ -315,7 +317,7 @@ study = Study(
             variable="coulomb_ratio",
             where={"law": "slip", "case": INCLINED_STRONG, "stiffness_ratio": 2.0},
             published=0.97,
-            reason="an inequality; ours is 0.974",
+            reason="an inequality; our result is 0.974",
         ),
         Claim.above(
             id="N6",
@@ -324,7 +326,7 @@ study = Study(
             variable="coulomb_ratio",
             where={"law": "slowness", "case": INCLINED_STRONG, "stiffness_ratio": 1.25},
             published=2.0,
-            reason="an inequality; ours is 2.40",
+            reason="an inequality; our result is 2.40",
         ),
     ],
     plot=figure,

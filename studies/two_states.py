@@ -251,7 +251,7 @@ study = Study(
             where=spring_place(0.95),
             published=8.02755656e-4,
             tolerance=5e-13,
-            reason="the digits given, times a = 0.01",
+            reason="rounding of the published value, multiplied by a = 0.01",
         ),
         Claim(
             id="S2",
@@ -263,7 +263,8 @@ study = Study(
             minus_variable="doubling_by_motion",
             published=0.0,
             tolerance=2e-4,
-            reason="half the distance of two springs, between which the motions say",
+            reason="half of the difference between the two stiffness values that bracket the "
+            "period doubling of the motions",
         ),
         Claim(
             id="S3",
@@ -273,7 +274,8 @@ study = Study(
             where=LAW_SELECTION,
             published=0.86626,
             tolerance=1e-5,
-            reason="digits given; differences of the return map and interpolation leave 1e-6",
+            reason="rounding of the expected value; finite differences of the return map and "
+            "interpolation have an error of 1e-6",
         ),
         Claim(
             id="S4",
@@ -283,7 +285,8 @@ study = Study(
             where=spring_place(0.8663),
             published=-1.0,
             tolerance=4e-3,
-            reason="within 1e-4 k_cr of the doubling: a change of the multiplier by 4e-3",
+            reason="the stiffness is within 1e-4 k_cr of the period doubling, which changes the "
+            "multiplier by up to 4e-3",
         ),
         Claim.above(
             id="S5",
@@ -292,7 +295,7 @@ study = Study(
             variable="lyapunov_exponent",
             where=spring_place(0.8531),
             published=0.1,
-            reason="an inequality, well above what 32 events leave uncertain",
+            reason="an inequality; the bound is much larger than the uncertainty due to 32 events",
         ),
         Claim(
             id="S6",

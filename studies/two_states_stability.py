@@ -80,10 +80,13 @@ def critical_stiffness_claim(
     )
 
 
-PUBLISHED_DIGITS_TOLERANCE: dict[str, Any] = {"tolerance": 5e-8, "reason": "the digits given"}
+PUBLISHED_DIGITS_TOLERANCE: dict[str, Any] = {
+    "tolerance": 5e-8,
+    "reason": "rounding of the published value",
+}
 ROUNDING_TOLERANCE: dict[str, Any] = {
     "tolerance": 3e-15,
-    "reason": "rounding, of slopes of the law by differences",
+    "reason": "rounding of the derivatives of the law, which are finite differences",
 }
 
 study = Study(

@@ -75,8 +75,8 @@ CLAIMS = (
         published=FIRST_ORDER_SPREAD,
         tolerance=0.2 * FIRST_ORDER_SPREAD,
         reason=(
-            "256 samples tell a spread to 5 %, of which three; and elasticities grow by a tenth "
-            "where b - a is a fifth smaller"
+            "three standard errors of a standard deviation from 256 samples (5 % each), and an "
+            "increase of the elasticities by 10 % if b - a is smaller by 20 %"
         ),
     ),
     Claim.below(

@@ -83,8 +83,8 @@ def rigid_limit_claim(law: str, ratio: float) -> Claim:
         where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": STIFFEST},
         published=expected,
         tolerance=(0.1 if law == "slip" else 0.01) * expected,
-        reason="second order, in (a/K)(b - a)/a = 1/300: three times that by the slowness law, and "
-        "thirty times by the slip law, whose evolution is steeper by ln r and more",
+        reason="the second order in (a/K)(b - a)/a = 1/300 is multiplied by 3 under the slowness "
+        "law, and by 30 under the slip law, because the evolution is steeper by ln r or more",
     )
 
 
@@ -139,8 +139,8 @@ def rate_dependence_claim(law: str, ratio: float) -> Claim:
         where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": 3.0},
         published=a - b,
         tolerance=5e-8 * a,
-        reason="oscillations die as exp[-(k^ - 1)/2] a D_c: exp(-20) is left; and half of the "
-        "accuracy asked for",
+        reason="oscillations decay by exp[-(k^ - 1)/2] per D_c to exp(-20); the tolerance includes "
+        "half of the requested accuracy",
     )
 
 
@@ -169,7 +169,8 @@ def slip_distance_claim(ratio: float) -> Claim:
         where={"law": "slowness", "velocity_ratio": ratio, "stiffness_ratio": STIFFEST},
         published=left,
         tolerance=0.02,
-        reason="(a/K) ln(K/a) of slip comes before the peak, from which it is counted",
+        reason="the slip distance is measured from the peak, which occurs after a slip of (a/K) "
+        "ln(K/a)",
     )
 
 

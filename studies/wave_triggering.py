@@ -122,8 +122,8 @@ def linear_limit_claim(law: str, period: float, phase: float) -> Claim:
         where=claim_place(law, period, SMALL, phase),
         published=1.0,
         tolerance=within,
-        reason="the second order: twice A mu_*/a, for the first order of several waves cancels in "
-        "part",
+        reason="the second order is 2 A mu_*/a, because the first-order effects of several waves "
+        "cancel in part",
     )
 
 
@@ -151,9 +151,9 @@ def coulomb_limit_claim(law: str, phase: float) -> Claim:
         where=claim_place(law, SLOW_WAVES, LARGE, phase),
         published=1.0,
         tolerance=0.05,
-        reason="contact goes on healing by b ln t, 0.04 of the loading (b over K V_0 times the "
-        "interval); half a wave after it began normal stress changes by 0.002 of itself within the "
-        "time of nucleation",
+        reason="healing by b ln t is 0.04 of the loading (b relative to K V_0 times the interval); "
+        "half a wave after the beginning of the train, normal stress changes by 0.2 % within the "
+        "nucleation time",
     )
 
 
@@ -181,7 +181,7 @@ def strong_waves_claim(law: str) -> Claim:
         where=claim_place(law, WAVES, LARGEST, 0.9),
         published=1.0,
         tolerance=NUCLEATION_TIME / 5.0,
-        reason="a sigma/(k V_0) over a clock advance of 5 D_c/V_*",
+        reason="ratio of the nucleation time a sigma/(k V_0) to a clock advance of 5 D_c/V_*",
     )
 
 
@@ -207,7 +207,7 @@ def early_train_claim(amplitude: float) -> Claim:
         where=claim_place("slowness", FAST_WAVES, amplitude, 0.5),
         published=0.0,
         tolerance=5e-7,
-        reason="its error estimate, and as much again several times: 5e-9 of the interval",
+        reason="several times the error estimate, which is 5e-9 of the recurrence interval",
     )
 
 
@@ -232,7 +232,7 @@ def coulomb_error_claim(law: str) -> Claim:
         variable="coulomb_ratio",
         where=claim_place(law, WAVES, LARGE, 0.8),
         published=1.5,
-        reason="an inequality; ours are 1.9 and 11",
+        reason="an inequality; our results are 1.9 and 11",
     )
 
 

@@ -113,7 +113,7 @@ def interval_claim(name: str, order: str, end: str) -> Claim:
         where={"input": name},
         relation="below" if end == "low" else "above",
         published=0.5,
-        reason="an interval of 95 %",
+        reason="a 95 % confidence interval",
     )
 
 
@@ -142,7 +142,8 @@ def first_order_claim(of: str, name: str, share: float) -> Claim:
         where={"input": name},
         published=share,
         tolerance=0.1,
-        reason="128 points tell an index to .06; the logarithm holds a, b - a and k once more",
+        reason="the standard error of an index from 128 points is 0.06, and the logarithmic factor "
+        "also depends on a, b - a and k",
     )
 
 
@@ -235,7 +236,8 @@ study = Study(
             where={"input": "ln_stiffness"},
             published=0.0,
             tolerance=1e-15,
-            reason="rounding: the boundary is asked at the critical stiffness, whatever k is",
+            reason="rounding; the critical displacement is computed at the critical stiffness, so "
+            "it does not depend on k",
         ),
         first_order_claim("drop", "ln_net", 1.0),
         first_order_claim("interval", "ln_net", 0.5),
