@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class ExactResponse(NamedTuple):
     """Exact response to a velocity step.
 
-    Attributes
+    Parameters
     ----------
     step : float
         Time of the step in s.

@@ -85,7 +85,7 @@ def draw_signed(size: DrawFunction) -> DrawFunction:
 class Question(NamedTuple):
     """Question about a random scene.
 
-    Attributes
+    Parameters
     ----------
     measure : Measure
         Measure that is computed for the scene.

@@ -19,7 +19,7 @@ EXTENDED_PRECISION_SOURCE = (
 class KnownValue(NamedTuple):
     """Known value and its source.
 
-    Attributes
+    Parameters
     ----------
     answer : float
         Known value.

@@ -41,6 +41,11 @@ class HardCase(ProblemMeasure):
 
     The status is ``ok`` if the outcome has the expected status and the error does not exceed the
     error estimate. Otherwise the status is ``unverified``.
+
+    Parameters
+    ----------
+    problems : tuple of Problem
+        Problems, one for each scene of the lattice.
     """
 
     name: ClassVar[str] = "hard_case"

@@ -45,7 +45,7 @@ def initial_log_rate(step: float) -> float:
     Returns
     -------
     float
-        ln(V/V_*).
+        Natural logarithm of V/V_*.
     """
     r = 1.0 + step
     return float((mu * (1.0 / r - 1.0) + alpha * math.log(r)) / a)
