@@ -5,9 +5,10 @@ is drained, or dilatant with pores that drain into the surroundings. Before the 
 spring is slightly softer than critical. The critical stiffness decreases with effective normal
 stress. Small perturbations therefore stop growing when k exceeds the critical stiffness at the
 current pressure in the fault, and start to grow again when k falls below the critical stiffness.
-For both laws, this rule predicts the pressure to within the pressure change in one or two D_c/V_*.
-While pressure rises, slip is faster, and the ratio of drainage to slip rate is smaller. On a
-dilatant fault, instability therefore ends at a lower pressure than the pressure at which it begins.
+For both laws, the pressure that follows from this rule is accurate to the pressure change in one or
+two D_c/V_*. While pressure rises, slip is faster, and the ratio of drainage to slip rate is
+smaller. On a dilatant fault, instability therefore ends at a lower pressure than the pressure at
+which it begins.
 """
 
 import math
@@ -114,8 +115,8 @@ class StabilisationPressure(Measure):
     """Pore pressures at which small perturbations stop or start to grow.
 
     The scene contains a record of pore pressure that rises until the middle of the record and then
-    falls. Perturbations stop growing at the maximum of their size in the first half, and start to
-    grow again at the minimum in the second half.
+    falls. The size of a perturbation has a maximum in the first half, when the perturbation stops
+    growing, and a minimum in the second half, when the perturbation starts to grow again.
     """
 
     name: ClassVar[str] = "stabilisation"
