@@ -1,1 +1,4 @@
-"""The named studies, one declaration a file; each holds a `Study` named `study`."""
+"""Named studies of the package.
+
+Each module without a leading underscore declares one study, a ``Study`` object called ``study``.
+"""

@@ -1,4 +1,9 @@
-"""Peaks of slip rate event by event, with Floquet multipliers of the cycle of one event."""
+"""Peak slip rates of successive events, and Floquet multipliers of the cycle.
+
+The measure ``Bifurcation`` follows a motion event by event. The measure also searches for the
+period-one cycle, which has one event per period, and computes the Floquet multipliers of this
+cycle.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -25,12 +30,14 @@ from rsfstudy.measure_base import check_steady_loading
 from rsfstudy.measures import Measure, Outcome, Output, Quantity, Status
 from rsfstudy.motion import WorkMeter, estimate_error
 
-#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
+#: Lower bound of error estimates, relative to the requested accuracy. Without this bound, the
+#: estimate is too small if two runs agree by chance.
 _COINCIDENCE_FLOOR = 0.02
-#: Events along which a departure turns to where it grows, before growth counts: other directions
-#: lag behind by a factor of ten an event and more.
+#: Number of events that are used to align a perturbation with the direction of fastest growth. In
+#: all other directions, a perturbation grows more slowly by a factor of at least ten per event.
 _ALIGNMENT_EVENTS = 16
-#: How many guesses there are at a cycle of one event, and how far off the first may be.
+#: Maximum number of starting points in the search for the period-one cycle, and the maximum
+#: distance of the cycle from a starting point relative to ``a`` times the range of ln V.
 _MAX_CYCLE_GUESSES, _MAX_GUESS_DISTANCE = 3, 0.3
 
 _OUTPUTS = (
@@ -94,24 +101,29 @@ _OUTPUTS = (
 
 @dataclass(frozen=True)
 class Bifurcation(Measure):
-    """Peaks of slip rate after a transient, event by event, under a steady load point velocity.
+    """Peak slip rates of successive events at a constant load point velocity.
 
-    A cycle of one event is looked for too, whether it attracts or not, close to where the motion
-    comes closest to repeating itself. Its Floquet multipliers are the eigenvalues of the derivative
-    of the map of spring stress and states from one maximum of spring stress to the next: where one
-    passes -1, the period doubles. The period is that of a cycle that closes to the accuracy and
-    attracts; without one the motion ends as `not_periodic`, with all numbers but those of a period.
-    Peaks of chaotic motion have no error estimate, because no accuracy would reproduce them; the
-    number of events in a period has none because it is whole. The Lyapunov exponent of such a
-    motion is a mean over the events that are kept, with its standard error; that of a cycle is the
-    logarithm of its largest multiplier, and has none.
+    The measure discards a transient and then records the peak slip rate of each event. The measure
+    also searches for the period-one cycle near the events that almost repeat the preceding event.
+    The period-one cycle is reported even if it repels neighbouring motions. The Floquet multipliers
+    of this cycle are the eigenvalues of the derivative of the return map, which maps spring stress
+    and states from one maximum of spring stress to the next. The period doubles if a multiplier
+    passes through -1.
+
+    A period is reported only if the motion approaches an attracting cycle that closes to the
+    requested accuracy. Otherwise the status is ``not_periodic``, and the Lyapunov exponent is the
+    mean growth of perturbations over the recorded events, with a standard error. If the motion
+    approaches a cycle, the Lyapunov exponent is the logarithm of the absolute value of the largest
+    multiplier divided by the period, without a standard error. The peaks of a chaotic motion have
+    no error estimate, because a more accurate integration does not reproduce them. The error of the
+    number of events per period is zero, because this number is an integer.
 
     Parameters
     ----------
-    transient : int
-        Events that are left out.
-    events : int
-        Events that are kept, along `event`.
+    transient : int, default: 64
+        Number of initial events that are discarded.
+    events : int, default: 32
+        Number of events that are recorded along the dimension ``event``.
 
     References
     ----------
@@ -128,6 +140,7 @@ class Bifurcation(Measure):
     dimensions = (Quantity("event", "", "1", "number of the event, of those that are kept"),)
 
     def __post_init__(self) -> None:
+        """Check the numbers of events."""
         if self.transient < 0:
             raise InvalidValue("transient", self.transient, "must be 0 or greater")
         if self.events < 4:
@@ -135,10 +148,28 @@ class Bifurcation(Measure):
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        """Coordinate values of the dimension ``event``."""
         return {"event": np.arange(1, self.events + 1)}
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Follow the events, and close the cycle of one event at two accuracies."""
+        """Follow the events, and find the period-one cycle.
+
+        The period-one cycle is computed at two accuracies to estimate its errors.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Outcome with the status ``not_periodic`` if the motion does not approach a cycle.
+        """
         check_steady_loading(scene)
         if scene.log_load_velocity == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
@@ -167,7 +198,7 @@ class Bifurcation(Measure):
         return Outcome(status, values, why)
 
     def _event_outputs(self, scene: Scene, seen: Sequence[Cycle]) -> dict[str, float | np.ndarray]:
-        """Numbers of the events that are kept."""
+        """Return the results of the recorded events."""
         peaks = np.array([cycle.max_log_slip_rate / LN10 for cycle in seen])
         return {
             "peak_log10_slip_rate": peaks,
@@ -180,7 +211,28 @@ class Bifurcation(Measure):
 def _one_event_cycle_outputs(
     scene: Scene, accuracy: Accuracy, motion: EventSequence, meter: WorkMeter
 ) -> tuple[Status, str, dict[str, float | np.ndarray]]:
-    """The cycle of one event, if the motion comes close to one; and whether it is known."""
+    """Compute the results of the period-one cycle.
+
+    Parameters
+    ----------
+    scene : Scene
+        Parameters of the slider.
+    accuracy : Accuracy
+        Requested accuracy.
+    motion : EventSequence
+        Cycles of the motion.
+    meter : WorkMeter
+        Counter of right-hand-side evaluations.
+
+    Returns
+    -------
+    status : Status
+        ``unverified`` if the error estimate is too large, and OK otherwise.
+    message : str
+        Explanation of the status.
+    values : dict of str to float
+        Results of the cycle. Empty if no period-one cycle is found.
+    """
     one = _find_one_event_cycle(ReturnMap(scene, accuracy, meter), motion.cycles)
     if one is None:
         return Status.OK, "", {}
@@ -204,12 +256,27 @@ def _one_event_cycle_outputs(
 
 
 def _mean_growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float, float]:
-    """By how much small departures grow along the last so many events, as a logarithm: mean and
-    its standard error, over as many blocks of events as each has; NaN where they lead away from
-    the motion.
+    """Compute the mean logarithmic growth of small perturbations per event.
 
-    Which way a departure grows it learns along the events before, or the first half where there
-    are few.
+    The perturbation is aligned with the direction of fastest growth before growth is averaged. The
+    alignment uses 16 events, or half of the events if there are fewer than 32. The standard error
+    is computed from the means of approximately ``sqrt(n)`` blocks of events, where ``n`` is the
+    number of averaged events.
+
+    Parameters
+    ----------
+    by : ReturnMap
+        Return map of the motion.
+    seen : sequence of Cycle
+        Cycles of the motion.
+    kept : int
+        Number of events over which growth is averaged.
+
+    Returns
+    -------
+    tuple of float
+        Mean growth and its standard error. Both are NaN if a perturbed motion does not complete a
+        cycle.
     """
     seen = seen[-(kept + _ALIGNMENT_EVENTS) :]
     step = DIFFERENCE_STEP * by.scene.a * max(cycle.log_slip_rate_range for cycle in seen)
@@ -228,9 +295,22 @@ def _mean_growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float
 
 
 def _find_one_event_cycle(by: ReturnMap, seen: Sequence[Cycle]) -> Orbit | None:
-    """The cycle of one event that a motion comes close to, whether it attracts or not."""
+    """Find the period-one cycle near the motion.
+
+    Parameters
+    ----------
+    by : ReturnMap
+        Return map of the motion.
+    seen : sequence of Cycle
+        Cycles of the motion.
+
+    Returns
+    -------
+    Orbit or None
+        None if the search fails from all starting points.
+    """
     for near in _closest_returns(seen):
-        # where periods have doubled, events go back and forth around it
+        # After a period doubling, successive events alternate between the two sides of the cycle.
         midpoint = 0.5 * (section_at(near.start_point) + section_at(near.end_point))
         orbit = by.find_orbit(
             midpoint, 1, near.log_slip_rate_range, max_distance=_MAX_GUESS_DISTANCE
@@ -241,11 +321,15 @@ def _find_one_event_cycle(by: ReturnMap, seen: Sequence[Cycle]) -> Orbit | None:
 
 
 def _closest_returns(seen: Sequence[Cycle]) -> list[Cycle]:
-    """The events of the later half that came closest to the one before, over how far ln V swings;
-    the closest first.
+    """Return the cycles that almost repeat, in order of distance.
+
+    Only the second half of the cycles is searched. A cycle almost repeats if the states at its end
+    are close to the states at its beginning. The distance is the largest change of a state over one
+    cycle, relative to the range of ln V.
     """
 
     def off(cycle: Cycle) -> float:
+        """Return the relative change of the states over a cycle."""
         apart = np.subtract(cycle.end_point.psis, cycle.start_point.psis)
         return float(np.abs(apart).max()) / cycle.log_slip_rate_range
 
@@ -253,6 +337,6 @@ def _closest_returns(seen: Sequence[Cycle]) -> list[Cycle]:
 
 
 def _lyapunov_exponent(orbit: Orbit) -> float:
-    """The Lyapunov exponent of a cycle."""
+    """Return the Lyapunov exponent of a periodic orbit."""
     size = float(abs(orbit.multipliers[0]))
     return math.log(size) / orbit.period if size else -math.inf

@@ -1,4 +1,4 @@
-"""The integrator with the least work for a number of correct digits."""
+"""Reduction that finds the most efficient integrator for a given accuracy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ import xarray as xr
 from rsfstudy.measures import Quantity
 from rsfstudy.reductions import Reduction
 
-#: What is given, by the ends of the names: units, and what it is.
+#: Unit and description of each result, by the suffix of its name.
 _RESULT_DESCRIPTIONS = {
     "integrator": ("", "integrator with the least right-hand sides"),
     "work": ("1", "its right-hand sides"),
@@ -24,25 +24,26 @@ _RESULT_DESCRIPTIONS = {
 
 @dataclass(frozen=True)
 class CheapestIntegrator(Reduction):
-    """The integrator that reaches a number of correct digits with the least work.
+    """Integrator that reaches a number of correct digits with the least work.
 
-    Work at exactly that many digits is interpolated, in logarithms, between neighbouring runs of
-    one integrator; runs that failed are left out.
+    The work for exactly this number of digits is interpolated logarithmically between neighbouring
+    runs of the same integrator. Failed runs are ignored.
 
     Parameters
     ----------
     name : str
-        Gives, along a dimension ``digits``, ``<name>_integrator`` (its name), ``<name>_work``,
-        ``<name>_relative`` (the work of each integrator over that of `default`), and
-        for the integrator `default` ``<name>_default_work``, ``<name>_default_time``,
-        ``<name>_default_request`` (the digits to ask for) and ``<name>_ratio``, its work over the
-        least.
+        Prefix of the results, which have a dimension ``digits``. ``<name>_integrator`` is the name
+        of the most efficient integrator, ``<name>_work`` is its work, and ``<name>_relative`` is
+        the work of each integrator relative to the default integrator. The results
+        ``<name>_default_work``, ``<name>_default_time``, ``<name>_default_request`` (number of
+        digits to request) and ``<name>_ratio`` (work relative to the least work) describe the
+        default integrator.
     of : str
-        Variable that holds the achieved digits along ``integrator`` and ``requested_digits``.
-    default : str
-        Name of the integrator in use.
-    digits : tuple of float
-        Digits wanted.
+        Variable that contains the achieved digits along ``integrator`` and ``requested_digits``.
+    default : str, default: "DOP853"
+        Name of the default integrator.
+    digits : tuple of float, default: (3.0, 6.0, 9.0)
+        Numbers of correct digits.
     """
 
     default: str = "DOP853"
@@ -51,21 +52,32 @@ class CheapestIntegrator(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Quantities that are given, and the digits that they are given for."""
+        """Quantities of the results and of the dimension ``digits``."""
         digits = Quantity("digits", "", "1", "correct decimal digits wanted")
         return digits, *(
             Quantity(f"{self.name}_{n}", "", *about) for n, about in _RESULT_DESCRIPTIONS.items()
         )
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compare the integrators; nothing where `default` is not among them."""
+        """Compare the integrators.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the study.
+
+        Returns
+        -------
+        xarray.Dataset
+            Empty if the default integrator is not part of the dataset.
+        """
         names = dataset["integrator"].values.astype(str)
         if self.default not in names:
             return xr.Dataset()
         digits = xr.DataArray(list(self.digits), {"digits": list(self.digits)}, "digits")
 
         def reached(values: Any) -> Any:
-            """Values of each integrator where it reaches the digits."""
+            """Interpolate the values of each integrator."""
             core = [["requested_digits"], ["requested_digits"], ["digits"]]
             return xr.apply_ufunc(
                 _values_at_digits,
@@ -97,17 +109,49 @@ class CheapestIntegrator(Reduction):
 
 
 def _values_at_digits(achieved: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Values at the first run from which on all reach the digits wanted; NaN where none does."""
+    """Interpolate values to the numbers of correct digits.
+
+    Parameters
+    ----------
+    achieved : ndarray
+        Achieved digits of each run, in the order of the requested digits.
+    values : ndarray
+        Values of each run.
+    wanted : ndarray
+        Numbers of correct digits.
+
+    Returns
+    -------
+    ndarray
+        Interpolated values. NaN for numbers of digits that the runs do not reach.
+    """
     known = np.isfinite(achieved) & np.isfinite(values)
     achieved, values = achieved[known], values[known]
     if achieved.size == 0:
         return np.full(wanted.shape, np.nan)
-    # digits that a loose request reaches by luck do not count, only those all tighter ones reach
+    # A run with a loose tolerance may reach n digits by chance. A run is therefore accepted only if
+    # all runs with tighter tolerances also reach n digits.
     kept = np.minimum.accumulate(achieved[::-1])[::-1]
     return np.array([_first_value_with_digits(kept, values, digits) for digits in wanted])
 
 
 def _first_value_with_digits(kept: np.ndarray, values: np.ndarray, digits: float) -> float:
+    """Interpolate the values to one number of digits.
+
+    Parameters
+    ----------
+    kept : ndarray
+        Digits that a run and all runs with tighter tolerances achieve.
+    values : ndarray
+        Values of each run.
+    digits : float
+        Number of correct digits.
+
+    Returns
+    -------
+    float
+        NaN if the runs do not reach the number of digits.
+    """
     reached = np.flatnonzero(kept >= digits)
     if reached.size == 0:
         return float("nan")

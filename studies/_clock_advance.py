@@ -1,4 +1,9 @@
-"""Clock advance of the next event by a train of waves: as measured, and by two theories."""
+"""Clock advance of the next stick-slip event by a train of waves.
+
+The measure ``ClockAdvance`` computes the clock advance from motions with and without the waves. The
+measure also computes two approximations: first-order perturbation theory, and a threshold of
+Coulomb stress.
+"""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -26,16 +31,19 @@ from rsfstudy.motion import (
 from rsfstudy.slider import Point
 from rsfstudy.slider.loading.oscillation import NormalStressOscillation
 
-#: Displacement step in D_c that sets free motion off, and most events until its cycle repeats.
+#: Displacement step in D_c that starts the stick-slip motion without waves, and maximum number of
+#: events until the motion repeats.
 START_DISPLACEMENT_STEP, MAX_EVENTS = 0.1, 300
-#: Part of the accuracy asked for to which two runs may agree by chance.
+#: Lower bound of error estimates, relative to the requested accuracy, because two runs may agree by
+#: chance.
 _COINCIDENCE_FLOOR = 0.06
-#: ln(V/V_*) beyond which what is left of the time to an event is nothing: exp(-9) D_c/V_*.
+#: Value of ln(V/V_*) at which the linear equations stop. The remaining time to the event is then
+#: approximately exp(-9) D_c/V_*, which is negligible.
 NEGLIGIBLE_TIME_LOG_RATE = 9.0
-#: Times at which Coulomb stress is looked at.
+#: Number of times at which Coulomb stress is evaluated.
 COULOMB_STRESS_SAMPLES = 2001
 INTERVAL = "recurrence_interval"
-#: Laws of which there are linear equations here.
+#: Evolution laws for which the linear equations are implemented.
 LINEARISED_LAWS = ("slip", "slowness")
 
 _OUTPUTS = (
@@ -70,10 +78,17 @@ _OUTPUTS = (
 
 @dataclass(frozen=True)
 class ClockAdvance(Measure):
-    """Time by which a train of waves makes the next event of stick-slip come earlier.
+    """Clock advance of the next stick-slip event by a train of waves.
 
-    An event comes as the slip rate reaches the instability norm. The train begins at a part
-    `cycle_phase` of the interval from one event to the next, whatever the scene says of its begin.
+    The clock advance is the time by which the event occurs earlier than without the waves. An event
+    occurs when the slip rate reaches the instability norm. The parameter ``cycle_phase`` determines
+    the time at which the train begins, and the value of ``oscillation_begin`` in the scene is
+    ignored.
+
+    Parameters
+    ----------
+    cycle_phase : float, default: 0.5
+        Beginning of the train, as a fraction of the recurrence interval after an event.
     """
 
     cycle_phase: float = 0.5
@@ -83,11 +98,30 @@ class ClockAdvance(Measure):
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
+        """Check that the train begins between two events."""
         if not 0.0 < self.cycle_phase < 1.0:
             raise InvalidValue("cycle_phase", self.cycle_phase, "must lie between 0 and 1")
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """From a free cycle, and once more with smaller tolerances for the errors."""
+        """Compute the clock advance and its error estimate.
+
+        The error estimate is based on a second run with smaller tolerances.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Outcome with the status ``no_limit_cycle`` if the motion without waves settles to steady
+            sliding.
+        """
         if not isinstance(scene.parts.loading, NormalStressOscillation):
             return Outcome(Status.NO_STEP, message="normal stress does not oscillate")
         runs = [self._find_next_event(scene, how, meter) for how in (accuracy, accuracy.refined())]
@@ -113,13 +147,43 @@ class ClockAdvance(Measure):
         return Outcome(Status.OK, {**values, **ratios, **errors})
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """Both are differences of times."""
+        """Return the scales of the numerical errors.
+
+        Both results are differences of two times, so each scale is twice the recurrence interval.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        values : mapping
+            Results by name.
+
+        Returns
+        -------
+        mapping
+            Scales by result.
+        """
         return dict.fromkeys(("clock_advance", INTERVAL), 2.0 * values[INTERVAL])
 
     def _find_next_event(
         self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
     ) -> "_NextEvent | None":
-        """The next event after a train comes; None where there is no stick-slip."""
+        """Find the next event after the train has begun.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        _NextEvent or None
+            None if there is no stick-slip motion.
+        """
         free = scene.with_segment(Segment(scene.load_velocity))
         cycle = _find_free_cycle(free, accuracy, meter)
         if cycle is None:
@@ -136,17 +200,20 @@ class ClockAdvance(Measure):
 
 
 class _NextEvent(NamedTuple):
-    """The next event after a train comes.
+    """Next event after the beginning of a train of waves.
 
     Attributes
     ----------
-    recurrence_interval, clock_advance : float
-    left : float
-        Time from the beginning of the train to the free event.
-    begin : Point
-        What the slider does as the train begins.
-    onset : float
-        Friction coefficient where V rises through V_0 before a free event.
+    recurrence_interval : float
+        Recurrence interval without waves in D_c/V_*.
+    clock_advance : float
+        Clock advance in D_c/V_*.
+    remaining_time : float
+        Time in D_c/V_* from the beginning of the train to the event that occurs without waves.
+    cycle_start : Point
+        Point of the slider at the beginning of the train.
+    train_start : float
+        Friction coefficient at the onset of an event without waves, when V rises through V_0.
     """
 
     recurrence_interval: float
@@ -159,8 +226,22 @@ class _NextEvent(NamedTuple):
 def _find_free_cycle(
     free: Scene, accuracy: Accuracy, meter: WorkMeter
 ) -> tuple[Point, tuple[float, float]] | None:
-    """A free cycle: where it begins, with V at V_0, and times of two events from there; None where
-    the motion settles to steady sliding.
+    """Find the limit cycle without waves.
+
+    Parameters
+    ----------
+    free : Scene
+        Scene without waves.
+    accuracy : Accuracy
+        Requested accuracy.
+    meter : WorkMeter
+        Counter of right-hand-side evaluations.
+
+    Returns
+    -------
+    tuple or None
+        Point of the cycle at which V = V_0, and the times of the next two events. None if the
+        motion settles to steady sliding.
     """
     nudged = free.with_segment(Segment(free.load_velocity, START_DISPLACEMENT_STEP))
     approach = CycleSearch(nudged, accuracy, meter)
@@ -170,23 +251,38 @@ def _find_free_cycle(
     motion = integrate_events(
         free, accuracy, meter, _event_specifications(free), start=start, with_time=True
     )
-    begin = next(motion).point  # all of it
+    begin = next(motion).point  # The first event holds the fully evaluated point.
     first, second = _event_times(motion, 2)
     return begin, (first, second)
 
 
 def _event_specifications(scene: Scene) -> list[EventSpecification]:
-    """An event comes as the slip rate reaches the instability norm."""
+    """Return the specification of a rise of slip rate through the norm."""
     return [rise("log_slip_rate", scene.log_instability_rate)]
 
 
 def _event_times(motion: Iterator[Event], count: int) -> list[float]:
-    """Times of the first events of a motion that was asked for nothing else."""
+    """Return the times of the first events of a motion.
+
+    The motion must have no event specifications except the rise through the norm.
+    """
     return list(islice((event.time for event in motion if event.specification is not None), count))
 
 
 def _normal_stress_change(scene: Scene) -> Callable[[float], float]:
-    """Change of normal stress over sigma_*, against time since the train begins."""
+    """Return the normal stress of the train as a function of time.
+
+    Parameters
+    ----------
+    scene : Scene
+        Parameters of the slider.
+
+    Returns
+    -------
+    callable
+        Function that returns the change of normal stress in sigma_* at a time since the beginning
+        of the train.
+    """
     loading = scene.parts.loading
     assert isinstance(loading, NormalStressOscillation)
     amplitude, angle, lasts = (
@@ -197,20 +293,45 @@ def _normal_stress_change(scene: Scene) -> Callable[[float], float]:
     turn = 2.0 * math.pi / loading.oscillation_period
 
     def train(time: float) -> float:
+        """Return the change of normal stress at a time."""
         return amplitude * math.sin(turn * time + angle) if 0.0 <= time < lasts else 0.0
 
     return train
 
 
 def _linear_clock_advance(scene: Scene, found: _NextEvent, meter: WorkMeter) -> float:
-    """Clock advance to first order in the amplitude; NaN of scenes with other equations than these.
-    Departures of spring stress f and state Psi from the free motion grow along it by
+    r"""Compute the clock advance to first order in the amplitude of the waves.
 
-        a dx = df - dPsi - (mu_* + f) dsigma,    df/dt = -K V dx,
-        dPsi/dt = -V [(Psi + b x) dx + dPsi + b dx]            (slip law),
-        dPsi/dt = -exp(-Psi/b) dPsi - b V dx                   (slowness law);
+    The perturbations of the spring stress :math:`f` and of the state :math:`\Psi` are integrated
+    along the motion without waves:
 
-    once slip rate grows by itself, the motion is the free one of an earlier time, dx = Dt dx/dt.
+    .. math::
+
+        a\,\delta x &= \delta f - \delta\Psi - (\mu_* + f)\,\delta\sigma, \qquad
+        \dot{\delta f} = -K V\,\delta x, \\
+        \dot{\delta\Psi} &= -V\,[(\Psi + b x)\,\delta x + \delta\Psi + b\,\delta x]
+        \quad \text{(slip law)}, \\
+        \dot{\delta\Psi} &= -e^{-\Psi/b}\,\delta\Psi - b V\,\delta x
+        \quad \text{(slowness law)},
+
+    with :math:`x = \ln(V/V_*)`. During nucleation the perturbed motion becomes the original motion,
+    shifted in time by the clock advance :math:`\Delta t`, so that
+    :math:`\delta x = \Delta t\,\dot x`.
+
+    Parameters
+    ----------
+    scene : Scene
+        Parameters of the slider.
+    found : _NextEvent
+        Event after the beginning of the train.
+    meter : WorkMeter
+        Counter of right-hand-side evaluations.
+
+    Returns
+    -------
+    float
+        Clock advance in D_c/V_*. NaN if the scene has other equations, for example radiation
+        damping, another evolution law, or a dependence of the state on normal stress.
     """
     damps = scene.parts.dynamics.radiated_stress_slope(0.0)
     if scene.law not in LINEARISED_LAWS or scene.normal_stress != "imposed" or scene.alpha or damps:
@@ -223,6 +344,22 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, meter: WorkMeter) -> 
     )
 
     def along(t: float, y: np.ndarray, pressed: float) -> tuple[float, float, list[float]]:
+        """Evaluate the equations of the motion and of the perturbations.
+
+        Parameters
+        ----------
+        t : float
+            Time. Not used.
+        y : ndarray
+            Spring stress, state, and their perturbations.
+        pressed : float
+            Change of normal stress relative to the amplitude.
+
+        Returns
+        -------
+        tuple
+            Time derivative of ln V, perturbation of ln V, and time derivatives of ``y``.
+        """
         f, psi, df, dpsi = y
         x, dx = (f - psi) / a, (df - dpsi - (mu_star + f) * pressed) / a
         v = math.exp(x)
@@ -237,16 +374,18 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, meter: WorkMeter) -> 
         return (rates[0] - rates[1]) / a, dx, rates
 
     def rate(t: float, y: np.ndarray) -> list[float]:
+        """Evaluate the right-hand side of the linear equations."""
         return along(t, y, train(t) / amplitude)[-1]
 
     def fast(t: float, y: np.ndarray) -> float:
+        """Return zero when the remaining time to the event is negligible."""
         return float((y[0] - y[1]) / a - NEGLIGIBLE_TIME_LOG_RATE)
 
-    setattr(fast, "terminal", True)  # noqa: B010  # as SciPy asks for it
+    setattr(fast, "terminal", True)  # noqa: B010  # attribute required by SciPy
     latest = 2.0 * found.remaining_time
     over = min((scene.oscillation_cycles or math.inf) * scene.oscillation_period, latest)
     y: Any = [found.cycle_start.spring_stress, found.cycle_start.psis[0], 0.0, 0.0]
-    # no step is longer than part of a wave
+    # The step size is limited so that the integrator does not skip a wave.
     for begin, end, longest in (
         (0.0, over, scene.oscillation_period / 8.0),
         (over, latest, latest),
@@ -262,8 +401,25 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, meter: WorkMeter) -> 
 
 
 def _coulomb_clock_advance(scene: Scene, found: _NextEvent) -> float:
-    """Clock advance where the spring is loaded at K V_0, and an event comes as soon as friction is
-    what it is at the onset of a free one: K V_0 (t - t_1) = mu dsigma/sigma_*.
+    r"""Compute the clock advance for a threshold of Coulomb stress.
+
+    The load point stresses the spring at the rate :math:`K V_0`. The event occurs when friction
+    first reaches the value :math:`\mu` at the onset of an event without waves, at :math:`t_1`. The
+    clock advance :math:`t_1 - t` follows from
+
+    .. math:: K V_0\,(t - t_1) = \mu\,\Delta\sigma(t)/\sigma_*.
+
+    Parameters
+    ----------
+    scene : Scene
+        Parameters of the slider.
+    found : _NextEvent
+        Event after the beginning of the train.
+
+    Returns
+    -------
+    float
+        Clock advance in D_c/V_*.
     """
     loading = scene.stiffness * scene.load_velocity
     latest = found.remaining_time + found.train_start * scene.oscillation_amplitude / loading
@@ -271,6 +427,7 @@ def _coulomb_clock_advance(scene: Scene, found: _NextEvent) -> float:
     train = _normal_stress_change(scene)
 
     def missing(time: float) -> float:
+        """Return the difference between the threshold and Coulomb stress."""
         return found.train_start * train(time) - loading * (time - found.remaining_time)
 
     times = np.linspace(0.0, 1.01 * latest, COULOMB_STRESS_SAMPLES).tolist()

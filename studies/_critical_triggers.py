@@ -1,4 +1,8 @@
-"""Critical steps of normal stress, displacement and velocity, as changes of stress."""
+"""Critical steps of normal stress, displacement and velocity.
+
+The measure ``Triggers`` computes the three critical steps of a scene and converts them to stress
+changes, so that the triggers can be compared.
+"""
 
 import math
 from collections.abc import Mapping
@@ -11,7 +15,8 @@ from rsfstudy.measures import CriticalStep, Measure, Outcome, Output, Status
 from rsfstudy.motion import WorkMeter
 from rsfstudy.slider import effective_friction
 
-#: The triggers; the fall of normal stress comes first, which constant normal stress refuses.
+#: Triggers. The decrease of normal stress comes first, because a scene with constant normal stress
+#: rejects this step.
 _NORMAL_STRESS_FALL = CriticalStep(of="normal_stress_step", direction="down")
 _DISPLACEMENT_STEP, _VELOCITY_STEP = (
     CriticalStep(of="displacement_step"),
@@ -21,7 +26,7 @@ TRIGGERS = (_NORMAL_STRESS_FALL, _DISPLACEMENT_STEP, _VELOCITY_STEP)
 
 
 def _trigger_outputs(trigger: CriticalStep) -> tuple[Output, ...]:
-    """Outputs of one critical step."""
+    """Return the outputs of a critical step."""
     of = trigger.primary_output
     ended = f"status with which the search for a critical {trigger.of} ended, as its flag value"
     return (
@@ -33,7 +38,7 @@ def _trigger_outputs(trigger: CriticalStep) -> tuple[Output, ...]:
 
 
 _SYMBOL = r"$\Delta\mathrm{CFS}/\sigma_*$"
-#: Changes of stress, and ratios of them.
+#: Stress changes and their ratios.
 _STRESS_OUTPUTS = (
     Output(
         "coulomb_stress_of_displacement",
@@ -88,13 +93,18 @@ _OUTPUTS = (
 
 @dataclass(frozen=True)
 class Triggers(Measure):
-    """Critical fall of normal stress, critical displacement step and critical velocity step, with
-    the changes of Coulomb stress that the first two are.
+    """Critical decrease of normal stress, displacement step and velocity step.
 
-    After the first two the load point is held, unless the scene states its `load_velocity_ratio`,
-    which the third looks for. Each is sought within a work budget of its own, as if it were asked
-    for alone, and has its own status. One without a critical step leaves its number out, and says
-    why in the message; the slider answers while the first two have theirs and none has failed.
+    The results include the critical steps and the corresponding stress changes. A decrease of
+    normal stress and a displacement step are converted to a change of Coulomb stress. A velocity
+    step is converted to its direct effect.
+
+    The load point is held after a decrease of normal stress or a displacement step unless the scene
+    specifies ``load_velocity_ratio``. The search for each critical step has a separate work budget
+    and a separate status. If a critical step does not exist, the message explains the reason. If a
+    search fails, the outcome has the status of the first failed search. If no search fails, the
+    outcome is successful if a critical decrease of normal stress and a critical displacement step
+    exist. The critical velocity step is optional.
     """
 
     name: ClassVar[str] = "triggers"
@@ -105,11 +115,26 @@ class Triggers(Measure):
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """As for a critical step."""
+        """Relative work by number of digits, as for ``CriticalStep``."""
         return _NORMAL_STRESS_FALL.work_by_digits
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """One critical step after the other."""
+        """Compute the critical steps and the corresponding stress changes.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Outcome with the status ``not_applicable`` if the scene has no effective friction.
+        """
         why = _reason_without_effective_friction(scene)
         coupling = scene.parts.normal_stress.coupling
         if why or coupling is None:
@@ -136,7 +161,18 @@ class Triggers(Measure):
 
 
 def _reason_without_effective_friction(scene: Scene) -> str:
-    """Part of a scene that has no one effective friction mu', in words; empty where it is known."""
+    """Return the part of the scene for which no effective friction is defined.
+
+    Parameters
+    ----------
+    scene : Scene
+        Parameters of the slider.
+
+    Returns
+    -------
+    str
+        Description of the part. Empty if the effective friction is defined.
+    """
     law, stress, fluid = scene.parts.law, scene.parts.normal_stress, scene.parts.fluid
     if stress.coupling is None or stress.normal_stress is None:
         return f"{stress.name} normal stress"
@@ -148,8 +184,26 @@ def _reason_without_effective_friction(scene: Scene) -> str:
 def _find_critical_step(
     trigger: CriticalStep, scene: Scene, accuracy: Accuracy, meter: WorkMeter
 ) -> Outcome:
-    """A critical step, or the status of what ended the search. Where steady sliding at V_* is
-    unstable, any step of velocity triggers.
+    """Find a critical step.
+
+    If steady sliding at V_* is unstable, every velocity step triggers an instability, and the
+    search is skipped.
+
+    Parameters
+    ----------
+    trigger : CriticalStep
+        Critical step to search for.
+    scene : Scene
+        Parameters of the slider.
+    accuracy : Accuracy
+        Requested accuracy.
+    meter : WorkMeter
+        Counter of right-hand-side evaluations.
+
+    Returns
+    -------
+    Outcome
+        Outcome of the search.
     """
     if trigger is _VELOCITY_STEP and not is_linearly_stable(_without_steps(scene)):
         text = "steady sliding at V_* is unstable already"
@@ -158,14 +212,35 @@ def _find_critical_step(
 
 
 def _without_steps(scene: Scene) -> Scene:
-    """The slider whose load point goes on at V_*."""
+    """Return the scene without steps and with a load point velocity of V_*."""
     return scene.with_(load_velocity_ratio=1.0, displacement_step=0.0, normal_stress_step=0.0)
 
 
 def _trigger_stresses(
     scene: Scene, cot_phi: float, alpha: float, values: Mapping[str, float]
 ) -> dict[str, float]:
-    """Triggers as changes of stress, and their ratios, with errors."""
+    r"""Convert the critical steps to stress changes.
+
+    The change of Coulomb stress is :math:`\Delta\tau - \mu'\,\Delta\sigma` with the effective
+    friction :math:`\mu' = \mu_* - \alpha\,(1 - a/b)`. The direct effect of a velocity step is
+    :math:`a\,\ln(V_0/V_*)`.
+
+    Parameters
+    ----------
+    scene : Scene
+        Parameters of the slider.
+    cot_phi : float
+        Derivative of normal stress with respect to shear stress.
+    alpha : float
+        Effect of normal stress on the state.
+    values : mapping
+        Critical steps and their errors.
+
+    Returns
+    -------
+    dict
+        Stress changes in sigma_*, their ratios, and the errors of both.
+    """
     friction = effective_friction(scene.mu_star, scene.parts.law.b_over_a, alpha)
     pulled = _scale_with_error(
         scene.stiffness * (1.0 - friction * cot_phi), _DISPLACEMENT_STEP.primary_output, values
@@ -189,7 +264,7 @@ def _trigger_stresses(
 
 
 def _scale_with_error(factor: float, name: str, values: Mapping[str, float]) -> tuple[float, float]:
-    """A number times a factor, and its error."""
+    """Return a result multiplied by a factor, and its error."""
     value, error = values.get(name, math.nan), values.get(f"{name}_error", math.nan)
     return factor * value, abs(factor) * error
 
@@ -197,7 +272,10 @@ def _scale_with_error(factor: float, name: str, values: Mapping[str, float]) -> 
 def _quotient_with_error(
     above: tuple[float, float], below: tuple[float, float]
 ) -> tuple[float, float]:
-    """A quotient and its error, which those of both add up to."""
+    r"""Return the quotient of two results and its error.
+
+    The error is absolute: :math:`(\Delta x + |x/y|\,\Delta y)/|y|` for a quotient :math:`x/y`.
+    """
     (value, error), (divisor, its_error) = above, below
     if not divisor:
         return math.nan, math.nan

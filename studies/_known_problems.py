@@ -1,5 +1,7 @@
-"""A problem whose answer is known: a scene, a measure, a number and where that comes from; and
-measures that solve such problems.
+"""Problems with known answers, and measures that solve them.
+
+A problem consists of a scene, a measure, and the known value of one of its outputs. The studies
+that test the accuracy of the package register their problems in this module.
 """
 
 import json
@@ -11,7 +13,7 @@ from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Output, Status
 
-#: What is told of a problem that has been solved.
+#: Outputs of measures that solve a problem.
 ERROR_OUTPUTS = (
     Output("measured_error", "", "1", "error against an independent reference", error=True),
     Output("error_estimate", "", "1", "the run's own estimate of its error"),
@@ -20,25 +22,27 @@ ERROR_OUTPUTS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """A scene with a known answer.
+    """Scene with a known answer.
 
     Parameters
     ----------
     scene : Scene
+        Scene of the problem.
     measure : Measure
-        What is asked of it.
-    quantity : str
-        The number of the measure that is known; by default its headline.
+        Measure that is computed for the scene.
+    quantity : str, optional
+        Output of the measure that is known. By default, the primary output.
     answer : float, optional
-        Its value; None where the answer is a status.
-    status : Status
-        How the measure must end.
-    scale : float
-        What errors are relative to; by default the answer.
-    uncertainty : float
-        Error of the answer itself, over `scale`.
+        Known value. None if the answer is a status.
+    status : Status, optional
+        Expected status of the outcome.
+    scale : float, default: 0.0
+        Errors are relative to this scale. By default, the scale is the absolute value of the
+        answer.
+    uncertainty : float, default: 0.0
+        Error of the known value, relative to the scale.
     source : str
-        Where the answer comes from.
+        Source of the known value.
     """
 
     scene: Scene
@@ -51,27 +55,58 @@ class Problem:
     source: str
 
     def __post_init__(self) -> None:
+        """Set the default of ``quantity``."""
         object.__setattr__(self, "quantity", self.quantity or self.measure.primary_output)
 
     def relative_error(self, outcome: Outcome) -> float:
-        """Error of an outcome, over the scale."""
+        """Return the error of an outcome relative to the scale.
+
+        Parameters
+        ----------
+        outcome : Outcome
+            Outcome of the measure.
+
+        Returns
+        -------
+        float
+            Absolute value of the relative error.
+        """
         assert self.answer is not None
         return abs(self._output_value(outcome) - self.answer) / self._error_scale
 
     def relative_error_estimate(self, outcome: Outcome) -> float:
-        """The outcome's own estimate of its error, over the scale."""
+        """Return the error estimate of an outcome relative to the scale.
+
+        Parameters
+        ----------
+        outcome : Outcome
+            Outcome of the measure.
+
+        Returns
+        -------
+        float
+            Relative error estimate.
+        """
         return float(outcome.values[f"{self.quantity}_error"]) / self._error_scale
 
     def _output_value(self, outcome: Outcome) -> float:
+        """Return the value of the known output."""
         return float(outcome.values[self.quantity])
 
     @property
     def _error_scale(self) -> float:
+        """Scale of the errors."""
         assert self.answer is not None
         return self.scale or abs(self.answer)
 
     def describe(self) -> dict[str, Any]:
-        """The problem as plain data."""
+        """Return the problem as plain data.
+
+        Returns
+        -------
+        dict
+            Description that can be written as JSON.
+        """
         return {
             "scene": self.scene.describe(),
             "measure": self.measure.describe(),
@@ -86,37 +121,80 @@ class Problem:
 
 Fields = dict[str, str | float | bool]
 
-#: All problems that the studies pose.
+#: All problems of the studies.
 REGISTERED_PROBLEMS: list[Problem] = []
 
 
 def register_problem(fields: Fields, measure: Measure, **known: Any) -> tuple[Fields, Problem]:
-    """Fields of a scene, and the problem that it poses."""
+    """Register a problem.
+
+    Parameters
+    ----------
+    fields : dict
+        Fields of the scene.
+    measure : Measure
+        Measure that is computed for the scene.
+    **known : object
+        Other arguments of ``Problem``.
+
+    Returns
+    -------
+    fields : dict
+        Fields of the scene.
+    problem : Problem
+        Problem that was registered.
+    """
     REGISTERED_PROBLEMS.append(Problem(scene=Scene(**fields), measure=measure, **known))
     return fields, REGISTERED_PROBLEMS[-1]
 
 
 @dataclass(frozen=True)
 class ProblemMeasure(Measure):
-    """Base of measures that solve the problem which a scene poses.
+    """Base class of measures that solve the problem of a scene.
 
     Parameters
     ----------
-    problems : tuple of Problem
-        One for each scene of the lattice.
+    problems : tuple of Problem, optional
+        Problems, one for each scene of the lattice.
     """
 
     problems: tuple[Problem, ...] = ()
 
     def describe(self) -> dict[str, Any]:
-        """The measure as plain data."""
+        """Return the measure as plain data.
+
+        Returns
+        -------
+        dict
+            Description that can be written as JSON.
+        """
         problems = [problem.describe() for problem in self.problems]
         return {"name": self.name, "problems": problems, **self.plain_fields}
 
     @classmethod
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """The problems, taken out of a description: those that are posed, described so."""
-        from rsfstudy.storage import schema  # which workers do not load
+        """Return the problems that a description contains.
+
+        The entry ``problems`` is removed from the description.
+
+        Parameters
+        ----------
+        described : dict
+            Description of the measure.
+        path : str
+            Location of the description, for error messages.
+
+        Returns
+        -------
+        dict
+            Field ``problems``. Empty if the description contains no problems.
+
+        Raises
+        ------
+        DataError
+            If a problem is not registered.
+        """
+        from rsfstudy.storage import schema  # Worker processes do not need this module.
 
         if "problems" not in described:
             return {}
@@ -130,12 +208,23 @@ class ProblemMeasure(Measure):
         return {"problems": tuple(REGISTERED_PROBLEMS[known.index(each)] for each in listed)}
 
     def problem_of_scene(self, scene: Scene) -> Problem:
-        """The problem of this scene.
+        """Return the problem of a scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+
+        Returns
+        -------
+        Problem
+            Problem with this scene.
 
         Raises
         ------
         InvalidValue
-            Where none has it: an axis or a fixed value was changed.
+            If there is no problem with this scene, for example because an axis or a fixed value was
+            changed.
         """
         for problem in self.problems:
             if problem.scene == scene:

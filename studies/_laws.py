@@ -1,4 +1,4 @@
-"""Laws that the studies of state evolution compare, and their sources."""
+"""Evolution laws that the studies compare, with references and styles."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ from rsfstudy import Panel
 if TYPE_CHECKING:
     import xarray as xr
 
-#: The family from slip (eps = 0) to slowness (eps = 1), and laws beside it.
+#: Names of the laws. A family of laws with the exponent eps connects the slip law (eps = 0) with
+#: the slowness law (eps = 1). The other laws do not belong to this family.
 SLIP_END, FAMILY_MIDDLE, SLOWNESS_END = "eps = 0 (slip)", "eps = 0.5", "eps = 1 (slowness)"
 PERRIN_RICE_ZHENG, COMPOSITE, CUT_OFF = "Perrin-Rice-Zheng", "composite", "cut-off"
 NAGATA = "slowness, c = 1"
-#: V_c/V_* of the composite law and of the cut-off.
+#: Cut-off velocity V_c/V_* of the composite law and of the law with a cut-off.
 COMPOSITE_CUTOFF_VELOCITY, CUT_OFF_VELOCITY = 100.0, 1e4
 
 
 def _family_fields(exponent: float) -> dict[str, str | float]:
+    """Return the scene fields of a member of the family of laws."""
     return {"law": "family", "law_exponent": exponent}
 
 
@@ -34,7 +36,7 @@ LAWS: dict[str, dict[str, str | float]] = {
     NAGATA: {"law": "slowness", "stress_dependence": 1.0},
 }
 
-#: Those that are told apart by name: all but the quarters of the family.
+#: Laws that have a name. The laws with eps = 0.25 and eps = 0.75 are not included.
 LABELLED_LAWS = (
     SLIP_END,
     FAMILY_MIDDLE,
@@ -45,7 +47,7 @@ LABELLED_LAWS = (
     NAGATA,
 )
 
-#: w exp(w) = exp(-V_*/V_c): the steady state of the composite law at V_*.
+#: Steady state w of the composite law at V_*, from w exp(w) = exp(-V_*/V_c).
 COMPOSITE_STEADY_STATE = 0.56353169695
 
 REFERENCES = [
@@ -56,10 +58,10 @@ REFERENCES = [
 ]
 
 
-# ---- how figures draw them ----------------------------------------------------------------------
+# ---- styles of figures --------------------------------------------------------------------------
 
-#: Colour and line, by their places in the cycle of the style, of laws beside the family; no colour
-#: is one of the family's, and no two lines look alike in grey.
+#: Indices of the colour and of the line style of laws outside the family. The family uses other
+#: colours, and the line styles can be distinguished in greyscale.
 _STYLES_OUTSIDE_FAMILY = {
     PERRIN_RICE_ZHENG: (1, 1),
     COMPOSITE: (3, 3),
@@ -69,14 +71,39 @@ _STYLES_OUTSIDE_FAMILY = {
 
 
 def family_colour(exponent: float) -> Any:
-    """Colour of a member of the family of laws, from dark to light."""
+    """Return the colour of a member of the family of laws.
+
+    Parameters
+    ----------
+    exponent : float
+        Exponent eps of the law. Colours range from dark (0) to light (1).
+
+    Returns
+    -------
+    object
+        Colour in a format that matplotlib accepts.
+    """
     from matplotlib import colormaps
 
     return colormaps["viridis"](0.85 * exponent)
 
 
 def law_style(row: xr.Dataset) -> dict[str, Any]:
-    """The family solid, from dark to light and with markers; others in other colours and dashed."""
+    """Return the line style of a law.
+
+    Members of the family are drawn as solid lines with markers, from dark to light. Other laws are
+    drawn as dashed lines in other colours, without markers.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results of one law.
+
+    Returns
+    -------
+    dict
+        Keyword arguments for ``matplotlib.axes.Axes.plot``.
+    """
     from rsfstudy.plots import cycle_marker, cycle_style
 
     name, exponent = str(row["evolution"].item()), float(row.get("law_exponent", math.nan))
@@ -95,6 +122,23 @@ def law_style(row: xr.Dataset) -> dict[str, Any]:
 
 
 def panel_by_normal_stress(x: str, y: str, log: str, **more: Any) -> Panel:
-    """A panel for each normal stress condition, with a curve a law."""
+    """Return one panel per normal stress condition, with one curve per law.
+
+    Parameters
+    ----------
+    x : str
+        Variable or coordinate on the horizontal axis.
+    y : str
+        Variable on the vertical axis.
+    log : str
+        Axes with a logarithmic scale: "x", "y", "xy" or "".
+    **more : object
+        Other arguments of ``Panel``.
+
+    Returns
+    -------
+    Panel
+        Panel for a figure.
+    """
     laws: dict[str, Any] = {"hue": ["evolution"], "facet": ["normal_stress"], "style": law_style}
     return Panel(x=x, y=y, log=log, y_scale_group=y, **laws, **more)

@@ -19,14 +19,18 @@ if TYPE_CHECKING:
 
 
 class ExactResponse(NamedTuple):
-    """The exact response to a velocity step.
+    """Exact response to a velocity step.
 
-    Attributes
+    Parameters
     ----------
-    step, ends : float
-        Times in s of the step and of the end of the record.
-    before, after : float
-        Load point velocities in um/s before and after the step.
+    step : float
+        Time of the step in s.
+    ends : float
+        End of the record in s.
+    before : float
+        Load point velocity in um/s before the step.
+    after : float
+        Load point velocity in um/s after the step.
     friction : callable
         Function that returns friction at given times in s.
     noise_size : float
@@ -41,43 +45,56 @@ class ExactResponse(NamedTuple):
     noise_size: float
 
     def displacement(self, time: np.ndarray) -> np.ndarray:
-        """Return the load point displacement relative to the step, in um."""
+        """Return the load point displacement relative to the step.
+
+        Parameters
+        ----------
+        time : ndarray
+            Times in s.
+
+        Returns
+        -------
+        ndarray
+            Displacements in um. Negative before the step.
+        """
         late = time - self.step
         return np.where(late < 0.0, self.before, self.after) * late
 
 
 @dataclass(frozen=True)
 class NoiseKind:
-    """A kind of imperfection of a laboratory record.
+    """Imperfections of a laboratory record.
 
-    Attributes
+    Parameters
     ----------
-    rate : tuple of float
+    rate : tuple[float, float], default: (2.0, 20.0)
         Sampling rates in Hz before and after the step.
-    jitter : float
+    jitter : float, default: 0.0
         Standard deviation of the sample times, as a fraction of the sampling interval.
-    correlation : float
+    correlation : float, default: 0.0
         Correlation between the noise of successive rows.
-    correlation_time : float
+    correlation_time : float, default: 0.0
         Correlation time of the noise in s, as an alternative to ``correlation``.
-    louder : float
+    louder : float, default: 1.0
         Ratio of the noise after the step to the noise before the step.
-    spikes : float
+    spikes : float, default: 0.0
         Fraction of rows that are outliers.
-    quantum : float
+    quantum : float, default: 0.0
         Quantum to which friction is rounded, relative to the standard deviation of the noise.
-    mean_of : int
+    mean_of : int, default: 1
         Number of rows in a running mean of friction.
-    displacement_noise, displacement_quantum : float
-        Noise and quantum of the recorded load point displacement, in um.
-    pink : bool
+    displacement_noise : float, default: 0.0
+        Standard deviation of the noise of the recorded load point displacement, in um.
+    displacement_quantum : float, default: 0.0
+        Quantum to which the recorded load point displacement is rounded, in um.
+    pink : bool, default: False
         If True, the power spectrum of the noise is proportional to 1/f.
-    trend : float
+    trend : float, default: 0.0
         Trend of friction in 1/um.
-    noise_factor : float
+    noise_factor : float, default: 1.0
         Factor by which the standard deviation of the noise is multiplied.
-    states_filter : bool
-        If True, the fit is given the length of the running mean.
+    states_filter : bool, default: False
+        If True, the length of the running mean is passed to the fit.
     """
 
     rate: tuple[float, float] = (2.0, 20.0)
@@ -97,7 +114,7 @@ class NoiseKind:
 
     @property
     def filter(self) -> str:
-        """The filter that is passed to the fit, or an empty string."""
+        """Filter that is passed to the fit, or an empty string."""
         return f"mean {self.mean_of / self.rate[1]!r}" if self.states_filter else ""
 
     @property
@@ -109,8 +126,21 @@ class NoiseKind:
         return self.displacement_noise > 0.0 or self.displacement_quantum > 0.0
 
     def draw(self, truth: ExactResponse, rng: np.random.Generator) -> Record:
-        """Draw a random record."""
-        from rsfstudy.fitting import Record  # imports xarray, which is slow
+        """Draw a random record.
+
+        Parameters
+        ----------
+        truth : ExactResponse
+            Exact response to the velocity step.
+        rng : numpy.random.Generator
+            Random number generator.
+
+        Returns
+        -------
+        Record
+            Record of time, load point displacement and friction.
+        """
+        from rsfstudy.fitting import Record  # The import is slow.
 
         margin = self.mean_of // 2
         time = self._times(truth, rng, margin)
@@ -137,6 +167,10 @@ class NoiseKind:
         return record.with_steps([(truth.step, truth.step, truth.before, truth.after)])
 
     def _times(self, truth: ExactResponse, rng: np.random.Generator, margin: int) -> np.ndarray:
+        """Return the sample times.
+
+        The record is longer by ``margin`` rows at both ends, because the running mean shortens it.
+        """
         slow, fast = (1.0 / rate for rate in self.rate)
         first = np.arange(-margin * slow + 0.5 * slow, truth.step, slow)
         second = np.arange(truth.step + 0.3 * fast, truth.ends + margin * fast, fast)
@@ -146,6 +180,7 @@ class NoiseKind:
         return np.asarray(np.sort(time + shift))
 
     def _unit_noise(self, time: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Draw noise with a standard deviation of 1."""
         drawn = rng.standard_normal(len(time))
         if self.pink:
             power = 1.0 / np.fft.rfftfreq(8 * len(time))[1:]

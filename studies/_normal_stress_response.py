@@ -1,4 +1,8 @@
-"""Response to oscillating normal stress: how much spring stress oscillates with it, and when."""
+"""Amplitude and phase of spring stress under oscillating normal stress.
+
+The measure ``NormalStressResponse`` follows a motion until transients have decayed, and then
+computes the Fourier coefficient of spring stress at the forcing period.
+"""
 
 from __future__ import annotations
 
@@ -20,16 +24,17 @@ from rsfstudy.slider import Point, growth_rates, steady_sliding
 from rsfstudy.slider.loading.oscillation import NormalStressOscillation
 from rsfstudy.slider.stability import response_to_normal_stress
 
-#: Part of the accuracy asked for that is left of the transient where the record begins, by the
-#: slowest decay of small changes.
+#: Remaining transient at the beginning of the record, relative to the requested accuracy. The
+#: remaining transient is computed from the slowest decay rate of small perturbations.
 _REMAINING_TRANSIENT = 0.1
-#: Most periods of forcing after which a response that repeats itself is told as one; how many it is
-#: looked at for, at the end of the transient, and at how many instants in each.
+#: Largest response period in forcing periods, number of forcing periods that are compared to find
+#: the response period, and number of samples per forcing period for this comparison.
 _MAX_RESPONSE_PERIODS, _COMPARED_PERIODS, _INSTANTS_PER_PERIOD = 4, 8, 4
-#: How often it is looked at before it is said to repeat nothing, and how many times as many
-#: instants as are kept are looked at to resolve it.
+#: Maximum number of comparisons before the response is reported as not periodic, and maximum factor
+#: by which the number of samples is increased to resolve the response.
 _MAX_REPETITION_CHECKS, _MAX_SAMPLE_REFINEMENT = 6, 8
-#: Part by which two records may differ where the response has settled.
+#: Largest difference between two records of a settled response, relative to the range of spring
+#: stress.
 _REPETITION_RTOL = 1e-3
 
 _OUTPUTS = (
@@ -85,8 +90,16 @@ _OUTPUTS = (
 
 
 class _ResponsePeriod(NamedTuple):
-    """A response: how long a period of it lasts, how many of forcing that is, and over how many of
-    its own small changes fall to 1/e.
+    """Period of a response.
+
+    Attributes
+    ----------
+    duration : float
+        Period in D_c/V_*.
+    forcing_periods : int
+        Period in forcing periods.
+    decay_time : float, default: 0.0
+        Time in which small perturbations decay by a factor of e, in response periods.
     """
 
     duration: float
@@ -95,9 +108,21 @@ class _ResponsePeriod(NamedTuple):
 
 
 class _ResponseRecord(NamedTuple):
-    """One period of a response, of so many periods of forcing: events spread evenly over it, the
-    last a period after the first; and spring stress and imposed normal stress at all but that,
-    without the trend by which spring stress does not come back, which would be taken for overtones.
+    """Record of one response period.
+
+    Attributes
+    ----------
+    events : sequence of Event
+        Samples at regular intervals. The last sample is one response period after the first.
+    spring_stress : ndarray
+        Spring stress at all samples except the last. The linear trend over the period is removed,
+        because it would contribute to the overtones.
+    imposed : ndarray
+        Imposed normal stress at all samples except the last.
+    trend : float
+        Change of spring stress over the response period.
+    periods : int
+        Number of forcing periods.
     """
 
     events: Sequence[Event]
@@ -108,27 +133,34 @@ class _ResponseRecord(NamedTuple):
 
     @property
     def harmonics(self) -> np.ndarray:
-        """Fourier's coefficients of spring stress."""
+        """Fourier coefficients of spring stress."""
         return np.fft.rfft(self.spring_stress)
 
     @property
     def drift(self) -> float:
-        """Response that the trend would have made, over the response."""
+        """Amplitude of the removed trend relative to the response."""
         amplitude = 2.0 * abs(self.harmonics[self.periods]) / len(self.spring_stress)
         return float(abs(self.trend) / (math.pi * self.periods * amplitude))
 
     @property
     def overtones(self) -> np.ndarray:
-        """Spring stress at other periods than that of forcing, over that at it."""
+        """Fourier coefficients at all periods except the forcing period.
+
+        The coefficients are relative to the coefficient at the forcing period. The mean is not
+        included.
+        """
         harmonics = self.harmonics
         return np.asarray(np.delete(harmonics, [0, self.periods]) / harmonics[self.periods])
 
     @property
     def aliasing(self) -> float:
-        """Change of all overtones together by those that the samples do not resolve.
+        """Estimated change of the norm of all overtones due to aliasing.
 
-        They are taken to be as strong as the upper quarter of those that are resolved, B. They add
-        up in squares, and are folded back upon that quarter: (B**2 + 2 B B)/(2 D) of a sum D.
+        Let :math:`D` be the norm of the resolved overtones and :math:`B` the norm of their upper
+        quarter. The unresolved overtones are assumed to have the norm :math:`B` as well. The
+        unresolved overtones are missing in the sum of squares, which changes the norm by up to
+        :math:`B^2/(2D)`. Aliasing also folds the unresolved overtones onto the upper quarter, which
+        changes the norm by up to :math:`3B^2/(2D)`. The sum of both changes is :math:`2B^2/D`.
         """
         overtones = np.abs(self.overtones)
         resolved = float(np.linalg.norm(overtones))
@@ -137,25 +169,42 @@ class _ResponseRecord(NamedTuple):
 
     @property
     def response(self) -> complex:
-        """Spring stress over imposed normal stress, at the period of forcing."""
+        """Ratio of spring stress to normal stress at the forcing period."""
         return self._subsampled(1)
 
     def _subsampled(self, stride: int) -> complex:
+        """Compute the response from every ``stride``-th sample."""
         pair = self.spring_stress, self.imposed
         ours, imposed = (np.fft.rfft(x[::stride])[self.periods] for x in pair)
         return complex(ours / imposed)
 
     def equals_in_median(self, other: _ResponseRecord) -> bool:
-        """True if spring stress is the same in the median: jumps may come an instant earlier."""
+        """Return True if two records of spring stress agree in the median.
+
+        The median is used because a jump of spring stress may be shifted by one sample.
+
+        Parameters
+        ----------
+        other : _ResponseRecord
+            Another record of the same length.
+
+        Returns
+        -------
+        bool
+            True if the median difference is less than 0.1 % of the range of spring stress.
+        """
         apart = np.abs(self.spring_stress - other.spring_stress)
         return bool(np.median(apart) < _REPETITION_RTOL * np.ptp(self.spring_stress))
 
     @property
     def resolution_error(self) -> float:
-        """Relative error of the response by what the instants do not resolve.
+        """Relative error of the response due to the finite number of samples.
 
-        Twice as many take away half of it where spring stress jumps, and all but its square where
-        it is smooth: from a quarter, half and all of them. Two to a period resolve nothing.
+        The estimate compares the responses from all samples, from every second sample and from
+        every fourth sample. If spring stress jumps, the error halves when the number of samples is
+        doubled. If spring stress is smooth, the error decreases much faster. If the number of
+        samples per forcing period is less than 16 or not a multiple of four, the estimate is the
+        difference between all samples and every second sample.
         """
         change = abs(self._subsampled(2) / self.response - 1.0)
         several, rest = divmod(len(self.spring_stress) // self.periods, 4)
@@ -167,28 +216,31 @@ class _ResponseRecord(NamedTuple):
 
 @dataclass(frozen=True)
 class NormalStressResponse(RecordingMeasure):
-    """Response of spring stress to an oscillation of imposed normal stress, once transients have
-    decayed: Fourier's projection over one period.
+    """Response of spring stress to oscillating normal stress.
 
-    The motion is followed until the slowest decay of small changes has left a tenth of the accuracy
-    asked for, and read then; and once more after a further e-fold of that decay, from which all is
-    told. Strong oscillations may be answered by a response that repeats itself only after 2, 3 or 4
-    periods of forcing, the `response_period`: all is then told of so many. It has `settled` where
-    the two records agree to a thousandth of how far spring stress swings. A response that repeats
-    itself after none of these is `not_periodic`. Where steady sliding is unstable nothing decays,
-    and nothing is read.
+    The motion is followed until the transient has decayed to a tenth of the requested accuracy. The
+    decay time is computed from the slowest decay rate of small perturbations. The response is then
+    recorded twice. The second record begins after the transient has decayed by another factor of e,
+    and provides the results.
+
+    The response to strong oscillations may repeat only after 2, 3 or 4 forcing periods. The result
+    ``response_period`` reports this number, and all other results refer to a complete response
+    period. The result ``settled`` is 1 if the two records agree to 0.1 % of the range of spring
+    stress. If the response does not repeat within 4 forcing periods, the status is
+    ``not_periodic``. If steady sliding is unstable, transients do not decay, and the status is
+    ``not_applicable``.
 
     Parameters
     ----------
-    samples : int
-        Instants in a period of forcing at which the motion is looked at, an even number; up to
-        eight times as many where these do not resolve it to the accuracy. So many of a period of
-        the response, and the first of the next, are kept along `phase`.
+    samples : int, default: 64
+        Number of samples per forcing period, an even number. The measure uses up to eight times
+        this number if necessary for the requested accuracy. The record along ``phase`` contains
+        ``samples + 1`` points of one response period.
 
     References
     ----------
-    Boettcher and Marone (2004), J. Geophys. Res. 109, B03406; Perfettini et al. (2001), J.
-    Geophys. Res. 106, 13455-13472.
+    Boettcher and Marone (2004), J. Geophys. Res. 109, B03406; Perfettini et al. (2001), J. Geophys.
+    Res. 106, 13455-13472.
     """
 
     samples: int = 64
@@ -198,17 +250,34 @@ class NormalStressResponse(RecordingMeasure):
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
+        """Check the number of samples."""
         if self.samples < 8 or self.samples % 2:
             rule = "must be an even number, at least 8"
             raise InvalidValue("samples", self.samples, rule)
 
     @property
     def point_count(self) -> int:
+        """Number of points of the record along ``phase``."""
         return self.samples + 1
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """Of spring stress itself and a, over the amplitude of normal stress. The overtones are
-        resolved by `samples`.
+        """Return the scales of the numerical errors.
+
+        The scale of the gain is the gain plus the ratio of the direct effect ``a`` to the amplitude
+        of normal stress. The result ``distortion`` is not included, because its accuracy depends on
+        the option ``samples``.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        values : mapping
+            Results by name.
+
+        Returns
+        -------
+        mapping
+            Scales by result.
         """
         stressed = scene.a / scene.oscillation_amplitude
         size = values["gain"] + stressed
@@ -219,7 +288,29 @@ class NormalStressResponse(RecordingMeasure):
         }
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Read the response, and once more with smaller tolerances for the errors."""
+        """Compute the response, and estimate its errors from a second motion.
+
+        The second motion has smaller tolerances.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Outcome of the measure.
+
+        Raises
+        ------
+        InvalidValue
+            If the oscillation begins later or ends.
+        """
         loading = scene.parts.loading
         if not isinstance(loading, NormalStressOscillation):
             return Outcome(Status.NO_STEP, message="normal stress does not oscillate")
@@ -238,7 +329,8 @@ class NormalStressResponse(RecordingMeasure):
         linear = response_to_normal_stress(scene, scene.log_load_velocity, 2.0 * math.pi / period)
         by_theory = {"linear_gain": abs(linear), "linear_phase_lead": _phase_in_degrees(linear)}
         fold = 1.0 / decay / period
-        # looked at once the transient would not be taken for a response, and until it is over
+        # The transient must be too weak to be mistaken for the response when the comparison of
+        # periods begins, and must have decayed when the comparison ends.
         faint, over = (
             -math.log(_REMAINING_TRANSIENT * part) * fold
             for part in (_REPETITION_RTOL, accuracy.rtol)
@@ -266,8 +358,29 @@ class NormalStressResponse(RecordingMeasure):
     def _find_repetition(
         self, scene: Scene, waits: int, accuracy: Accuracy, meter: WorkMeter
     ) -> tuple[Point, int]:
-        """Point of a motion after so many periods of forcing, and those during which it is looked
-        at; and after how many it repeats itself, or 0. It may take longer than small changes do.
+        """Find the number of forcing periods after which the response repeats.
+
+        The motion is first integrated over a number of forcing periods, the argument ``waits``. The
+        comparison is repeated several times, because strong oscillations may settle more slowly
+        than small perturbations.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        waits : int
+            Number of forcing periods before the comparison.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        point : Point
+            End of the motion.
+        count : int
+            Number of forcing periods. Zero if the response does not repeat.
         """
         period = scene.oscillation_period
         *_earlier, begin = integrate_events(scene, accuracy, meter, until=waits * period)
@@ -277,7 +390,8 @@ class NormalStressResponse(RecordingMeasure):
                 scene, point, way, _COMPARED_PERIODS * _INSTANTS_PER_PERIOD, accuracy, meter
             )
             point = seen.events[-1].point
-            # with its trend: of a response of three periods that is a part of it
+            # The trend is not removed, because it is part of a response that repeats after three
+            # periods.
             springs = [event.point.spring_stress for event in seen.events[:-1]]
             spring_stress = np.reshape(springs, (_COMPARED_PERIODS, _INSTANTS_PER_PERIOD))
             for count in range(1, _MAX_RESPONSE_PERIODS + 1):
@@ -292,7 +406,27 @@ class NormalStressResponse(RecordingMeasure):
     def _resolve(
         self, scene: Scene, start: Point, way: _ResponsePeriod, accuracy: Accuracy, meter: WorkMeter
     ) -> tuple[_ResponseRecord, _ResponseRecord]:
-        """Two records at enough instants for the accuracy, or at the most there may be."""
+        """Record the response with enough samples for the requested accuracy.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        start : Point
+            Point at which the first record begins.
+        way : _ResponsePeriod
+            Period of the response.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        tuple of _ResponseRecord
+            Two records. The resolution error may be too large if the maximum number of samples is
+            not sufficient.
+        """
         instants = way.forcing_periods * self.samples
         most = _MAX_SAMPLE_REFINEMENT * instants
         while True:
@@ -312,8 +446,31 @@ class NormalStressResponse(RecordingMeasure):
         accuracy: Accuracy,
         meter: WorkMeter,
     ) -> tuple[_ResponseRecord, _ResponseRecord]:
-        """Two records of a response: from a point, and an e-fold of decay later. What repeats
-        itself later than that is elsewhere then: what lies between is no multiple of 2 or 3.
+        """Record the response at two times.
+
+        The second record begins when the transient has decayed by another factor of e. The time
+        between the records is not a multiple of two or three response periods. The records
+        therefore differ if the response repeats after a longer time.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        start : Point
+            Point at which the first record begins.
+        way : _ResponsePeriod
+            Period of the response.
+        instants : int
+            Number of samples.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        tuple of _ResponseRecord
+            First and second record.
         """
         first = self._record_period(scene, start, way, instants, accuracy, meter)
         point, between = first.events[-1].point, math.ceil(way.decay_time)
@@ -334,8 +491,30 @@ class NormalStressResponse(RecordingMeasure):
         accuracy: Accuracy,
         meter: WorkMeter,
     ) -> _ResponseRecord:
-        """The motion at instants spread evenly, each followed from the one before: exactly then,
-        and not between the steps of an integrator.
+        """Record the motion at regular intervals over one response period.
+
+        Each sample is the end of a separate integration. The samples are therefore exact, and not
+        interpolated between integration steps.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        start : Point
+            Point at which the record begins.
+        way : _ResponsePeriod
+            Period of the response.
+        instants : int
+            Number of samples.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        _ResponseRecord
+            Record of the motion.
         """
         events: list[Event] = []
         time = slip = 0.0
@@ -358,11 +537,12 @@ class NormalStressResponse(RecordingMeasure):
 
 
 def _phase_in_degrees(response: complex) -> float:
+    """Return the phase of a complex number in degrees."""
     return math.degrees(cmath.phase(response))
 
 
 def _read_outputs(record: _ResponseRecord, linear: complex) -> dict[str, float]:
-    """Numbers that are read off a record."""
+    """Compute the results from a record."""
     response = record.response
     return {
         "gain": abs(response),
@@ -380,14 +560,37 @@ def _estimate_errors(
     moved: float,
     asked: tuple[Scene, Accuracy],
 ) -> dict[str, float]:
-    """Errors of what is read off a record, from another run: with what the response has moved
-    since, what its trend made of it, and what the instants do not resolve.
+    """Estimate the errors of the results.
+
+    The errors are estimated from a second run with smaller tolerances. The errors include the
+    change of the response between the two records, the effect of the trend, and the finite number
+    of samples.
+
+    Parameters
+    ----------
+    values : mapping
+        Results of the first run.
+    linear : complex
+        Response to small oscillations.
+    record : _ResponseRecord
+        Record of the first run.
+    again : _ResponseRecord
+        Record of the second run.
+    moved : float
+        Relative change of the response between the two records of the first run.
+    asked : tuple[Scene, Accuracy]
+        Scene and requested accuracy.
+
+    Returns
+    -------
+    dict
+        Errors by name.
     """
     unseen = record.resolution_error + moved + record.drift
     hidden = {
         "gain": unseen * values["gain"],
         "phase_lead": math.degrees(unseen),
-        # what is left of overtones adds up as noise does, and seldom cancels
+        # Errors of the overtones add up like random noise and rarely cancel.
         "distortion": 5.0 * float(np.linalg.norm(record.overtones - again.overtones))
         + record.drift
         + record.aliasing,
@@ -395,7 +598,7 @@ def _estimate_errors(
     }
     over_imposed = 1.0 / asked[0].oscillation_amplitude
     over_spring = over_imposed / values["gain"]
-    # errors of the instants add up as noise does: over the period they cancel for the most part
+    # Errors at different samples are independent, so they mostly cancel over one period.
     left = math.sqrt(2.0 / len(record.spring_stress))
     by_friction = {
         "gain": left * over_imposed,
@@ -408,7 +611,7 @@ def _estimate_errors(
 
 
 def _record_outputs(scene: Scene, events: Sequence[Event]) -> dict[str, np.ndarray]:
-    """The record itself."""
+    """Return the record along ``phase``."""
     time = np.array([event.time for event in events])
     return {
         "time": time,

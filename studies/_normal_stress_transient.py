@@ -35,16 +35,16 @@ from rsfstudy.motion import (
     sample_along_path,
 )
 
-#: Part of the record, at its end, over which friction must stay, and within which part of what it
-#: is at `fit_from`.
+#: Final fraction of the record over which friction must be constant, and the tolerance of this
+#: condition relative to the remaining transient at ``fit_from``.
 _FINAL_SHARE, _FINAL_FRICTION_RTOL = 0.1, 0.01
-#: ln(V/V_*) within which slip rate must be again where reading begins: the spring has then taken up
-#: what strength changed by.
+#: Largest value of |ln(V/V_*)| at ``fit_from``. If the slip rate is closer to V_*, the spring
+#: stress has followed the change of strength.
 _SPRING_RESPONSE_LOG_RATE = math.log(2.0)
-#: How often a motion is followed to a slip, each time as long as its slip rate says, and the least
-#: ln(V/V_*) that is taken for one.
+#: Number of iterations that find the time at which a slip is reached, and the smallest ln(V/V_*)
+#: that is used in these iterations.
 _MAX_EXTENSIONS, _MIN_LOG_SLIP_RATE = 3, -600.0
-#: Direct change over mu_* that is no more than rounding.
+#: Largest direct change of friction relative to mu_* that is attributed to rounding.
 _NEGLIGIBLE_DIRECT_CHANGE = 10.0 * ROUNDING_ERROR
 
 _OUTPUTS = (
@@ -97,8 +97,8 @@ class _TransientRecord(NamedTuple):
     rows : ndarray
         Recorded samples.
     friction : mapping of float to float
-        Friction at the slips at which it is read. Empty if the spring has not followed the change
-        of strength.
+        Friction by the slip at which friction is read. Empty if the spring stress has not followed
+        the change of strength at the first slip.
     """
 
     begin: Event
@@ -111,28 +111,54 @@ class _TransientRecord(NamedTuple):
         return float(friction_coefficient(self.rows[-1:])[0])
 
     def remaining_transient(self, slip: float) -> float:
-        """Return the remaining transient of friction at a slip."""
+        """Return the remaining transient of friction at a slip.
+
+        Parameters
+        ----------
+        slip : float
+            Slip since the step in D_c.
+
+        Returns
+        -------
+        float
+            Friction at the slip minus friction at the end of the record. NaN if friction was not
+            read at this slip.
+        """
         return self.friction.get(slip, math.nan) - self.final_friction
 
 
 @dataclass(frozen=True)
 class NormalStressTransient(RecordingMeasure):
-    """Transient of friction after a step of imposed normal stress by a ratio r.
+    r"""Transient of friction after a step of imposed normal stress.
 
-    The load point moves at V_* throughout. An exponential is fitted to the remaining transient at
-    two slips, and gives the slip distance. The size of the transient follows by extrapolation to
-    the step, and alpha is this size divided by -ln r. The transient of a rigid slider is -alpha ln
-    r exp(-slip/D_c) under the slip law, and b ln{1 + [r^(-alpha/b) - 1] exp(-slip/D_c)} under the
-    slowness law. The fitted alpha therefore equals the parameter alpha only under the slip law.
+    The load point moves at :math:`V_*` throughout, and normal stress changes by a factor :math:`r`.
+    An exponential function is fitted to the remaining transient at two slips. The slip distance
+    follows from the decay of this function. The size of the transient is extrapolated to the time
+    of the step. The apparent :math:`\alpha` is the size divided by :math:`-\ln r`.
+
+    The transient of a rigid slider after a slip :math:`\delta` is
+
+    .. math::
+
+        -\alpha \ln r \; e^{-\delta/D_c} \quad \text{(slip law)}, \qquad
+        b \ln\left[1 + \left(r^{-\alpha/b} - 1\right) e^{-\delta/D_c}\right]
+        \quad \text{(slowness law)}.
+
+    The apparent :math:`\alpha` therefore equals the parameter :math:`\alpha` only under the slip
+    law.
 
     Parameters
     ----------
-    fit_from, fit_to : float
-        Slips since the step at which the exponential is read, in D_c. At the first slip, the spring
-        must have followed the change of strength, so that slip rate is V_* within a factor of two.
-    record : float
-        Load point displacement of the record, in D_c. Friction at its end is taken as steady.
-    phases : int
+    fit_from : float, default: 0.5
+        First slip since the step at which the exponential is fitted, in D_c. At this slip, the
+        spring must have followed the change of strength, so that the slip rate differs from V_* by
+        less than a factor of two.
+    fit_to : float, default: 1.5
+        Second slip since the step at which the exponential is fitted, in D_c.
+    record : float, default: 30.0
+        Load point displacement of the record, in D_c. Friction at the end of the record is regarded
+        as steady.
+    phases : int, default: 300
         Number of points of the record along ``phase``.
 
     References
@@ -150,6 +176,7 @@ class NormalStressTransient(RecordingMeasure):
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
+        """Check the parameters."""
         super().__post_init__()
         if not 0.0 < self.fit_from < self.fit_to:
             rule = "must be greater than 0 and less than fit_to"
@@ -159,8 +186,23 @@ class NormalStressTransient(RecordingMeasure):
             raise InvalidValue("record", self.record, rule)
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """The numbers themselves, of a transient that errs by what a is beside its size where it is
-        read last.
+        """Return the scales of the numerical errors.
+
+        The scale of a result is its absolute value, multiplied by one plus the ratio of ``a`` to
+        the remaining transient at ``fit_to``. The relative error may therefore be larger if the
+        transient is small.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        values : mapping
+            Results by name.
+
+        Returns
+        -------
+        mapping
+            Scales by result.
         """
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
         distance = values["apparent_slip_distance"]
@@ -170,9 +212,23 @@ class NormalStressTransient(RecordingMeasure):
         return {name: part * abs(values[name]) for name in names}
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Compute the transient, and its errors from a second motion.
+        """Compute the transient, and estimate its errors from a second motion.
 
         The second motion has smaller tolerances.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Outcome of the measure.
         """
         check_steady_loading(scene)
         step = scene.parts.loading.segments[0]
@@ -220,7 +276,19 @@ class NormalStressTransient(RecordingMeasure):
     ) -> _TransientRecord | None:
         """Record the motion.
 
-        The result is None if slip does not reach the values at which friction is read.
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        _TransientRecord or None
+            None if slip does not reach the values at which friction is read.
         """
         recording = Recording()
         begin, *_others = integrate_events(
@@ -241,7 +309,7 @@ class NormalStressTransient(RecordingMeasure):
     def _friction_at_slips(
         self, scene: Scene, rows: np.ndarray, accuracy: Accuracy, meter: WorkMeter
     ) -> dict[float, float]:
-        """Return friction at the slips at which it is read.
+        """Return friction at the slips that the measure evaluates.
 
         The recorded rows give an estimate of the time at which a slip is reached. The motion is
         then followed to this time, and the time is corrected with the slip rate. Friction is not
@@ -263,16 +331,26 @@ class NormalStressTransient(RecordingMeasure):
                     elapsed, slipped, start = elapsed + end.time, slipped + end.slip, end.point
                 log_slip_rate = max(end.point.log_slip_rate, _MIN_LOG_SLIP_RATE)
                 wait = (slip - slipped) / math.exp(log_slip_rate)
-            # spring stress rises by K (V_0/V - 1) per unit slip
+            # Spring stress increases by K (V_0/V - 1) per unit slip.
             pulled = scene.stiffness * math.expm1(-log_slip_rate) / stress
             found[slip] = end.point.apparent_friction + pulled * (slip - slipped)
         return found
 
     def _read_outputs(self, scene: Scene, record: _TransientRecord) -> dict[str, float]:
-        """Return the numbers that are read from the record.
+        """Return the results that are read from the record.
 
-        The result is empty if the remaining strength change does not fit an exponential, or if the
-        spring has not followed the change of strength.
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        record : _TransientRecord
+            Record of the motion.
+
+        Returns
+        -------
+        dict
+            Empty if the spring stress has not followed the change of strength, or if the remaining
+            transient does not decay exponentially.
         """
         first, last = (
             record.remaining_transient(self.fit_from),
@@ -293,8 +371,10 @@ class NormalStressTransient(RecordingMeasure):
     def _sensitivities_to_friction(
         self, scene: Scene, record: _TransientRecord, values: Mapping[str, float]
     ) -> dict[str, float]:
-        """Change of each number by that of the friction it is read from: at `fit_from`, `fit_to`
-        and D_c, each less that at the end, which may err as much.
+        """Return the derivatives of the results with respect to friction.
+
+        Friction is read at ``fit_from``, ``fit_to`` and a slip of D_c, and at the end of the
+        record. All readings may have the same error, so the derivatives contain a factor of two.
         """
         first, last = (
             abs(record.remaining_transient(self.fit_from)),
@@ -312,7 +392,7 @@ class NormalStressTransient(RecordingMeasure):
     def _record_outputs(
         self, scene: Scene, record: _TransientRecord
     ) -> dict[str, float | np.ndarray]:
-        """Return the direct change of friction, the flag, the departure and the record."""
+        """Return the record, and the results that need no exponential fit."""
         rows, friction = record.rows, friction_coefficient(record.rows)
         late = rows[:, 0] >= (1.0 - _FINAL_SHARE) * self.record
         is_flat = bool(
@@ -333,8 +413,23 @@ class NormalStressTransient(RecordingMeasure):
         }
 
     def _departure_from_rigid(self, scene: Scene, record: _TransientRecord) -> float:
-        """Largest departure of friction, from `fit_from` on, from what a stiff slider shows after
-        so much slip, ``b relaxation(-(alpha/b) ln r, slip)``; NaN where there is no such form.
+        r"""Compute the largest difference of friction from the closed form.
+
+        The closed form of a rigid slider is :math:`b\,R(-(\alpha/b) \ln r, \delta)`, with the
+        function :math:`R` that the law provides as ``relaxation``. The difference is evaluated at
+        all slips larger than ``fit_from``.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        record : _TransientRecord
+            Record of the motion.
+
+        Returns
+        -------
+        float
+            Largest absolute difference. NaN if the law provides no closed form.
         """
         law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
         if law.relaxation is None or law.depends_on_stress or coupling is None:
@@ -342,7 +437,7 @@ class NormalStressTransient(RecordingMeasure):
         slip = record.rows[:, MOTION_VARIABLES.index("slip")]
         read = slip >= self.fit_from
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
-        # without b there is no alpha either, and nothing evolves
+        # If b is zero, alpha is zero too, and friction does not evolve.
         away = -coupling[1] / scene.b * math.log(ratio) if scene.b else 0.0
         left = np.array([law.relaxation(away, at) for at in slip[read].tolist()])
         seen = friction_coefficient(record.rows[read]) - scene.mu_star

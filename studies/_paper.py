@@ -1,4 +1,4 @@
-"""Name of the paper, and the cases of normal stress that its studies compare."""
+"""Reference of the paper, and normal stress cases of the studies."""
 
 PAPER = "doi:10.1007/s11589-014-0098-4"
 REFERENCE = (

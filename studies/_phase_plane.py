@@ -1,5 +1,6 @@
-"""Marks that figures in the plane of stress and slip rate share: the steady-state and
-constant-state lines.
+"""Reference lines for figures of stress against slip rate.
+
+The functions draw the line of steady sliding and lines of constant state.
 """
 
 from __future__ import annotations
@@ -23,19 +24,42 @@ LN10 = math.log(10.0)
 
 
 def steady_line_key(cell: xr.Dataset) -> tuple[str, float, float]:
-    """Choices that decide the steady-state line: normal stress, its angle, and the law where steady
-    friction at ten times V_* tells of one.
+    """Return the choices that determine the line of steady sliding.
+
+    Cells with the same key share the same line, so the line is drawn only once.
+
+    Parameters
+    ----------
+    cell : xarray.Dataset
+        Results of one cell.
+
+    Returns
+    -------
+    tuple[str, float, float]
+        Normal stress condition, driving angle, and steady friction at ten times V_* relative to
+        mu_*.
     """
     scene = scene_from_coordinates(cell)
     return scene.normal_stress, scene.phi or 0.0, steady_friction_excess(scene, LN10)
 
 
 def scene_from_coordinates(cell: xr.Dataset) -> Scene:
-    """The scene of one cell, from its coordinates."""
+    """Return the scene of a cell.
+
+    Parameters
+    ----------
+    cell : xarray.Dataset
+        Results of one cell, with the fields of the scene as coordinates.
+
+    Returns
+    -------
+    Scene
+        Scene with the values of the coordinates.
+    """
     here = {str(name): cell[name].item() for name in cell.coords if cell[name].ndim == 0}
     parts = find_named_user_parts(here, [here])
     kinds = field_types(parts.values())
-    # no NaN, and no part of the user's own where there is none
+    # Coordinates that do not apply to the cell are NaN or an empty string.
     values = {n: v for n, v in here.items() if n in kinds and v == v and v != ""}
     flags = [name for name in values if kinds[name] in (bool, bool | None)]
     values |= {name: bool(values[name]) for name in flags}
@@ -45,26 +69,62 @@ def scene_from_coordinates(cell: xr.Dataset) -> Scene:
 
 
 def steady_line(cell: xr.Dataset, log10_rates: np.ndarray) -> np.ndarray:
-    """Shear stress of steady sliding at slip rates 10^x V_*; NaN where there is none."""
+    """Compute the shear stress of steady sliding.
+
+    Parameters
+    ----------
+    cell : xarray.Dataset
+        Results of one cell.
+    log10_rates : ndarray
+        Decimal logarithms of V/V_*.
+
+    Returns
+    -------
+    ndarray
+        Shear stress in sigma_*. NaN if there is no steady sliding at a slip rate.
+    """
     scene = scene_from_coordinates(cell)
     excesses = [steady_friction_excess(scene, rate * LN10) for rate in log10_rates.tolist()]
     return _stresses_from_friction(scene, np.array(excesses))
 
 
 def constant_state_line(cell: xr.Dataset, state: float, log10_rates: np.ndarray) -> np.ndarray:
-    """Shear stress at one value of the state variable; NaN where no stress is as strong."""
+    """Compute the shear stress at a constant value of the state variable.
+
+    Parameters
+    ----------
+    cell : xarray.Dataset
+        Results of one cell.
+    state : float
+        Value of the state variable Theta.
+    log10_rates : ndarray
+        Decimal logarithms of V/V_*.
+
+    Returns
+    -------
+    ndarray
+        Shear stress in sigma_*. NaN if no shear stress balances friction.
+    """
     scene = scene_from_coordinates(cell)
     return _stresses_from_friction(scene, scene.a * log10_rates * LN10 + state)
 
 
 def _stresses_from_friction(scene: Scene, excesses: np.ndarray) -> np.ndarray:
-    """Shear stress at each friction coefficient, less mu_*."""
+    """Compute the shear stress at friction coefficients relative to mu_*."""
     stresses = (stress_for_friction(scene, excess) for excess in excesses.tolist())
     return np.array([math.nan if g is None else scene.mu_star + g for g in stresses])
 
 
 def plot_steady_line(dataset: xr.Dataset, axes: Axes) -> None:
-    """Steady sliding, as far as the axes reach; a mark."""
+    """Draw the line of steady sliding over the range of the axes.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     reach, height = axes.get_xlim(), axes.get_ylim()
     rates = np.linspace(reach[0], reach[1], 400)
     one = dataset.isel(dict.fromkeys(dataset["status"].dims, 0))
@@ -73,8 +133,17 @@ def plot_steady_line(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def hatch_reversed_stress(_dataset: xr.Dataset, axes: Axes) -> None:
-    """Hatch where stress along y is below zero, if the axes reach there: friction of forward slip
-    does not apply; a mark.
+    """Hatch the area of negative stress if it is visible.
+
+    The friction laws apply to forward slip only, so results with negative shear stress are not
+    valid.
+
+    Parameters
+    ----------
+    _dataset : xarray.Dataset
+        Results of the study. Not used.
+    axes : matplotlib.axes.Axes
+        Axes with stress on the vertical axis.
     """
     lowest, highest = axes.get_ylim()
     if lowest < 0.0:

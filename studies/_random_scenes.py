@@ -1,4 +1,8 @@
-"""Random scenes, drawn from wide ranges of every parameter, and the questions asked of them."""
+"""Random scenes, and the questions that are asked about them.
+
+A question consists of a measure and of the random distributions of the loading parameters. All
+other parameters of a scene are drawn from wide ranges.
+"""
 
 import math
 import zlib
@@ -21,29 +25,73 @@ from rsfstudy.measures import (
 from ._normal_stress_response import NormalStressResponse
 from ._normal_stress_transient import NormalStressTransient
 
-#: What draws a number.
+#: Function that draws a random number.
 DrawFunction = Callable[[np.random.Generator], float]
 
 
 def draw_uniform(low: float, high: float) -> DrawFunction:
-    """Any number between two, as likely as another."""
+    """Return a function that draws uniformly distributed numbers.
+
+    Parameters
+    ----------
+    low : float
+        Lower end of the range.
+    high : float
+        Upper end of the range.
+
+    Returns
+    -------
+    DrawFunction
+        Function of a random number generator.
+    """
     return lambda draw: float(draw.uniform(low, high))
 
 
 def draw_log_uniform(low: float, high: float) -> DrawFunction:
-    """Any number between two, each decade as likely as another."""
+    """Return a function that draws log-uniformly distributed numbers.
+
+    Parameters
+    ----------
+    low : float
+        Lower end of the range.
+    high : float
+        Upper end of the range.
+
+    Returns
+    -------
+    DrawFunction
+        Function of a random number generator.
+    """
     exponent = draw_uniform(math.log(low), math.log(high))
     return lambda draw: math.exp(exponent(draw))
 
 
 def draw_signed(size: DrawFunction) -> DrawFunction:
-    """A size, and a sign."""
+    """Return a function that draws numbers with a random sign.
+
+    Parameters
+    ----------
+    size : DrawFunction
+        Function that draws the absolute value.
+
+    Returns
+    -------
+    DrawFunction
+        Function of a random number generator.
+    """
     return lambda draw: size(draw) * (1.0 if draw.uniform() < 0.5 else -1.0)
 
 
 class Question(NamedTuple):
-    """Question that may be asked of a random scene: a measure, and what is drawn of the spring and
-    the loading; numbers of the measure's own choice of scene are given as they are.
+    """Question about a random scene.
+
+    Parameters
+    ----------
+    measure : Measure
+        Measure that is computed for the scene.
+    scene : mapping
+        Fields of the spring and of the loading, each with a fixed value or a function that draws
+        the value.
     """
 
     measure: Measure
@@ -51,7 +99,7 @@ class Question(NamedTuple):
 
 
 _UNSTABLE_STIFFNESS_RATIO, _STABLE_STIFFNESS_RATIO = draw_uniform(0.3, 0.97), draw_uniform(1.0, 2.5)
-#: Rigs from soft to stiff.
+#: Stiffness of testing machines relative to the critical stiffness.
 _RIG_STIFFNESS_RATIO = draw_log_uniform(1.1, 300.0)
 _STEP_UP, _STEP_UP_OR_DOWN = draw_log_uniform(1.1, 100.0), draw_log_uniform(0.03, 30.0)
 
@@ -69,7 +117,7 @@ MOTION_QUESTIONS: Mapping[str, Question] = {
         CriticalStep(of="displacement_step"), {"stiffness_ratio": _STABLE_STIFFNESS_RATIO}
     ),
 }
-#: The same of the readings of a laboratory.
+#: Questions about quantities that are measured in laboratory tests.
 LABORATORY_QUESTIONS: Mapping[str, Question] = {
     "rigid response": Question(
         RigidResponse(points=2), {"load_velocity_ratio": draw_log_uniform(1e-4, 1e4)}
@@ -108,13 +156,29 @@ ALL_QUESTIONS = {**MOTION_QUESTIONS, **LABORATORY_QUESTIONS}
 
 
 def random_scene(like: Scene, question: str, sample: int) -> Scene:
-    """A scene of the same law, normal stress condition and dynamics as another, with numbers drawn
-    from wide ranges.
+    """Draw a random scene.
+
+    The random number generator is seeded with the sample number and the type of the scene. The
+    result is therefore the same for each call.
+
+    Parameters
+    ----------
+    like : Scene
+        Scene with the law, normal stress condition and dynamics of the result.
+    question : str
+        Name of the question.
+    sample : int
+        Number of the random sample.
+
+    Returns
+    -------
+    Scene
+        Scene with random parameters.
 
     Raises
     ------
     InvalidValue
-        Where the question is of a loading that has no meaning for that normal stress condition.
+        If the loading of the question is not compatible with the normal stress condition.
     """
     kind = f"{question} {like.law} {' '.join(like.effects)}"
     draw = np.random.default_rng([sample, zlib.crc32(kind.encode())])
@@ -135,7 +199,7 @@ def random_scene(like: Scene, question: str, sample: int) -> Scene:
         lowest = math.degrees(math.atan(fields["mu_star"]))
         fields["phi"] = lowest + angle * (90.0 - lowest)
     if like.radiation_damping:
-        # about the impedance of spring and mass
+        # The radiation damping is close to the impedance of the spring and the mass.
         inertial_time = fields["period"] * fields["reference_rate"] / (2.0 * math.pi)
         impedance = fields.get("stiffness_ratio", 1.0) * fields["a"] * inertial_time
         fields["radiation_damping"] = impedance * (fields["b_over_a"] - 1.0)

@@ -1,10 +1,12 @@
-"""Numbers known to more digits than anything measured, and how they were made.
+"""Reference values for the numerical accuracy of the package.
 
-Cycles and the critical step come from `tests/benchmarks/extended_precision.py`: the paper's own
-unknowns instead of ours, extrapolated midpoint steps in 64-bit mantissas instead of SciPy's, the
-error of leaving the slow manifold removed by Richardson extrapolation. Two such computations, with
-the switch at slip rate norms of 0.02 and 0.01, agree to the uncertainty given here. The others are
-closed forms, evaluated to 30 digits.
+The values of limit cycles and of critical steps were computed with
+``tests/benchmarks/extended_precision.py``. That program integrates the unknowns of the paper
+instead of the unknowns of rsfstudy. It uses extrapolated midpoint steps in extended precision
+(64-bit mantissa), and removes the error of the slow manifold by Richardson extrapolation. Two
+computations with different thresholds for the change of regime, at slip rate norms of 0.02 and
+0.01, agree to the uncertainty that is listed with each value. All other values are closed forms
+that were evaluated with 30 digits.
 """
 
 from typing import NamedTuple
@@ -15,8 +17,19 @@ EXTENDED_PRECISION_SOURCE = (
 
 
 class KnownValue(NamedTuple):
-    """A known number and its source; errors are relative to `scale`, or to the number where that is
-    0, and so is its own `uncertainty`.
+    """Known value and its source.
+
+    Parameters
+    ----------
+    answer : float
+        Known value.
+    source : str, optional
+        Source of the value.
+    uncertainty : float, default: 0.0
+        Error of the value, relative to ``scale``.
+    scale : float, default: 0.0
+        Errors are relative to this scale. If the scale is zero, errors are relative to the known
+        value.
     """
 
     answer: float
@@ -25,36 +38,40 @@ class KnownValue(NamedTuple):
     scale: float = 0.0
 
 
-#: Slip law, constant normal stress, b/a = 2, k = 1.25 k_cr, norm 5e-4, without mass: critical
-#: V_0/V_*, by bisection between motions; bisection ends at 1e-18.
+#: Critical V_0/V_* for the slip law, constant normal stress, b/a = 2, k = 1.25 k_cr and an
+#: instability norm of 5e-4, without inertia. The value results from a bisection of motions to
+#: 1e-18.
 CRITICAL_VELOCITY = KnownValue(
     2.633547063232728405, EXTENDED_PRECISION_SOURCE, 1e-17, 2.633547063232728405 - 1.0
 )
 
-#: The same at k = (1 + 1e-8) k_cr.
+#: Critical V_0/V_* for the same parameters, but k = (1 + 1e-8) k_cr.
 JUST_ABOVE_CRITICAL_STIFFNESS = KnownValue(1.9999494063490342617, scale=1.9999494063490342617 - 1.0)
 
-#: Slowness law, alpha = 0.56, phi = 60 degrees, b/a = e, k = 1.5 k_cr: the paper's ~2361 V_*.
+#: Critical V_0/V_* for the slowness law, alpha = 0.56, phi = 60 degrees, b/a = e and k = 1.5 k_cr.
+#: The paper reports approximately 2361.
 CRITICAL_VELOCITY_OF_SECTION_4 = KnownValue(2361.0972350083046758)
 
-#: Limit cycles of b/a = 2, k = 0.8 k_cr, V_0 = 2 V_*, T = 5 s: static drop with the slip law, and
-#: recurrence interval with the slowness law.
+#: Static stress drop (slip law) and recurrence interval (slowness law) of limit cycles with b/a =
+#: 2, k = 0.8 k_cr, V_0 = 2 V_* and T = 5 s.
 SLIP_STATIC_DROP = KnownValue(0.58233021615674673, uncertainty=4e-12)
 SLOWNESS_RECURRENCE = KnownValue(23.93999870907226927, uncertainty=4e-13)
 
-#: Slowness law, constant normal stress, k = k_cr, b/a = 2: log10 of the peak slip rate after a step
-#: to 20 V_*, from the conserved quantity Omega - ln Omega + lambda (w - ln w); and to 200 V_*.
+#: Decimal logarithm of the peak slip rate after velocity steps to 20 V_* and 200 V_*, for the
+#: slowness law, constant normal stress, k = k_cr and b/a = 2. The values follow from the conserved
+#: quantity Omega - ln Omega + lambda (w - ln w).
 CONSERVED_QUANTITY_SOURCE = (
     "conserved quantity of the slowness law at k = k_cr (Ranjith and Rice 1999)"
 )
 PEAK_AFTER_20 = KnownValue(8.853655123157110332821499968933, CONSERVED_QUANTITY_SOURCE, scale=1.0)
 PEAK_AFTER_200 = KnownValue(87.02666189007507609300213265385, CONSERVED_QUANTITY_SOURCE, scale=1.0)
 
-#: Slowness law, constant normal stress, V = 200 V_*: slip until 1/e of the stress change is left,
-#: ln[(V - 1)/(V**(1/e) - 1)] (eq. 17a).
+#: Slip after which 1/e of the stress change remains, ln[(V - 1)/(V**(1/e) - 1)] in D_c, for the
+#: slowness law, constant normal stress and V = 200 V_* (eq. 17a).
 EVOLUTION_DISTANCE = KnownValue(3.497775839483122296584238615316, "closed form (eq. 17a)", 1e-16)
 
-#: Slip law, k = k_cr, b/a = 2, norm 5e-4 unless said otherwise: critical V_0/V_*; `hard_cases`.
+#: Critical V_0/V_* for the slip law, k = k_cr, b/a = 2 and an instability norm of 5e-4, except for
+#: the parameter in the name of each value. The study ``hard_cases`` uses these values.
 HARD_STEPS = {
     label: KnownValue(answer, uncertainty=1e-15, scale=answer - 1.0)
     for label, answer in {
@@ -71,7 +88,7 @@ HARD_STEPS = {
     }.items()
 }
 
-#: Slip law, constant normal stress, b/a = 2: recurrence interval.
+#: Recurrence intervals for the slip law, constant normal stress and b/a = 2.
 HARD_CYCLES = {
     "k = 0.99 k_cr": KnownValue(20.19254266647416257, uncertainty=4e-12),
     "V_0 = V_*": KnownValue(56.59980667862398402, uncertainty=4e-12),
@@ -79,7 +96,8 @@ HARD_CYCLES = {
     "T = 1e4 s": KnownValue(17.26640860590658854, uncertainty=4e-12),
 }
 
-#: Variable normal stress, mass, any parameters (see `hard_cases`): recurrence interval. What the
-#: switch costs falls with the square of its norm there, which is removed.
+#: Recurrence intervals for variable normal stress and inertia, with random parameters (see the
+#: study ``hard_cases``). The error of the change of regime decreases with the square of the
+#: threshold in these cases, and was removed by extrapolation.
 DOWN_TO_137 = KnownValue(0.79876073128172, uncertainty=3e-12)
 DOWN_TO_1745 = KnownValue(49.2071554225251, uncertainty=3e-11)

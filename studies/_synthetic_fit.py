@@ -1,4 +1,8 @@
-"""Fits of synthetic records with known parameters, to test the errors of fits."""
+"""Fits of synthetic records with known parameters.
+
+The measure ``SyntheticFit`` computes a record from a scene, adds noise, and fits the record. The
+studies of fits use this measure to test confidence intervals and standard errors.
+"""
 
 from __future__ import annotations
 
@@ -35,17 +39,18 @@ from ._noise_kinds import NOISE_KINDS, ExactResponse
 #: Correlation of an autoregressive process of order one, and coefficients of moving averages.
 _AR1_CORRELATION, _MOVING_AVERAGES = 0.9, {"white": (1.0,), "ma3": (1.0, 0.8, 0.5, 0.2)}
 _PROCESSES = ("ar1", *_MOVING_AVERAGES, *NOISE_KINDS)
-#: Shares of records whose parameters lie within one and two standard deviations of Gaussian errors.
+#: Probability that a Gaussian variable lies within one and two standard deviations of the mean.
 SHARE_WITHIN_ONE_STDERR, SHARE_WITHIN_TWO_STDERRS = 0.6827, 0.9545
-#: The fault and machine of the studies that fit synthetic records, the work that one of those may
-#: take, and steps from 1 to 10 um/s and back.
+#: Scene, work budget and protocols of the studies that fit synthetic records. The protocols contain
+#: a velocity step from 1 to 10 um/s and a step back.
 BASE_SCENE = Scene(normal_stress="constant", a=0.01, b_over_a=1.3, stiffness=0.03)
 FIT_ACCURACY = Accuracy(budget=50_000_000, engine="compiled")
 STEP_UP_PROTOCOL, STEP_BACK_PROTOCOL = "1:30, 10:270", "10:30, 1:270"
 _NUMBER_PATTERN = r"\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*"
-#: Velocity and displacement of a piece, or time where an s follows.
+#: Velocity and displacement of a segment. If the letter s follows, the second number is the
+#: duration.
 _SEGMENT_PATTERN = re.compile(rf"{_NUMBER_PATTERN}:{_NUMBER_PATTERN}(s?)\s*")
-#: Slip distance that a search begins with, over the true one.
+#: Ratio of the initial slip distance of a fit to the exact value.
 _INITIAL_SLIP_DISTANCE_FACTOR = 1.5
 
 _PARAMETER_OUTPUTS = (
@@ -65,12 +70,33 @@ _FLAGGED_OUTPUT = Output(
 
 
 def protocol_axis(protocols: Mapping[str, str]) -> Axis:
-    """Return an axis of named protocols."""
+    """Return an axis of named protocols.
+
+    Parameters
+    ----------
+    protocols : mapping
+        Protocols by name.
+
+    Returns
+    -------
+    Axis
+        Axis with the dimension ``design``.
+    """
     return Axis("design", {name: {"protocol": text} for name, text in protocols.items()})
 
 
 class _ProtocolSegment(NamedTuple):
-    """Segment of a protocol: velocity in um/s, duration in s, and number of rows."""
+    """Segment of a protocol.
+
+    Attributes
+    ----------
+    velocity : float
+        Load point velocity in um/s.
+    duration : float
+        Duration in s.
+    rows : int
+        Number of rows.
+    """
 
     velocity: float
     duration: float
@@ -87,27 +113,27 @@ class SyntheticFit(Measure):
 
     Parameters
     ----------
-    protocol : str
+    protocol : str, optional
         Velocities in um/s and displacements in um: ``"1:30, 10:270"`` is a step after 30 um. A hold
         is specified by its duration: ``"0:100 s"``. Semicolons separate windows that are fitted
         jointly.
-    free : tuple of str
+    free : tuple of str, optional
         Names of the free parameters.
-    slip_distance : float
+    slip_distance : float, default: 10.0
         Slip distance D_c in um.
-    rows : int
+    rows : int, default: 500
         Number of rows in each window.
-    noise_size : float
+    noise_size : float, default: 0.0005
         Standard deviation of the noise.
-    process : str
+    process : str, default: "white"
         Noise process: "white", "ar1" (autoregressive with a correlation of 0.9), "ma3" (a moving
         average of four rows), or a kind of laboratory record (``_noise_kinds.NOISE_KINDS``), which
         selects its own sample times.
-    noise : str
+    noise : str, default: "ar"
         Noise model of the fit (see ``Fit``).
-    fitted_law : str
+    fitted_law : str, optional
         Law that is fitted. By default, the law of the scene.
-    seed : int
+    seed : int, default: 0
         Seed of the random noise.
     """
 
@@ -136,6 +162,7 @@ class SyntheticFit(Measure):
     )
 
     def __post_init__(self) -> None:
+        """Check the parameters."""
         windows = self._window_segments()
         check_free_parameters(self.free)
         if self.process not in _PROCESSES:
@@ -149,7 +176,7 @@ class SyntheticFit(Measure):
 
     @property
     def outputs(self) -> Sequence[Output]:
-        """Outputs: errors of each parameter, and how well each law fits."""
+        """Outputs for each parameter and for the quality of the fit."""
         by = [
             Output(name, "", "1", text, dims=("parameter",), error=name == self.primary_output)
             for name, text in _PARAMETER_OUTPUTS
@@ -162,16 +189,32 @@ class SyntheticFit(Measure):
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         """Names of the parameters.
 
-        If each window has its own value of a parameter, the first window is reported.
+        If each window has a separate value of a parameter, the first window is reported.
         """
         return {"parameter": np.array(self.free, dtype=object)}
 
     @property
     def _free_parameters(self) -> tuple[str, ...]:
+        """Names of the free parameters, with a number for each window."""
         return number_parameters(self.free, len(self._window_segments()))
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Draw a record and fit it."""
+        """Draw a record and fit it.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Outcome of the measure.
+        """
         if self.process in NOISE_KINDS:
             return self._fit_noisy_record(scene, accuracy, meter)
         true = self._exact_parameters(scene)
@@ -194,7 +237,7 @@ class SyntheticFit(Measure):
 
     def _fit_noisy_record(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Draw a laboratory record and fit it in the same way as ``rsfstudy.fit``."""
-        from rsfstudy.measures import Fit  # imports xarray, which is slow
+        from rsfstudy.measures import Fit  # The import is slow.
 
         kind, true = NOISE_KINDS[self.process], self._exact_parameters(scene)
         if "trend1" in true:
@@ -207,6 +250,7 @@ class SyntheticFit(Measure):
         smooth = replace(accuracy, rtol=min(accuracy.rtol, 1e-9))
 
         def friction(time: np.ndarray) -> np.ndarray:
+            """Return exact friction at given times."""
             begins = min(float(time[0]), 0.0)
             pieces = [
                 (begins, before.velocity, 1.0, 0.0),
@@ -219,7 +263,7 @@ class SyntheticFit(Measure):
 
         ends = before.duration + after.duration
         step = before.duration, ends, before.velocity, after.velocity
-        # other noise for each kind, so that their coverages are independent
+        # The noise differs between the kinds, so that their coverages are independent.
         rng = np.random.default_rng([self.seed, [*NOISE_KINDS].index(self.process)])
         record = kind.draw(ExactResponse(*step, friction, self.noise_size), rng)
         guess, stated = _INITIAL_SLIP_DISTANCE_FACTOR * self.slip_distance, kind.filter
@@ -245,7 +289,7 @@ class SyntheticFit(Measure):
             naive = FitProblem(search.model, found.values, self._free_parameters, "white").solve()
         exact = search.coordinates(true)
         profiles = [LikelihoodProfile(search, found, name) for name in self._free_parameters]
-        # noise of the load point widens the intervals in proportion
+        # Noise of the load point displacement widens the intervals in proportion.
         wider = np.array(
             [found.coordinate_stderr[one.index] / one.noise_stderr for one in profiles]
         )
@@ -266,7 +310,7 @@ class SyntheticFit(Measure):
             for prefix, of, far in (("", found, squared), ("naive_", naive, naively)):
                 inside = np.array(far) <= stderr_multiplier(of, share) ** 2
                 by_parameter[f"{prefix}inside_{words}"] = inside.astype(float)
-        # of those that each window has for itself, that of the first one
+        # If a parameter has a separate value in each window, the first window is reported.
         shown = [
             self._free_parameters.index(n if n in self._free_parameters else f"{n}_1")
             for n in self.free

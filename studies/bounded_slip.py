@@ -1,10 +1,11 @@
-"""Bounded slip: the slowness law after large steps, quasi-static against full (Figs. 8 and 12).
+"""Bounded slip rates after velocity steps, slowness law (Figs. 8 and 12).
 
-With the slowness law and k >= k_cr the slip rate after any step stays bounded, without mass too; at
-constant normal stress and k = k_cr oscillations repeat for ever. Bounded is not slow: after large
-steps mass limits the slip rate, and the motion with mass leaves the quasi-static one. At variable
-normal stress and k = k_cr the two join again after the largest steps; elsewhere an offset of stress
-remains.
+Under the slowness law and with k >= k_cr, the slip rate remains bounded after every velocity step,
+even without inertia. At constant normal stress and k = k_cr, the oscillations continue without
+decay. Peak slip rates can still be very high. After large steps, inertia limits the slip rate, and
+the motion with inertia departs from the quasi-static motion. At variable normal stress and k =
+k_cr, the two motions merge again after the largest steps. In all other cases, a difference in
+stress remains.
 """
 
 import math
@@ -28,29 +29,34 @@ from ._phase_plane import hatch_reversed_stress, plot_steady_line
 RANJITH_RICE = "Ranjith and Rice (1999), J. Mech. Phys. Solids 47, 1207-1218"
 
 
-#: Slip rates, evenly spaced in ln V, at which two paths are compared.
+#: Number of slip rates at which two paths are compared. The slip rates are evenly spaced in ln V.
 _COMPARED_SLIP_RATES = 4000
-#: Part of a branch left out at each end: where a path turns, stress at one slip rate says nothing.
+#: Fraction of a branch that is excluded at each end, because a path turns there and the stress at a
+#: given slip rate is not meaningful.
 _EXCLUDED_END_SHARE = 0.02
 
 
 @dataclass(frozen=True)
 class PathSeparation(Reduction):
-    """Places where a path with another effect leaves the path without it on the way to its first
-    peak of slip rate, and where it joins it again on the way down.
+    """Slip rates at which two paths separate and merge.
+
+    One path includes an additional effect, such as inertia, and the other path does not. The paths
+    separate on the branch that leads to the first peak of slip rate, and merge on the branch that
+    follows the peak.
 
     Parameters
     ----------
     name : str
-        Gives ``<name>_parting`` and ``<name>_merging``, decimal logarithms of V/V_* (NaN where the
-        two never part, or never merge before their first minima), and ``<name>_offset``, the median
-        difference of stress on the way down.
+        Prefix of the results. ``<name>_parting`` and ``<name>_merging`` are decimal logarithms of
+        V/V_*. They are NaN if the paths never separate, or if they do not merge before the first
+        minimum of slip rate. ``<name>_offset`` is the median difference of stress after the peak.
     of : str
-        Stress along the path.
-    along : str
-        Dimension of the two points that are compared.
-    tolerance : float
-        Difference of stress, over its range along the second path, at which paths count as parted.
+        Variable that contains the stress along the path.
+    along : str, default: "inertia"
+        Dimension of the two paths. It must have two points.
+    tolerance : float, default: 0.001
+        Largest difference of stress between paths that are considered equal, relative to the range
+        of stress along the second path.
     """
 
     along: str = "inertia"
@@ -63,16 +69,27 @@ class PathSeparation(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Both places, and the difference of stress."""
+        """Quantities of the results."""
         words = "stress after the rupture with mass, less that without"
         offset = Quantity(f"{self.name}_offset", "", "1", words, "sigma_*")
         return [*super().quantities, offset]
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compare the two points of `along`; nothing unless there are two."""
+        """Compare the two paths along ``along``.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the study.
+
+        Returns
+        -------
+        xarray.Dataset
+            Empty unless the dimension has two points.
+        """
         if dataset.sizes.get(self.along, 0) != 2:
             return xr.Dataset()
-        dataset = dataset.sortby(self.along)  # without the effect first
+        dataset = dataset.sortby(self.along)  # The path without the effect comes first.
         bad = is_failed(dataset["status"]).any(self.along)
         core = [self.along, "phase"]
         parting, merging, offset = xr.apply_ufunc(
@@ -97,6 +114,7 @@ class PathSeparation(Reduction):
         )
 
     def _compare(self, rates: np.ndarray, stresses: np.ndarray) -> tuple[float, float, float]:
+        """Return the two slip rates and the median difference of stress."""
         if not (np.isfinite(rates).all() and np.isfinite(stresses).all()):
             return np.nan, np.nan, np.nan
         one, other = (_branches(rate, stress) for rate, stress in zip(rates, stresses, strict=True))
@@ -115,7 +133,21 @@ class PathSeparation(Reduction):
 def _stress_difference(
     one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Slip rates the two branches share, ascending, and the second's stress less the first's."""
+    """Compute the difference of stress between two branches.
+
+    Parameters
+    ----------
+    one : tuple[np.ndarray, np.ndarray]
+        Slip rates and stresses of the first branch.
+    other : tuple[np.ndarray, np.ndarray]
+        Slip rates and stresses of the second branch.
+
+    Returns
+    -------
+    tuple of ndarray
+        Slip rates that the branches share, in ascending order, and the stress of the second branch
+        minus the stress of the first branch.
+    """
     low, high = max(one[0][0], other[0][0]), min(one[0][-1], other[0][-1])
     at = np.linspace(
         low + _EXCLUDED_END_SHARE * (high - low),
@@ -128,7 +160,20 @@ def _stress_difference(
 def _branches(
     rate: np.ndarray, stress: np.ndarray
 ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-    """The ways up to the first peak of slip rate and down from it, by ascending slip rate."""
+    """Split a path at its first peak of slip rate.
+
+    Parameters
+    ----------
+    rate : ndarray
+        Slip rates along the path.
+    stress : ndarray
+        Stresses along the path.
+
+    Returns
+    -------
+    tuple
+        Slip rates and stresses of both branches, in ascending order of the slip rates.
+    """
     moves = np.append(True, np.diff(rate) != 0.0)
     rate, stress = rate[moves], stress[moves]
     rising = np.diff(rate) > 0.0
@@ -150,7 +195,15 @@ orbit_panel = Panel(
 
 
 def plot_separation(dataset: xr.Dataset, axes: Axes) -> None:
-    """Lines where paths with mass and without it part, and where they merge."""
+    """Draw lines at the slip rates at which the paths separate and merge.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     for name in ("paths_parting", "paths_merging"):
         rates = np.atleast_1d(dataset.get(name, math.nan))
         for rate in rates[np.isfinite(rates)]:
@@ -162,7 +215,7 @@ peaks_panel = Panel(hue=["normal_stress", "stiffness_ratio"])
 
 figure = Figure(
     [
-        # Fig. 8
+        # Fig. 8 of the paper.
         replace(
             orbit_panel,
             hue=["load_velocity_ratio"],
@@ -172,7 +225,7 @@ figure = Figure(
                 "load_velocity_ratio": lambda v: [max(v), min(v)],
             },
         ),
-        # Fig. 12
+        # Fig. 12 of the paper.
         replace(
             orbit_panel,
             hue=["inertia"],
@@ -201,7 +254,24 @@ figure = Figure(
 def decaying_peaks_claim(
     normal_stress: str, stiffness_ratio: float, rate: float, source: str
 ) -> Claim:
-    """C11: quasi-static slip stays bounded, its second peak lower than its first."""
+    """Return the claim that the peaks of quasi-static motions decay (C11).
+
+    Parameters
+    ----------
+    normal_stress : str
+        Normal stress condition.
+    stiffness_ratio : float
+        Stiffness relative to the critical stiffness.
+    rate : float
+        Load point velocity relative to V_*.
+    source : str
+        Source of the claim.
+
+    Returns
+    -------
+    Claim
+        Claim on the ratio of the second peak to the first peak.
+    """
     return Claim.below(
         id="C11",
         statement=f"quasi-static, {normal_stress}, {stiffness_ratio:g} k_cr, {rate:g} V_*: decays",
@@ -218,7 +288,21 @@ def decaying_peaks_claim(
 
 
 def repeating_peaks_claim(rate: float) -> Claim:
-    """C11: the theorem of Ranjith and Rice at k = k_cr."""
+    """Return the claim that oscillations at k = k_cr repeat (C11).
+
+    Ranjith and Rice (1999) proved that quasi-static oscillations repeat under the slowness law if
+    normal stress is constant.
+
+    Parameters
+    ----------
+    rate : float
+        Load point velocity relative to V_*.
+
+    Returns
+    -------
+    Claim
+        Claim on the ratio of the second peak to the first peak.
+    """
     return Claim(
         id="C11",
         statement=f"quasi-static, constant, k = k_cr, {rate:g} V_*: oscillations repeat",
@@ -232,7 +316,7 @@ def repeating_peaks_claim(rate: float) -> Claim:
         },
         published=1.0,
         tolerance=1e-7,
-        reason="a theorem; the accuracy asked for",
+        reason="exact result; the tolerance is the requested accuracy",
     )
 
 
@@ -288,8 +372,8 @@ study = Study(
             minus={**LARGEST_STEP, "peak": 2, "inertia": False},
             published=0.0,
             tolerance=5e-5,
-            reason="0.05 of the offset of stress, as with other masses, and paths count as merged "
-            "within 2e-3 of its range, 0.6 sigma_*",
+            reason="5 % of the difference in stress, as for other masses; paths are considered "
+            "merged if they differ by less than 2e-3 of the range of stress, 0.6 sigma_*",
         ),
         Claim.above(
             id="C18",
@@ -298,7 +382,8 @@ study = Study(
             variable="paths_merging",
             where=LARGEST_STEP,
             published=0.0,
-            reason="an inequality: the segment leads from there to 10^-6 V_*; NaN if they did not",
+            reason="an inequality: the segment extends to 10^-6 V_*; the result is NaN if the "
+            "paths do not merge",
         ),
         Claim.above(
             id="C18",

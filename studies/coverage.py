@@ -1,12 +1,13 @@
-"""Coverage: do error estimates cover the errors, over random scenes?
+"""Coverage of error estimates for random scenes.
 
-Scenes drawn from wide ranges of every parameter, for both laws, constant and variable normal
-stress, and each kind of dynamics. Each is measured at the accuracy asked for and a hundred times
-tighter: the error that shows, beyond what the tighter run is itself uncertain by, over the estimate
-that the first run gave. More scenes by --set sample=0:49:50, other accuracies by --set
-requested_digits=4,7,9, and the readings of a laboratory by --set question: rigid response, velocity
-step, healing; and, with --set normal_stress=imposed, normal stress transient and normal stress
-response.
+Scenes with random parameters from wide ranges are solved with both laws, constant and variable
+normal stress, and all kinds of dynamics. Each scene is solved at the requested accuracy and with a
+tolerance that is smaller by a factor of 100. The measured error is the difference between the two
+runs minus the error estimate of the more accurate run. The figure shows the ratio of the measured
+error to the error estimate of the first run. Use --set sample=0:49:50 for more scenes, --set
+requested_digits=4,7,9 for other accuracies, and --set question for quantities that are measured in
+laboratory tests: rigid response, velocity step, healing, and (with --set normal_stress=imposed)
+normal stress transient and normal stress response.
 """
 
 import math
@@ -32,11 +33,11 @@ _ESTIMATED_OUTPUTS = tuple(
     )
 )
 _TIGHTER_RTOL_FACTOR = 0.01
-#: Work the tighter run may cost, over that of the run it judges.
+#: Work budget of the more accurate run relative to the first run.
 _MAX_TIGHTER_WORK = 6
 
 
-#: What its numbers are.
+#: Outputs of the measure.
 _OUTPUTS = (
     Output("status_kept", long_name="whether a tighter run ends with the same status", error=True),
     Output("ended_as"),
@@ -53,20 +54,21 @@ _OUTPUTS = (
 
 @dataclass(frozen=True)
 class Coverage(Measure):
-    """Errors of a measure in a random scene, over its own estimates of them.
+    """Ratios of errors to error estimates in a random scene.
 
-    The scene shares law, normal stress condition and dynamics with the scene of the cell; its
-    numbers are drawn from wide ranges, the same whenever it is asked for. The true numbers are
-    those of a run a hundred times tighter, within its error estimate.
+    The random scene has the law, normal stress condition and dynamics of the given scene. All other
+    parameters are drawn from wide ranges and are the same for each call. The exact results are
+    known from a run with a tolerance that is smaller by a factor of 100, within the error estimate
+    of that run.
 
     Parameters
     ----------
-    question : str
-        What is measured; one of `MOTION_QUESTIONS` or `LABORATORY_QUESTIONS`.
-    sample : int
-        Number of the draw.
-    requested_digits : int
-        Accuracy asked for: rtol = 10**-digits.
+    question : str, default: "limit cycle"
+        Name of the question, a key of ``MOTION_QUESTIONS`` or ``LABORATORY_QUESTIONS``.
+    sample : int, default: 0
+        Number of the random sample.
+    requested_digits : int, default: 7
+        Requested accuracy as a number of digits: ``rtol = 10**-requested_digits``.
     """
 
     question: str = "limit cycle"
@@ -84,6 +86,7 @@ class Coverage(Measure):
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
     def __post_init__(self) -> None:
+        """Check the parameters."""
         if self.question not in ALL_QUESTIONS:
             raise InvalidValue("question", self.question, "is unknown", choices=ALL_QUESTIONS)
         if self.sample < 0:
@@ -94,14 +97,30 @@ class Coverage(Measure):
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
+        """Names of the results along the dimension ``number``."""
         return {"number": np.array(_ESTIMATED_OUTPUTS, dtype=object)}
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Measure twice, and compare each number that both give."""
+        """Compute the measure at two accuracies, and compare the results.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Outcome with the status ``not_applicable`` if the question does not apply to the scene.
+        """
         measure = ALL_QUESTIONS[self.question].measure
         try:
             drawn = random_scene(scene, self.question, self.sample)
-        except InvalidValue as error:  # a step of normal stress that is constant
+        except InvalidValue as error:  # e.g. normal stress is constant
             return Outcome(Status.NOT_APPLICABLE, message=str(error))
         asked = replace(accuracy, rtol=10.0**-self.requested_digits)
         rtol = max(_TIGHTER_RTOL_FACTOR * asked.rtol, MIN_RTOL)
@@ -115,7 +134,7 @@ class Coverage(Measure):
         values: dict[str, Any] = {
             "ended_as": float(outcome.status),
             "status_kept_error": 0.0,
-            # a failure claims nothing, and nothing is known where the tighter run fails
+            # The status is not compared if one of the runs fails.
             "status_kept": float(
                 outcome.status is truth.status
                 or not (outcome.status.is_answer and truth.status.is_answer)
@@ -129,8 +148,23 @@ class Coverage(Measure):
 def _compare_errors(
     measured: Mapping[str, Any], truth: Mapping[str, Any], rtol: float
 ) -> dict[str, np.ndarray]:
-    """Errors beyond what the truth itself is uncertain by, over their estimates, and over the
-    accuracy asked for.
+    """Compute the ratios of errors to their estimates and to the tolerance.
+
+    The uncertainty of the exact results is subtracted from the errors.
+
+    Parameters
+    ----------
+    measured : mapping
+        Results of the first run.
+    truth : mapping
+        Results of the more accurate run.
+    rtol : float
+        Requested relative accuracy.
+
+    Returns
+    -------
+    dict
+        Both ratios for each result. NaN for results that are missing.
     """
     over_estimate, over_request = (np.full(len(_ESTIMATED_OUTPUTS), math.nan) for _ in range(2))
     for i, name in enumerate(_ESTIMATED_OUTPUTS):
@@ -143,18 +177,19 @@ def _compare_errors(
 
 
 def _error_ratio(error: float, allowed: float) -> float:
+    """Return the ratio of an error to the allowed error."""
     if not error:
         return 0.0
     return error / allowed if allowed else math.inf
 
 
-# Numba looks for a package of this name, and finds this file where Python runs in this directory
+# Numba imports a package called coverage, and finds this file if Python runs in this directory.
 if __name__ == "coverage":
     raise ImportError("this is a study, and not the package coverage")
 
 DYNAMICS: dict[str, dict[str, bool | float]] = {
     "quasi-static": {"inertia": False},
-    # how much is drawn with the scene
+    # The value is replaced by a random value.
     "radiation damping": {"radiation_damping": 1e-9},
     "inertia": {"inertia": True},
 }
@@ -163,18 +198,18 @@ REQUESTED_DIGITS = (4, 7)
 
 @dataclass(frozen=True)
 class CoverageStatistics(Reduction):
-    """Statistics of errors over their estimates, by the points of some dimensions.
+    """Statistics of the ratios of errors to error estimates.
 
     Parameters
     ----------
     name : str
-        Gives ``<name>_share`` (of numbers whose error is within its estimate), ``<name>_worst``
-        (the largest error over its estimate), ``<name>_typical`` (the median of estimates over
-        errors) and ``<name>_numbers`` (how many there are).
+        Prefix of the results: ``<name>_share`` (fraction of errors that do not exceed their
+        estimates), ``<name>_worst`` (largest ratio of an error to its estimate), ``<name>_typical``
+        (median ratio of estimates to errors) and ``<name>_numbers`` (number of errors).
     of : str
-        Variable that holds errors over estimates; NaN where there is no number.
-    by : tuple of str
-        Dimensions that stay.
+        Variable that contains the ratios of errors to estimates. NaN for missing results.
+    by : tuple of str, optional
+        Dimensions that are kept.
     """
 
     by: tuple[str, ...] = ()
@@ -182,7 +217,7 @@ class CoverageStatistics(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Statistics, and what is counted apart."""
+        """Quantities of the results."""
         among = ", by question" if "question" in self.by else ""
         texts = {
             "share": "share of errors within their estimates",
@@ -193,7 +228,18 @@ class CoverageStatistics(Reduction):
         return [Quantity(f"{self.name}_{k}", "", "1", f"{t}{among}") for k, t in texts.items()]
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Count over all other dimensions."""
+        """Compute the statistics over all dimensions that are not kept.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the study.
+
+        Returns
+        -------
+        xarray.Dataset
+            Statistics of the ratios.
+        """
         ratios = dataset[self.of]
         over = [d for d in ratios.dims if d not in self.by]
         known = ratios.notnull()
@@ -209,12 +255,20 @@ class CoverageStatistics(Reduction):
         return self.results(f"{self.of} over {', '.join(map(str, over))}", statistics)
 
 
-#: Errors this far below and above their estimates are drawn there.
+#: Range of error ratios in the figure. Ratios outside this range are drawn at its ends.
 PLOTTED_ERROR_RATIOS = (1e-3, 10.0)
 
 
 def plot_error_histogram(dataset: xr.Dataset, axes: Axes) -> None:
-    """One outline an accuracy."""
+    """Draw one histogram of error ratios per requested accuracy.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots import cycle_style
 
     for number, digits in enumerate(dataset["requested_digits"].values):
@@ -246,7 +300,7 @@ figure = Figure(
 )
 
 
-#: What is promised of error estimates at each accuracy: in words, of which number, and how far.
+#: Claims about error estimates at each accuracy: statement, variable, and arguments of ``Claim``.
 COVERAGE_CLAIMS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     (
         "at least 99.5 % of errors lie within their estimates",
@@ -255,8 +309,8 @@ COVERAGE_CLAIMS: tuple[tuple[str, str, dict[str, Any]], ...] = (
             "relation": "above",
             "published": 0.995,
             "tolerance": 0.005,
-            "reason": "over 250 numbers the share scatters by a half of that, and a last bit moves "
-            "it",
+            "reason": "the standard deviation of the fraction over 250 numbers is half of the "
+            "tolerance, and rounding changes the fraction",
         },
     ),
     (
@@ -271,7 +325,7 @@ COVERAGE_CLAIMS: tuple[tuple[str, str, dict[str, Any]], ...] = (
             "relation": "below",
             "published": 10.0,
             "tolerance": 4.0,
-            "reason": "two standard errors of a median over 290 numbers, by resampling them",
+            "reason": "two standard errors of the median of 290 numbers, from resampling",
         },
     ),
 )

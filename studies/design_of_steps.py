@@ -1,10 +1,11 @@
-"""Which experiment tells the parameters? Designs of steps and machines, before any is run.
+"""Expected standard errors of parameters for several designs of experiments.
 
-Fisher's information tells the errors of an experiment before it is made: steps up, back, holds and
-pairs of them, on a stiff and on a compliant machine. A step up and one back tell the exponent of
-the law seven times better than two steps up; a compliant machine tells it better by one step, five
-times; four times as many rows tell as much as half the noise, twice as well. Fits of synthetic
-records keep what is promised.
+The Fisher information predicts the standard errors of an experiment before it is performed. The
+designs are steps up, steps back, holds and pairs of steps, on a stiff and on a compliant machine. A
+step up followed by a step back determines the exponent of the law seven times more accurately than
+two steps up. With a single step, a compliant machine determines the exponent five times more
+accurately than a stiff machine. Four times as many rows have the same effect as half the noise, and
+both halve the standard errors. Fits of synthetic records agree with the predicted standard errors.
 """
 
 import xarray as xr
@@ -18,7 +19,7 @@ from .law_identification import EXPONENT_FIT, FAMILY_SCENE, MAX_CHANCE_DEVIATION
 
 RECORDS, SLIP_DISTANCE = 4, 10.0
 HOLD_PROTOCOL = "1:30, 0:1000 s, 1:270"
-#: Rows of a step, and white noise.
+#: Number of rows per step, and standard deviation of the white noise.
 ROWS, NOISE_SIZE = 500, 5e-4
 DESIGNS: dict[str, dict[str, str | float]] = {
     "step up": {"protocol": STEP_UP_PROTOCOL},
@@ -31,18 +32,40 @@ DESIGNS: dict[str, dict[str, str | float]] = {
     "up and hold": {"protocol": f"{STEP_UP_PROTOCOL}; {HOLD_PROTOCOL}"},
 }
 PLOTTED_PARAMETERS = ("a", "b", "slip_distance", "law_exponent")
-#: Stiffness over normal stress in 1/um.
+#: Ratios of stiffness to normal stress in 1/um.
 MACHINE_STIFFNESSES = (1e-3, 3e-3)
 
 
 def parameter_symbol(row: xr.Dataset) -> str:
-    """That of a parameter, or of its logarithm where that is fitted."""
+    """Return the symbol of a parameter, or of its logarithm.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results of one parameter.
+
+    Returns
+    -------
+    str
+        Symbol in LaTeX. Parameters that are fitted as logarithms have the symbol of the logarithm.
+    """
     name = str(row["parameter"].item())
     return rf"$\ln$ {MODEL[name].symbol}" if name in LOGARITHMIC_PARAMETERS else MODEL[name].symbol
 
 
 def machine_title(dataset: xr.Dataset) -> str:
-    """The machine of a panel."""
+    """Return the title of a panel with the stiffness of the machine.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of one machine.
+
+    Returns
+    -------
+    str
+        Title in LaTeX.
+    """
     return rf"$k$ = {float(dataset['stiffness']) / SLIP_DISTANCE:g} per $\mu$m"
 
 
@@ -66,7 +89,22 @@ figure = Figure(
 
 
 def expected_error_claim(design: str, k: float, published: float) -> Claim:
-    """D1: what a design promises for the exponent of the law."""
+    """Return a claim on the expected standard error of the exponent (D1).
+
+    Parameters
+    ----------
+    design : str
+        Name of the design.
+    k : float
+        Ratio of stiffness to normal stress in 1/um.
+    published : float
+        Expected standard error.
+
+    Returns
+    -------
+    Claim
+        Claim on the expected standard error.
+    """
     return Claim(
         id="D1",
         statement=f"{design}, k = {k:g} per um: standard error of the exponent",
@@ -80,12 +118,26 @@ def expected_error_claim(design: str, k: float, published: float) -> Claim:
         },
         published=published,
         tolerance=0.1 * published,
-        reason="rows before the step are not told; 10 to 100 um of them move it by as much",
+        reason="the length of the record before the step is not specified; lengths from 10 to 100 "
+        "um change the standard error by this amount",
     )
 
 
 def fit_error_claim(k: float, parameter: str) -> Claim:
-    """D2: fits keep the promise."""
+    """Return the claim that fits have the expected standard errors (D2).
+
+    Parameters
+    ----------
+    k : float
+        Ratio of stiffness to normal stress in 1/um.
+    parameter : str
+        Name of the parameter.
+
+    Returns
+    -------
+    Claim
+        Claim on the scatter of the estimates.
+    """
     return Claim(
         id="D2",
         statement=f"k = {k:g} per um: estimates of {parameter} scatter as promised",
@@ -94,7 +146,7 @@ def fit_error_claim(k: float, parameter: str) -> Claim:
         where={"stiffness": k * SLIP_DISTANCE, "parameter": parameter},
         published=0.0,
         tolerance=MAX_CHANCE_DEVIATION,
-        reason="standard deviations of a standard deviation",
+        reason="in standard deviations of the estimated standard deviation",
     )
 
 

@@ -1,10 +1,12 @@
-"""Dilatancy: the critical stiffness of steady sliding against drainage.
+"""Critical stiffness of a dilatant fault as a function of drainage.
 
-Where pores open with slip rate, pore pressure falls and friction rises until fluid flows in.
-Drained fast, the critical stiffness is b - a, as without a fluid; undrained, it is b - a - E with E
-= mu_* eps/(beta sigma_*), and no spring is soft enough for instability where E exceeds b - a. In
-between, drainage within the slip distance D_c decides: even the strongest dilatancy leaves
-oscillations that are slow enough to drain.
+If pores dilate with slip rate, pore pressure falls, and frictional strength rises until fluid flows
+into the pores. With fast drainage, the critical stiffness is (b - a) sigma_*/D_c, as without a
+fluid. Without drainage, the critical stiffness is (b - a - E) sigma_*/D_c, with E = mu_* eps/(beta
+sigma_*). If E exceeds b - a, the undrained fault is stable at every stiffness. Between these
+limits, the result depends on the drainage within the time in which the fault slips by D_c. Even at
+the strongest dilatancy, oscillations that are slow enough to drain remain unstable on a soft
+spring.
 """
 
 import numpy as np
@@ -18,7 +20,20 @@ from ._fluids import DILATANT_FAULT, REFERENCE, SEGALL_RICE
 
 
 def closed_form_claim(drainage: float, value: float) -> Claim:
-    """D1: the closed form at E = 0.002."""
+    """Return the claim that k_cr equals the closed form (D1).
+
+    Parameters
+    ----------
+    drainage : float
+        Drainage rate c* D_c/V.
+    value : float
+        Critical stiffness from the closed form at E = 0.002.
+
+    Returns
+    -------
+    Claim
+        Claim on the critical stiffness.
+    """
     return Claim(
         id="D1",
         statement=f"E = 0.002, c* D_c/V = {drainage:g}: k_cr = {value:g} sigma_*/D_c",
@@ -34,7 +49,26 @@ def closed_form_claim(drainage: float, value: float) -> Claim:
 def drainage_limit_claim(
     drainage: float, value: float, which: str, tolerance: float, reason: str
 ) -> Claim:
-    """D2: undrained and drained."""
+    """Return a claim on the undrained or drained limit of k_cr (D2).
+
+    Parameters
+    ----------
+    drainage : float
+        Drainage rate c* D_c/V.
+    value : float
+        Critical stiffness in the limit.
+    which : str
+        Name of the limit.
+    tolerance : float
+        Tolerance of the claim.
+    reason : str
+        Reason for the tolerance.
+
+    Returns
+    -------
+    Claim
+        Claim on the critical stiffness.
+    """
     return Claim(
         id="D2",
         statement=f"E = 0.002, {which}: k_cr = {value:g} sigma_*/D_c",
@@ -48,7 +82,22 @@ def drainage_limit_claim(
 
 
 def growth_threshold_claim(dilatancy: float, drainage: float) -> Claim:
-    """D3: the threshold of the equations as they are assembled."""
+    """Return the claim that perturbations grow below k_cr (D3).
+
+    The threshold of growth is computed from the eigenvalues of the assembled equations.
+
+    Parameters
+    ----------
+    dilatancy : float
+        Value of the field ``dilatancy``.
+    drainage : float
+        Drainage rate c* D_c/V.
+
+    Returns
+    -------
+    Claim
+        Claim on the difference from the closed form.
+    """
     return Claim(
         id="D3",
         statement=f"dilatancy {dilatancy:g}, drainage {drainage:g}: k_cr is that of growth",
@@ -57,17 +106,36 @@ def growth_threshold_claim(dilatancy: float, drainage: float) -> Claim:
         where={"dilatancy": dilatancy, "drainage": drainage},
         published=0.0,
         tolerance=3e-11,
-        reason="central differences of the assembled equations, to 1e-8 of it",
+        reason="central differences of the assembled equations have a relative error of 1e-8",
     )
 
 
 def drained_critical_stiffness(dataset: xr.Dataset) -> float:
-    """b - a, the critical stiffness of a drained fault."""
+    """Return the critical stiffness of a drained fault, b - a.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+
+    Returns
+    -------
+    float
+        Critical stiffness in sigma_*/D_c.
+    """
     return float(dataset["a"]) * (float(dataset["b_over_a"]) - 1.0)
 
 
 def plot_limits(dataset: xr.Dataset, axes: Axes) -> None:
-    """The drained limit across, and at the left those without drainage."""
+    """Draw the drained limit, and the undrained limits at the left.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots import cycle_style
 
     drained = drained_critical_stiffness(dataset)
@@ -129,7 +197,7 @@ study = Study(
             variable="critical_stiffness",
             where={"dilatancy": 0.012, "drainage": 1e-3},
             published=1e-4,
-            reason="an inequality: a fiftieth of b - a",
+            reason="an inequality; the bound is 2 % of b - a",
         ),
         Claim.above(
             id="D4",

@@ -1,11 +1,12 @@
-"""Dilatancy: stick-slip cycles that become slow.
+"""Stick-slip cycles of a dilatant fault, from dynamic rupture to slow slip.
 
-A spring half as stiff as the drained critical one: steady sliding is unstable in every cell, and
-without dilatancy cycles end in dynamic rupture at 10^9 V_*. Ruptures have no time to drain. Some
-way beyond the dilatancy at which the spring is stiffer than the undrained critical one, b - a - E,
-slip still accelerates, but never comes to rupture: within a narrow range of dilatancy cycles of
-10^9 V_* become slow slip of 10 to 1000 V_*, with a tenth of the stress drop. Faster drainage moves
-that to stronger dilatancy.
+The stiffness is half of the critical stiffness of a drained fault, so steady sliding is unstable in
+all cells. Without dilatancy, the cycles end in dynamic ruptures with slip rates of 10^9 V_*. Fluid
+does not have enough time to flow into the pores during a rupture. If dilatancy is so strong that
+the spring is considerably stiffer than the undrained critical stiffness, (b - a - E) sigma_*/D_c,
+slip accelerates but does not become a rupture. Within a narrow range of dilatancy, the peak slip
+rate decreases from 10^9 V_* to values between 10 and 1000 V_*, and the stress drop decreases by a
+factor of ten. With faster drainage, this change occurs at stronger dilatancy.
 """
 
 import numpy as np
@@ -21,7 +22,26 @@ from ._fluids import DILATANT_FAULT, REFERENCE, SEGALL_RICE
 def peak_slip_rate_claim(
     law: str, dilatancy: float, relation: str, log10: float, what: str
 ) -> Claim:
-    """D7: how fast a cycle slips where c* D_c/V_* = 1."""
+    """Return a claim on the peak slip rate of a cycle at c* D_c/V_* = 1 (D7).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    dilatancy : float
+        Value of the field ``dilatancy``.
+    relation : str
+        Relation of the result to the expected value: "equals", "below" or "above".
+    log10 : float
+        Bound of the decimal logarithm of V/V_*.
+    what : str
+        Description of the cycle.
+
+    Returns
+    -------
+    Claim
+        Claim on the peak slip rate.
+    """
     return Claim(
         id="D7",
         statement=f"{law} law, dilatancy {dilatancy:g}: {what}",
@@ -34,13 +54,22 @@ def peak_slip_rate_claim(
     )
 
 
-#: Time, in D_c/V_*, before and after the fastest slip is on log scales that meet in a linear one of
-#: this width: slip speeds up to a rupture as one over the time that is left.
+#: Half-width of the linear range of the time axis, in D_c/V_*. Outside this range, the axis is
+#: logarithmic on both sides of the fastest slip, because the slip rate increases as the inverse of
+#: the time that remains before a rupture.
 LINEAR_TIME_RANGE = 1e-6
 
 
 def plot_undrained_stiffness(dataset: xr.Dataset, axes: Axes) -> None:
-    """Line where the spring is as stiff as the critical one of no drainage."""
+    """Draw a line at the dilatancy at which the undrained spring is critical.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     weakening = float(dataset["a"]) * (float(dataset["b_over_a"]) - 1.0)
     critical = (weakening - float(dataset["stiffness"])) / float(dataset["mu_star"])
     text = "spring as stiff as the undrained critical one"
@@ -48,13 +77,32 @@ def plot_undrained_stiffness(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def time_from_fastest_slip(row: xr.Dataset) -> xr.DataArray:
-    """Time from the fastest slip."""
+    """Return time relative to the time of fastest slip.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results of one cycle.
+
+    Returns
+    -------
+    xarray.DataArray
+        Time in D_c/V_*.
+    """
     fastest = int(np.argmax(np.nan_to_num(row["log10_slip_rate"].values, nan=-np.inf)))
     return row["time"] - row["time"][fastest]
 
 
 def set_symlog_time_scale(_dataset: xr.Dataset, axes: Axes) -> None:
-    """Log scales before and after the fastest slip."""
+    """Set logarithmic time scales before and after the fastest slip.
+
+    Parameters
+    ----------
+    _dataset : xarray.Dataset
+        Results of the study. Not used.
+    axes : matplotlib.axes.Axes
+        Axes with time on the horizontal axis.
+    """
     axes.set_xscale("symlog", linthresh=LINEAR_TIME_RANGE, linscale=0.5)
     axes.set_xticks([-1.0, -1e-3, 0.0, 1e-3, 1.0], ["$-1$", "$-10^{-3}$", "0", "$10^{-3}$", "1"])
     axes.set_xticks([], minor=True)

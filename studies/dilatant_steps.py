@@ -1,10 +1,10 @@
-"""Dilatancy: the critical step of load point velocity against drainage.
+"""Critical velocity step of a dilatant fault as a function of drainage.
 
-The spring is stiffer than critical however fast pores drain, and steady sliding stable: it takes a
-step of load point velocity to trigger instability. The step grows with dilatancy, and the more the
-less there is time to drain. Slip accelerates far beyond drainage on the way to instability, so that
-drainage has to be a hundred times faster than for steady sliding (study dilatancy) to bring the
-drained boundary back.
+The spring is stiffer than critical at all drainage rates, so steady sliding is stable, and only a
+step of load point velocity can trigger an instability. The critical step increases with dilatancy,
+in particular at slow drainage. On the way to instability, slip becomes much faster than drainage.
+The drainage that is necessary to reach the drained limit is therefore a hundred times faster than
+for steady sliding (see the study dilatancy).
 """
 
 from typing import Any
@@ -28,7 +28,22 @@ FAULTS: dict[str, dict[str, str | float]] = {
 
 
 def stabilisation_claim(fault: str, drainage: float, by: float) -> Claim:
-    """D5: dilatancy stabilises."""
+    """Return the claim that dilatancy increases the critical step (D5).
+
+    Parameters
+    ----------
+    fault : str
+        Name of the fault.
+    drainage : float
+        Drainage rate c* D_c/V_*.
+    by : float
+        Minimum increase of the critical step relative to the drained fault, in V_*.
+
+    Returns
+    -------
+    Claim
+        Claim on the difference of the critical steps.
+    """
     return Claim.above(
         id="D5",
         statement=f"{fault}, drainage {drainage:.3g}: {by:g} V_* more than drained",
@@ -41,7 +56,20 @@ def stabilisation_claim(fault: str, drainage: float, by: float) -> Claim:
 
 
 def fault_style(row: xr.Dataset) -> dict[str, Any]:
-    """Style of what no drainage changes, behind the others."""
+    """Return the line style of a fault.
+
+    The drained fault does not depend on drainage and is drawn in grey behind the other curves.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results of one fault.
+
+    Returns
+    -------
+    dict
+        Keyword arguments for ``matplotlib.axes.Axes.plot``.
+    """
     grey = {"color": "0.75", "linestyle": "-", "linewidth": 2.2, "marker": "", "zorder": 1}
     return grey if row["fluid"] == "drained" else {}
 

@@ -1,12 +1,13 @@
-"""Displacement boundary: how large a step of load point displacement triggers instability (Fig.
-7).
+"""Critical step of load point displacement against a/(b-a) (Fig. 7).
 
-A slider in steady state at V_* has its load point displaced at once, and then held or moved on at
-V_*. The boundary is the smallest step that takes the slip rate to the instability norm. For the
-slip law and a load point held it is D_c a/(b-a) at every stiffness, at constant normal stress and
-in the limit of a large norm; variable normal stress moves it little. A load point that moves on
-lowers it, the more the softer the spring. The slowness law takes 1.7 to 8 times the displacement;
-where a spring is stiff, only one that takes the slip rate to the norm by itself.
+A slider in steady state at V_* is subjected to an instantaneous displacement of the load point. The
+load point is then held or continues to move at V_*. The critical step is the smallest step after
+which the slip rate reaches the instability norm. Under the slip law, at constant normal stress and
+for a large norm, the critical step of a load point that is held is D_c a/(b-a) at every stiffness,
+and variable normal stress changes this result very little. If the load point continues to move, the
+critical step is smaller, in particular for soft springs. Under the slowness law, the critical step
+is 1.7 to 8 times larger. On stiff springs, an instability under the slowness law occurs only if the
+slip rate reaches the norm during the step.
 """
 
 from typing import Any
@@ -39,7 +40,24 @@ SLIP_HELD = {"law": "slip", "load": "held"}
 
 
 def closeness_claim(case: str, stiffness_ratio: float, tolerance: float, reason: str) -> Claim:
-    """C10: the boundary close to D_c/lambda."""
+    """Return the claim that the critical step is close to D_c a/(b-a) (C10).
+
+    Parameters
+    ----------
+    case : str
+        Name of the case.
+    stiffness_ratio : float
+        Stiffness relative to the critical stiffness.
+    tolerance : float
+        Tolerance of the claim.
+    reason : str
+        Reason for the tolerance.
+
+    Returns
+    -------
+    Claim
+        Claim on the slope of the critical step against a/(b-a).
+    """
     return Claim(
         id="C10",
         statement=f"{case}, k = {stiffness_ratio:g} k_cr: step = D_c a/(b-a)",
@@ -56,7 +74,20 @@ ABSCISSA = "a_over_b_minus_a"
 
 
 def marker_style(row: xr.Dataset) -> dict[str, Any]:
-    """Points that lie on each other show all the same, the larger behind."""
+    """Return markers that remain visible if points coincide.
+
+    Markers are larger and open for small values of alpha.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results of one case.
+
+    Returns
+    -------
+    dict
+        Keyword arguments for ``matplotlib.axes.Axes.plot``.
+    """
     alpha = float(np.nan_to_num(row.get("alpha", 0.0)))
     return {
         "markersize": max(2.0, 7.0 - 9.0 * alpha),
@@ -163,7 +194,8 @@ study = Study(
             },
             published=2.697,
             tolerance=6e-4,
-            reason="printed to three decimals; ours is 2.6975, and theirs cut rather than rounded",
+            reason="the paper has three decimals; our result is 2.6975, so the published value is "
+            "truncated instead of rounded",
         ),
     ],
     plot=figure,

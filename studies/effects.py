@@ -1,11 +1,13 @@
-"""Effects: what each combination costs in a limit cycle, and what the answer loses without it.
+"""Cost of each physical effect in a limit cycle, and error if it is neglected.
 
-Every combination of normal stress coupling and dynamics for both laws, k = 0.8 k_cr. Without mass
-or damping the slip rate runs away, but for the slowness law at variable normal stress, whose cycles
-reach 10^13 to 10^19 V_*. Radiation damping costs half of what mass does, and loses the overshoot: a
-quarter to a half of the static stress drop. An effect that is not in the scene adds no unknown and
-no time. Times of a right-hand side are over those of the plainest scene, quasi-static at constant
-normal stress, which takes turns with it.
+The study combines all normal stress couplings with all kinds of dynamics for both laws at k = 0.8
+k_cr. Without inertia and radiation damping, the slip rate is unbounded, except under the slowness
+law at variable normal stress, where it reaches 10^13 to 10^19 V_*. A cycle with radiation damping
+needs half as many right-hand-side evaluations as a cycle with inertia. However, a cycle with
+radiation damping has no overshoot, so the static stress drop is smaller by 25 to 50 %. An effect
+that is not part of the scene adds no unknowns and no computing time. Times of a right-hand-side
+evaluation are relative to a quasi-static scene at constant normal stress. Both are timed in
+alternation.
 """
 
 import math
@@ -25,8 +27,8 @@ from rsfstudy.slider import Equations, equations_between_ruptures, equations_in_
 from rsfstudy.study import DrawFunction
 from rsfstudy.study.figure_declarations import Axes
 
-#: Radiation damping with the impedance of spring and mass, K T V_*/(2 pi D_c), at constant normal
-#: stress.
+#: Radiation damping that equals the impedance of the spring and the mass at constant normal stress,
+#: K T V_*/(2 pi D_c).
 IMPEDANCE = 0.8 * 0.0145 * 5.0 * 1.17e-8 / (2.0 * math.pi)
 
 COUPLINGS: dict[str, dict[str, str | float]] = {
@@ -42,14 +44,14 @@ DYNAMICS: dict[str, dict[str, bool | float]] = {
 FULL_SCENE_PLACE = {"coupling": "inclined driving, alpha", "dynamics": "inertia"}
 
 
-#: Evaluations timed together, and how often: the forms of the equations take short turns, so that
-#: a busy moment of the machine falls on all of them.
+#: Number of evaluations per timing, and number of timings. The forms of the equations are timed in
+#: short turns, so that other processes on the machine affect all forms equally.
 _EVALUATIONS_PER_TIMING, _TIMING_REPEATS = 100, 25
-#: Unknowns at which they are evaluated; further states are 0.
+#: Values of the unknowns at which the equations are evaluated. Additional states are zero.
 _SLOW_UNKNOWNS, _RUPTURE_UNKNOWNS = (0.01, 0.0), (0.01, 10.0, 0.01)
 
 _CYCLE_MEASURE = LimitCycle(phases=2)
-#: Of its numbers, those that are kept.
+#: Outputs of the limit cycle that are kept.
 _CYCLE_OUTPUTS = tuple(
     replace(about, error=about.name == LimitCycle.primary_output)
     for about in LimitCycle.outputs
@@ -57,7 +59,7 @@ _CYCLE_OUTPUTS = tuple(
 )
 
 
-#: What its numbers are.
+#: Outputs of the measure.
 _OUTPUTS = (
     *_CYCLE_OUTPUTS,
     Output("unknowns", "", "1", "unknowns of the equations between ruptures"),
@@ -84,10 +86,12 @@ _OUTPUTS = (
 
 @dataclass(frozen=True)
 class EffectCost(Measure):
-    """A limit cycle, with what its effects cost: the numbers of the cycle, the unknowns of each
-    form of the equations, the share of the work that the full equations took, and the time of one
-    right-hand side of each form, also relative to that of the plainest scene of the same law:
-    constant normal stress, quasi-static.
+    """Limit cycle with the computational cost of its physical effects.
+
+    The results include the number of unknowns and the time of a right-hand-side evaluation for each
+    form of the equations. The fraction of evaluations during ruptures is reported as well. Times
+    are also reported relative to the simplest scene of the same law, which is quasi-static with
+    constant normal stress.
     """
 
     name: ClassVar[str] = "effect_cost"
@@ -97,7 +101,22 @@ class EffectCost(Measure):
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """The cycle under this meter; the forms of the equations on their own."""
+        """Compute the limit cycle and the cost of the equations.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Outcome of the measure. The costs are reported even if the limit cycle fails.
+        """
         costs = _measure_costs(scene)
         try:
             cycle = _CYCLE_MEASURE.compute(scene, accuracy, meter)
@@ -111,7 +130,18 @@ class EffectCost(Measure):
 
 
 def _measure_costs(scene: Scene) -> dict[str, float]:
-    """Unknowns of the forms of the equations of a scene, and the time of a right-hand side."""
+    """Measure the cost of the equations of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Parameters of the slider.
+
+    Returns
+    -------
+    dict
+        Results by name, for the equations between ruptures and, with inertia, during ruptures.
+    """
     slow = equations_between_ruptures(scene, clock=False)
     forms: dict[str, tuple[Equations, tuple[float, ...]]] = {"": (slow, _SLOW_UNKNOWNS)}
     if scene.inertia:
@@ -137,7 +167,7 @@ def _measure_costs(scene: Scene) -> dict[str, float]:
 
 
 def _time_right_hand_side(equations: Equations, state: tuple[float, ...]) -> float:
-    """Processor time of one right-hand side."""
+    """Return the processor time of one right-hand-side evaluation in s."""
     rate, p = equations.rate_function, equations.parameters
     state += (0.0,) * (len(equations.unknowns) - len(state))
     began = time.thread_time()
@@ -147,9 +177,25 @@ def _time_right_hand_side(equations: Equations, state: tuple[float, ...]) -> flo
 
 
 def draw_bars(variable: str, digits: int) -> DrawFunction:
-    """Bars of a number: one row a combination, and one bar a law."""
+    """Return a function that draws a bar chart of a variable.
+
+    The chart has one row for each combination of effects, and one bar for each law.
+
+    Parameters
+    ----------
+    variable : str
+        Name of the variable.
+    digits : int
+        Number of digits of the labels.
+
+    Returns
+    -------
+    DrawFunction
+        Function that draws on axes.
+    """
 
     def mark(dataset: xr.Dataset, axes: Axes) -> None:
+        """Draw the bar chart."""
         from rsfstudy.plots import cycle_style, label_rows
 
         values = dataset[variable].stack(row=("coupling", "dynamics")).transpose("law", "row")
@@ -193,7 +239,22 @@ figure = Figure(
 
 
 def static_drop_loss_claim(law: str, dynamics: str, published: float) -> Claim:
-    """E1: radiation damping instead of mass loses part of the static drop."""
+    """Return the claim that the static drop is smaller without inertia (E1).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    dynamics : str
+        Kind of dynamics that replaces inertia.
+    published : float
+        Minimum relative reduction of the static stress drop.
+
+    Returns
+    -------
+    Claim
+        Claim on the relative reduction.
+    """
     return Claim.above(
         id="E1",
         statement=f"{law} law: {dynamics} instead of mass loses part of the static drop",
@@ -233,7 +294,8 @@ study = Study(
             variable="unknowns",
             where={"law": "slip", **FULL_SCENE_PLACE},
             published=2.0,
-            reason="spring stress and state; mass adds its unknown in ruptures only",
+            reason="the unknowns are spring stress and state; inertia adds an unknown only during "
+            "ruptures",
         ),
         Claim.below(
             id="E2",

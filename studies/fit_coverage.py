@@ -42,9 +42,9 @@ MODELLED_KINDS = [
     kind for kind in NOISE_KINDS if kind not in (*FLAGGED_KINDS, *KINDS_WITHOUT_CLAIM)
 ]
 PROCESSES = (*CLASSIC_PROCESSES, *NOISE_KINDS)
-#: Of which shares of records are told, with what Gaussian errors cover.
+#: Nominal coverage of the intervals that are tested, by variable.
 NOMINAL_COVERAGE = {"inside_one": SHARE_WITHIN_ONE_STDERR, "inside_two": SHARE_WITHIN_TWO_STDERRS}
-#: Standard deviations of a binomial share by which ours may be off.
+#: Largest deviation of a measured coverage from its nominal value, in binomial standard deviations.
 MAX_BINOMIAL_DEVIATION = 3.5
 
 
@@ -59,7 +59,7 @@ class ShareInside(Reduction):
         ``covers``, in binomial standard deviations.
     of : str
         Variable that is 1 inside the interval and 0 outside.
-    covers : float
+    covers : float, optional
         Nominal coverage of the interval.
     """
 
@@ -71,7 +71,18 @@ class ShareInside(Reduction):
     }
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compute the mean over records."""
+        """Compute the mean over records.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the study.
+
+        Returns
+        -------
+        xarray.Dataset
+            Fraction for each parameter, and the smallest fraction.
+        """
         share = dataset[self.of].mean("seed")
         spread = np.sqrt(self.covers * (1.0 - self.covers) / dataset.sizes["seed"])
         least = (share.min("parameter") - self.covers) / spread
@@ -96,14 +107,33 @@ class ShareFlagged(Reduction):
     }
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compute the mean over records."""
+        """Compute the mean over records.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the study.
+
+        Returns
+        -------
+        xarray.Dataset
+            Fraction of records.
+        """
         return xr.Dataset({self.name: dataset[self.of].mean("seed")})
 
 
 def plot_shares(dataset: xr.Dataset, axes: Axes) -> None:
-    """Plot the fractions by kind of noise, for the fit and for the usual formula.
+    """Plot the fraction of intervals with the exact value by kind of noise.
 
-    Each parameter has a marker, and full markers are those of the fit.
+    Each parameter has a different marker. Full markers show the intervals of the fit, and open
+    markers show the intervals of the usual formula.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
     """
     from rsfstudy.plots import cycle_marker, cycle_style
 
@@ -131,12 +161,38 @@ shares_panel = Panel(
 
 
 def figure_height(dataset: xr.Dataset) -> float:
-    """Return the height of a panel in mm, for the number of kinds of noise."""
+    """Return the height of a panel for the number of kinds of noise.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+
+    Returns
+    -------
+    float
+        Height in mm.
+    """
     return 30.0 + 5.0 * dataset.sizes["process"]
 
 
 def coverage_claims(series: str, words: str, **where: str) -> list[Claim]:
-    """Return two claims that intervals have their nominal coverage."""
+    """Return the claims that two intervals have their nominal coverage.
+
+    Parameters
+    ----------
+    series : str
+        Prefix of the identifiers of the claims.
+    words : str
+        Description of the records.
+    **where : str
+        Coordinates of the records.
+
+    Returns
+    -------
+    list of Claim
+        Claims on the coverage of the 68.3 % and 95.4 % intervals.
+    """
     return [
         Claim.above(
             id=f"{series}{number}",
@@ -146,14 +202,29 @@ def coverage_claims(series: str, words: str, **where: str) -> list[Claim]:
             where=where,
             published=0.0,
             tolerance=MAX_BINOMIAL_DEVIATION,
-            reason="binomial standard deviations, of the parameter covered least",
+            reason="in binomial standard deviations, for the parameter with the lowest coverage",
         )
         for number, (name, share) in enumerate(NOMINAL_COVERAGE.items(), start=1)
     ]
 
 
 def flagged_claim(process: str, law: str, least: float) -> Claim:
-    """Declare that the fit detects noise that the noise model cannot describe."""
+    """Return the claim that the fit detects noise that it cannot model (F6).
+
+    Parameters
+    ----------
+    process : str
+        Kind of noise.
+    law : str
+        State evolution law.
+    least : float
+        Minimum fraction of records that are flagged.
+
+    Returns
+    -------
+    Claim
+        Claim on the fraction of flagged records.
+    """
     return Claim.above(
         id="F6",
         statement=f"{process} record, {law} law: the fit reports that errors are not valid",
@@ -161,12 +232,25 @@ def flagged_claim(process: str, law: str, least: float) -> Claim:
         variable="flagged_share",
         where={"process": process, "law": law},
         published=least,
-        reason="the least share of such records",
+        reason="smallest acceptable fraction of records",
     )
 
 
 def seldom_flagged_claim(process: str, law: str) -> Claim:
-    """Return the claim that the fit accepts noise that it can model."""
+    """Return the claim that the fit accepts noise that it can model (F7).
+
+    Parameters
+    ----------
+    process : str
+        Kind of noise.
+    law : str
+        State evolution law.
+
+    Returns
+    -------
+    Claim
+        Claim on the fraction of flagged records.
+    """
     return Claim.below(
         id="F7",
         statement=f"{process} record, {law} law: the fit seldom reports errors that are not valid",
@@ -175,12 +259,25 @@ def seldom_flagged_claim(process: str, law: str) -> Claim:
         where={"process": process, "law": law},
         published=0.05,
         tolerance=0.08,
-        reason="two of 24 records by chance",
+        reason="two of 24 records may be flagged by chance",
     )
 
 
 def naive_errors_claim(process: str, law: str) -> Claim:
-    """Return the claim that the usual formula underestimates errors."""
+    """Return the claim that the usual formula underestimates errors (F3).
+
+    Parameters
+    ----------
+    process : str
+        Kind of noise.
+    law : str
+        State evolution law.
+
+    Returns
+    -------
+    Claim
+        Claim on the coverage of the intervals of the usual formula.
+    """
     return Claim.below(
         id="F3",
         statement=f"{process} noise, {law} law: naive 68.3 % intervals cover far less",
@@ -188,7 +285,7 @@ def naive_errors_claim(process: str, law: str) -> Claim:
         variable="naive_share_one_least",
         where={"process": process, "law": law},
         published=-MAX_BINOMIAL_DEVIATION,
-        reason="beyond chance",
+        reason="the difference is too large to be due to chance",
     )
 
 

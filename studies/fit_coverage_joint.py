@@ -1,10 +1,12 @@
-"""Do the errors of fits with two states cover the truth, of one step and of two fitted as one?
+"""Coverage of the confidence intervals of fits with two states.
 
-Velocity steps of a slider with two states, with white noise and with noise of a correlation of 0.9,
-are fitted by the law that made them: a step up alone, and a step up and one back as one, each with
-its own friction before it and its own trend. Correlated noise leaves 26 independent rows to a step:
-one step tells the longer slip distance to a third then, and intervals of what goes with it are
-those of the likelihood, which is no parabola. Markers are as in fit_coverage.
+Synthetic records of a slider with two states are fitted with the law that was used to compute them.
+The records contain a single velocity step up, or a step up and a step back that are fitted jointly
+with separate values of initial friction and trend. The noise is white or has a correlation of 0.9.
+Correlated noise reduces the effective sample size of a step to 26. In this case, a single step
+determines the longer slip distance only to within a third. The likelihood of parameters that are
+correlated with this slip distance is not parabolic, and the confidence intervals are computed from
+the likelihood. Markers have the same meaning as in the study fit_coverage.
 """
 
 from dataclasses import replace

@@ -1,9 +1,10 @@
-"""Hard cases: what breaks ordinary slider codes, each with what must come out.
+"""Hard cases for slider codes, with known results.
 
-Slip rates from 10^-1745 to 10^87 V_*, critical stiffness to eight digits, parameters at the ends of
-their ranges, masses from none to overwhelming, and loading that friction cannot follow. Each case
-ends with the number an independent computation or a closed form gives, within its own error
-estimate, or with the status that names the reason.
+The cases include slip rates from 10^-1745 to 10^87 V_*, stiffness that differs from the critical
+stiffness in the eighth digit, parameters at the ends of their ranges, masses from zero to very
+large values, and loading that friction cannot balance. If the result is a number, it must agree
+with an independent computation or a closed form to within its error estimate. Otherwise the
+computation must end with a status that describes the reason.
 """
 
 import math
@@ -36,10 +37,15 @@ from ._reference_values import KnownValue
 
 @dataclass(frozen=True)
 class HardCase(ProblemMeasure):
-    """Solves the problem a scene poses and holds the outcome against the known answer.
+    """Comparison of the result of a scene with the known answer.
 
-    ``ok`` where it ends as it must and, if the answer is a number, the error is within the
-    outcome's own estimate; ``unverified`` otherwise.
+    The status is ``ok`` if the outcome has the expected status and the error does not exceed the
+    error estimate. Otherwise the status is ``unverified``.
+
+    Parameters
+    ----------
+    problems : tuple of Problem
+        Problems, one for each scene of the lattice.
     """
 
     name: ClassVar[str] = "hard_case"
@@ -49,7 +55,22 @@ class HardCase(ProblemMeasure):
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Measure, and compare."""
+        """Compute the result, and compare it with the known answer.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Outcome of the comparison.
+        """
         problem = self.problem_of_scene(scene)
         outcome, spent = problem.measure.run_metered(scene, accuracy)
         meter.evaluations_by_regime, meter.evaluations = (
@@ -93,38 +114,108 @@ cycle_measure, peaks_measure = LimitCycle(phases=2), StepResponse(peaks=2, phase
 
 
 def with_load_velocity(velocity_ratio: float, **fields: Any) -> Fields:
-    """Fields of a scene with this velocity of its load point."""
+    """Return fields of a scene with a given load point velocity.
+
+    Parameters
+    ----------
+    velocity_ratio : float
+        Load point velocity V_0/V_*.
+    **fields : object
+        Other fields of the scene.
+
+    Returns
+    -------
+    dict
+        Fields of the scene.
+    """
     return {**fields, "load_velocity_ratio": velocity_ratio}
 
 
 def near_critical_stiffness(off: float, **fields: Any) -> Fields:
-    """Fields of a scene with a stiffness of (1 + off) k_cr, at constant normal stress."""
+    """Return fields of a scene with a stiffness close to critical.
+
+    Normal stress is constant.
+
+    Parameters
+    ----------
+    off : float
+        Relative difference from the critical stiffness.
+    **fields : object
+        Other fields of the scene.
+
+    Returns
+    -------
+    dict
+        Fields of the scene.
+    """
     return {**CONSTANT_FIELDS, "stiffness_ratio": 1.0 + off, **fields}
 
 
 def add_value_case(label: str, measure: Measure, known: KnownValue, fields: Fields) -> None:
-    """A case with a number to come out."""
+    """Add a case with a known value.
+
+    Parameters
+    ----------
+    label : str
+        Name of the case.
+    measure : Measure
+        Measure that is computed.
+    known : KnownValue
+        Known value.
+    fields : dict
+        Fields of the scene.
+    """
     CASES[label] = register_problem(fields, measure, **known._asdict())
 
 
 def add_status_case(label: str, measure: Measure, status: Status, fields: Fields) -> None:
-    """A case that must end with a status."""
+    """Add a case with a known status.
+
+    Parameters
+    ----------
+    label : str
+        Name of the case.
+    measure : Measure
+        Measure that is computed.
+    status : Status
+        Expected status.
+    fields : dict
+        Fields of the scene.
+    """
     CASES[label] = register_problem(fields, measure, status=status, source="the physics")
 
 
 def add_critical_step_case(label: str, **fields: Any) -> None:
-    """A critical step of the slip law by the independent computation."""
+    """Add a case with a critical step from the independent computation.
+
+    Parameters
+    ----------
+    label : str
+        Name of the case, a key of ``HARD_STEPS``.
+    **fields : object
+        Fields of the scene.
+    """
     add_value_case(label, step_measure, known.HARD_STEPS[label], fields)
 
 
 def add_cycle_case(label: str, name: str, **fields: Any) -> None:
-    """A limit cycle of the slip law by the independent computation."""
+    """Add a case with a limit cycle from the independent computation.
+
+    Parameters
+    ----------
+    label : str
+        Name of the known value, a key of ``HARD_CYCLES``.
+    name : str
+        Name of the case.
+    **fields : object
+        Fields of the scene.
+    """
     add_value_case(
         name, cycle_measure, known.HARD_CYCLES[label], {**CONSTANT_FIELDS, **CYCLE_FIELDS, **fields}
     )
 
 
-# rates and steps beyond what numbers hold
+# Slip rates and steps that exceed the range of floating-point numbers.
 add_value_case(
     "200-fold step, peak at 10^87 V_*",
     peaks_measure,
@@ -165,7 +256,7 @@ add_value_case(
     KnownValue(1.0, CLOSED_FORM_SOURCE),
     with_load_velocity(1e24, **SLIP_FIELDS),
 )
-# at and around the critical stiffness
+# Stiffness close to the critical stiffness.
 add_value_case(
     "critical step, k = (1 +1e-08) k_cr",
     step_measure,
@@ -176,11 +267,12 @@ for off in (-1e-3, 1e-3):
     grows = KnownValue(float(off < 0.0), LINEAR_THEORY_SOURCE, scale=1.0)
     tiny = near_critical_stiffness(off, load_velocity_ratio=1.0 + 1e-3)
     add_value_case(f"tiny step, k = (1 {off:+g}) k_cr", triggered_measure, grows, tiny)
-# growth and decay of 1e-8 an orbit cannot be told apart at rtol 1e-7, and the status says so
+# A growth or decay of 1e-8 per orbit cannot be resolved at rtol = 1e-7, so the expected status is
+# "unverified".
 for off in (-1e-8, 1e-8):
     tiny = near_critical_stiffness(off, load_velocity_ratio=1.0 + 1e-3)
     add_status_case(f"tiny step, k = (1 {off:+g}) k_cr", triggered_measure, Status.UNVERIFIED, tiny)
-# every step is unstable there, by a growth of 1e-8 an orbit that no motion can show
+# Every step is unstable here, but a growth of 1e-8 per orbit is too slow to appear in a motion.
 add_status_case(
     "critical step, k = (1 -1e-08) k_cr",
     step_measure,
@@ -195,7 +287,7 @@ add_status_case(
 )
 add_cycle_case("k = 0.99 k_cr", "cycle at 0.99 k_cr", stiffness_ratio=0.99)
 add_cycle_case("V_0 = V_*", "cycle from a nudge, V_0 = V_*", load_velocity_ratio=1.0)
-# parameters at the ends of their ranges
+# Parameters at the ends of their ranges.
 add_critical_step_case("lambda = 0.01", **CONSTANT_FIELDS, b_over_a=1.01)
 add_critical_step_case("lambda = 20", **CONSTANT_FIELDS, b_over_a=21.0)
 add_critical_step_case("a = 1e-4", a=1e-4)
@@ -209,7 +301,7 @@ add_critical_step_case("T = 1e-6 s", period=1e-6)
 add_critical_step_case("T = 1e4 s", period=1e4)
 add_cycle_case("T = 1e-6 s", "cycle, T = 1e-6 s", period=1e-6)
 add_cycle_case("T = 1e4 s", "cycle, T = 1e4 s", period=1e4)
-# where there is no answer but a name
+# Cases with a status instead of a value.
 add_status_case(
     "no steady state below some V",
     rigid_measure,
@@ -294,7 +386,15 @@ add_status_case(
 
 
 def name_cases(dataset: xr.Dataset, axes: Axes) -> None:
-    """Rows with the names of cases."""
+    """Label the rows with the names of the cases.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots import label_rows
 
     label_rows(axes, [str(name) for name in dataset["hard_case"].values])
@@ -304,14 +404,34 @@ def name_cases(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def write_text(axes: Axes, row: int, text: str, color: str = "0.35") -> None:
-    """Words in a row."""
+    """Write text in a row.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    row : int
+        Number of the row.
+    text : str
+        Text to write.
+    color : str, default: "0.35"
+        Colour of the text.
+    """
     across = {"transform": axes.get_yaxis_transform(), "va": "center", "fontsize": 5.5}
     axes.text(0.02, row, text, color=color, **across)
 
 
 def plot_errors(dataset: xr.Dataset, axes: Axes) -> None:
-    """Measured errors (filled) and their estimates (open); names of statuses, and "exact" where
-    there is no error.
+    """Draw measured errors (filled) and error estimates (open).
+
+    Cases without an error are labelled with the name of the status or with the word "exact".
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
     """
     from rsfstudy.plots import cycle_style
 
@@ -334,7 +454,15 @@ def plot_errors(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def plot_work(dataset: xr.Dataset, axes: Axes) -> None:
-    """Right-hand sides of each case, none where none was needed."""
+    """Draw the number of right-hand-side evaluations of each case.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     rows, work = np.arange(dataset.sizes["hard_case"]), dataset["rhs_evaluations"].values
     axes.barh(rows[work > 0], work[work > 0], color="0.6", left=0.0)
     for row in rows[work == 0]:
@@ -373,7 +501,7 @@ study = Study(
             variable="measured_error",
             where={"hard_case": label},
             published=1e-7,
-            reason="an inequality, against an independent computation",
+            reason="an inequality; the reference is an independent computation",
         )
         for label in CASES
         if label.startswith(("cycle at", "cycle from", "cycle, T"))

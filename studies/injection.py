@@ -1,12 +1,14 @@
-"""Injection: fluid pressed slowly into a fault ends instability, and begins it as it flows back.
+"""Slow fluid injection and the stability of steady sliding.
 
-Pore pressure around a fault rises slowly, as it was sampled, and falls again; on a drained fault
-and on ones that dilate, into which it drains. The spring is a little softer than critical before.
-Small departures stop growing where k exceeds the critical stiffness at the pressure of the moment
-in the fault, which falls with effective normal stress, and begin to grow again where k falls below
-it: to the change of pressure within one or two D_c/V_*, by both laws. While pressure rises slip is
-faster, and drainage over slip rate less, so that dilatancy ends instability at lower pressure than
-it begins at.
+Pore pressure around the fault rises slowly and falls again, as given by a sampled record. The fault
+is drained, or dilatant with pores that drain into the surroundings. Before the injection, the
+spring is slightly softer than critical. The critical stiffness decreases with effective normal
+stress. Small perturbations therefore stop growing when k exceeds the critical stiffness at the
+current pressure in the fault, and start to grow again when k falls below the critical stiffness.
+For both laws, the pressure that follows from this rule is accurate to the pressure change in one or
+two D_c/V_*. While pressure rises, slip is faster, and the ratio of drainage to slip rate is
+smaller. On a dilatant fault, instability therefore ends at a lower pressure than the pressure at
+which it begins.
 """
 
 import math
@@ -24,8 +26,8 @@ from rsfstudy.slider import SampledHistory
 from rsfstudy.slider.sampled_history import TIME_COLUMN
 from rsfstudy.study.figure_declarations import Axes, horizontal_line
 
-#: Initial departure of spring stress, over a; samples in D_c/V_*; and part of the record around an
-#: extreme of the size of departures that is looked at for it.
+#: Initial perturbation of spring stress relative to ``a``, sampling interval in D_c/V_*, and
+#: half-width of the window around an extremum as a fraction of the record.
 INITIAL_DEPARTURE, SAMPLING_INTERVAL, EXTREMUM_WINDOW = 1e-5, 0.25, 1.0 / 16.0
 
 LOG_SLIP_RATE_COLUMN = MOTION_VARIABLES.index("log10_slip_rate")
@@ -68,11 +70,34 @@ _OUTPUTS = (
 
 
 def critical_stiffness(scene: Scene, pressure: float, velocity: float) -> float:
-    """k_cr D_c/sigma_* at a pore pressure and a slip rate over V_*, at alpha = 0.
+    r"""Compute the critical stiffness at a pore pressure and a slip rate.
 
-    Drained ``(b - a) s`` with s = 1 - P; else s times the root of
-    ``[K + a (1 + c) - b + E] [K (1 + c) - c (b - a)] = a c K`` with c = c* D_c/V and E = mu_*
-    eps/(beta sigma_* s) (Segall and Rice, 1995).
+    The parameter alpha must be zero. Let :math:`P` be the pore pressure and :math:`s = 1 - P` the
+    effective normal stress, both in units of :math:`\sigma_*`. The critical stiffness of a drained
+    fault is :math:`(b - a)\,s`. The critical stiffness of a dilatant fault is :math:`s K`, and
+    :math:`K` solves
+
+    .. math:: [K + a (1 + c) - b + E]\,[K (1 + c) - c (b - a)] = a c K,
+
+    with :math:`c = c^* D_c/V` and :math:`E = \mu_* \epsilon/(\beta \sigma_* s)`.
+
+    Parameters
+    ----------
+    scene : Scene
+        Parameters of the slider.
+    pressure : float
+        Pore pressure in sigma_*.
+    velocity : float
+        Slip rate V/V_*.
+
+    Returns
+    -------
+    float
+        Critical stiffness in sigma_*/D_c.
+
+    References
+    ----------
+    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171.
     """
     a, weakening, ratio = scene.a, scene.b - scene.a, 1.0 - pressure
     if scene.fluid == "drained":
@@ -87,9 +112,11 @@ def critical_stiffness(scene: Scene, pressure: float, velocity: float) -> float:
 
 @dataclass(frozen=True)
 class StabilisationPressure(Measure):
-    """Pore pressures at which small departures from a motion stop growing while a record of
-    pressure rises, up to its middle, and begin to grow again while it falls: where the size of a
-    departure has its maximum and its minimum.
+    """Pore pressures at which small perturbations stop or start to grow.
+
+    The scene contains a record of pore pressure that rises until the middle of the record and then
+    falls. The size of a perturbation has a maximum in the first half, when the perturbation stops
+    growing, and a minimum in the second half, when the perturbation starts to grow again.
     """
 
     name: ClassVar[str] = "stabilisation"
@@ -98,8 +125,23 @@ class StabilisationPressure(Measure):
     outputs = _OUTPUTS
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """From the motion and one that begins a little beside it; and once more with smaller
-        tolerances for the errors.
+        """Compute the pressures from a motion and a perturbed motion.
+
+        A second run with smaller tolerances provides the error estimates.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Outcome of the measure.
         """
         loading = scene.parts.loading
         if not isinstance(loading, SampledHistory) or not loading.of_pressure:
@@ -122,14 +164,20 @@ class StabilisationPressure(Measure):
 
 
 class _Departures(NamedTuple):
-    """Departures of a motion from another.
+    """Difference between a perturbed and an unperturbed motion.
 
     Attributes
     ----------
-    time, pressure, log_slip_rate : ndarray
-        Of the motion: time, pore pressure in the fault, and ln(V/V_*).
-    when, log_size : ndarray
-        Times at which the departure of ln V is largest, either way, and the logarithms of these.
+    time : ndarray
+        Sample times of the unperturbed motion.
+    pressure : ndarray
+        Pore pressure in the fault at the sample times.
+    log_slip_rate : ndarray
+        ln(V/V_*) at the sample times.
+    when : ndarray
+        Times at which the absolute difference of ln V has a local maximum.
+    log_size : ndarray
+        Logarithm of the absolute difference at these times.
     """
 
     time: np.ndarray
@@ -140,7 +188,22 @@ class _Departures(NamedTuple):
 
     @classmethod
     def follow(cls, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> "_Departures":
-        """Departures of a motion that begins a little beside another, along a record."""
+        """Integrate the unperturbed and the perturbed motion along the record.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        _Departures
+            Differences between the motions.
+        """
         loading = scene.parts.loading
         assert isinstance(loading, SampledHistory)
         time = np.arange(
@@ -157,7 +220,7 @@ class _Departures(NamedTuple):
             tables.append(recording.table(beside))
         motion, other = (math.log(10.0) * table[:, LOG_SLIP_RATE_COLUMN] for table in tables)
         size = np.log(np.abs(other - motion))
-        # of the largest of three neighbours, the parabola through them
+        # The local maxima are refined with a parabola through three samples.
         before, at, after = size[:-2], size[1:-1], size[2:]
         tops = (at > before) & (at >= after)
         before, at, after = before[tops], at[tops], after[tops]
@@ -166,9 +229,23 @@ class _Departures(NamedTuple):
         return cls(time, tables[0][:, -1], motion, when, at - 0.25 * (before - after) * off)
 
     def find_extrema(self, scene: Scene, degree: int = 3) -> dict[str, float]:
-        """Pore pressures, and stiffness over the critical one there, where the size of departures
-        has its maximum in the first half of the record, and its minimum in the second: of a
-        polynomial through those around it.
+        """Find the pore pressures at the extrema of the perturbation.
+
+        The maximum lies in the first half of the record, and the minimum lies in the second half.
+        Each extremum is the root of the derivative of a polynomial that is fitted to the logarithm
+        of the perturbation near the extremum.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        degree : int, default: 3
+            Degree of the polynomial.
+
+        Returns
+        -------
+        dict
+            Pore pressure, and ratio of the stiffness to the critical stiffness, at both extrema.
         """
         lasts, values = float(self.time[-1]), {}
         for at, sign, half in ((GROWTH_ENDS, 1.0, 0.0), (GROWTH_BEGINS, -1.0, 0.5)):
@@ -188,9 +265,10 @@ class _Departures(NamedTuple):
 
 
 def _critical_pressure(scene: Scene) -> float:
-    """Pore pressure at which stiffness is critical at V_0."""
+    """Return the pore pressure at which the stiffness is critical at V_0."""
 
     def excess(pressure: float) -> float:
+        """Return the excess of the critical stiffness over the stiffness."""
         return critical_stiffness(scene, pressure, scene.load_velocity) - scene.stiffness
 
     return float(brentq(excess, -1.0, 0.99))
@@ -198,10 +276,11 @@ def _critical_pressure(scene: Scene) -> float:
 
 # ---- the study -----------------------------------------------------------------------------------
 
-#: How long records last, in D_c/V_*, and the highest pressure, over sigma_*, in their middle.
+#: Durations of the pressure records in D_c/V_*, and the maximum pressure in sigma_*, which is
+#: reached in the middle of the record.
 RECORD_DURATIONS, MAX_PRESSURE = [500.0, 1000.0, 2000.0], 0.04
 SLOWEST_RECORD = f"{RECORD_DURATIONS[-1]:g}"
-#: Samples of a record.
+#: Number of samples of a pressure record.
 RECORD_SAMPLES = 401
 LAWS = ("slip", "slowness")
 DRAINAGES = [0.1, 0.3, 1.0, 3.0, 10.0]
@@ -209,6 +288,7 @@ DRAINED = "drained"
 
 
 def _case_name(drainage: float) -> str:
+    """Return the name of a dilatant case."""
     return f"dilatant, c* = {drainage:g}"
 
 
@@ -220,19 +300,56 @@ base = Scene(normal_stress="imposed", alpha=0.0, b_over_a=2.0, stiffness_ratio=0
 
 
 def pressure_record(lasts: float) -> SampledHistory:
-    """A record of pressure that rises and falls as a cosine does."""
+    """Return a record of pressure that rises and falls as a cosine.
+
+    Parameters
+    ----------
+    lasts : float
+        Duration of the record in D_c/V_*.
+
+    Returns
+    -------
+    SampledHistory
+        Loading history with pore pressure.
+    """
     time = np.linspace(0.0, lasts, RECORD_SAMPLES)
     pressure = 0.5 * MAX_PRESSURE * (1.0 - np.cos(2.0 * math.pi * time / lasts))
     return history({"time": time, "pore_pressure": pressure}, name=f"within_{lasts:g}")
 
 
 def max_pressure_rate(lasts: float) -> float:
-    """The largest rate of pressure, in sigma_* V_*/D_c."""
+    """Return the maximum rate of pressure.
+
+    Parameters
+    ----------
+    lasts : float
+        Duration of the record in D_c/V_*.
+
+    Returns
+    -------
+    float
+        Rate in sigma_* V_*/D_c.
+    """
     return math.pi * MAX_PRESSURE / lasts
 
 
 def critical_stiffness_claim(at: str, law: str, case: str) -> Claim:
-    """I1: stiffness is critical there."""
+    """Return the claim that the stiffness is critical at an extremum (I1).
+
+    Parameters
+    ----------
+    at : str
+        Name of the extremum: "end" or "begin".
+    law : str
+        State evolution law.
+    case : str
+        Name of the case.
+
+    Returns
+    -------
+    Claim
+        Claim on the ratio of stiffness to critical stiffness.
+    """
     return Claim(
         id="I1",
         statement=f"{law} law, {case}, slowest record: k/k_cr where small departures "
@@ -242,12 +359,32 @@ def critical_stiffness_claim(at: str, law: str, case: str) -> Claim:
         where={"law": law, "case": case, "record": SLOWEST_RECORD},
         published=1.0,
         tolerance=2.0 * max_pressure_rate(RECORD_DURATIONS[-1]),
-        reason="by how much pressure changes within 2 D_c/V_*, in which contact and pores evolve",
+        reason="the pressure change within 2 D_c/V_*, the time in which the state and the porosity "
+        "evolve",
     )
 
 
 def critical_pressure_claim(at: str, law: str, case: str, within: float, reason: str) -> Claim:
-    """I2: the pressure itself."""
+    """Return the claim that pressure is critical at an extremum (I2).
+
+    Parameters
+    ----------
+    at : str
+        Name of the extremum: "end" or "begin".
+    law : str
+        State evolution law.
+    case : str
+        Name of the case.
+    within : float
+        Tolerance of the claim in sigma_*.
+    reason : str
+        Reason for the tolerance.
+
+    Returns
+    -------
+    Claim
+        Claim on the difference from the critical pressure at V_0.
+    """
     where = {"law": law, "case": case, "record": SLOWEST_RECORD}
     return Claim(
         id="I2",
@@ -264,17 +401,30 @@ def critical_pressure_claim(at: str, law: str, case: str, within: float, reason:
     )
 
 
-#: By how much slip is faster where pressure changes fastest, over V_*: shear stress follows mu_* P.
+#: Maximum increase of the slip rate relative to V_*. Shear stress follows mu_* P, so the slip rate
+#: is highest when pressure changes fastest.
 MAX_SLIP_RATE_EXCESS = base.mu_star * max_pressure_rate(RECORD_DURATIONS[-1]) / base.stiffness
-CHANGE_REASON = "by how much pressure changes within 2 D_c/V_*"
+CHANGE_REASON = "the pressure change within 2 D_c/V_*"
 RATE_REASON = (
-    "slip is faster or slower by mu_* dP/dt over K, which changes c* D_c/V by as much and k_cr by "
-    "a fifth of that at most: it falls by 0.21 of itself from drained to undrained"
+    "the slip rate changes by (mu_*/K) dP/dt; c* D_c/V has the same relative change, and k_cr has "
+    "at most a fifth of this change, because k_cr decreases by 21 % from drained to undrained "
+    "conditions"
 )
 
 
 def pressure_panel(at: str) -> Panel:
-    """Pore pressures at which departures stop or begin to grow, beside closed forms."""
+    """Return a panel of pore pressures at one of the extrema.
+
+    Parameters
+    ----------
+    at : str
+        Name of the extremum: "end" or "begin".
+
+    Returns
+    -------
+    Panel
+        Panel with the measured pressures and the closed forms.
+    """
     return Panel(
         x="drainage",
         y=f"{at}_pressure",
@@ -291,7 +441,17 @@ def pressure_panel(at: str) -> Panel:
 
 
 def plot_critical_pressure(dataset: xr.Dataset, axes: Axes) -> None:
-    """Pressure at which stiffness is critical at V_0, against drainage, and drained."""
+    """Draw the critical pressure at V_0 as a function of drainage.
+
+    The value of a drained fault is drawn as a dotted line.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     drainages = np.geomspace(0.5 * DRAINAGES[0], 2.0 * DRAINAGES[-1], 100)
     scenes = (base.with_(**CASES[_case_name(1.0)] | {"drainage": c}) for c in drainages.tolist())
     found = [_critical_pressure(scene) for scene in scenes]
@@ -302,20 +462,52 @@ def plot_critical_pressure(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def pressure_rates(row: xr.Dataset) -> xr.DataArray:
-    """Fastest change of pressure of each record."""
+    """Return the maximum rate of pressure of each record.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along the dimension ``record``.
+
+    Returns
+    -------
+    xarray.DataArray
+        Rates in sigma_* V_*/D_c.
+    """
     return xr.DataArray(
         [max_pressure_rate(float(label)) for label in row["record"].values], dims="record"
     )
 
 
 def plot_one_to_one_line(dataset: xr.Dataset, axes: Axes) -> None:
-    """Change of pressure within D_c/V_*."""
+    """Draw the pressure change within D_c/V_*.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     known = pressure_rates(dataset)
     axes.plot(known, known, color="0.8", linewidth=2.2, label="change within $D_c/V_*$", zorder=1.5)
 
 
 def stiffness_deviation_panel(at: str) -> Panel:
-    """How far from critical stiffness is where they do, at pressure and slip rate of the moment."""
+    """Return a panel of deviations from the critical stiffness.
+
+    The critical stiffness is evaluated at the current pressure and slip rate.
+
+    Parameters
+    ----------
+    at : str
+        Name of the extremum: "end" or "begin".
+
+    Returns
+    -------
+    Panel
+        Panel with the deviations.
+    """
     return Panel(
         x=pressure_rates,
         y=lambda row: abs(row[f"{at}_stiffness_ratio"] - 1.0),

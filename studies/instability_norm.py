@@ -1,9 +1,9 @@
-"""Instability norm: how boundaries depend on it, and which norm the paper's numbers imply.
+"""Influence of the instability norm on critical steps.
 
-A motion counts as unstable once V T/(2 pi D_c) reaches a norm the paper does not state. Both of its
-numbers for the slowness law imply the same one, 5e-4. The slip law feels the norm where b - a is
-small against a: at a/(b-a) = 4 the boundary is 4.66 V_* at 5e-4, and 5 V_* for a norm without
-bound.
+A motion is considered unstable when V T/(2 pi D_c) reaches a norm that the paper does not specify.
+Two critical velocities that the paper reports for the slowness law imply the same norm of 5e-4.
+Under the slip law, the norm is important if b - a is small compared to a: at a/(b-a) = 4, the
+critical load point velocity is 4.66 V_* for a norm of 5e-4, and 5 V_* for an infinite norm.
 """
 
 import math
@@ -19,8 +19,9 @@ from rsfstudy.study.figure_declarations import Axes, horizontal_line
 
 from ._paper import PAPER, REFERENCE
 
-#: The two numbers of section 4 (slowness law, b/a = e, alpha = 0.56), and where the slip law at
-#: constant normal stress feels the norm most: weak net weakening.
+#: Critical steps of the study: two values from section 4 of the paper (slowness law, b/a = e, alpha
+#: = 0.56), and the slip law at constant normal stress with small b - a, for which the norm is most
+#: important.
 SOFT_BOUNDARY, STIFF_BOUNDARY = "slowness at k_cr", "slowness at 1.5 k_cr"
 SLOWNESS_FIELDS: dict[str, str | float] = {
     "law": "slowness",
@@ -44,13 +45,29 @@ BOUNDARIES: dict[str, dict[str, str | float]] = {
 
 
 def plot_norm(_dataset: xr.Dataset, axes: Axes) -> None:
-    """The norm of the other studies."""
+    """Draw a line at the norm of the other studies.
+
+    Parameters
+    ----------
+    _dataset : xarray.Dataset
+        Results of the study. Not used.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     grey = {"color": "0.7", "linewidth": 0.8, "linestyle": ":"}
     axes.axvline(5e-4, label="norm of our studies", **grey)
 
 
 def plot_published_norms(dataset: xr.Dataset, axes: Axes) -> None:
-    """The norms that published values imply."""
+    """Draw the norms that the published values imply.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots import cycle_marker, cycle_style, format_number
 
     for place in range(dataset.sizes["boundary"]):
@@ -68,7 +85,20 @@ def plot_published_norms(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def select_law(law: str, values: xr.DataArray) -> xr.DataArray:
-    """Those of one law."""
+    """Select the values of one law.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    values : xarray.DataArray
+        Values with a coordinate ``law``.
+
+    Returns
+    -------
+    xarray.DataArray
+        Values of this law. NaN for the other law.
+    """
     return values.where(values["law"] == law)
 
 
@@ -127,7 +157,7 @@ study = Study(
             where={"boundary": STIFF_BOUNDARY},
             published=5e-4,
             tolerance=1.3e-7,
-            reason="half a unit of the printed 2361 is 1.3e-7 in the norm",
+            reason="half a unit of the last digit of 2361 corresponds to 1.3e-7 in the norm",
         ),
         Claim(
             id="C17",
@@ -138,7 +168,8 @@ study = Study(
             minus={"boundary": STIFF_BOUNDARY},
             published=0.0,
             tolerance=7.9e-6,
-            reason="half a unit of each printed number: 7.7e-6 and 1.3e-7 in the norm",
+            reason="half a unit of the last digit of each value corresponds to 7.7e-6 and 1.3e-7 "
+            "in the norm",
         ),
     ],
     plot=figure,

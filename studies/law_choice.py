@@ -1,8 +1,9 @@
-"""Slip law or slowness law? How often a record tells, and how often it misleads.
+"""Correct and wrong choices between the slip law and the slowness law.
 
-Velocity steps made by one law and fitted by both; Akaike's criterion, in which the noise counts,
-decides where it differs by 4. At the noise of a good rig one step tells the law. At ten times that
-noise a step leaves it open, and a pair, up and back, tells it.
+Velocity steps are computed with one law and fitted with both laws. The law with the lower AIC is
+chosen if the difference exceeds 4. The AIC accounts for the noise model. With the noise of a good
+testing machine, a single step is sufficient to identify the law. With ten times this noise, a
+single step leaves the choice open, and a step up followed by a step back identifies the law.
 """
 
 from collections.abc import Mapping
@@ -32,20 +33,21 @@ DESIGNS = {
     "a pair, up and back": f"{STEP_UP_PROTOCOL}; {STEP_BACK_PROTOCOL}",
 }
 NOISE_SIZES = (5e-4, 5e-3)
-#: Difference of the criterion that decides: the other law is then e^2 times less likely.
+#: Difference of the AIC that is considered decisive. The likelihood of the other law is then lower
+#: by a factor of e^2.
 DECISIVE_AIC_DIFFERENCE = 4.0
 
 
 @dataclass(frozen=True)
 class LawChoiceShares(Reduction):
-    """Shares of records that tell the law that made them, tell the other one, or tell neither.
+    """Fractions of records with a correct, wrong or open choice of the law.
 
     Parameters
     ----------
     name : str
-        Gives ``<name>_right``, ``<name>_wrong`` and ``<name>_open``.
+        Prefix of the results ``<name>_right``, ``<name>_wrong`` and ``<name>_open``.
     of : str
-        The criterion, by law and by fitted law.
+        Variable that contains the AIC along ``law`` and ``fitted_law``.
     """
 
     kind: ClassVar[str] = "choice"
@@ -56,7 +58,18 @@ class LawChoiceShares(Reduction):
     }
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Over records."""
+        """Compute the fractions over all records.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the study.
+
+        Returns
+        -------
+        xarray.Dataset
+            Fractions of records.
+        """
         of = dataset[self.of]
         other = of.sel(fitted_law=list(reversed(LAWS))).assign_coords(fitted_law=list(LAWS))
         laws = of["law"].values
@@ -74,7 +87,15 @@ class LawChoiceShares(Reduction):
 
 
 def plot_shares(dataset: xr.Dataset, axes: Axes) -> None:
-    """Bars of right, open and wrong choices."""
+    """Draw bars with the fractions of correct, open and wrong choices.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots import label_rows
 
     rows = dataset.stack(row=("design", "noise_size"))
@@ -103,7 +124,24 @@ figure = Figure(
 
 
 def all_records_decide_claim(law: str, design: str, size: float) -> Claim:
-    """L1: where the exponent is known to a tenth, all records tell the law."""
+    """Return the claim that all records identify the law (L1).
+
+    The standard error of the exponent is less than 0.1 in these cases.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    design : str
+        Name of the design.
+    size : float
+        Standard deviation of the noise.
+
+    Returns
+    -------
+    Claim
+        Claim on the fraction of correct choices.
+    """
     return Claim(
         id="L1",
         statement=f"{law} law, {design}, noise {size:g}: every record tells it",
@@ -111,12 +149,23 @@ def all_records_decide_claim(law: str, design: str, size: float) -> Claim:
         variable="chosen_right",
         where={"law": law, "design": design, "noise_size": size},
         published=1.0,
-        reason="ten standard errors lie between the laws",
+        reason="the exponents of the laws differ by ten standard errors",
     )
 
 
 def seldom_wrong_claim(law: str) -> Claim:
-    """L2: where noise hides it, a record is seldom taken for one of the other law."""
+    """Return the claim that strong noise rarely leads to a wrong choice (L2).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+
+    Returns
+    -------
+    Claim
+        Claim on the fraction of wrong choices.
+    """
     return Claim.below(
         id="L2",
         statement=f"{law} law, one step up, noise 0.005: fewer than half mislead",
@@ -124,7 +173,7 @@ def seldom_wrong_claim(law: str) -> Claim:
         variable="chosen_wrong",
         where={"law": law, "design": "one step up", "noise_size": 5e-3},
         published=0.5,
-        reason="four of six mislead by chance once in 500",
+        reason="the probability that four of six choices are wrong by chance is 1/500",
     )
 
 

@@ -1,9 +1,11 @@
-"""Which steps tell the evolution law? Its exponent, and how well, by three designs.
+"""Standard error of the exponent of the evolution law for three designs.
 
-Velocity steps of ten with white noise of 5e-4, each with its own friction before it and its own
-trend. The exponent of the law is 0 for the slip law and 1 for the slowness law. One step up tells
-it poorly, since slip distance makes up for it; a second one like it helps as any repetition does. A
-step back tells it ten times better.
+The records contain tenfold velocity steps with white noise, which has a standard deviation of 5e-4.
+Each window has separate values of initial friction and trend. The exponent is 0 for the slip law
+and 1 for the slowness law. A single step up determines the exponent poorly, because a change of the
+slip distance has a similar effect. A second step up reduces the standard error only as much as any
+repetition does. A step up followed by a step back determines the exponent ten times more
+accurately.
 """
 
 import math
@@ -34,11 +36,11 @@ DESIGNS = {
     "a pair, up and back": f"{STEP_UP_PROTOCOL}; {STEP_BACK_PROTOCOL}",
     "two steps up": f"{STEP_UP_PROTOCOL}; {STEP_UP_PROTOCOL}",
 }
-#: Standard errors of the exponent by Fisher's information.
+#: Standard errors of the exponent from the Fisher information.
 EXPECTED_STDERRS = {"one step up": 0.087, "a pair, up and back": 0.009, "two steps up": 0.062}
-#: Standard deviations of chance.
+#: Largest deviation that is attributed to chance, in standard deviations.
 MAX_CHANCE_DEVIATION = 3.5
-#: A law halfway between slip and slowness, whose exponent is fitted.
+#: Exact value of the fitted exponent, halfway between the slip law and the slowness law.
 TRUE_EXPONENT = 0.5
 FAMILY_SCENE = BASE_SCENE.with_(law="family", law_exponent=TRUE_EXPONENT)
 EXPONENT_FIT = SyntheticFit(
@@ -48,16 +50,16 @@ EXPONENT_FIT = SyntheticFit(
 
 @dataclass(frozen=True)
 class ScatterRatio(Reduction):
-    """Scatter of an estimate over records, over the standard error promised.
+    """Ratio of the scatter of an estimate to its expected standard error.
 
     Parameters
     ----------
     name : str
-        Gives ``<name>``, the root of the mean square of deviations over what is promised, and
-        ``<name>_off``: how far that is from 1, in its own standard deviations.
+        Name of the ratio. The scatter is the root mean square of the deviations. ``<name>_off`` is
+        the difference of the ratio from 1, in standard deviations of the ratio.
     of : str
-        Deviations of the estimate.
-    over : tuple of str
+        Variable that contains the deviations of the estimate.
+    over : tuple of str, default: ("seed",)
         Dimensions of the records.
     """
 
@@ -69,23 +71,54 @@ class ScatterRatio(Reduction):
     }
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Over records."""
+        """Compute the ratio over all records.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the study.
+
+        Returns
+        -------
+        xarray.Dataset
+            Ratio, and its difference from 1.
+        """
         square = (dataset[self.of] / dataset["promised_spread"]) ** 2
         found = np.sqrt(square.mean(self.over))
         off = (found - 1.0) * math.sqrt(2.0 * self._record_dimensions(dataset))
         return xr.Dataset({self.name: found, f"{self.name}_off": off})
 
     def derivatives(self, dataset: xr.Dataset) -> Derivatives:
-        """By each deviation: that over what is promised, over the mean and the number of all."""
+        """Return the derivatives of the ratio with respect to the deviations.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the study.
+
+        Returns
+        -------
+        Derivatives
+            Derivatives by result and variable.
+        """
         over = dataset[self.of] / dataset["promised_spread"] ** 2
         return [(over / (self._record_dimensions(dataset) * self(dataset)[self.name]), {})]
 
     def _record_dimensions(self, dataset: xr.Dataset) -> int:
+        """Return the number of records."""
         return math.prod(dataset.sizes[name] for name in self.over)
 
 
 def plot_estimates(dataset: xr.Dataset, axes: Axes) -> None:
-    """Estimates of the exponent by design, and bars of what is promised."""
+    """Draw the estimates of the exponent and the expected standard errors.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots import cycle_marker, cycle_style
 
     seen = dataset.sel(parameter="law_exponent")
@@ -120,7 +153,18 @@ figure = Figure(
 
 
 def design_claims(design: str) -> list[Claim]:
-    """I1 and I2: what steps tell, and that fits find as much."""
+    """Return the claims on the standard error of a design (I1 and I2).
+
+    Parameters
+    ----------
+    design : str
+        Name of the design.
+
+    Returns
+    -------
+    list of Claim
+        Claims on the expected standard error, and on the scatter of the estimates.
+    """
     where = {"design": design, "parameter": "law_exponent"}
     return [
         Claim(
@@ -131,7 +175,7 @@ def design_claims(design: str) -> list[Claim]:
             where={**where, "seed": 0},
             published=EXPECTED_STDERRS[design],
             tolerance=0.02 * EXPECTED_STDERRS[design],
-            reason="two digits are told",
+            reason="the expected value has two digits",
         ),
         Claim(
             id="I2",
@@ -141,7 +185,7 @@ def design_claims(design: str) -> list[Claim]:
             where=where,
             published=0.0,
             tolerance=MAX_CHANCE_DEVIATION,
-            reason="standard deviations of a standard deviation",
+            reason="in standard deviations of the estimated standard deviation",
         ),
     ]
 

@@ -1,14 +1,15 @@
-"""Laws: how much of the displacement boundary hangs on the state evolution law.
+"""Influence of the evolution law on the critical displacement step.
 
-The load point is displaced at once and then held. For every law that falls with Theta/b + ln V
-alone the critical step has a closed form at constant normal stress, h(u*) = -k/k_cr. Between the
-slip and the slowness law (eps from 0 to 1) the step grows with stiffness, and none exists for eps k
->= k_cr: what is left is the jump of slip rate at the step itself. Laws that fall faster than the
-slip law far from steady sliding need smaller steps, the smaller the stiffer the spring. That
-variable normal stress hardly moves the boundary (Fig. 7) holds for the slip law and those near to
-it, and not for the slowness law; nor where slip faster than a cut-off strengthens. The composite
-law has V_c = 100 V_*, the cut-off is at 10^4 V_*. The norm is 1e6, so high that closed forms for an
-infinite one apply.
+The load point is displaced instantaneously and then held. If the evolution of a law depends only on
+Theta/b + ln V, the critical step at constant normal stress has a closed form, h(u*) = -k/k_cr. The
+exponent eps connects the slip law (eps = 0) with the slowness law (eps = 1). For eps > 0, the
+critical step increases with stiffness and does not exist if eps k >= k_cr. On such stiff springs,
+an instability occurs only if the slip rate reaches the norm during the step. Laws with a faster
+evolution than the slip law far from steady sliding have smaller critical steps, in particular on
+stiff springs. Variable normal stress has little influence on the critical step under the slip law
+(Fig. 7 of the paper) and under similar laws. The influence is larger under the slowness law and
+under a law with a cut-off velocity. The composite law has V_c = 100 V_*, and the cut-off velocity
+is 10^4 V_*. The instability norm of 1e6 is so high that closed forms for an infinite norm apply.
 """
 
 import math
@@ -43,7 +44,22 @@ CRITICAL_STIFFNESS_FIELDS = {"normal_stress": "constant", "stiffness_ratio": 1.0
 
 
 def critical_stiffness_claim(law: str, published: float, source: str) -> Claim:
-    """L1: critical stiffness over (b - a) sigma/D_c."""
+    """Return a claim on the critical stiffness of a law (L1).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    published : float
+        Critical stiffness relative to (b - a) sigma/D_c.
+    source : str
+        Source of the claim.
+
+    Returns
+    -------
+    Claim
+        Claim on the critical stiffness.
+    """
     return Claim(
         id="L1",
         statement=f"{law}, constant: k_cr is {published:.6g} (b-a) sigma/D_c",
@@ -52,14 +68,34 @@ def critical_stiffness_claim(law: str, published: float, source: str) -> Claim:
         where={"evolution": law, **CRITICAL_STIFFNESS_FIELDS},
         published=published * (base.b - base.a),
         tolerance=1e-12 * base.b,
-        reason="exact; slopes of the law are taken by differences of order eight",
+        reason="exact, except for the derivatives of the law, which are finite differences of "
+        "order eight",
     )
 
 
 def critical_displacement_claim(
     id_: str, law: str, ratio: float, published: float, tolerance: float
 ) -> Claim:
-    """The critical displacement step in closed form."""
+    """Return the claim that the critical step equals the closed form (L2).
+
+    Parameters
+    ----------
+    id_ : str
+        Identifier of the claim.
+    law : str
+        State evolution law.
+    ratio : float
+        Stiffness relative to the critical stiffness.
+    published : float
+        Critical step relative to D_c a/(b-a).
+    tolerance : float
+        Tolerance of the claim.
+
+    Returns
+    -------
+    Claim
+        Claim on the critical displacement.
+    """
     return Claim(
         id=id_,
         statement=f"{law}, constant, k = {ratio:g} k_cr: step over D_c a/(b-a)",
@@ -68,13 +104,26 @@ def critical_displacement_claim(
         where={"evolution": law, "normal_stress": "constant", "stiffness_ratio": ratio},
         published=published,
         tolerance=tolerance,
-        reason="exact for an infinite norm: 1e6 leaves exp(-32) of it; exp(-16) = 1e-7 at 2 k_cr "
-        "or halfway to the slowness law; its error estimate is 5e-10",
+        reason="exact for an infinite norm; a norm of 1e6 causes a relative error of exp(-32), or "
+        "exp(-16) = 1e-7 at 2 k_cr and for eps = 0.5; the error estimate is 5e-10",
     )
 
 
 def variable_normal_stress_claim(law: str, published: float) -> Claim:
-    """L4: variable normal stress."""
+    """Return a claim on the influence of variable normal stress (L4).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    published : float
+        Expected relative change of the critical step.
+
+    Returns
+    -------
+    Claim
+        Claim on the relative change.
+    """
     return Claim(
         id="L4",
         statement=f"{law}, k = k_cr: variable normal stress moves the step by a few per cent",
@@ -88,7 +137,15 @@ def variable_normal_stress_claim(law: str, published: float) -> Claim:
 
 
 def plot_closed_forms(dataset: xr.Dataset, axes: Axes) -> None:
-    """Open circles at the closed forms that there are."""
+    """Draw open circles at the closed forms.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     if "over_closed_form_closed_form" in dataset:
         known = dataset["over_closed_form_closed_form"].where(
             dataset["normal_stress"] == "constant"
@@ -157,7 +214,8 @@ study = Study(
             where={"evolution": SLOWNESS_END, "normal_stress": "constant", "stiffness_ratio": 2.0},
             published=0.5 * base.log_instability_rate,
             tolerance=1e-7,
-            reason="exact: a ln(V/V_*)/K at the norm; to a tenth of the accuracy asked for",
+            reason="exact: a ln(V/V_*)/K at the norm; the tolerance is a tenth of the requested "
+            "accuracy",
         ),
         variable_normal_stress_claim(SLIP_END, 0.0),
         variable_normal_stress_claim(PERRIN_RICE_ZHENG, 0.0),

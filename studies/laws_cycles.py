@@ -1,12 +1,13 @@
-"""Laws: how much of stick-slip hangs on the state evolution law.
+"""Influence of the evolution law on stick-slip cycles.
 
-Limit cycles with mass by every law, at four load point velocities. The dynamic stress drop falls
-with ln V_0 by about (a-b) sigma_* whatever the law, at constant normal stress; the static drop does
-by 2.1 times that for the slip law and 1.5 times for the slowness law. What hangs on the law most is
-how slow a slider gets between its slips: from 10^-1.4 V_* (slip) to 10^-19 V_* (Perrin-Rice-Zheng).
-That variable normal stress takes ten decades off the slowest slip rate is true of the slip law
-alone; for the slowness law it takes none. The composite law has V_c = 100 V_*; the cut-off at 10^4
-V_* keeps slip below 10^5.4 V_*, and drops small.
+Limit cycles with inertia are computed for all laws at four load point velocities. At constant
+normal stress, the dynamic stress drop decreases with ln V_0 by about (a-b) sigma_* for all laws.
+The static stress drop decreases by 2.1 times this amount under the slip law, and by 1.5 times this
+amount under the slowness law. The minimum slip rate depends most strongly on the law, and ranges
+from 10^-1.4 V_* (slip law) to 10^-19 V_* (Perrin-Rice-Zheng law). Variable normal stress lowers the
+minimum slip rate by ten decades under the slip law, but not under the slowness law. The composite
+law has V_c = 100 V_*. The cut-off velocity of 10^4 V_* limits the slip rate to 10^5.4 V_* and makes
+the stress drops small.
 """
 
 from rsfstudy import Axis, Claim, Figure, Scene, Study
@@ -30,7 +31,22 @@ EXTENDED_PRECISION_SOURCE = "extended precision: other unknowns, another method,
 
 
 def known_cycle_claim(law: str, variable: str, published: float) -> Claim:
-    """L9: the ends of the family are the laws of the paper, whose cycles are known."""
+    """Return the claim that a limit cycle agrees with its known value (L9).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    variable : str
+        Name of the variable.
+    published : float
+        Expected value.
+
+    Returns
+    -------
+    Claim
+        Claim on the variable.
+    """
     return Claim(
         id="L9",
         statement=f"{law}, constant, V_0 = 2 V_*: {variable.replace('_', ' ')}",
@@ -44,7 +60,20 @@ def known_cycle_claim(law: str, variable: str, published: float) -> Claim:
 
 
 def dynamic_drop_claim(law: str) -> Claim:
-    """L10: what C15 says of the slip law."""
+    """Return the claim that the dynamic stress drop scales with ln V_0 (L10).
+
+    The paper reports this result for the slip law.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+
+    Returns
+    -------
+    Claim
+        Claim on the scaled slope.
+    """
     return Claim(
         id="L10",
         statement=f"{law}, constant: dynamic drop against ln V_0 is about (a-b) sigma_*",
@@ -53,12 +82,30 @@ def dynamic_drop_claim(law: str) -> Claim:
         where={"evolution": law, "normal_stress": "constant"},
         published=1.0,
         tolerance=0.5,
-        reason="'scales with' a whole multiple, no error stated: half of (a-b) sigma_*",
+        reason="the paper reports an integer multiple ('scales with') without an error; the "
+        "tolerance is half of (a-b) sigma_*",
     )
 
 
 def slip_rate_claim(law: str, relation: str, decades: float) -> Claim:
-    """L11: what C12 says of the slip law."""
+    """Return a claim on the minimum slip rate at variable normal stress (L11).
+
+    The paper reports a decrease of ten decades for the slip law.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    relation : str
+        Relation of the result to the expected value: "equals", "below" or "above".
+    decades : float
+        Bound of the change in decades.
+
+    Returns
+    -------
+    Claim
+        Claim on the change of the minimum slip rate.
+    """
     return Claim(
         id="L11",
         statement=f"{law}, V_0 = 2 V_*: variable normal stress moves the slowest V by decades",

@@ -1,11 +1,12 @@
-"""Laws: how much of the load velocity boundary hangs on the state evolution law.
+"""Influence of the evolution law on the critical velocity step.
 
-The faster the state falls above steady sliding, the smaller the critical step: at 1.25 k_cr and
-constant normal stress from 2.1 V_* (Perrin-Rice-Zheng) and 2.6 V_* (slip) to 53 V_* (slowness) and
-146 V_* (slowness with a cut-off at 10^4 V_*); at 2 k_cr from 3.4 V_* to 4700 V_*. That variable
-normal stress lowers the boundary, as the paper finds for the slip law, holds for every law near
-critical stiffness; between 1.5 and 1.9 k_cr it ends for the slowness law, alone or with c = 1. The
-composite law has V_c = 100 V_*.
+The critical step of load point velocity is smaller if the state evolves faster above steady
+sliding. At 1.25 k_cr and constant normal stress, the critical step ranges from 2.1 V_*
+(Perrin-Rice-Zheng) and 2.6 V_* (slip) to 53 V_* (slowness) and 146 V_* (slowness with a cut-off
+velocity of 10^4 V_*). At 2 k_cr, the critical step ranges from 3.4 V_* to 4700 V_*. Close to the
+critical stiffness, variable normal stress lowers the critical step for all laws, as the paper
+reports for the slip law. For the slowness law, with and without a dependence on stress rate (c =
+1), this effect ends between 1.5 and 1.9 k_cr. The composite law has V_c = 100 V_*.
 """
 
 import numpy as np
@@ -31,7 +32,22 @@ STIFF_FIELDS = {"normal_stress": "constant", "stiffness_ratio": 1.25}
 
 
 def law_order_claim(smaller: str, larger: str) -> Claim:
-    """L5: the faster the state falls above steady sliding, the smaller the critical step."""
+    """Return a claim on the order of the critical steps of two laws (L5).
+
+    The law with the faster evolution above steady sliding has the smaller critical step.
+
+    Parameters
+    ----------
+    smaller : str
+        Law with the smaller critical step.
+    larger : str
+        Law with the larger critical step.
+
+    Returns
+    -------
+    Claim
+        Claim on the difference of the critical steps.
+    """
     return Claim.above(
         id="L5",
         statement=f"constant, k = 1.25 k_cr: step by {larger} above that by {smaller}",
@@ -44,7 +60,20 @@ def law_order_claim(smaller: str, larger: str) -> Claim:
 
 
 def variable_normal_stress_claim(law: str) -> Claim:
-    """L6: what C7 says of the slip law."""
+    """Return the claim that variable normal stress lowers the step (L6).
+
+    The paper reports this result for the slip law.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+
+    Returns
+    -------
+    Claim
+        Claim on the relative change of the critical step.
+    """
     return Claim.above(
         id="L6",
         statement=f"{law}, k = 1.25 k_cr: variable normal stress lowers the critical step",
@@ -52,7 +81,7 @@ def variable_normal_stress_claim(law: str) -> Claim:
         variable="lowering",
         where={"evolution": law, **STIFF_FIELDS, "normal_stress": "variable"},
         published=0.1,
-        reason="an inequality; ours are 0.12 to 0.48",
+        reason="an inequality; our results are 0.12 to 0.48",
     )
 
 
@@ -93,7 +122,7 @@ study = Study(
             variable="lowering",
             where={"evolution": SLOWNESS_END, "normal_stress": "variable", "stiffness_ratio": 1.75},
             published=0.0,
-            reason="an inequality; ours is -0.03",
+            reason="an inequality; our result is -0.03",
         ),
     ],
     plot=figure,

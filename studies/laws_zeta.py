@@ -1,10 +1,11 @@
-"""Laws: zeta of the rate-step boundary, from the slip law towards the slowness law.
+"""Coefficient zeta of the critical velocity step for a family of laws.
 
-At constant normal stress and critical stiffness the critical step of the family of laws between
-slip (eps = 0) and slowness (eps = 1) is V_0/V_* = 1 + a/[(1 - eps)(b-a)], of which eq. 10 of the
-paper is the beginning: zeta = 1/(1 - eps), and no step is critical for every norm by the slowness
-law. Variable normal stress lowers zeta; closer to the slowness law it takes the critical step away,
-because k_cr falls with V_0. The norm is 1e6, so high that the closed form for an infinite one
+A family of laws with the exponent eps connects the slip law (eps = 0) with the slowness law (eps =
+1). At constant normal stress and critical stiffness, the critical step is V_0/V_* = 1 + a/[(1 -
+eps)(b-a)], so zeta = 1/(1 - eps). Eq. 10 of the paper is the special case eps = 0. Under the
+slowness law, no step is critical for an arbitrarily large norm. Variable normal stress lowers zeta.
+Close to the slowness law, the critical step disappears at variable normal stress, because k_cr
+decreases with V_0. The instability norm of 1e6 is so high that the closed form for an infinite norm
 applies.
 """
 
@@ -20,7 +21,18 @@ from ._paper import PAPER, REFERENCE
 
 
 def zeta_claim(exponent: float) -> Claim:
-    """L7: eq. 10 beyond the slip law."""
+    """Return the claim that zeta equals the closed form (L7).
+
+    Parameters
+    ----------
+    exponent : float
+        Exponent eps of the law.
+
+    Returns
+    -------
+    Claim
+        Claim on zeta at constant normal stress.
+    """
     return Claim(
         id="L7",
         statement=f"eps = {exponent:g}, constant normal stress: zeta = 1/(1 - eps)",
@@ -29,13 +41,26 @@ def zeta_claim(exponent: float) -> Claim:
         where={"law_exponent": exponent, "normal_stress": "constant"},
         published=1.0 / (1.0 - exponent),
         tolerance=1.5e-7,
-        reason="exact for an infinite norm, and 1e6 lowers it by 1e-7 at eps = 0.5; and numerical "
-        "errors of the steps, which allow 7e-8",
+        reason="exact for an infinite norm; a norm of 1e6 lowers zeta by 1e-7 at eps = 0.5, and "
+        "numerical errors of the critical steps contribute up to 7e-8",
     )
 
 
 def variable_normal_stress_claim(exponent: float) -> Claim:
-    """L8: what C7 says of the slip law."""
+    """Return the claim that variable normal stress lowers zeta (L8).
+
+    The paper reports this result for the slip law.
+
+    Parameters
+    ----------
+    exponent : float
+        Exponent eps of the law.
+
+    Returns
+    -------
+    Claim
+        Claim on the difference of zeta.
+    """
     return Claim.below(
         id="L8",
         statement=f"eps = {exponent:g}: variable normal stress lowers zeta",
@@ -48,7 +73,18 @@ def variable_normal_stress_claim(exponent: float) -> Claim:
 
 
 def fit_line(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """The line of a fit."""
+    """Return the fitted line.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    tuple of ndarray
+        Values of a/(b-a) and of V_0/V_* at the ends of the line.
+    """
     reach = np.array([0.0, 1.04 * float(row["a_over_b_minus_a"].max())])
     return reach, 1.0 + float(row.get("zeta", np.nan)) * reach
 

@@ -1,8 +1,10 @@
-"""Stick-slip limit cycles: both laws, constant and variable normal stress (Figs. 9, 10 and 11).
+"""Stick-slip limit cycles, both laws (Figs. 9, 10 and 11).
 
-Complete stick-slip motions with inertia, once cycles repeat. With the slip law, variable normal
-stress lowers the slowest slip rate by ten orders of magnitude; with the slowness law it changes the
-range of slip rate little, and a segment of nearly constant stress follows each rupture.
+The figures show complete stick-slip cycles with inertia at constant and at variable normal stress,
+after the motion has reached its limit cycle. Under the slip law, variable normal stress lowers the
+minimum slip rate by ten orders of magnitude. Under the slowness law, variable normal stress has
+little influence on the range of slip rate, and a segment of nearly constant stress follows each
+rupture.
 """
 
 from collections.abc import Sequence
@@ -28,24 +30,50 @@ from ._phase_plane import (
 
 
 def cycle_place(law: str, normal_stress: str) -> dict[str, str]:
-    """Place of one cycle on the lattice."""
+    """Return the coordinates of a limit cycle.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    normal_stress : str
+        Normal stress condition.
+
+    Returns
+    -------
+    dict
+        Coordinates of the lattice.
+    """
     return {"law": law, "normal_stress": normal_stress}
 
 
-#: Constant-state lines are drawn for -b ln(V/V_*) at these log10(V/V_*), where they cross the
-#: steady state.
+#: Values of log10(V/V_*) at which the lines of constant state intersect the line of steady sliding.
+#: The state of a line is -b ln(V/V_*).
 CONSTANT_STATE_LOG_RATES = (-8.0, -4.0, 0.0, 4.0, 8.0)
 
 
 def distinct_orbits(dataset: xr.Dataset) -> list[tuple[xr.Dataset, str]]:
-    """The cycles that exist and differ, over all axes of the lattice, each with a name."""
+    """Return the distinct limit cycles and their names.
+
+    If several cells contain the same motion, only the first of these cells is returned.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+
+    Returns
+    -------
+    list of tuple
+        Results of a cell, and its name.
+    """
     from rsfstudy.plots import describe_point
 
     found: dict[bytes, tuple[xr.Dataset, str]] = {}
     dims = dataset["status"].dims
     for at in np.ndindex(*dataset["status"].shape):
         cell = dataset.isel(dict(zip(dims, at, strict=True)))
-        constant = steady_line_key(cell)[0] == "constant"  # angles mean nothing there
+        constant = steady_line_key(cell)[0] == "constant"  # The driving angle has no effect here.
         words = [
             describe_point(cell, str(d)) for d in dims if not (constant and d in ("phi", "alpha"))
         ]
@@ -55,8 +83,16 @@ def distinct_orbits(dataset: xr.Dataset) -> list[tuple[xr.Dataset, str]]:
 
 
 def plot_orbits(dataset: xr.Dataset, axes: Axes) -> None:
-    """Stress against slip rate, with lines of steady state and of constant state, for each coupling
-    of stress and slip that there is.
+    """Draw stress against slip rate, with lines of steady and constant state.
+
+    The lines are drawn once for each coupling of normal stress and shear stress.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
     """
     from rsfstudy.plots import cycle_style
 
@@ -93,7 +129,7 @@ def plot_orbits(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def _axes_fractions(axes: Axes, x: Any, y: Any) -> np.ndarray:
-    """Places on the axes, as fractions of their sides."""
+    """Convert data coordinates to fractions of the axes."""
     panel = axes.transData + axes.transAxes.inverted()
     return np.asarray(panel.transform(np.column_stack([np.asarray(x), np.asarray(y)])))
 
@@ -101,22 +137,52 @@ def _axes_fractions(axes: Axes, x: Any, y: Any) -> np.ndarray:
 def _label_line(
     axes: Axes, line: np.ndarray, number: str, colour: str, taken: Sequence[np.ndarray]
 ) -> np.ndarray:
-    """Write a number on what is seen of a line, far from all else; where that is."""
+    """Label a line where it is visible and far from other points.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    line : ndarray
+        Points of the line as fractions of the axes.
+    number : str
+        Text of the label.
+    colour : str
+        Colour of the label.
+    taken : sequence of ndarray
+        Points of all other lines and labels, as fractions of the axes.
+
+    Returns
+    -------
+    ndarray
+        Points of the label. Empty if the line is not visible.
+    """
     seen = line[((line > 0.06) & (line < 0.94)).all(axis=1)][::8]
     others = np.concatenate([points[np.isfinite(points).all(axis=1)] for points in taken])
     if not len(seen):
         return seen
-    wide = (1.0, 2.0)  # numbers are wider than high
+    wide = (1.0, 2.0)  # The distance is scaled because labels are wider than high.
     apart = np.hypot(*((seen[:, None, :] - others[None, :, :]) * wide).T).min(axis=0)
     place = seen[int(apart.argmax())]
     white = {"facecolor": "white", "edgecolor": "none", "pad": 0.4}
-    style = {"color": colour, "fontsize": 6, "bbox": white, "zorder": 1.5}  # below the orbits
+    style = {"color": colour, "fontsize": 6, "bbox": white, "zorder": 1.5}  # below the limit cycles
     axes.text(*place, number, ha="center", va="center", transform=axes.transAxes, **style)
     return np.asarray(place + np.outer(np.linspace(-0.07, 0.07, 5), (1.0, 0.0)))
 
 
 def plot_along_slip(dataset: xr.Dataset, axes: Axes) -> None:
-    """Two cycles, one after the other, against slip; what the spring carries in the first."""
+    """Draw stress against slip over two limit cycles.
+
+    Dashed lines show the spring stress during the first cycle, and markers show the point of
+    fastest slip.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots import cycle_marker, cycle_style
 
     for number, (cell, name) in enumerate(distinct_orbits(dataset)):
@@ -188,7 +254,7 @@ study = Study(
             minus=cycle_place("slowness", "constant"),
             published=0.0,
             tolerance=0.5,
-            reason="'similar', beside ten decades for the slip law",
+            reason="'similar', compared with ten decades for the slip law",
         ),
         *(
             Claim(
@@ -199,7 +265,8 @@ study = Study(
                 where=cycle_place("slowness", stress),
                 published=-0.5,
                 tolerance=0.05,
-                reason="'approximately': stress is not quite constant, the spring is loaded",
+                reason="'approximately': stress is not exactly constant, because the spring is "
+                "loaded",
             )
             for stress in ("constant", "variable")
         ),
@@ -211,7 +278,7 @@ study = Study(
                 variable="drop_asymmetry",
                 where=cycle_place("slowness", stress),
                 published=1.5,
-                reason="'strongly asymmetrical'; 1 is symmetrical",
+                reason="'strongly asymmetrical'; symmetrical drops have a ratio of 1",
             )
             for stress in ("constant", "variable")
         ),
@@ -223,7 +290,8 @@ study = Study(
             where=cycle_place("slowness", "constant"),
             minus=cycle_place("slip", "constant"),
             published=1.0,
-            reason="'different to the slip law', whose two drops are within a quarter of equal",
+            reason="'different to the slip law', under which the two drops differ by less than 25 "
+            "%",
         ),
     ],
     plot=figure,

@@ -1,11 +1,11 @@
-"""Linear stability: the critical stiffness as a function of slip rate and driving angle (Fig.
-2).
+"""Critical stiffness as a function of slip rate and driving angle (Fig. 2).
 
-Above its curve steady sliding is stable under small perturbations, below it unstable. The curves
-fall with slip rate, the more steeply the smaller the angle between the driving stress and the fault
-normal; where phi < atan(mu_ss) there is no steady state. So a faster load point can stabilise a
-spring, and a slower one destabilise it. Mass raises the curves in proportion to (T V)**2: by 6e-5
-at most for T = 5 s and 1e6 V_*.
+Steady sliding is stable under small perturbations if the stiffness lies above the curve, and
+unstable if the stiffness lies below the curve. The critical stiffness decreases with slip rate, and
+the decrease is steeper for small angles between the driving stress and the normal of the fault. If
+phi < atan(mu_ss), there is no steady state. A faster load point can therefore stabilise a spring,
+and a slower load point can destabilise it. Inertia raises the critical stiffness in proportion to
+(T V)**2. For T = 5 s, the relative increase is at most 6e-5, at a slip rate of 10^6 V_*.
 """
 
 import math
@@ -32,7 +32,24 @@ MASS_CASES: dict[str, dict[str, bool | float]] = {
 
 
 def growth_threshold_claim(mass: str, phi: float, rate: float) -> Claim:
-    """C1: the closed form is the threshold of the equations as they are assembled."""
+    """Return the claim that perturbations grow below k_cr (C1).
+
+    The threshold of growth is computed from the eigenvalues of the assembled equations.
+
+    Parameters
+    ----------
+    mass : str
+        Name of the inertia case.
+    phi : float
+        Driving angle in degrees.
+    rate : float
+        Slip rate relative to V_*.
+
+    Returns
+    -------
+    Claim
+        Claim on the difference from the closed form.
+    """
     return Claim(
         id="C1",
         statement=f"{mass}, phi = {phi:g}, {rate:g} V_*: k_cr is that of growing perturbations",
@@ -41,12 +58,25 @@ def growth_threshold_claim(mass: str, phi: float, rate: float) -> Claim:
         where={"mass": mass, "phi": phi, "load_velocity_ratio": rate},
         published=0.0,
         tolerance=3e-10,
-        reason="central differences of the assembled equations, to 1e-8 of it",
+        reason="central differences of the assembled equations have a relative error of 1e-8",
     )
 
 
 def steepness_claim(phi: float, gentler: float) -> Claim:
-    """C1: steeper curves for smaller angles."""
+    """Return the claim that the curve is steeper for a smaller angle (C1).
+
+    Parameters
+    ----------
+    phi : float
+        Smaller driving angle in degrees.
+    gentler : float
+        Larger driving angle in degrees.
+
+    Returns
+    -------
+    Claim
+        Claim on the difference of the slopes.
+    """
     return Claim.below(
         id="C1",
         statement=f"k_cr falls with V more steeply at {phi:g} than at {gentler:g} degrees",
@@ -59,7 +89,20 @@ def steepness_claim(phi: float, gentler: float) -> Claim:
 
 
 def critical_stiffness_curve(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Slip rates and the critical stiffness there, closely where it grows without bound."""
+    """Compute the critical stiffness at closely spaced slip rates.
+
+    The spacing is smallest close to the slip rate at which the critical stiffness is unbounded.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    tuple of ndarray
+        Slip rates V/V_* and critical stiffness in sigma_*/D_c. NaN if there is no steady sliding.
+    """
     scene, rates = (
         scene_from_coordinates(row.isel(load_velocity_ratio=-1)),
         row["load_velocity_ratio"].values,
@@ -73,7 +116,15 @@ def critical_stiffness_curve(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 
 def plot_slowest_steady_rate(dataset: xr.Dataset, axes: Axes) -> None:
-    """Dotted lines where slower sliding has no steady state."""
+    """Draw dotted lines at the lowest slip rate of steady sliding.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots import cycle_style
 
     for number in range(dataset.sizes["phi"]):
@@ -88,7 +139,20 @@ def plot_slowest_steady_rate(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def angle_label(row: xr.Dataset) -> str:
-    """The angle, and from which slip rate on a spring of 0.8 k_cr(V_*) is stable."""
+    """Return the driving angle and the slip rate that stabilises a spring.
+
+    The stiffness of the spring is 0.8 k_cr(V_*).
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results for one driving angle.
+
+    Returns
+    -------
+    str
+        Text in LaTeX.
+    """
     from rsfstudy.plots import format_number
 
     text = rf"$\phi = {float(row['phi']):g}°$"
@@ -98,7 +162,20 @@ def angle_label(row: xr.Dataset) -> str:
 
 
 def stiffness_rise_claim(row: xr.Dataset) -> xr.DataArray:
-    """Rise of the stiffness at which perturbations neither grow nor decay, where it is one."""
+    """Return the relative increase of the critical stiffness due to inertia.
+
+    The critical stiffness is computed from the growth of perturbations.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    xarray.DataArray
+        Relative increase. NaN if the increase is too small to be resolved.
+    """
     massless = row["critical_stiffness"] / (1.0 + row["rise_by_dynamics"])
     rise = row["critical_stiffness_from_growth"] / massless - 1.0
     return rise.where((rise > 1e-8) & (row["rise_by_dynamics"] > 0.0))
@@ -182,7 +259,7 @@ study = Study(
             minus={"mass": NO_MASS, "phi": 50.0, "load_velocity_ratio": 100.0},
             published=0.0,
             tolerance=1e-15,
-            reason="an identity; rounding",
+            reason="an identity; the tolerance covers rounding",
         ),
         growth_threshold_claim(NO_MASS, 60.0, 1.0),
         growth_threshold_claim(PUBLISHED_PERIOD, 60.0, 1e6),
@@ -195,7 +272,8 @@ study = Study(
             variable="steady_friction",
             where={"mass": NO_MASS, "phi": 40.0, "load_velocity_ratio": 1e-4},
             published=0.8391,
-            reason="an inequality: no steady state there, while faster sliding has one",
+            reason="an inequality: there is no steady state at this slip rate, but there is one at "
+            "faster slip rates",
         ),
         Claim.below(
             id="C2",
@@ -204,7 +282,7 @@ study = Study(
             variable="stabilising_velocity",
             where={"mass": NO_MASS, "phi": 50.0},
             published=1000.0,
-            reason="an inequality; the limit cycles of that spring end there too",
+            reason="an inequality; the limit cycles of this spring end at the same velocity",
         ),
         Claim.above(
             id="C2",

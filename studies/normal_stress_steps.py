@@ -1,11 +1,12 @@
-"""Steps of normal stress: alpha and D_c as Linker and Dieterich's test gives them.
+"""Estimates of alpha and D_c from steps of normal stress.
 
-Imposed normal stress steps while the load point moves on at V_*, and friction is recorded over 20
-D_c. An exponential through the transient, followed back to the step, gives alpha and D_c. With the
-slip law both are right on a stiff machine. With the slowness law alpha is read too small from steps
-up and too large from steps down, however stiff the machine. On a compliant machine slip has passed
-before the spring has taken up the change of strength, and what is read says as much of the machine
-as of the fault.
+Imposed normal stress changes by a step while the load point continues to move at V_*, and friction
+is recorded over 20 D_c. As in the experiments of Linker and Dieterich (1992), an exponential
+function is fitted to the transient and extrapolated to the time of the step, which gives estimates
+of alpha and D_c. Under the slip law, both estimates are correct on a stiff machine. Under the
+slowness law, alpha is too small for steps up and too large for steps down, even on a very stiff
+machine. On a compliant machine, considerable slip occurs before the spring has followed the change
+of strength, so the estimates depend on the machine as much as on the fault.
 """
 
 import math
@@ -21,7 +22,7 @@ from rsfstudy.study.figure_declarations import Axes, horizontal_line
 from ._normal_stress_transient import NormalStressTransient
 from ._phase_plane import scene_from_coordinates
 
-#: Stiffness over critical stiffness, compliant to stiff.
+#: Ratios of stiffness to critical stiffness, from compliant to stiff machines.
 RATIOS = [10.0, 20.0, 50.0, 100.0]
 STEPS = [-0.2, -0.05, 0.05, 0.2]
 STIFFEST = RATIOS[-1]
@@ -34,18 +35,48 @@ CLOSED_FORM_SOURCE = "closed form at constant slip rate, and its first order in 
 
 
 def initial_log_rate(step: float) -> float:
-    """ln V just after the step."""
+    """Compute ln(V/V_*) immediately after a step of normal stress.
+
+    Parameters
+    ----------
+    step : float
+        Step of normal stress in sigma_*.
+
+    Returns
+    -------
+    float
+        Natural logarithm of V/V_*.
+    """
     r = 1.0 + step
     return float((mu * (1.0 / r - 1.0) + alpha * math.log(r)) / a)
 
 
 def remaining_transient(law: str, step: float, ratio: float, slip: float) -> float:
-    """Transient of friction that is left after so much slip, to first order in a/K.
+    r"""Compute the remaining transient of friction, to first order in a/K.
 
-    With r = 1 + step, a rigid slider shows -alpha ln r exp(-slip) by the slip law, and b ln(1 + y)
-    with y = [r^(-alpha/b) - 1] exp(-slip) by the slowness law. While the spring takes up the change
-    of strength, ln V goes from x to 0 over a slip of about a r/K, and the state evolves otherwise
-    than at V_*; and slip is not as fast as the load point while friction changes.
+    Let :math:`r` be one plus the step, and :math:`\delta` the slip in :math:`D_c`. The transient of
+    a rigid slider is :math:`-\alpha \ln r \, e^{-\delta}` under the slip law. Under the slowness
+    law, it is :math:`b \ln(1 + y)` with :math:`y = (r^{-\alpha/b} - 1)\,e^{-\delta}`. The finite
+    stiffness :math:`K` has two effects. While the spring follows the change of strength, ln V
+    returns to zero over a slip of approximately :math:`a r/K`, and the state does not evolve as at
+    :math:`V_*`. Later, the slip rate differs from the velocity of the load point while friction
+    changes.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    step : float
+        Step of normal stress in sigma_*.
+    ratio : float
+        Stiffness relative to the critical stiffness.
+    slip : float
+        Slip since the step in D_c.
+
+    Returns
+    -------
+    float
+        Remaining transient of friction.
     """
     r = 1.0 + step
     short = r / (ratio * (b - a))
@@ -62,7 +93,22 @@ def remaining_transient(law: str, step: float, ratio: float, slip: float) -> flo
 
 
 def expected_readings(law: str, step: float, ratio: float = math.inf) -> tuple[float, float]:
-    """alpha and D_c that the measure reads off that."""
+    """Compute the estimates of the measure from the closed form.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    step : float
+        Step of normal stress in sigma_*.
+    ratio : float, optional
+        Stiffness relative to the critical stiffness. By default, the slider is rigid.
+
+    Returns
+    -------
+    tuple of float
+        Estimates of alpha and of D_c.
+    """
     first, last = (
         remaining_transient(law, step, ratio, slip)
         for slip in (TRANSIENT_MEASURE.fit_from, TRANSIENT_MEASURE.fit_to)
@@ -72,7 +118,20 @@ def expected_readings(law: str, step: float, ratio: float = math.inf) -> tuple[f
 
 
 def rigid_limit_claim(law: str, step: float) -> Claim:
-    """R5: a stiff slider."""
+    """Return a claim on the estimate of alpha on a stiff machine (R5).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    step : float
+        Step of normal stress in sigma_*.
+
+    Returns
+    -------
+    Claim
+        Claim on the estimate.
+    """
     read, rigid = expected_readings(law, step, STIFFEST)[0], expected_readings(law, step)[0]
     return Claim(
         id="R5",
@@ -83,12 +142,26 @@ def rigid_limit_claim(law: str, step: float) -> Claim:
         where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFFEST},
         published=read,
         tolerance=0.2 * abs(read - rigid) + 1e-3 * alpha,
-        reason="second order in a/K: a fifth of the first; and 1e-3 of alpha",
+        reason="the second order in a/K is less than a fifth of the first order; 1e-3 of alpha is "
+        "added",
     )
 
 
 def slip_distance_claim(law: str, step: float) -> Claim:
-    """R6: the slip distance on a stiff machine."""
+    """Return a claim on the estimate of D_c on a stiff machine (R6).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    step : float
+        Step of normal stress in sigma_*.
+
+    Returns
+    -------
+    Claim
+        Claim on the estimate.
+    """
     read, rigid = expected_readings(law, step, STIFFEST)[1], expected_readings(law, step)[1]
     quicker = initial_log_rate(step) if law == "slip" else -initial_log_rate(step)
     return Claim(
@@ -100,13 +173,26 @@ def slip_distance_claim(law: str, step: float) -> Claim:
         where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFFEST},
         published=read,
         tolerance=(0.1 * max(quicker, 0.0) + 0.06) * b / (STIFFEST * (b - a)),
-        reason="second order, over b/K: 0.06, and 0.1 for each e-fold by which the slider is first "
-        "faster (slip law) or slower (slowness law) and its state evolves otherwise",
+        reason="the second order relative to b/K is 0.06, plus 0.1 for each factor of e by which "
+        "the slider is initially faster (slip law) or slower (slowness law)",
     )
 
 
 def direct_change_claim(law: str, step: float) -> Claim:
-    """R7: at once."""
+    """Return the claim that the state changes by -alpha ln r at the step (R7).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    step : float
+        Step of normal stress in sigma_*.
+
+    Returns
+    -------
+    Claim
+        Claim on the immediate change of friction.
+    """
     return Claim(
         id="R7",
         statement=f"{law} law, step of {step:+g} sigma_*: the state loses alpha ln r at once",
@@ -115,21 +201,40 @@ def direct_change_claim(law: str, step: float) -> Claim:
         where={"law": law, "normal_stress_step": step, "stiffness_ratio": RATIOS[0]},
         published=-alpha * math.log(1.0 + step),
         tolerance=1e-15,
-        reason="an identity: rounding",
+        reason="an identity; the tolerance covers rounding",
     )
 
 
-#: Slip that is shown of the records, in D_c.
+#: Slip in D_c up to which records are plotted.
 PLOTTED_SLIP = 4.0
 
 
 def friction_change(row: xr.Dataset) -> xr.DataArray:
-    """Change of friction, as far as it is shown."""
+    """Return the change of friction over the plotted range of slip.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    xarray.DataArray
+        Change of friction. NaN outside the plotted range.
+    """
     return (row["friction_coefficient"] - row["mu_star"]).where(row["slip"] <= PLOTTED_SLIP)
 
 
 def plot_rigid_transients(dataset: xr.Dataset, axes: Axes) -> None:
-    """The transients of a rigid slider, by the closed form of its law."""
+    """Draw the transients of a rigid slider from the closed form of the law.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     slip, highest = np.linspace(0.0, PLOTTED_SLIP, 100), 0.0
     for place in range(dataset.sizes["normal_stress_step"]):
         row = dataset.isel(normal_stress_step=place, stiffness_ratio=0)

@@ -1,11 +1,10 @@
-"""Rate-step boundary against b/a: how large a step of load point velocity triggers instability
-(Fig. 5).
+"""Critical velocity step against a/(b-a) (Fig. 5).
 
-A slider in steady state at V_* has its load point velocity stepped to V_0. The boundary is the
-smallest V_0 that takes the slip rate to the instability norm, at constant normal stress and at
-normal stress varying with shear stress. The fit V_0/V_* = 1 + zeta a/(b-a) covers a/(b-a) from 0.25
-to 1; beyond, the finite norm takes even the curve of constant normal stress below its line V_0/V_*
-= 1 + a/(b-a).
+The load point velocity of a slider in steady state at V_* changes to V_0. The critical step is the
+smallest V_0 for which the slip rate reaches the instability norm. The figure shows the critical
+step for constant normal stress, and for normal stress that varies with shear stress. The function
+V_0/V_* = 1 + zeta a/(b-a) is fitted for a/(b-a) from 0.25 to 1. At larger values, the finite norm
+lowers the critical step even at constant normal stress, below the line V_0/V_* = 1 + a/(b-a).
 """
 
 import numpy as np
@@ -26,8 +25,8 @@ from ._paper import (
     WEAK_NORMAL_STRESS_EFFECT,
 )
 
-#: a/(b-a): densely over the paper's range, which is fitted, and on to where the finite norm bends
-#: the curves.
+#: Values of a/(b-a). They are closely spaced over the range of the paper, which is fitted, and
+#: extend to values at which the finite norm bends the curves.
 a_over_b_minus_a = np.concatenate([np.arange(5, 20) / 20, np.arange(4, 17) / 4])
 
 
@@ -35,13 +34,32 @@ FITTED_RANGE = (0.25, 1.0)
 
 
 def fit_line(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """The line of a fit."""
+    """Return the fitted line.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    tuple of ndarray
+        Values of a/(b-a) and of V_0/V_* at the ends of the line.
+    """
     reach = np.array([0.0, 1.03 * float(row["a_over_b_minus_a"].max())])
     return reach, 1.0 + float(row.get("zeta", np.nan)) * reach
 
 
 def plot_fitted_range(_dataset: xr.Dataset, axes: Axes) -> None:
-    """The range of the fit."""
+    """Shade the range of the fit.
+
+    Parameters
+    ----------
+    _dataset : xarray.Dataset
+        Results of the study. Not used.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     axes.axvspan(*FITTED_RANGE, color="0.94", zorder=0)
     axes.text(0.27, 0.97, "fitted", transform=axes.get_xaxis_transform(), va="top", color="0.45")
 
@@ -70,7 +88,20 @@ figure = Figure(
 
 
 def variable_normal_stress_claim(inverse: float, published: float) -> Claim:
-    """C7: by how much the boundary is lower at a value of a/(b-a)."""
+    """Return a claim on the effect of variable normal stress (C7).
+
+    Parameters
+    ----------
+    inverse : float
+        Value of a/(b-a).
+    published : float
+        Expected relative reduction of the critical step.
+
+    Returns
+    -------
+    Claim
+        Claim on the relative reduction.
+    """
     return Claim(
         id="C7",
         statement=f"alpha = 0.56, a/(b-a) = {inverse:g}: lower by {100.0 * published:g} %",
@@ -79,7 +110,8 @@ def variable_normal_stress_claim(inverse: float, published: float) -> Claim:
         where={"case": STRONG_NORMAL_STRESS_EFFECT, "b_over_a": 1.0 + 1.0 / inverse},
         published=published,
         tolerance=0.013,
-        reason="whole per cent (0.5), and the paper's error of 0.4 % in each of two velocities",
+        reason="rounding of the published value (0.5 %), and the error of the paper (0.4 %) in "
+        "each of two velocities",
     )
 
 

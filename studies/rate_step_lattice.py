@@ -1,8 +1,9 @@
-"""Rate-step boundary the plain way: a lattice of cells that are stable or unstable (Fig. 6).
+"""Critical velocity step from stable and unstable cells (Fig. 6).
 
-Each cell follows one motion and says whether it reaches the instability norm; the boundary between
-the cells is all such a lattice can tell, to within its spacing. It costs 40 motions for two digits
-where rate_step_stiffness has ten from a few paths.
+Each cell computes one motion and reports if its slip rate reaches the instability norm. The
+critical step lies between the last stable and the first unstable cell, so its accuracy is limited
+by the spacing of the lattice. Two digits require 40 motions, whereas the study rate_step_stiffness
+obtains ten digits from a few paths.
 """
 
 import math
@@ -19,7 +20,15 @@ from ._paper import CONSTANT_NORMAL_STRESS, NORMAL_STRESS_CASES, PAPER, REFERENC
 
 
 def plot_cells(dataset: xr.Dataset, axes: Axes) -> None:
-    """Stable cells open, and unstable ones filled; and the boundary, where they have one."""
+    """Draw stable cells (open), unstable cells (filled) and the boundary.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     if "lattice_boundary" in dataset:
         boundary, half = dataset["lattice_boundary"], dataset["lattice_boundary_error"]
         bars = {"fmt": "o-", "elinewidth": 0.8, "capsize": 3, "label": "boundary with its bracket"}
@@ -67,7 +76,7 @@ study = Study(
             where={"case": CONSTANT_NORMAL_STRESS, "stiffness_ratio": 1.0},
             published=1.0 + 1.0 / (math.e - 1.0),
             tolerance=0.0309,
-            reason="half of the spacing of the lattice there",
+            reason="half of the spacing of the lattice at this point",
         )
     ],
     plot=figure,

@@ -1,9 +1,10 @@
-"""Rate-step boundary against stiffness, b/a = e, both laws (Fig. 6 and section 4).
+"""Critical velocity step against stiffness (Fig. 6 and section 4).
 
-The critical step of load point velocity grows with stiffness, about exponentially for the slip law;
-the slowness law is much more stable. Eq. 11 of the paper, V_0/V_* = exp(k/k_cr)/lambda, is exact at
-k = k_cr only: the boundary lies up to 2.4 % lower. The study rate_step_lattice finds the same
-boundary from stable and unstable cells, instability_norm how it depends on the norm.
+The critical step of load point velocity at b/a = e increases with stiffness, approximately
+exponentially for the slip law. The critical step is much larger for the slowness law. Eq. 11 of the
+paper, V_0/V_* = exp(k/k_cr)/lambda, is exact only at k = k_cr. At larger stiffness, the critical
+step is up to 2.4 % smaller. The study rate_step_lattice finds the same critical step from stable
+and unstable cells, and the study instability_norm shows the influence of the norm.
 """
 
 import math
@@ -31,7 +32,24 @@ from ._paper import (
 def section_4_claim(
     stiffness_ratio: float, published: float, tolerance: float, digits: str
 ) -> Claim:
-    """C17: the numbers of section 4."""
+    """Return a claim on a critical step of section 4 (C17).
+
+    Parameters
+    ----------
+    stiffness_ratio : float
+        Stiffness relative to the critical stiffness.
+    published : float
+        Expected value.
+    tolerance : float
+        Tolerance of the claim.
+    digits : str
+        Precision of the published value, in words.
+
+    Returns
+    -------
+    Claim
+        Claim on the critical step.
+    """
     return Claim(
         id="C17",
         statement=f"slowness, alpha = 0.56, k = {stiffness_ratio:g} k_cr: {published:g} V_*",
@@ -44,12 +62,29 @@ def section_4_claim(
         },
         published=published,
         tolerance=tolerance,
-        reason=f"printed to {digits}; our norm is inferred from it, see instability_norm",
+        reason=f"printed to {digits}; our norm is derived from this value (see instability_norm)",
     )
 
 
 def eq_11_claim(stiffness_ratio: float, published: float, tolerance: float, reason: str) -> Claim:
-    """C8: eq. 11 at constant normal stress, and its own error away from k = k_cr."""
+    """Return a claim on the ratio of the critical step to eq. 11 (C8).
+
+    Parameters
+    ----------
+    stiffness_ratio : float
+        Stiffness relative to the critical stiffness.
+    published : float
+        Expected ratio.
+    tolerance : float
+        Tolerance of the claim.
+    reason : str
+        Reason for the tolerance.
+
+    Returns
+    -------
+    Claim
+        Claim on the ratio at constant normal stress.
+    """
     return Claim(
         id="C8",
         statement=f"slip law, constant, k = {stiffness_ratio:g} k_cr: V_0 over that of eq. 11",
@@ -63,12 +98,20 @@ def eq_11_claim(stiffness_ratio: float, published: float, tolerance: float, reas
 
 
 PAPER_WORDS_ON_UNDERESTIMATE = (
-    "'underestimates by 1-2 %', which the paper takes for its procedure's error"
+    "'underestimates by 1-2 %', which the paper attributes to an error of its procedure"
 )
 
 
 def plot_eq_11(dataset: xr.Dataset, axes: Axes) -> None:
-    """The approximation that is published for the slip law."""
+    """Draw the approximation of the paper for the slip law.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     weakening, text = float(dataset["b_over_a"]) - 1.0, r"$\exp(k/k_{cr})/\lambda$ (eq. 11)"
     if dataset["law"] == "slip":
         reference_line("stiffness_ratio", lambda x: np.exp(x) / weakening, text)(dataset, axes)
@@ -131,7 +174,8 @@ study = Study(
             where={"law": "slip", "case": WEAK_NORMAL_STRESS_EFFECT, "stiffness_ratio": 1.0},
             published=0.0,
             tolerance=0.02,
-            reason="'very close'; about the width of the symbols of the figure",
+            reason="'very close'; the tolerance is approximately the size of the symbols in the "
+            "figure",
             expected="differs",
             because="it is lower by 5.7 %, half of that at alpha = 0.56; by 6 % above k_cr",
         ),

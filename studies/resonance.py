@@ -1,9 +1,9 @@
-"""Resonance: what oscillating normal stress makes of spring stress, against its period.
+"""Response of spring stress to oscillating normal stress.
 
-Imposed normal stress oscillates around steady sliding, and spring stress with it. Small
-oscillations resound at the period 2 pi sqrt(a/(b - a)) D_c/V as stiffness falls to critical, by
-either law. The closer stiffness is to critical, the smaller the amplitude at which linear theory
-fails.
+Imposed normal stress oscillates during steady sliding, and spring stress oscillates with the same
+period. If the stiffness approaches the critical stiffness, small oscillations have a resonance at
+the period 2 pi sqrt(a/(b - a)) D_c/V under both laws. If the stiffness is closer to critical,
+linear theory fails at a smaller amplitude.
 """
 
 import math
@@ -25,14 +25,14 @@ from ._phase_plane import scene_from_coordinates
 
 base = Scene(normal_stress="imposed", alpha=0.25, b_over_a=2.0)
 a, b = base.a, base.b
-#: Period of resonance as k falls to k_cr, 2 pi over sqrt((b - a)/a), and others over it.
+#: Resonant period in D_c/V_* in the limit k = k_cr, 2 pi/sqrt((b - a)/a).
 RESONANCE_PERIOD = 2.0 * math.pi * math.sqrt(a / (b - a))
 PERIODS = [factor * RESONANCE_PERIOD for factor in (0.75, 1.0, 1.5)]
 STIFFNESS_RATIOS = [1.2, 1.5, 4.0]
 SMALL_AMPLITUDE, LARGE_AMPLITUDE = 1e-4, 1e-2
 AMPLITUDES = [SMALL_AMPLITUDE, 3e-4, 1e-3, 3e-3, LARGE_AMPLITUDE, 5e-2]
 LAWS = ("slip", "slowness")
-#: Departure of the response from that of small oscillations beyond which linear theory has failed.
+#: Largest relative difference from linear theory for which linear theory is considered valid.
 MAX_LINEAR_DEVIATION = 0.1
 LINEAR_THEORY_SOURCE = (
     "linear theory of steady sliding: K [mu + (mu - alpha) z]/[a z^2 + (K - b + a) z + K]"
@@ -40,19 +40,65 @@ LINEAR_THEORY_SOURCE = (
 
 
 def linear_gain(ratio: float, period: float) -> float:
-    """Gain of small oscillations, in units with stress over sigma and z = i omega D_c/V."""
+    """Compute the gain of small oscillations.
+
+    Parameters
+    ----------
+    ratio : float
+        Stiffness relative to the critical stiffness.
+    period : float
+        Period of the oscillation in D_c/V_*.
+
+    Returns
+    -------
+    float
+        Ratio of the amplitude of spring stress to the amplitude of normal stress.
+    """
     stiffness, z = ratio * (b - a), 2j * math.pi / period
     above = stiffness * (base.mu_star + (base.mu_star - base.alpha) * z)
     return float(abs(above / (a * z * z + (stiffness - b + a) * z + stiffness)))
 
 
 def log_rate_amplitude(ratio: float, period: float, amplitude: float) -> float:
-    """Amplitude of ln V in small oscillations: V - V_0 is -d(spring stress)/dt over K."""
+    r"""Compute the amplitude of ln V in small oscillations.
+
+    The slip rate differs from :math:`V_0` by :math:`-(d\tau/dt)/K`, where :math:`\tau` is the
+    spring stress.
+
+    Parameters
+    ----------
+    ratio : float
+        Stiffness relative to the critical stiffness.
+    period : float
+        Period of the oscillation in D_c/V_*.
+    amplitude : float
+        Amplitude of normal stress in sigma_*.
+
+    Returns
+    -------
+    float
+        Amplitude of ln V.
+    """
     return 2.0 * math.pi / period * linear_gain(ratio, period) * amplitude / (ratio * (b - a))
 
 
 def linear_limit_claim(law: str, ratio: float, period: float) -> Claim:
-    """R1: the limit of small amplitude."""
+    """Return the claim that small oscillations follow linear theory (R1).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    ratio : float
+        Stiffness relative to the critical stiffness.
+    period : float
+        Period of the oscillation in D_c/V_*.
+
+    Returns
+    -------
+    Claim
+        Claim on the gain.
+    """
     gain = linear_gain(ratio, period)
     return Claim(
         id="R1",
@@ -68,12 +114,26 @@ def linear_limit_claim(law: str, ratio: float, period: float) -> Claim:
         },
         published=gain,
         tolerance=gain * (log_rate_amplitude(ratio, period, SMALL_AMPLITUDE) ** 2 + 1e-6),
-        reason="linear theory leaves out the square of the amplitude of ln V, up to 5e-4; and 1e-6",
+        reason="linear theory neglects the square of the amplitude of ln V, which is up to 5e-4; "
+        "1e-6 is added",
     )
 
 
 def resonance_claim(law: str, period: float) -> Claim:
-    """R2: the period of resonance."""
+    """Return the claim that the gain is largest at the resonant period (R2).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    period : float
+        Another period in D_c/V_*.
+
+    Returns
+    -------
+    Claim
+        Claim on the difference of the gains at the two periods.
+    """
     at = {
         "law": law,
         "stiffness_ratio": STIFFNESS_RATIOS[0],
@@ -92,7 +152,24 @@ def resonance_claim(law: str, period: float) -> Claim:
 
 
 def linear_range_claim(law: str, ratio: float, amplitude: float, *, still: bool = True) -> Claim:
-    """R3: up to which amplitude, near critical stiffness and far from it."""
+    """Return a claim on the validity of linear theory at an amplitude (R3).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    ratio : float
+        Stiffness relative to the critical stiffness.
+    amplitude : float
+        Amplitude of normal stress in sigma_*.
+    still : bool, default: True
+        If True, linear theory is valid at this amplitude.
+
+    Returns
+    -------
+    Claim
+        Claim on the relative difference from linear theory.
+    """
     return Claim(
         id="R3",
         statement=f"{law} law, k = {ratio:g} k_cr at resonance, A = {amplitude:g}: linear theory "
@@ -111,7 +188,22 @@ def linear_range_claim(law: str, ratio: float, amplitude: float, *, still: bool 
 
 
 def failure_order_claim(softer: float, stiffer: float) -> Claim:
-    """R4: the amplitude at which linear theory fails."""
+    """Return a claim on the amplitudes at which linear theory fails (R4).
+
+    Linear theory fails at a smaller amplitude on the softer spring.
+
+    Parameters
+    ----------
+    softer : float
+        Lower stiffness relative to the critical stiffness.
+    stiffer : float
+        Higher stiffness relative to the critical stiffness.
+
+    Returns
+    -------
+    Claim
+        Claim on the difference of the amplitudes at which linear theory fails.
+    """
     at = {"law": "slowness", "oscillation_period": RESONANCE_PERIOD}
     return Claim.below(
         id="R4",
@@ -128,7 +220,22 @@ def failure_order_claim(softer: float, stiffer: float) -> Claim:
 def linear_theory_line(
     part: Callable[[np.ndarray], Any], row: xr.Dataset
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Periods, to twice as far as those of the motions, and what linear theory says of them."""
+    """Compute the response of linear theory at closely spaced periods.
+
+    The periods extend beyond the range of the results by a factor of two.
+
+    Parameters
+    ----------
+    part : callable
+        Function that converts complex responses to the plotted values.
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    tuple of ndarray
+        Periods in D_c/V_*, and plotted values.
+    """
     scene, known = scene_from_coordinates(row.isel(oscillation_period=0)), row["oscillation_period"]
     periods = np.geomspace(0.5 * float(known.min()), 2.0 * float(known.max()), 300)
     frequencies = 2.0 * math.pi / periods
@@ -137,17 +244,49 @@ def linear_theory_line(
 
 
 def phase_lead(responses: np.ndarray) -> Any:
-    """Lead of spring stress in degrees."""
+    """Return the phase lead of spring stress in degrees.
+
+    Parameters
+    ----------
+    responses : ndarray
+        Complex responses.
+
+    Returns
+    -------
+    object
+        Phase lead in degrees.
+    """
     return np.degrees(np.angle(responses))
 
 
 def settled_values(variable: str, row: xr.Dataset) -> xr.DataArray:
-    """Values of a variable where the motion repeats itself; NaN elsewhere."""
+    """Return the values of a variable in cells with a settled response.
+
+    Parameters
+    ----------
+    variable : str
+        Name of the variable.
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    xarray.DataArray
+        Values of the variable. NaN in cells without a settled response.
+    """
     return row[variable].where(row["settled"] == 1.0)
 
 
 def plot_linear_theory(dataset: xr.Dataset, axes: Axes) -> None:
-    """Gains of linear theory."""
+    """Draw horizontal lines at the gains of linear theory.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots import cycle_style
 
     for number in range(dataset.sizes["stiffness_ratio"]):
@@ -158,7 +297,18 @@ def plot_linear_theory(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def closest_to_resonance(periods: list[float]) -> float:
-    """The period that linear theory has the largest gain near, on the softest machine."""
+    """Return the period that is closest to the resonant period.
+
+    Parameters
+    ----------
+    periods : list of float
+        Periods in D_c/V_*.
+
+    Returns
+    -------
+    float
+        Period in D_c/V_*.
+    """
     return min(periods, key=lambda period: abs(period - RESONANCE_PERIOD))
 
 

@@ -1,10 +1,11 @@
-"""Stick-slip in the laboratory: recurrence interval and stress drop at three normal stresses.
+"""Recurrence interval and stress drop of laboratory stick-slip.
 
-Recurrence interval in s and static stress drop in MPa against load point velocity in um/s, on one
-machine, whose stiffness is 0.4, 0.2 and 0.1 of the critical one at 5, 10 and 20 MPa. Drops fall
-with the logarithm of load point velocity, by 2 (b-a) sigma and a little more: half of it by
-friction, half by overshoot. Intervals are the times in which the spring is loaded by the drop
-(lines), and a little longer for what creeps meanwhile.
+The figures show the recurrence interval in s and the static stress drop in MPa against load point
+velocity in um/s at three normal stresses. The stiffness of the machine is 0.4, 0.2 and 0.1 of the
+critical stiffness at 5, 10 and 20 MPa. Stress drops decrease with the logarithm of load point
+velocity by slightly more than 2 (b-a) sigma. One half of this decrease is due to friction, and the
+other half is due to overshoot. The recurrence interval is slightly longer than the time in which
+the spring is loaded by the stress drop (lines), because the slider creeps during this time.
 """
 
 from dataclasses import replace
@@ -17,7 +18,7 @@ from rsfstudy.reductions import LinearFit
 
 #: Normal stresses in MPa.
 NORMAL_STRESSES = (5.0, 10.0, 20.0)
-#: By how much of (b-a) sigma each drop falls as ln V_0 grows by 1.
+#: Decrease of each stress drop in (b-a) sigma if ln V_0 increases by 1.
 DROP_MULTIPLES = {"dynamic": 1.0, "static": 2.0}
 
 rig = Rig(
@@ -32,13 +33,28 @@ weakening = base.b - base.a
 
 CLOSED_FORM_SOURCE = "steady friction at the load point velocity and at the fastest slip rate"
 TOLERANCE_REASON = (
-    "the fastest slip rate goes with the drop, which makes the slope steeper by (b-a) sigma over "
-    "the dynamic drop, 6 to 9 % to first order"
+    "the peak slip rate is proportional to the stress drop, so the slope is steeper by the ratio "
+    "of (b-a) sigma to the dynamic drop, 6 to 9 % to first order"
 )
 
 
 def slip_law_drop_claim(stress: float, drop: str, multiple: float) -> Claim:
-    """S1: stress drops with the slip law fall by whole multiples of (b-a) sigma."""
+    """Return a claim on the slope of a stress drop under the slip law (S1).
+
+    Parameters
+    ----------
+    stress : float
+        Normal stress in MPa.
+    drop : str
+        Type of stress drop: "static" or "dynamic".
+    multiple : float
+        Expected decrease in (b-a) sigma.
+
+    Returns
+    -------
+    Claim
+        Claim on the slope against ln V_0.
+    """
     return Claim(
         id="S1",
         statement=f"slip law, {stress:g} MPa: {drop} drop falls by {multiple:g} (b-a) sigma with "
@@ -53,7 +69,21 @@ def slip_law_drop_claim(stress: float, drop: str, multiple: float) -> Claim:
 
 
 def slowness_law_drop_claim(stress: float) -> Claim:
-    """S2: with the slowness law contact heals all the while."""
+    """Return a claim on the static drop under the slowness law (S2).
+
+    The static drop decreases by more than 2 (b-a) sigma if ln V_0 increases by 1, because the state
+    increases throughout the interval between events.
+
+    Parameters
+    ----------
+    stress : float
+        Normal stress in MPa.
+
+    Returns
+    -------
+    Claim
+        Claim on the slope against ln V_0.
+    """
     return Claim.below(
         id="S2",
         statement=f"slowness law, {stress:g} MPa: static drop falls faster still",
@@ -65,7 +95,20 @@ def slowness_law_drop_claim(stress: float) -> Claim:
 
 
 def loading_time_line(row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
-    """The time in which the spring is loaded by the static drop while nothing slips."""
+    """Return the time in which the spring is loaded by the static stress drop.
+
+    The slider is assumed to be at rest during this time.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    tuple of xarray.DataArray
+        Load point velocities and times.
+    """
     stress_rate = row["stiffness"] * row["load_velocity"]
     return row["load_velocity"], row["static_stress_drop"] / stress_rate
 

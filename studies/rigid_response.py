@@ -1,8 +1,9 @@
-"""Responses of a rigid slider to steps of slip rate, both laws (Figs. 3 and 4).
+"""Response of a rigid slider to steps of slip rate (Figs. 3 and 4).
 
-Stress against slip after the slip rate of a rigid slider steps from V_* to V. Variable normal
-stress slows the evolution to the new steady state and makes upward and downward steps unequal; with
-the slowness law it separates the responses to large downward steps.
+The figures show stress against slip after the slip rate of a rigid slider changes from V_* to V.
+Variable normal stress slows down the evolution to the new steady state and makes the responses to
+steps up and steps down unequal. Under the slowness law, variable normal stress also separates the
+responses to large steps down.
 """
 
 import math
@@ -17,12 +18,30 @@ from rsfstudy.study.figure_declarations import horizontal_line
 
 from ._paper import PAPER, REFERENCE
 
-#: Steps of 1 to 4 decades; a small one, and the one of section 3.4.
+#: Slip rates V/V_* after the step: steps of 1 to 4 decades, a small step, and the step of section
+#: 3.4.
 STEPS = [1e-4, 1e-3, 1e-2, 1e-1, 1.05, 1e1, 1e2, 200.0, 1e3, 1e4]
 
 
 def slower_evolution_claim(law: str, rate: float, figure: str, claim: str) -> Claim:
-    """C3, C4: variable normal stress slows the evolution."""
+    """Return the claim that variable normal stress slows evolution (C3, C4).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    rate : float
+        Slip rate V/V_* after the step.
+    figure : str
+        Figure of the paper.
+    claim : str
+        Identifier of the claim.
+
+    Returns
+    -------
+    Claim
+        Claim on the relative difference of the evolution distances.
+    """
     return Claim.below(
         id=claim,
         statement=f"{law} law, V = {rate:g} V_*: slower evolution with variable sigma",
@@ -30,25 +49,61 @@ def slower_evolution_claim(law: str, rate: float, figure: str, claim: str) -> Cl
         variable="slowing",
         where={"law": law, "normal_stress": "variable", "load_velocity_ratio": rate},
         published=0.0,
-        reason="an inequality on 1 - (slip to 1/e, variable)/(constant)",
+        reason="an inequality; the result is 1 minus the ratio of the slip to 1/e at variable "
+        "normal stress to the slip to 1/e at constant normal stress",
     )
 
 
 def remaining_stress(row: xr.Dataset) -> xr.DataArray:
-    """Stress less its future steady value; steps between decades are there for their numbers."""
+    """Return the difference between stress and its final steady value.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    xarray.DataArray
+        Difference in a sigma_*. NaN if the step is not a whole number of decades.
+    """
     future = row["mu_star"] + row["steady_stress_change"]
     return ((row["shear_stress"] - future) / row["a"]).where(step_in_decades(row) is not None)
 
 
 def step_in_decades(row: xr.Dataset) -> int | None:
-    """Decades of the step, if it is of whole ones."""
+    """Return the size of the step in decades.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    int or None
+        None if the step is not a whole number of decades.
+    """
     decades = math.log10(row["load_velocity_ratio"]) if row["load_velocity_ratio"] > 0.0 else 0.0
     whole = round(decades)
     return whole if whole and abs(decades - whole) < 1e-9 else None
 
 
 def curve_style(row: xr.Dataset) -> dict[str, Any]:
-    """Steps up solid, and steps down dashed."""
+    """Return the line style of a step.
+
+    Steps up are solid, and steps down are dashed.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    dict
+        Keyword arguments for ``matplotlib.axes.Axes.plot``.
+    """
     from rsfstudy.plots import cycle_style
 
     decades = step_in_decades(row) or 1
@@ -106,7 +161,8 @@ study = Study(
             variable="evolution_asymmetry",
             where={"law": "slip", "normal_stress": "variable", "load_velocity_ratio": 1e-4},
             published=0.0,
-            reason="an inequality, on stress less its future steady value, as the figure plots it",
+            reason="an inequality; the figure of the paper shows stress relative to its final "
+            "steady value",
         ),
         Claim.above(
             id="C3",
@@ -129,7 +185,8 @@ study = Study(
             where={"law": "slowness", "normal_stress": "constant"},
             published=0.0,
             tolerance=2.9e-4,
-            reason="less than a line's width in the figure: 0.02 of its 37 a sigma_*",
+            reason="less than the width of a line in the figure, which is 0.02 of a range of 37 a "
+            "sigma_*",
         ),
         Claim.above(
             id="C4",
@@ -138,7 +195,7 @@ study = Study(
             variable="separation",
             where={"law": "slowness", "normal_stress": "variable"},
             published=0.5 * 0.0145,
-            reason="25 times that width",
+            reason="25 times the width of a line in the figure",
         ),
         Claim(
             id="C5",
@@ -148,7 +205,7 @@ study = Study(
             where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 200.0},
             published=0.0,
             tolerance=1e-8,
-            reason="the accuracy asked for, 1e-7 of the stress that evolves (0.15 sigma_*)",
+            reason="the requested accuracy, 1e-7 of the evolution of stress (0.15 sigma_*)",
         ),
         Claim(
             id="C5",
@@ -158,7 +215,8 @@ study = Study(
             where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 1.05},
             published=0.0,
             tolerance=0.01,
-            reason="ln(1 + x) = x to x/2, over ln 1.05: a quarter of it at most",
+            reason="ln(1 + x) differs from x by a relative error of x/2; the largest difference is "
+            "a quarter of this error, relative to ln 1.05",
         ),
         Claim.above(
             id="C5",
@@ -167,7 +225,8 @@ study = Study(
             variable="exponential_misfit",
             where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 200.0},
             published=0.3,
-            reason="an inequality: at some slip, over 0.3 of the change is left beyond eq. 17b",
+            reason="an inequality: at some slip, the remaining stress exceeds eq. 17b by more than "
+            "0.3 of the stress change",
         ),
         Claim(
             id="C5",

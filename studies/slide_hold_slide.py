@@ -1,10 +1,10 @@
-"""Slide-hold-slide: healing and relaxation against hold time and stiffness.
+"""Healing and relaxation in slide-hold-slide tests.
 
-The load point is held, from steady sliding at V_*, and moves on at V_*. With the slowness law and b
-> a relaxation comes to an end that depends on stiffness, and healing grows by b ln 10 a decade at
-every stiffness; without rate weakening relaxation never ends. With the slip law healing per decade
-falls with stiffness, and relaxation never ends either, so that what is read off says as much of the
-machine as of the fault.
+The load point is held after steady sliding at V_*, and then moves again at V_*. Under the slowness
+law with b > a, relaxation approaches a limit that depends on stiffness. Healing increases by b ln
+10 per decade of hold time at every stiffness. Without rate weakening, relaxation continues without
+limit. Under the slip law, relaxation continues without limit as well, and healing per decade
+decreases with stiffness. The measured values then depend on the machine as much as on the fault.
 """
 
 import math
@@ -22,9 +22,9 @@ CASES: dict[str, dict[str, str | float]] = {
     SLOWNESS: {"law": "slowness"},
     STRENGTHENING: {"law": "slowness", "b_over_a": 0.2},
 }
-#: Stiffness over a; with b/a = 2 over critical stiffness.
+#: Ratios of stiffness to a sigma_*/D_c. At b/a = 2, this unit equals the critical stiffness.
 STIFFNESS_OVER_A = (1.5, 3.0, 10.0, 30.0)
-#: Hold times over which slopes are fitted, and the longest.
+#: Range of hold times over which slopes are fitted, and the longest hold time.
 FITTED_HOLD_TIMES, LONGEST_HOLD_TIME = (1e4, 1e8), 1e8
 
 base = Scene(normal_stress="constant", b_over_a=2.0, stiffness=0.0145)
@@ -33,7 +33,18 @@ CLOSED_FORM_SOURCE = "stationary contact in closed form: slowness law, quasi-sta
 
 
 def relaxation_claim(ratio: float) -> Claim:
-    """P1: the limit of relaxation."""
+    """Return a claim on the limit of relaxation (P1).
+
+    Parameters
+    ----------
+    ratio : float
+        Stiffness relative to the critical stiffness.
+
+    Returns
+    -------
+    Claim
+        Claim on relaxation after the longest hold.
+    """
     return Claim(
         id="P1",
         statement=f"slowness law, b > a, k = {ratio:g} k_cr: relaxation ends",
@@ -42,12 +53,23 @@ def relaxation_claim(ratio: float) -> Claim:
         where={"case": SLOWNESS, "stiffness": ratio * a, "hold_time": LONGEST_HOLD_TIME},
         published=-a * ratio * math.log(ratio) / (ratio - 1.0),
         tolerance=1e-7 * a,
-        reason="the accuracy asked for; what is left of it goes as 1/t",
+        reason="the requested accuracy; the remaining relaxation decreases as 1/t",
     )
 
 
 def reloading_peak_claim(ratio: float) -> Claim:
-    """P3: the peak on reloading after a long hold."""
+    """Return a claim on the friction peak after a long hold (P3).
+
+    Parameters
+    ----------
+    ratio : float
+        Stiffness relative to the critical stiffness.
+
+    Returns
+    -------
+    Claim
+        Claim on healing after the longest hold.
+    """
     stiffness = ratio * a
     late = a * b * math.log(stiffness / b) / (stiffness - b)
     return Claim(
@@ -58,13 +80,25 @@ def reloading_peak_claim(ratio: float) -> Claim:
         where={"case": SLOWNESS, "stiffness": stiffness, "hold_time": LONGEST_HOLD_TIME},
         published=b * math.log(LONGEST_HOLD_TIME) - late,
         tolerance=2e-5 * b,
-        reason="2e-5 of b: most peaks come within 2e-7, and 3 of 100 neighbours in the last bit, "
-        "whose steps to the peak fall otherwise, within 1.2e-5, as their errors say",
+        reason="2e-5 of b: most peaks are accurate to 2e-7, but if parameters are changed in the "
+        "last bit, 3 of 100 peaks have different integration steps and are accurate to 1.2e-5, in "
+        "agreement with their error estimates",
     )
 
 
 def healing_claim(ratio: float) -> Claim:
-    """P4: healing per decade."""
+    """Return the claim that healing per decade is b ln 10 (P4).
+
+    Parameters
+    ----------
+    ratio : float
+        Stiffness relative to the critical stiffness.
+
+    Returns
+    -------
+    Claim
+        Claim on the slope of healing.
+    """
     return Claim(
         id="P4",
         statement=f"slowness law, k = {ratio:g} k_cr: heals by b ln 10 a decade",
@@ -73,13 +107,24 @@ def healing_claim(ratio: float) -> Claim:
         where={"case": SLOWNESS, "stiffness": ratio * a},
         published=b * math.log(10.0),
         tolerance=2.5e-4 * b,
-        reason="what the form leaves out goes as 1/t, up to 10/t of b: 1e-3 of it at 1e4, the "
-        "first of the points, which weighs a fifth",
+        reason="terms that the closed form neglects are up to 10 b/t, which is 1e-3 b at the first "
+        "point, t = 1e4; the weight of this point is a fifth",
     )
 
 
 def friction_change(row: xr.Dataset) -> xr.DataArray:
-    """Change of friction since steady sliding."""
+    """Return the change of friction relative to steady sliding.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    xarray.DataArray
+        Change of friction.
+    """
     return row["friction_coefficient"] - row["mu_star"]
 
 
@@ -155,8 +200,8 @@ study = Study(
                 where={"case": STRENGTHENING, "stiffness": ratio * a},
                 published=-0.8 * a * math.log(10.0),
                 tolerance=1.5e-4 * a,
-                reason="what the form leaves out is a t^(b/a - 1): 6e-4 of a at the first of the "
-                "points, which weighs a fifth",
+                reason="the closed form neglects a t^(b/a - 1), which is 6e-4 a at the first "
+                "point; the weight of this point is a fifth",
             )
             for ratio in STIFFNESS_OVER_A
         ),

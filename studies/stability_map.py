@@ -1,15 +1,16 @@
-"""Maps of limit cycles over stiffness and load point velocity: where steady sliding, damped
-oscillation, slow slip and stick-slip lie.
+"""Map of slip modes over stiffness and load point velocity.
 
-What a slider does in the end whose load point steps from V_* to V_0: it slides steadily where
-linear theory calls that stable, and cycles everywhere else. Cycles whose peak slip rate stays below
-the instability norm are slow slip, those that reach it stick-slip; motions that settle do so by a
-damped oscillation where the eigenvalues are a complex pair, up to some six times the critical
-stiffness (slip_mode). The critical stiffness at V_0, from the eigenvalues of steady sliding, bounds
-the cycling region in every column of the map; at variable normal stress it falls with V_0, and slow
-slip lies in a narrow band below, while at constant normal stress stick-slip reaches up to the
-boundary. Beside it cycles are approached slowly, over thousands of events, and small errors of a
-step move them far: motions are integrated 300 times more tightly than their numbers are asked for.
+The map shows the final behaviour of a slider after the load point velocity changes from V_* to V_0:
+steady sliding, damped oscillation, slow slip or stick-slip. Steady sliding occurs if linear theory
+predicts stability, and a limit cycle occurs in all other cases. A limit cycle is slow slip if its
+peak slip rate remains below the instability norm, and stick-slip otherwise. A motion settles by
+damped oscillation if the eigenvalues are a complex pair, which is the case up to about six times
+the critical stiffness. The critical stiffness at V_0, computed from the eigenvalues of steady
+sliding, bounds the region of limit cycles in every column of the map. At variable normal stress,
+this boundary decreases with V_0, and slow slip occurs in a narrow band below it. At constant normal
+stress, stick-slip occurs up to the boundary. Close to the boundary, motions approach their limit
+cycle slowly, over thousands of events, and small integration errors have large effects. The
+tolerance of the integration is therefore 300 times smaller than the requested accuracy.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,24 +42,28 @@ _STIFFNESS = "stiffness_ratio"
 
 @dataclass(frozen=True)
 class CycleRegionEdge(Reduction):
-    """Stiffness between cells with a limit cycle and cells that settle to steady sliding, beside
-    the critical stiffness at V_0 that follows from the eigenvalues of steady sliding, with mass.
+    """Stiffness at the boundary between limit cycles and steady sliding.
 
-    Nothing is interpolated: the cells bracket the edge, and no more. Both are over k_cr(V_*).
+    The boundary lies between the stiffest cell with a limit cycle and the softest cell that settles
+    to steady sliding. The position of the boundary between these cells is not interpolated. The
+    result is compared with the critical stiffness at :math:`V_0` from the eigenvalues of steady
+    sliding with inertia. Both are relative to :math:`k_{cr}(V_*)`.
 
     Parameters
     ----------
     name : str
-        Name of the edge, the middle of its bracket; ``<name>_error`` (half its width),
-        ``<name>_stable`` and ``<name>_unstable`` (its ends), ``<name>_crossings`` (how often the
-        answer changes along stiffness: the edge is a number only where it changes once),
-        ``<name>_linear`` (what the eigenvalues say), ``<name>_farthest`` (the largest distance of
-        the two along `across`, over the width of the bracket) and ``<name>_misplaced`` (how many
-        cells cycle above or settle below what the eigenvalues say) come with it.
+        Name of the boundary, which is the midpoint of its bracket. Further results are
+        ``<name>_error`` (half of the width of the bracket), ``<name>_stable`` and
+        ``<name>_unstable`` (ends of the bracket), ``<name>_crossings`` (number of changes between
+        limit cycles and steady sliding along stiffness), ``<name>_linear`` (critical stiffness from
+        the eigenvalues), ``<name>_farthest`` (largest distance between the boundary and the
+        critical stiffness along ``across``, relative to the width of the bracket), and
+        ``<name>_misplaced`` (number of limit cycles above and of settling cells below the critical
+        stiffness). The boundary is NaN unless there is exactly one change.
     of : str
-        Variable that is a number where there is a limit cycle.
-    across : str
-        Coordinate along the edge, of which the last two are summaries.
+        Variable that has a value in cells with a limit cycle.
+    across : str, default: "load_velocity_ratio"
+        Coordinate along the boundary, over which the last two results are computed.
     """
 
     across: str = "load_velocity_ratio"
@@ -71,7 +76,7 @@ class CycleRegionEdge(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Its results, as far as their names do not say what they are."""
+        """Quantities of the results."""
         name, ratio = self.name, r"$k/k_{cr}(V_*)$"
         return (
             Quantity(name, ratio, "1", "stiffness at which limit cycles end, over k_cr(V_star)"),
@@ -85,12 +90,23 @@ class CycleRegionEdge(Reduction):
         )
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Bracket the edge along stiffness; nothing where parts of the slider are the user's own.
+        """Find the bracket of the boundary along stiffness.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the study.
+
+        Returns
+        -------
+        xarray.Dataset
+            Empty if the scenes contain user-defined parts that cannot be reconstructed from the
+            coordinates.
 
         Raises
         ------
         InvalidValue
-            Where stiffness_ratio is no coordinate along one dimension.
+            If ``stiffness_ratio`` is not a coordinate along one dimension.
         """
         dimension = dimension_of_coordinate(dataset, _STIFFNESS)
         cycles, settles = dataset[self.of].notnull(), dataset["status"] == Status.NO_LIMIT_CYCLE
@@ -100,7 +116,8 @@ class CycleRegionEdge(Reduction):
         if linear is None:
             return xr.Dataset()
         stiffness = dataset[_STIFFNESS].astype(float)
-        # the change at the stiffest cells counts, and a boundary tells of the first one
+        # The reduction ``Boundary`` returns the first change, so the order is reversed to find the
+        # change at the stiffest cells.
         softening = answers.assign_coords({_STIFFNESS: -stiffness})
         found = Boundary(self.name, self.of, on=_STIFFNESS).bracket(softening)
         stable, unstable, crossings = abs(found[0]), abs(found[1]), found[2]
@@ -127,8 +144,19 @@ class CycleRegionEdge(Reduction):
 
 
 def _linear_boundary(places: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray | None:
-    """Critical stiffness at V_0 over that at V_*, at each place of a lattice; None where a scene
-    cannot be told from its coordinates alone.
+    """Compute the ratio of the critical stiffness at V_0 to the value at V_*.
+
+    Parameters
+    ----------
+    places : xarray.DataArray
+        Array with the dimensions of the lattice except stiffness.
+    dataset : xarray.Dataset
+        Results of the study.
+
+    Returns
+    -------
+    xarray.DataArray or None
+        None if a scene cannot be reconstructed from the coordinates.
     """
     values, cells = np.full(places.shape, np.nan), dataset.coords.to_dataset()
     cells = cells.isel({d: 0 for d in cells.dims if d not in places.dims})
@@ -145,28 +173,51 @@ def _linear_boundary(places: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray 
 
 MAP_AXES = ("stiffness_ratio", "load_velocity_ratio")
 PEAK = "max_log10_slip_rate"
-#: Stiffness ratios between which the edge is shown enlarged.
+#: Range of stiffness ratios of the magnified map.
 CLOSE_STIFFNESS_MIN, CLOSE_STIFFNESS_MAX = 0.8, 1.1
-#: Springs on both sides of where oscillation about steady sliding ends: at constant normal stress,
-#: where (k - k_cr)^2 = 4 a k, 5.83 k_cr for b = 2a.
+#: Stiffness ratios on both sides of the limit of damped oscillations. At constant normal stress,
+#: the limit is the solution of (k - k_cr)^2 = 4 a k, which is 5.83 k_cr for b = 2a.
 STIFF_SPRINGS = (1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
 
 
 def spans_stiffness(softest: float, dataset: xr.Dataset) -> bool:
-    """True if some springs are softer than that, and some stiffer."""
+    """Return True if the stiffness ratios lie on both sides of a limit.
+
+    Parameters
+    ----------
+    softest : float
+        Limit of the stiffness ratio. Zero for a map of all springs.
+    dataset : xarray.Dataset
+        Results of one case.
+
+    Returns
+    -------
+    bool
+        True if the map can be drawn.
+    """
     ratio = dataset["stiffness_ratio"]
     return not softest or bool(ratio.min() < softest < ratio.max())
 
 
 def plot_map(softest: float, dataset: xr.Dataset, axes: Axes) -> None:
-    """Peak slip rate from a stiffness on, with the linear boundary of steady sliding."""
+    """Draw the map of peak slip rate and the linear stability boundary.
+
+    Parameters
+    ----------
+    softest : float
+        Smallest stiffness ratio of the magnified map. Zero for a map of all springs.
+    dataset : xarray.Dataset
+        Results of one case.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots.maps import draw_map
 
     ratio = dataset["stiffness_ratio"]
     shown = (ratio > softest) & (ratio < CLOSE_STIFFNESS_MAX) if softest else ratio > softest
     case = dataset.isel(stiffness_ratio=np.flatnonzero(shown)).transpose(*MAP_AXES, ...)
     draw_map(PEAK, MAP_AXES, None, case, axes)
-    if not softest:  # the outermost cells may reach below zero
+    if not softest:  # The outermost cells may extend below zero.
         axes.set_ylim(float(ratio.min()), float(ratio.max()))
         axes.set_yscale("log")
     axes.set(xlim=axes.get_xlim(), ylim=axes.get_ylim())
@@ -177,9 +228,17 @@ def plot_map(softest: float, dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def label_slip_modes(case: xr.Dataset, axes: Axes) -> None:
-    """The bounds of the slip modes, and their names."""
+    """Draw the boundaries of the slip modes and their names.
+
+    Parameters
+    ----------
+    case : xarray.Dataset
+        Results of one case.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     x, y = case["load_velocity_ratio"].values, case["stiffness_ratio"].values
-    # heights in parts of the panel, on any scale
+    # Heights as fractions of the panel, for any scale of the axis.
     to_panel = axes.transData + axes.transAxes.inverted()
     heights = to_panel.transform(np.column_stack([np.full(len(y), x[0]), y]))[:, 1]
     box = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.0}
@@ -201,7 +260,20 @@ def label_slip_modes(case: xr.Dataset, axes: Axes) -> None:
 
 
 def map_title(softest: float, case: xr.Dataset) -> str:
-    """Law and normal stress, and which springs."""
+    """Return the title of a map.
+
+    Parameters
+    ----------
+    softest : float
+        Smallest stiffness ratio of the magnified map. Zero for a map of all springs.
+    case : xarray.Dataset
+        Results of one case.
+
+    Returns
+    -------
+    str
+        Law, normal stress condition, and the word "magnified" if applicable.
+    """
     text = f"{case['law'].item()} law, {case['normal_stress'].item()} normal stress".capitalize()
     return f"{text}, magnified" if softest else text
 
@@ -223,13 +295,14 @@ figure = Figure(
 )
 
 
-#: What is claimed of each case: its edge, and that no stick-slip lies above it, nor steady sliding
-#: below.
+#: Claims about each case: position of the boundary, and number of limit cycles above and of steady
+#: sliding below the boundary.
 EDGE_CLAIM: dict[str, Any] = {
     "says": "limit cycles end where the eigenvalues say",
     "variable": "cycling_edge_farthest",
     "tolerance": 0.5,
-    "reason": "half a spacing of the cells in stiffness: the boundary is within the bracket",
+    "reason": "half of the spacing of the cells in stiffness, because the boundary lies within the "
+    "bracket",
 }
 MISPLACED_CELLS_CLAIM: dict[str, Any] = {
     "says": "no cell cycles above it or settles below it",
@@ -240,7 +313,24 @@ MISPLACED_CELLS_CLAIM: dict[str, Any] = {
 
 
 def edge_claim(law: str, normal_stress: str, says: str, **held: Any) -> Claim:
-    """C1: the edge of the computed region is where the eigenvalues say."""
+    """Return a claim on the boundary of limit cycles (C1).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    normal_stress : str
+        Normal stress condition.
+    says : str
+        Statement of the claim.
+    **held : object
+        Other arguments of ``Claim``.
+
+    Returns
+    -------
+    Claim
+        Claim on the boundary.
+    """
     return Claim(
         id="C1",
         statement=f"{law} law, {normal_stress}: {says}",

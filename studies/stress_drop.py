@@ -1,13 +1,12 @@
-"""Stress drop against ln V_0: how loading rate scales static and dynamic stress drops (section
-3.5).
+"""Static and dynamic stress drops against ln V_0 (section 3.5).
 
-Stress drops of limit cycles fall with the logarithm of load point velocity. For the slip law the
-slopes over three decades are close to 2 (a-b) sigma_* (static) and (a-b) sigma_* (dynamic) at
-constant normal stress, and those over 1 - mu_* cot(phi) where normal stress varies; for the
-slowness law they depend on stiffness. Slopes at the slow and the fast end of the range tell how
-constant they are: at variable normal stress they are not. At phi = 50 degrees k_cr falls so much
-with V that stick-slip ends: those cells say so, and the fits leave them out and count what they
-have.
+Stress drops of limit cycles decrease with the logarithm of load point velocity. Under the slip law
+and at constant normal stress, the slopes over three decades are close to 2 (a-b) sigma_* (static)
+and (a-b) sigma_* (dynamic). At variable normal stress, these values are divided by 1 - mu_*
+cot(phi). Under the slowness law, the slopes depend on stiffness. Separate fits at low and at high
+velocities show that the slope is not constant at variable normal stress. At phi = 50 degrees, k_cr
+decreases so much with V that stick-slip ends. The fits ignore cells without stick-slip and report
+the number of points.
 """
 
 import math
@@ -34,16 +33,36 @@ CASES: dict[str, dict[str, str | float]] = {
     STEEP_CASE: {"normal_stress": "variable", "phi": 50.0},
 }
 
-#: ln V_0 over V_* at the slow and the fast end of the three decades.
+#: Ranges of ln(V_0/V_*) at the slow and at the fast end of the three decades.
 SLOW_RANGE, FAST_RANGE = (0.0, math.log(10.0)), (math.log(100.0), math.log(1000.0))
 
 
 def _normal_stress_term(case: str) -> str:
+    """Return the description of a normal stress case."""
     return case if case == CONSTANT_CASE else f"variable, {case}"
 
 
 def slip_law_slope_claim(drop: str, case: str, multiple: float, unit: float, law: str) -> Claim:
-    """C15: slip law slopes at 0.8 k_cr."""
+    """Return a claim on a slope under the slip law at 0.8 k_cr (C15).
+
+    Parameters
+    ----------
+    drop : str
+        Type of stress drop: "static" or "dynamic".
+    case : str
+        Name of the case.
+    multiple : float
+        Expected slope in ``unit``.
+    unit : float
+        Unit of the slope, for example (a-b) sigma_*.
+    law : str
+        Expression for the slope.
+
+    Returns
+    -------
+    Claim
+        Claim on the slope against ln V_0.
+    """
     return Claim(
         id="C15",
         statement=f"slip law, {_normal_stress_term(case)}: {drop} drop against ln V_0, {law}",
@@ -52,12 +71,24 @@ def slip_law_slope_claim(drop: str, case: str, multiple: float, unit: float, law
         where={"law": "slip", "case": case, "stiffness_ratio": 0.8},
         published=multiple * unit,
         tolerance=0.5 * abs(unit),
-        reason="'scales with' a whole multiple, no error stated: half of the next",
+        reason="the paper reports an integer multiple ('scales with') without an error; the "
+        "tolerance is half of the unit",
     )
 
 
 def slowness_law_drop_claim(case: str) -> Claim:
-    """C16: slowness law drops fall with ln V_0."""
+    """Return the claim that drops decrease under the slowness law (C16).
+
+    Parameters
+    ----------
+    case : str
+        Name of the case.
+
+    Returns
+    -------
+    Claim
+        Claim on the slope of the static drop against ln V_0.
+    """
     return Claim.below(
         id="C16",
         statement=f"slowness law, {case}: static drop falls with ln V_0",
@@ -69,7 +100,19 @@ def slowness_law_drop_claim(case: str) -> Claim:
 
 
 def slope_reductions(drop: str) -> list[Reduction]:
-    """The slope over three decades, over (a-b) sigma_*, and at either end of the range."""
+    """Return the reductions for the slopes of a stress drop.
+
+    Parameters
+    ----------
+    drop : str
+        Type of stress drop: "static" or "dynamic".
+
+    Returns
+    -------
+    list of Reduction
+        Slopes over three decades and at both ends of the range, and the slope relative to (a-b)
+        sigma_*.
+    """
     of, on = f"{drop}_stress_drop", "log_load_velocity_ratio"
     return [
         LinearFit(name=f"{drop}_slope", of=of, on=on),
@@ -80,19 +123,45 @@ def slope_reductions(drop: str) -> list[Reduction]:
 
 
 ABSCISSA = "log_load_velocity_ratio"
-#: Where a line misses by more than this part of what it spans, no line fits.
+#: Largest misfit of a line that is considered a good fit, relative to the range of the stress drop.
 MAX_MISFIT_SHARE = 0.05
 DROPS = ("static", "dynamic")
 
 
 def is_fitted_by_line(drop: str, row: xr.Dataset) -> bool:
-    """True if a line in ln V_0 fits a stress drop."""
+    """Return True if a stress drop is linear in ln V_0.
+
+    Parameters
+    ----------
+    drop : str
+        Type of stress drop: "static" or "dynamic".
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    bool
+        True if the misfit is small compared to the range of the stress drop.
+    """
     values, misfit = row[f"{drop}_stress_drop"], float(row.get(f"{drop}_slope_misfit", math.nan))
     return misfit <= MAX_MISFIT_SHARE * float(values.max() - values.min())
 
 
 def fit_line(drop: str, row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
-    """The line of a fit, if one fits."""
+    """Return the fitted line.
+
+    Parameters
+    ----------
+    drop : str
+        Type of stress drop: "static" or "dynamic".
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    tuple of xarray.DataArray
+        Values of ln(V_0/V_*) and of the line. NaN if a line does not fit.
+    """
     known = row[f"{drop}_stress_drop"]
     x = row[ABSCISSA].where(known.notnull() & is_fitted_by_line(drop, row))
     slope = float(row.get(f"{drop}_slope", math.nan))
@@ -100,7 +169,20 @@ def fit_line(drop: str, row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
 
 
 def curve_name(drop: str, row: xr.Dataset) -> str:
-    """The case, and its slope if a line fits."""
+    """Return the name of a case, with the slope if a line fits.
+
+    Parameters
+    ----------
+    drop : str
+        Type of stress drop: "static" or "dynamic".
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    str
+        Label of the curve.
+    """
     from rsfstudy.plots import format_slope
 
     text, slope = str(row["case"].item()), row.get(f"{drop}_slope", xr.DataArray(math.nan))
@@ -112,14 +194,36 @@ def curve_name(drop: str, row: xr.Dataset) -> str:
 
 
 def scaled_slope(row: xr.Dataset) -> xr.DataArray:
-    """f(k), where a line fits."""
+    """Return the scaled slopes of the static drop against stiffness.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    xarray.DataArray
+        Slopes relative to (a-b) sigma_*. NaN if a line does not fit.
+    """
     places = range(row.sizes["stiffness_ratio"])
     straight = [is_fitted_by_line("static", row.isel(stiffness_ratio=place)) for place in places]
     return row["static_slope_scaled"].where(xr.DataArray(straight, dims="stiffness_ratio"))
 
 
 def local_slope(row: xr.Dataset) -> xr.DataArray:
-    """Slope at each load point velocity, from its neighbours."""
+    """Compute the local slope at each load point velocity.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    xarray.DataArray
+        Slopes from finite differences.
+    """
     values = row["static_stress_drop"]
     several = values.size > 1
     return values.copy(data=np.gradient(values, row[ABSCISSA])) if several else values * math.nan
@@ -202,7 +306,7 @@ study = Study(
             where={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.4},
             minus={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.8},
             published=0.05,
-            reason="an inequality, well above the standard errors",
+            reason="an inequality; the bound is much larger than the standard errors",
         ),
         Claim(
             id="C2",
@@ -225,7 +329,7 @@ study = Study(
             variable="static_slope_points",
             where={"law": "slip", "case": STEEP_CASE, "stiffness_ratio": 0.8},
             published=10.0,
-            reason="an inequality: cells without stick-slip are left out",
+            reason="an inequality: cells without stick-slip are ignored",
         ),
     ],
     plot=figure,

@@ -1,24 +1,27 @@
-"""Triggering: critical steps of normal stress, displacement and velocity as changes of stress, and
-whether a change of Coulomb stress predicts one from the other.
+"""Triggering by steps of normal stress, displacement and velocity.
 
-A slider in steady state at V_* has its normal stress lowered at once, or its load point displaced,
-and is then held; or its load point goes on faster. To first order in k/k_cr a fall of normal stress
-triggers as a displacement step does, at a change of Coulomb stress with mu' = mu_* - alpha (1 -
-a/b), by every law. By the slip law that goes on to hold: exactly for alpha = 0, and to 3 % up to 2
-k_cr, inclined driving included. By the slowness law it ends near critical stiffness, where a fall
-of normal stress takes up to 2.4 times the change of Coulomb stress of a displacement: a fall also
-lowers the critical stiffness. Where the spring is so stiff that only a jump of slip rate to the
-norm is critical, it predicts no better. The effect of normal stress on the state makes falls
-trigger less. A velocity step, whose direct effect is a ln(V_0/V_*), takes 0.6 to 1.03 times the
-stress of a displacement, most of them less because the load point goes on; below critical stiffness
-any triggers. Inclined driving is at 60 degrees, the fall then one of sigma_3.
+A slider is in steady state at V_*. Then normal stress decreases instantaneously, or the load point
+is displaced, and the load point is held. Alternatively, the load point velocity increases. To first
+order in k/k_cr, a decrease of normal stress and a displacement step trigger an instability at the
+same change of Coulomb stress with mu' = mu_* - alpha (1 - a/b), for all laws. Under the slip law,
+this rule remains valid at larger stiffness: exactly for alpha = 0, and to within 3 % up to 2 k_cr,
+even for inclined driving. Under the slowness law, the rule fails close to the critical stiffness.
+The critical decrease of normal stress then needs up to 2.4 times the Coulomb stress change of a
+displacement step, because a decrease of normal stress also lowers the critical stiffness. On very
+stiff springs, an instability occurs only if the slip rate reaches the norm during the step, and the
+Coulomb stress change is not a good predictor either. The effect of normal stress on the state makes
+decreases of normal stress less effective. The direct effect of the critical velocity step, a
+ln(V_0/V_*), is 0.6 to 1.03 times the stress change of the critical displacement step. In most
+cases, the direct effect is smaller, because the load point continues to move. Below the critical
+stiffness, every velocity step triggers an instability. For inclined driving, the angle is 60
+degrees, and the decrease of normal stress is a decrease of sigma_3.
 
-A change of Coulomb stress is ``dtau - mu' dsigma``. A displacement step of the load point changes
-shear stress by K d, and normal stress by cot(phi) times that; a step of imposed normal stress, or
-of sigma_3, changes nothing else. To first order in k/k_cr both trigger at the same change of
-Coulomb stress, with mu' = mu_* - alpha (1 - a/b), by every law that falls with Theta/b + ln V. A
-step of load point velocity changes no stress at once; it is compared by that by which friction at
-V_0 exceeds friction at V_* before the state has changed, a ln(V_0/V_*).
+The change of Coulomb stress is ``dtau - mu' dsigma``. A displacement d of the load point changes
+shear stress by K d, and normal stress by cot(phi) times this amount. A step of imposed normal
+stress, or of sigma_3, does not change shear stress. The rule holds to first order in k/k_cr for all
+laws whose evolution depends on Theta/b + ln V. A step of load point velocity does not change stress
+instantaneously. The study represents a velocity step by its direct effect a ln(V_0/V_*), which is
+the increase of friction before the state changes.
 """
 
 from dataclasses import replace
@@ -51,13 +54,32 @@ HELD_LOAD_POINT_SOURCE = (
     "load point held: u begins at mu_* (q-1)/a - alpha (1/a - 1/b) ln q, threshold h(u*) = -q k^"
 )
 
-#: alpha = 0.56 at b/a = 2.
+#: Effective friction mu' for alpha = 0.56 and b/a = 2.
 EFFECTIVE_FRICTION = effective_friction(base.mu_star, base.b_over_a, 0.56)
 FRICTION_REDUCTION = base.mu_star - EFFECTIVE_FRICTION
 
 
 def critical_fall_claim(law: str, alpha: float, ratio: float, within: float, reason: str) -> Claim:
-    """N1: the critical fall of normal stress."""
+    """Return a claim on the critical decrease of normal stress (N1).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    alpha : float
+        Effect of normal stress on the state.
+    ratio : float
+        Stiffness relative to the critical stiffness.
+    within : float
+        Relative tolerance.
+    reason : str
+        Reason for the tolerance.
+
+    Returns
+    -------
+    Claim
+        Claim on the critical step.
+    """
     published = critical_normal_stress_step(
         base.mu_star, base.a, base.b_over_a, alpha, EXPONENTS[law], ratio
     )
@@ -78,7 +100,20 @@ def critical_fall_claim(law: str, alpha: float, ratio: float, within: float, rea
 
 
 def coulomb_limit_claim(law: str, case: str) -> Claim:
-    """N2: the Coulomb limit."""
+    """Return the claim that Coulomb stress is critical on soft springs (N2).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    case : str
+        Name of the case.
+
+    Returns
+    -------
+    Claim
+        Claim on the ratio of the Coulomb stress changes at 0.05 k_cr.
+    """
     return Claim(
         id="N2",
         statement=f"{law} law, {case}, k = 0.05 k_cr: falls and displacements trigger at the same "
@@ -88,12 +123,25 @@ def coulomb_limit_claim(law: str, case: str) -> Claim:
         where={"law": law, "case": case, "stiffness_ratio": 0.05},
         published=1.0,
         tolerance=1e-3,
-        reason="the second order: less than 0.02 k/k_cr in all of them",
+        reason="the second order is less than 0.02 k/k_cr in all cases",
     )
 
 
 def normal_stress_effect_claim(law: str) -> Claim:
-    """N3: what Linker and Dieterich's effect does."""
+    """Return the claim that alpha increases the critical decrease (N3).
+
+    Linker and Dieterich (1992) showed that a decrease of normal stress strengthens the state.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+
+    Returns
+    -------
+    Claim
+        Claim on the critical decrease of normal stress.
+    """
     where = {"law": law, "stiffness_ratio": 0.5}
     return Claim.below(
         id="N3",
@@ -103,12 +151,13 @@ def normal_stress_effect_claim(law: str) -> Claim:
         where={**where, "case": IMPOSED_WITH_ALPHA},
         minus={**where, "case": IMPOSED_WITHOUT_ALPHA},
         published=-0.5 * base.a * (0.5 / EFFECTIVE_FRICTION - 0.5 / base.mu_star),
-        reason="an inequality: by more than half of what the first order says",
+        reason="an inequality: the bound is half of the first-order result",
     )
 
 
 TOLERANCE_REASON = (
-    "its error estimate, to 1.2e-9 of it, and what a finite norm leaves, no more than that"
+    "the error estimate, which is up to 1.2e-9 of the step, and the effect of a finite norm, which "
+    "is not larger"
 )
 
 
@@ -136,9 +185,29 @@ CONTINUOUS_LINE_STYLE: dict[str, Any] = {
 def draw_comparison(
     variable: str, name: str, style: dict[str, Any], over: str | None = None
 ) -> DrawFunction:
-    """Curves beside falls of normal stress, in their colours; over a number of the scene."""
+    """Return a function that draws curves for comparison.
+
+    The curves have the colours of the critical decreases of normal stress.
+
+    Parameters
+    ----------
+    variable : str
+        Name of the variable.
+    name : str
+        Name in the legend.
+    style : dict
+        Line style.
+    over : str, optional
+        Variable by which the values are divided.
+
+    Returns
+    -------
+    DrawFunction
+        Function that draws on axes.
+    """
 
     def mark(dataset: xr.Dataset, axes: Axes) -> None:
+        """Draw the curves."""
         from rsfstudy.plots import add_grey_legend_entry, cycle_style
 
         values = dataset[variable] / (dataset[over] if over else 1.0)
@@ -227,7 +296,7 @@ study = Study(
             where={"law": "slip", "case": IMPOSED_WITH_ALPHA},
             published=-FRICTION_REDUCTION * base.a / (2.0 * EFFECTIVE_FRICTION**2),
             tolerance=0.02 * FRICTION_REDUCTION * base.a / (2.0 * EFFECTIVE_FRICTION**2),
-            reason="the third order, over stiffnesses up to 0.5 k_cr",
+            reason="effect of the third order for stiffness up to 0.5 k_cr",
         ),
         *map(normal_stress_effect_claim, EXPONENTS),
         Claim(
@@ -238,7 +307,8 @@ study = Study(
             where={"law": "slip", "case": IMPOSED_WITHOUT_ALPHA, "stiffness_ratio": 1.0},
             published=1.0,
             tolerance=1e-5,
-            reason="a finite norm takes 2e-5 of either, and about the same",
+            reason="a finite norm changes both steps by approximately the same relative amount, "
+            "2e-5",
         ),
         Claim.above(
             id="N5",
@@ -247,7 +317,7 @@ study = Study(
             variable="coulomb_ratio",
             where={"law": "slip", "case": INCLINED_STRONG, "stiffness_ratio": 2.0},
             published=0.97,
-            reason="an inequality; ours is 0.974",
+            reason="an inequality; our result is 0.974",
         ),
         Claim.above(
             id="N6",
@@ -256,7 +326,7 @@ study = Study(
             variable="coulomb_ratio",
             where={"law": "slowness", "case": INCLINED_STRONG, "stiffness_ratio": 1.25},
             published=2.0,
-            reason="an inequality; ours is 2.40",
+            reason="an inequality; our result is 2.40",
         ),
     ],
     plot=figure,

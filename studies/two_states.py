@@ -1,11 +1,11 @@
-"""A law of two states: cycles whose period doubles, chaos, and Floquet multipliers (Gu et al. 1984;
-Becker 2000).
+"""Period doubling and chaos under a law with two states.
 
-A spring a little softer than critical oscillates with a limited slip rate, without mass and with
-the slip law, because a second state evolves over a longer slip. Softened, its period doubles, and
-doubles again, until the motion never repeats itself; softer than that slip rate is unbounded. The
-first doubling is where a Floquet multiplier of the cycle of one event passes -1; repelling, that
-cycle goes on through all that follows.
+A second state with a longer slip distance limits the slip rate, so a spring slightly softer than
+critical oscillates even without inertia and under the slip law (Gu et al. 1984; Becker 2000). If
+the stiffness decreases, the period doubles repeatedly until the motion is chaotic. At still lower
+stiffness, the slip rate is unbounded. The first period doubling occurs when a Floquet multiplier of
+the period-one cycle passes through -1. Below this stiffness, the period-one cycle still exists, but
+it is repelling.
 """
 
 import math
@@ -28,11 +28,23 @@ LAW_SELECTION = {"law": "two_slip_states"}
 
 
 def spring_place(ratio: float) -> dict[str, str | float]:
-    """Place of one spring."""
+    """Return the coordinates of a spring.
+
+    Parameters
+    ----------
+    ratio : float
+        Stiffness relative to the critical stiffness.
+
+    Returns
+    -------
+    dict
+        Coordinates of the lattice.
+    """
     return {**LAW_SELECTION, "stiffness_ratio": ratio}
 
 
-#: Springs too soft for slip to stay bounded without mass; where periods double; and the others.
+#: Stiffness ratios in ascending order: springs with unbounded slip rates, springs with closely
+#: spaced stiffness in the range of period doubling, and stiffer springs.
 SPRINGS = np.round(
     np.concatenate(
         [
@@ -50,7 +62,15 @@ SPRINGS = np.round(
 
 
 def plot_peaks(dataset: xr.Dataset, axes: Axes) -> None:
-    """Peaks of the events that are kept, and the cycle of one event."""
+    """Draw the peak slip rates of the events and of the period-one cycle.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots import cycle_style
 
     ratio, peaks = dataset["stiffness_ratio"], dataset["peak_log10_slip_rate"]
@@ -72,7 +92,15 @@ def plot_peaks(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def plot_multipliers(dataset: xr.Dataset, axes: Axes) -> None:
-    """Floquet multipliers of the cycle of one event, and growth of departures by each event."""
+    """Draw the Floquet multipliers and the Lyapunov exponent.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots import cycle_style
 
     imaginary = dataset["floquet_multiplier_imaginary"]
@@ -100,9 +128,23 @@ def plot_multipliers(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def set_abscissa(magnified: bool) -> DrawFunction:
-    """The stiffness of all springs, or of those around where periods double; and where they do."""
+    """Return a function that sets the range of the stiffness axis.
+
+    The function also marks the range of unbounded slip rates and the first period doubling.
+
+    Parameters
+    ----------
+    magnified : bool
+        If True, only the range of period doubling is shown.
+
+    Returns
+    -------
+    DrawFunction
+        Function that draws on axes.
+    """
 
     def mark(dataset: xr.Dataset, axes: Axes) -> None:
+        """Set the range of the axis and draw the marks."""
         ratio = dataset["stiffness_ratio"].values
         beyond = ratio[dataset["status"].values == int(Status.SLIP_RATE_UNBOUNDED)]
         bounded = ratio[np.isfinite(dataset["peak_spread"].values)]
@@ -126,7 +168,18 @@ def set_abscissa(magnified: bool) -> DrawFunction:
 
 
 def has_doublings(dataset: xr.Dataset) -> bool:
-    """True if there are springs enough to be magnified."""
+    """Return True if enough springs lie in the range of period doubling.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+
+    Returns
+    -------
+    bool
+        True if the magnified panel can be drawn.
+    """
     ratio = dataset["stiffness_ratio"].where(dataset["peak_spread"].notnull())
     return 2 < int((ratio < ratio.min() + 0.019).sum()) < int(ratio.notnull().sum())
 
@@ -198,7 +251,7 @@ study = Study(
             where=spring_place(0.95),
             published=8.02755656e-4,
             tolerance=5e-13,
-            reason="the digits given, times a = 0.01",
+            reason="rounding of the published value, multiplied by a = 0.01",
         ),
         Claim(
             id="S2",
@@ -210,7 +263,8 @@ study = Study(
             minus_variable="doubling_by_motion",
             published=0.0,
             tolerance=2e-4,
-            reason="half the distance of two springs, between which the motions say",
+            reason="half of the difference between the two stiffness values that bracket the "
+            "period doubling of the motions",
         ),
         Claim(
             id="S3",
@@ -220,7 +274,8 @@ study = Study(
             where=LAW_SELECTION,
             published=0.86626,
             tolerance=1e-5,
-            reason="digits given; differences of the return map and interpolation leave 1e-6",
+            reason="rounding of the expected value; finite differences of the return map and "
+            "interpolation have an error of 1e-6",
         ),
         Claim(
             id="S4",
@@ -230,7 +285,8 @@ study = Study(
             where=spring_place(0.8663),
             published=-1.0,
             tolerance=4e-3,
-            reason="within 1e-4 k_cr of the doubling: a change of the multiplier by 4e-3",
+            reason="the stiffness is within 1e-4 k_cr of the period doubling, which changes the "
+            "multiplier by up to 4e-3",
         ),
         Claim.above(
             id="S5",
@@ -239,7 +295,7 @@ study = Study(
             variable="lyapunov_exponent",
             where=spring_place(0.8531),
             published=0.1,
-            reason="an inequality, well above what 32 events leave uncertain",
+            reason="an inequality; the bound is much larger than the uncertainty due to 32 events",
         ),
         Claim(
             id="S6",

@@ -1,11 +1,10 @@
-"""Two states: critical stiffness against the second evolution effect and its slip distance, down to
-friction that strengthens with slip rate.
+"""Critical stiffness of a law with two states.
 
-What a second state does to the stability of steady sliding. A negative b_2 over a longer slip
-distance makes steady friction strengthen with slip rate (b_1 + b_2 < a, b_2 below -0.4 a), and
-steady sliding is unstable nevertheless on springs that are soft enough: the first state weakens
-before the second has taken part. Over shorter distances than that of the first, the second state
-only takes from the direct effect or adds to it.
+The critical stiffness of steady sliding depends on the second evolution effect b_2 and on its slip
+distance. A negative b_2 with a long slip distance makes steady friction rate-strengthening (b_1 +
+b_2 < a, i.e. b_2 below -0.4 a). Steady sliding is still unstable on sufficiently soft springs,
+because the first state weakens friction before the second state evolves. If the second slip
+distance is shorter than the first, the second state only reduces or increases the direct effect.
 """
 
 import math
@@ -20,8 +19,23 @@ DIRECT_EFFECT, FIRST_EFFECT_OVER_A = 0.01, 1.4
 
 
 def cubic_critical_stiffness(second: float, longer: float) -> float:
-    """Critical stiffness from the cubic of small perturbations: b_2/a and L_2/L_1 to
-    k_cr L_1/sigma.
+    """Compute the critical stiffness from the cubic characteristic equation.
+
+    Parameters
+    ----------
+    second : float
+        Ratio b_2/a.
+    longer : float
+        Ratio of the slip distances, L_2/L_1.
+
+    Returns
+    -------
+    float
+        Critical stiffness in sigma_*/L_1.
+
+    References
+    ----------
+    Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196.
     """
     rho = 1.0 / longer
     linear = (
@@ -35,7 +49,26 @@ def cubic_critical_stiffness(second: float, longer: float) -> float:
 def critical_stiffness_claim(
     second: float, longer: float, says: str, published: float, **held: Any
 ) -> Claim:
-    """One pair of states."""
+    """Return a claim on the critical stiffness of a pair of states (S7).
+
+    Parameters
+    ----------
+    second : float
+        Ratio b_2/a.
+    longer : float
+        Ratio of the slip distances, L_2/L_1.
+    says : str
+        Statement of the claim.
+    published : float
+        Expected value.
+    **held : object
+        Other arguments of ``Claim``.
+
+    Returns
+    -------
+    Claim
+        Claim on the critical stiffness.
+    """
     return Claim(
         id="S7",
         statement=f"b_2 = {second:g} a, L_2 = {longer:g} D_c: {says}",
@@ -47,10 +80,13 @@ def critical_stiffness_claim(
     )
 
 
-PUBLISHED_DIGITS_TOLERANCE: dict[str, Any] = {"tolerance": 5e-8, "reason": "the digits given"}
+PUBLISHED_DIGITS_TOLERANCE: dict[str, Any] = {
+    "tolerance": 5e-8,
+    "reason": "rounding of the published value",
+}
 ROUNDING_TOLERANCE: dict[str, Any] = {
     "tolerance": 3e-15,
-    "reason": "rounding, of slopes of the law by differences",
+    "reason": "rounding of the derivatives of the law, which are finite differences",
 }
 
 study = Study(

@@ -1,9 +1,11 @@
-"""From a fit of a, b and D_c with their covariance to the distribution of a recurrence interval.
+"""Distribution of a recurrence interval from the covariance of a fit.
 
-A fit of a velocity step knows a and b to a tenth each, and b - a to a fifth, because the two are
-correlated; D_c, known to an eighth, hardly shows. The interval of stick-slip on this machine is
-known to 15 %: the drop goes with b - a, and with b for what heals at rest. Errors taken for
-independent would say 90 %.
+A fit of a velocity step determines a and b to within 10 % each, and b - a to within 20 %, because
+the errors of a and b are correlated. The standard error of the slip distance D_c is 13 %, but D_c
+has little influence. The standard error of the recurrence interval of stick-slip is 15 % on the
+machine of this study. The recurrence interval depends on b - a through the stress drop, and on b
+through healing between events. If the errors of the parameters were independent, the standard error
+would be 90 %.
 """
 
 import math
@@ -17,12 +19,13 @@ from rsfstudy.measures import LimitCycle
 from rsfstudy.reductions import InUnits, Logarithm, Mean, Quantile, StandardDeviation, StatusShares
 from rsfstudy.study.figure_declarations import Axes
 
-# ---- what a fit says ----------------------------------------------------------------------------
+# ---- result of a fit ----------------------------------------------------------------------------
 
-#: A fit of a velocity step of basalt from 3 to 10 um/s at 20 MPa, of which a record is shipped:
-#: ``rsfstudy.fit(record, stiffness="0.0013 1/um", laws=["slowness"])``. Estimates, D_c in um, and
-#: their covariance with correlated noise, of the load point too. One step tells b - a far better
-#: than a or b, whose errors are correlated by 0.97.
+#: Estimates and covariance matrix of a, b and D_c (in um) from a fit of a velocity step of basalt
+#: from 3 to 10 um/s at 20 MPa. The record is part of the package, and the fit is
+#: ``rsfstudy.fit(record, stiffness="0.0013 1/um", laws=["slowness"])``. The covariance accounts for
+#: correlated noise, including noise of the load point displacement. The correlation between the
+#: errors of a and b is 0.97, so b - a is known much better than a or b.
 ESTIMATES = {"a": 5.683e-3, "b": 6.221e-3, "slip_distance": 7.800}
 COVARIANCE = np.array(
     [
@@ -35,13 +38,15 @@ COVARIANCE = np.array(
 # ---- the study ----------------------------------------------------------------------------------
 
 SAMPLES = 256
-#: d ln(interval in s)/d ln p at the estimates, all others held: by the measure `Elasticities`.
+#: Derivatives of the logarithm of the interval in s with respect to the logarithm of each
+#: parameter, computed at the estimates with the measure ``Elasticities``.
 ELASTICITIES = {"a": -7.54, "b": 8.69, "slip_distance": -0.113}
-#: To first order, the spread of ln(interval) by the covariance, and by the variances alone.
+#: Standard deviation of the logarithm of the interval to first order, from the full covariance
+#: matrix and from the variances only.
 LOG_INTERVAL_SLOPES = np.array([ELASTICITIES[name] / value for name, value in ESTIMATES.items()])
 FIRST_ORDER_SPREAD = math.sqrt(LOG_INTERVAL_SLOPES @ COVARIANCE @ LOG_INTERVAL_SLOPES)
 SPREAD_WITHOUT_CORRELATION = math.sqrt(LOG_INTERVAL_SLOPES**2 @ np.diag(COVARIANCE))
-#: Standard error of b - a over b - a.
+#: Relative standard error of b - a.
 NET_WEAKENING_STDERR = math.sqrt(np.array([-1, 1]) @ COVARIANCE[:2, :2] @ np.array([-1, 1])) / (
     ESTIMATES["b"] - ESTIMATES["a"]
 )
@@ -70,8 +75,8 @@ CLAIMS = (
         published=FIRST_ORDER_SPREAD,
         tolerance=0.2 * FIRST_ORDER_SPREAD,
         reason=(
-            "256 samples tell a spread to 5 %, of which three; and elasticities grow by a tenth "
-            "where b - a is a fifth smaller"
+            "three standard errors of a standard deviation from 256 samples (5 % each), and an "
+            "increase of the elasticities by 10 % if b - a is smaller by 20 %"
         ),
     ),
     Claim.below(
@@ -103,18 +108,45 @@ CLAIMS = (
 
 
 def net_weakening(row: xr.Dataset) -> xr.DataArray:
-    """b - a."""
+    """Return the net weakening b - a.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results of the study.
+
+    Returns
+    -------
+    xarray.DataArray
+        Net weakening.
+    """
     return row["a"] * (row["b_over_a"] - 1.0)
 
 
 def plot_quantiles(dataset: xr.Dataset, axes: Axes) -> None:
-    """The median, and from where to where nine of ten are."""
+    """Draw the median and the range from the 5 % to the 95 % quantile.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     axes.axvspan(float(dataset["q05"]), float(dataset["q95"]), color="0.5", alpha=0.2, zorder=0.5)
     axes.axvline(float(dataset["median"]), color="0.2", linewidth=0.9)
 
 
 def plot_histogram(dataset: xr.Dataset, axes: Axes) -> None:
-    """How often an interval is met."""
+    """Draw a histogram of the recurrence interval.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots.samples import draw_histogram
 
     draw_histogram("recurrence_interval", [], dataset, axes)

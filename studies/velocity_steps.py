@@ -1,11 +1,12 @@
-"""Velocity steps: by how much a, b, a - b and D_c as read off lie, against stiffness.
+"""Estimates of a, b, a - b and D_c from velocity steps.
 
-Load point velocity steps from V_* to r V_*, and friction is recorded over 20 D_c. Read off are the
-direct effect, the evolution after it and the displacement over which it falls to 1/e. The softer
-the machine, the smaller a and b: at 10 k_cr tenfold steps give an a that is 14 to 40 % too small. a
-- b is right wherever friction has settled. D_c lies by the machine and, with the slowness law, by
-the direction of the step, which no correction for stiffness mends. With the slip law, large steps
-up on soft machines end in instability.
+The load point velocity changes from V_* to r V_*, and friction is recorded over 20 D_c. The direct
+effect, the following evolution, and the displacement over which the evolution decays to 1/e give
+estimates of a, b and D_c. On soft machines, the estimates of a and b are too small. At 10 k_cr,
+tenfold steps give a value of a that is 14 to 40 % too small. The estimate of a - b is correct if
+friction has reached steady state. The error of D_c depends on the machine and, under the slowness
+law, on the direction of the step, and a correction for stiffness does not remove it. Under the slip
+law, large steps up on soft machines end in instability.
 """
 
 import math
@@ -18,7 +19,7 @@ from rsfstudy.measures import VelocityStep
 from rsfstudy.reductions import ClosedFormRatio
 from rsfstudy.study.figure_declarations import horizontal_line
 
-#: Stiffness over critical stiffness, compliant to stiff.
+#: Ratios of stiffness to critical stiffness, from compliant to stiff machines.
 STIFFNESS_RATIOS = [1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0, 300.0]
 STEPS = [0.01, 0.1, 10.0, 100.0]
 STIFFEST = STIFFNESS_RATIOS[-1]
@@ -29,9 +30,23 @@ STEP_DESCRIPTIONS = {0.01: "down by 100", 0.1: "down by 10", 10.0: "up by 10", 1
 
 
 def peak_departure(law: str, ratio: float) -> float:
-    """Departure of friction at its peak from that of a rigid slider, to first order in a/K, in
-    units of b a/K: what does not evolve while slip speeds up, and the direct effect of the slip
-    that is faster than the load point while friction falls.
+    """Compute the difference of peak friction from the closed form.
+
+    The difference is computed to first order in a/K. The difference has two causes. The evolution
+    is incomplete while slip accelerates, and slip is faster than the load point while friction
+    decreases, which increases the direct effect.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    ratio : float
+        Velocity ratio r of the step.
+
+    Returns
+    -------
+    float
+        Difference of friction in units of b a/K.
     """
     rate = math.log(ratio)
     if law == "slowness":
@@ -40,7 +55,20 @@ def peak_departure(law: str, ratio: float) -> float:
 
 
 def rigid_limit_claim(law: str, ratio: float) -> Claim:
-    """P6: a stiff slider."""
+    """Return a claim on the difference from a rigid slider (P6).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    ratio : float
+        Velocity ratio r of the step.
+
+    Returns
+    -------
+    Claim
+        Claim on the largest difference of friction.
+    """
     forms = {
         "slip": "dmu = a ln r - b ln r [1 - exp(-delta/D_c)]",
         "slowness": "dmu = (a - b) ln r + b ln[1 + (r - 1) exp(-delta/D_c)]",
@@ -55,13 +83,28 @@ def rigid_limit_claim(law: str, ratio: float) -> Claim:
         where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": STIFFEST},
         published=expected,
         tolerance=(0.1 if law == "slip" else 0.01) * expected,
-        reason="second order, in (a/K)(b - a)/a = 1/300: three times that by the slowness law, and "
-        "thirty times by the slip law, whose evolution is steeper by ln r and more",
+        reason="the second order in (a/K)(b - a)/a = 1/300 is multiplied by 3 under the slowness "
+        "law, and by 30 under the slip law, because the evolution is steeper by ln r or more",
     )
 
 
 def direct_effect_claim(law: str, ratio: float) -> Claim:
-    """P7: the direct effect of a machine that is ten times as stiff as critical."""
+    """Return the claim that the estimate of a is too small (P7).
+
+    The stiffness is 10 k_cr.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    ratio : float
+        Velocity ratio r of the step.
+
+    Returns
+    -------
+    Claim
+        Claim on the estimate of a.
+    """
     return Claim.below(
         id="P7",
         statement=f"{law} law, {STEP_DESCRIPTIONS[ratio]}, k = 10 k_cr: a is read at least a "
@@ -74,7 +117,20 @@ def direct_effect_claim(law: str, ratio: float) -> Claim:
 
 
 def rate_dependence_claim(law: str, ratio: float) -> Claim:
-    """P8: a - b does not depend on the machine."""
+    """Return the claim that the estimate of a - b is correct (P8).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    ratio : float
+        Velocity ratio r of the step.
+
+    Returns
+    -------
+    Claim
+        Claim on the estimate of a - b at 3 k_cr.
+    """
     return Claim(
         id="P8",
         statement=f"{law} law, {STEP_DESCRIPTIONS[ratio]}, k = 3 k_cr: a - b is read right",
@@ -83,13 +139,26 @@ def rate_dependence_claim(law: str, ratio: float) -> Claim:
         where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": 3.0},
         published=a - b,
         tolerance=5e-8 * a,
-        reason="oscillations die as exp[-(k^ - 1)/2] a D_c: exp(-20) is left; and half of the "
-        "accuracy asked for",
+        reason="oscillations decay by exp[-(k^ - 1)/2] per D_c to exp(-20); the tolerance includes "
+        "half of the requested accuracy",
     )
 
 
 def slip_distance_claim(ratio: float) -> Claim:
-    """P9: 1/e of a slowness-law evolution is not left after D_c."""
+    """Return a claim on the estimate of D_c under the slowness law (P9).
+
+    Under the slowness law, the slip over which the evolution decays to 1/e is not equal to D_c.
+
+    Parameters
+    ----------
+    ratio : float
+        Velocity ratio r of the step.
+
+    Returns
+    -------
+    Claim
+        Claim on the estimate of D_c.
+    """
     left = math.log((ratio - 1.0) / (ratio ** (1.0 / math.e) - 1.0))
     return Claim(
         id="P9",
@@ -100,22 +169,45 @@ def slip_distance_claim(ratio: float) -> Claim:
         where={"law": "slowness", "velocity_ratio": ratio, "stiffness_ratio": STIFFEST},
         published=left,
         tolerance=0.02,
-        reason="(a/K) ln(K/a) of slip comes before the peak, from which it is counted",
+        reason="the slip distance is measured from the peak, which occurs after a slip of (a/K) "
+        "ln(K/a)",
     )
 
 
-#: Load point displacement that is shown of the records, in D_c.
+#: Load point displacement in D_c up to which records are plotted.
 PLOTTED_DISPLACEMENT = 8.0
 
 
 def smallest_steps(ratios: list[float]) -> list[float]:
-    """The step down and the step up that are closest to none."""
+    """Return the smallest step down and the smallest step up.
+
+    Parameters
+    ----------
+    ratios : list of float
+        Velocity ratios of the steps.
+
+    Returns
+    -------
+    list of float
+        Velocity ratios, the step up first.
+    """
     down, up = [r for r in ratios if r < 1.0], [r for r in ratios if r > 1.0]
     return [*([min(up)] if up else []), *([max(down)] if down else [])]
 
 
 def friction_change(row: xr.Dataset) -> xr.DataArray:
-    """Change of friction, as far as it is shown."""
+    """Return the change of friction over the plotted range of displacement.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    xarray.DataArray
+        Change of friction divided by a. NaN outside the plotted range.
+    """
     change = (row["friction_coefficient"] - row["friction_before"]) / row["a"]
     return change.where(row["load_point_displacement"] <= PLOTTED_DISPLACEMENT)
 
@@ -123,7 +215,26 @@ def friction_change(row: xr.Dataset) -> xr.DataArray:
 def reading_panel(
     title: str, label: str, name: str, over: tuple[str, ...] = (), alike: str = ""
 ) -> Panel:
-    """A number as read off over the product of some of the scene's own, against stiffness."""
+    """Return a panel of an estimate relative to its exact value.
+
+    Parameters
+    ----------
+    title : str
+        Title of the panel.
+    label : str
+        Label of the vertical axis.
+    name : str
+        Name of the variable.
+    over : tuple of str, optional
+        Scene fields whose product is the exact value.
+    alike : str, optional
+        Name of the group of panels with the same vertical scale.
+
+    Returns
+    -------
+    Panel
+        Panel with the estimate against stiffness.
+    """
     return Panel(
         x="stiffness_ratio",
         y=lambda row: row[name] / math.prod(float(row[factor]) for factor in over),

@@ -1,12 +1,14 @@
-"""Wave triggering: by how much a train of waves advances the clock of the next event.
+"""Clock advance of stick-slip events by a train of waves.
 
-A slider in its stick-slip cycle is met by two waves of normal stress, which falls first. Small ones
-advance or delay the next event in proportion to their amplitude, as the equations linear in
-departures from the free cycle say; with the slowness law what comes longer than a few a sigma/(k
-V_0) before the event is forgotten. Waves a hundred times slower than that trigger where Coulomb
-stress reaches the threshold of free events, to a few per cent, and so do strong ones, which raise
-it faster than the load point does, to within a sigma/(k V_0). In between the threshold misleads by
-a factor of two to ten.
+Two waves of normal stress, which first decrease normal stress, reach a slider during its stick-slip
+cycle. Small waves advance or delay the next event in proportion to their amplitude, as predicted by
+linear perturbation theory. Under the slowness law, waves have no effect if they end several
+nucleation times a sigma/(k V_0) before the event. Slow waves and strong waves trigger the event
+when Coulomb stress reaches the threshold of an event without waves. For slow waves with a period of
+a hundred nucleation times, the clock advance of this threshold is accurate to a few percent. For
+strong waves, which raise Coulomb stress faster than the load point does, the clock advance is
+accurate to one nucleation time. In all other cases, the threshold is wrong by a factor of two to
+ten.
 """
 
 from collections.abc import Callable
@@ -31,19 +33,37 @@ base = Scene(
     oscillation_phase=180.0,
     oscillation_cycles=2.0,
 )
-#: Time in which loading raises ln V by 1, a sigma/(k V_0): that of nucleation.
+#: Nucleation time a sigma/(k V_0), in which loading increases ln V by 1.
 NUCLEATION_TIME = base.a / base.stiffness
 FAST_WAVES, WAVES, SLOW_WAVES = PERIODS = [
     factor * NUCLEATION_TIME for factor in (2.0, 10.0, 100.0)
 ]
 SMALL, LARGE, LARGEST = AMPLITUDES = [1e-4, 1e-2, 5e-2]
 PHASES = [0.4, 0.5, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95]
-#: Change of ln V by the amplitude of a wave: the second order over the first.
+#: Change of ln V per unit amplitude of a wave, which is the ratio of the second order to the first
+#: order of perturbation theory.
 SECOND_ORDER_RATIO = base.mu_star / base.a
 
 
 def claim_place(law: str, period: float, amplitude: float, phase: float) -> dict[str, Any]:
-    """Where a claim looks."""
+    """Return the coordinates of a claim.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    period : float
+        Period of the waves in D_c/V_*.
+    amplitude : float
+        Amplitude of the waves in sigma_*.
+    phase : float
+        Beginning of the train as a fraction of the recurrence interval.
+
+    Returns
+    -------
+    dict
+        Coordinates of the lattice.
+    """
     return {
         "law": law,
         "oscillation_period": period,
@@ -53,7 +73,22 @@ def claim_place(law: str, period: float, amplitude: float, phase: float) -> dict
 
 
 def place_description(law: str, period: float, phase: float) -> str:
-    """The same in words."""
+    """Return a description of the coordinates of a claim.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    period : float
+        Period of the waves in D_c/V_*.
+    phase : float
+        Beginning of the train as a fraction of the recurrence interval.
+
+    Returns
+    -------
+    str
+        Text for the statement of the claim.
+    """
     return (
         f"{law} law, period {period / NUCLEATION_TIME:g} a sigma/(k V_0), train at "
         f"{phase:g} of a cycle"
@@ -61,7 +96,22 @@ def place_description(law: str, period: float, phase: float) -> str:
 
 
 def linear_limit_claim(law: str, period: float, phase: float) -> Claim:
-    """W1: the limit of small amplitude."""
+    """Return the claim that small waves follow linear theory (W1).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    period : float
+        Period of the waves in D_c/V_*.
+    phase : float
+        Beginning of the train as a fraction of the recurrence interval.
+
+    Returns
+    -------
+    Claim
+        Claim on the ratio of the clock advance to linear theory.
+    """
     within = 2.0 * SMALL * SECOND_ORDER_RATIO
     return Claim(
         id="W1",
@@ -72,13 +122,26 @@ def linear_limit_claim(law: str, period: float, phase: float) -> Claim:
         where=claim_place(law, period, SMALL, phase),
         published=1.0,
         tolerance=within,
-        reason="the second order: twice A mu_*/a, for the first order of several waves cancels in "
-        "part",
+        reason="the second order is 2 A mu_*/a, because the first-order effects of several waves "
+        "cancel in part",
     )
 
 
 def coulomb_limit_claim(law: str, phase: float) -> Claim:
-    """W2: Coulomb's limit of slow waves."""
+    """Return the claim that slow waves trigger at a Coulomb threshold (W2).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+    phase : float
+        Beginning of the train as a fraction of the recurrence interval.
+
+    Returns
+    -------
+    Claim
+        Claim on the ratio of the clock advance to the Coulomb threshold.
+    """
     return Claim(
         id="W2",
         statement=f"{place_description(law, SLOW_WAVES, phase)}: the event comes where "
@@ -88,14 +151,27 @@ def coulomb_limit_claim(law: str, phase: float) -> Claim:
         where=claim_place(law, SLOW_WAVES, LARGE, phase),
         published=1.0,
         tolerance=0.05,
-        reason="contact goes on healing by b ln t, 0.04 of the loading (b over K V_0 times the "
-        "interval); half a wave after it began normal stress changes by 0.002 of itself within the "
-        "time of nucleation",
+        reason="healing by b ln t is 0.04 of the loading (b relative to K V_0 times the interval); "
+        "half a wave after the beginning of the train, normal stress changes by 0.2 % within the "
+        "nucleation time",
     )
 
 
 def strong_waves_claim(law: str) -> Claim:
-    """W3: strong waves, which raise Coulomb stress faster than the load point does."""
+    """Return the claim that strong waves trigger at a Coulomb threshold (W3).
+
+    Strong waves increase Coulomb stress faster than the load point does.
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+
+    Returns
+    -------
+    Claim
+        Claim on the ratio of the clock advance to the Coulomb threshold.
+    """
     return Claim(
         id="W3",
         statement=f"{place_description(law, WAVES, 0.9)}, A = {LARGEST:g}: triggered where "
@@ -105,12 +181,23 @@ def strong_waves_claim(law: str) -> Claim:
         where=claim_place(law, WAVES, LARGEST, 0.9),
         published=1.0,
         tolerance=NUCLEATION_TIME / 5.0,
-        reason="a sigma/(k V_0) over a clock advance of 5 D_c/V_*",
+        reason="ratio of the nucleation time a sigma/(k V_0) to a clock advance of 5 D_c/V_*",
     )
 
 
 def early_train_claim(amplitude: float) -> Claim:
-    """W4: trains that are over long before the event."""
+    """Return the claim that early trains have no effect (W4).
+
+    Parameters
+    ----------
+    amplitude : float
+        Amplitude of the waves in sigma_*.
+
+    Returns
+    -------
+    Claim
+        Claim on the clock advance under the slowness law.
+    """
     return Claim(
         id="W4",
         statement=f"{place_description('slowness', FAST_WAVES, 0.5)}, A = {amplitude:g}: forgotten",
@@ -120,12 +207,23 @@ def early_train_claim(amplitude: float) -> Claim:
         where=claim_place("slowness", FAST_WAVES, amplitude, 0.5),
         published=0.0,
         tolerance=5e-7,
-        reason="its error estimate, and as much again several times: 5e-9 of the interval",
+        reason="several times the error estimate, which is 5e-9 of the recurrence interval",
     )
 
 
 def coulomb_error_claim(law: str) -> Claim:
-    """W5: what Coulomb's threshold misses of waves that are not slow."""
+    """Return the claim that the Coulomb threshold fails for fast waves (W5).
+
+    Parameters
+    ----------
+    law : str
+        State evolution law.
+
+    Returns
+    -------
+    Claim
+        Claim on the ratio of the clock advance to the Coulomb threshold.
+    """
     return Claim.above(
         id="W5",
         statement=f"{place_description(law, WAVES, 0.8)}, A = {LARGE:g}: delayed by more "
@@ -134,17 +232,42 @@ def coulomb_error_claim(law: str) -> Claim:
         variable="coulomb_ratio",
         where=claim_place(law, WAVES, LARGE, 0.8),
         published=1.5,
-        reason="an inequality; ours are 1.9 and 11",
+        reason="an inequality; our results are 1.9 and 11",
     )
 
 
 def over_amplitude(name: str) -> Callable[[xr.Dataset], xr.DataArray]:
-    """A clock advance over the amplitude."""
+    """Return a function that divides a clock advance by the amplitude.
+
+    Parameters
+    ----------
+    name : str
+        Name of the variable.
+
+    Returns
+    -------
+    callable
+        Function of the results along one curve.
+    """
     return lambda row: row[name] / row["oscillation_amplitude"]
 
 
 def theory_line(row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
-    """Clock advance by Coulomb's threshold of slow waves, and by linear equations of others."""
+    """Return the clock advance of the applicable theory.
+
+    The theory is the Coulomb threshold for the slowest waves, and linear perturbation theory for
+    all other waves.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results along one curve.
+
+    Returns
+    -------
+    tuple of xarray.DataArray
+        Beginnings of the train, and clock advance divided by amplitude.
+    """
     slow = float(row["oscillation_period"]) == SLOW_WAVES
     name = "coulomb_clock_advance" if slow else "linear_clock_advance"
     return row["cycle_phase"], over_amplitude(name)(row)

@@ -1,9 +1,10 @@
-"""What matters: Sobol indices of three headlines under uncertain a, b - a and stiffness.
+"""Sobol indices of critical displacement, stress drop and recurrence interval.
 
-Each of a, b - a and k is uncertain by 10 %, independently. The displacement boundary a/(b - a)
-feels a and b - a alike; the stress drop b - a almost alone; the interval, which is the drop over k
-V_0, b - a and k. Indices of first order and total are the same: nothing acts together. Bars are
-intervals of 95 %.
+The parameters a, b - a and k have independent uncertainties of 10 %. The critical displacement step
+D_c a/(b - a) depends equally on a and on b - a. The stress drop depends almost only on b - a. The
+recurrence interval is the stress drop divided by k V_0, so it depends on b - a and on k.
+First-order and total indices are equal, so the parameters do not interact. Bars are 95 % confidence
+intervals.
 """
 
 import math
@@ -29,11 +30,12 @@ from rsfstudy.motion import WorkMeter
 from rsfstudy.reductions import Logarithm, SobolIndices
 from rsfstudy.study.figure_declarations import Axes
 
-#: Independent quantities, each uncertain by a tenth; the stiffness is that of the cycles.
+#: Means of the independent parameters, each with an uncertainty of 10 %. The stiffness is the
+#: stiffness of the limit cycles.
 INPUT_MEANS = {"ln_a": 0.01, "ln_net": 0.02, "ln_stiffness": 0.006}
 RELATIVE_UNCERTAINTY = 0.1
 SOBOL_POINTS = 128
-#: Names of indices, and what they are of.
+#: Output of each index, by the prefix of the index.
 INDEXED_OUTPUTS = {
     "displacement": "critical_displacement",
     "drop": "static_stress_drop",
@@ -44,8 +46,11 @@ _STEP_MEASURE, _CYCLE_MEASURE = CriticalStep("displacement_step"), LimitCycle(ph
 
 @dataclass(frozen=True)
 class Headlines(Measure):
-    """The displacement boundary at the critical stiffness, where it is D_c a/(b - a), and drop and
-    interval of the limit cycle at the stiffness of the scene.
+    """Critical displacement, stress drop and recurrence interval of a scene.
+
+    The critical displacement step is computed at the critical stiffness, where it equals D_c a/(b -
+    a). Stress drop and recurrence interval are computed for the limit cycle at the stiffness of the
+    scene.
     """
 
     name: ClassVar[str] = "headlines"
@@ -55,7 +60,23 @@ class Headlines(Measure):
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Measure both; the first that has no number ends it."""
+        """Compute the critical displacement and the limit cycle.
+
+        Parameters
+        ----------
+        scene : Scene
+            Parameters of the slider.
+        accuracy : Accuracy
+            Requested accuracy.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        Outcome
+            Outcome of the measure. If one of the computations fails, the outcome has its status and
+            message.
+        """
         at_critical = scene.without_mass().with_(stiffness_ratio=1.0)
         values: dict[str, OutputValue] = {}
         for measure, asked in ((_STEP_MEASURE, at_critical), (_CYCLE_MEASURE, scene)):
@@ -67,7 +88,22 @@ class Headlines(Measure):
 
 
 def interval_claim(name: str, order: str, end: str) -> Claim:
-    """W1: the interval of an index of the displacement holds its closed form."""
+    """Return the claim that a confidence interval contains 1/2 (W1).
+
+    Parameters
+    ----------
+    name : str
+        Name of the parameter.
+    order : str
+        Order of the index: "first_order" or "total".
+    end : str
+        End of the interval: "low" or "high".
+
+    Returns
+    -------
+    Claim
+        Claim on one end of the confidence interval.
+    """
     where = "begins below" if end == "low" else "ends above"
     return Claim(
         id="W1",
@@ -77,12 +113,27 @@ def interval_claim(name: str, order: str, end: str) -> Claim:
         where={"input": name},
         relation="below" if end == "low" else "above",
         published=0.5,
-        reason="an interval of 95 %",
+        reason="a 95 % confidence interval",
     )
 
 
 def first_order_claim(of: str, name: str, share: float) -> Claim:
-    """W3: indices of cycles, to first order."""
+    """Return a claim on an index of the limit cycle (W3).
+
+    Parameters
+    ----------
+    of : str
+        Prefix of the index: "drop" or "interval".
+    name : str
+        Name of the parameter.
+    share : float
+        Expected index.
+
+    Returns
+    -------
+    Claim
+        Claim on the total index.
+    """
     return Claim(
         id="W3",
         statement=f"{of}: {name} explains {share:g} of the variance of its logarithm",
@@ -91,12 +142,23 @@ def first_order_claim(of: str, name: str, share: float) -> Claim:
         where={"input": name},
         published=share,
         tolerance=0.1,
-        reason="128 points tell an index to .06; the logarithm holds a, b - a and k once more",
+        reason="the standard error of an index from 128 points is 0.06, and the logarithmic factor "
+        "also depends on a, b - a and k",
     )
 
 
 def plot_indices(of: str, dataset: xr.Dataset, axes: Axes) -> None:
-    """Indices of first order and total with their intervals, input by input."""
+    """Draw first-order and total indices with their confidence intervals.
+
+    Parameters
+    ----------
+    of : str
+        Prefix of the index.
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     from rsfstudy.plots import cycle_marker, cycle_style
 
     for number, (order, text) in enumerate((("first_order", "first order"), ("total", "total"))):
@@ -174,7 +236,8 @@ study = Study(
             where={"input": "ln_stiffness"},
             published=0.0,
             tolerance=1e-15,
-            reason="rounding: the boundary is asked at the critical stiffness, whatever k is",
+            reason="rounding; the critical displacement is computed at the critical stiffness, so "
+            "it does not depend on k",
         ),
         first_order_claim("drop", "ln_net", 1.0),
         first_order_claim("interval", "ln_net", 0.5),

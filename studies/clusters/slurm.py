@@ -1,8 +1,9 @@
-"""Run a named study on a SLURM cluster: ``python slurm.py rate_step_boundary``, and options as of
-``rsfstudy run``: ``--set``, ``--rtol``, ``--engine``, ``--output``.
+"""Script that runs a named study on a SLURM cluster.
 
-Run it on a login node, in the environment in which rsfstudy is installed (with dask-jobqueue); it
-submits jobs, waits for the first, and ends them when the study is done.
+Run ``python slurm.py rate_step_boundary`` on a login node, in an environment with rsfstudy and
+dask-jobqueue. The options ``--set``, ``--rtol``, ``--engine`` and ``--output`` have the same
+meaning as for ``rsfstudy run``. The script submits jobs, waits for the first job to start, and
+cancels the jobs after the study has finished.
 """
 
 import shlex
@@ -18,18 +19,20 @@ import rsfstudy
 from rsfstudy.cli import assignments, options
 from rsfstudy.study import catalogue
 
-#: One job: 16 worker processes of one thread each, because a cell keeps its thread busy.
+#: Options of one job. Each of the 16 worker processes has one thread, because a cell uses its
+#: thread fully.
 JOB_OPTIONS = {
     "cores": 16,
     "processes": 16,
     "memory": "32GB",
     "walltime": "02:00:00",
-    "queue": "normal",  # your partition
-    # "account": "...", "interface": "ib0", as your site asks for
-    # encryption, with certificates for this cluster only: without it, everybody on the login node
-    # could run code in your name
+    "queue": "normal",  # name of your partition
+    # Add "account": "..." or "interface": "ib0" if your site requires them.
+    # Use encryption with temporary certificates. Without encryption, all users of the login node
+    # could run code under your account.
     "security": True,
-    # a directory of yours that all nodes see; workers read the certificates from it
+    # A directory of yours that is visible on all nodes. Workers read the certificates from this
+    # directory.
     "shared_temp_directory": "~",
 }
 JOBS = 4
@@ -42,7 +45,21 @@ def main(
     jobs: int = JOBS,
     **job: object,
 ) -> None:
-    """Start a cluster, run a study on it as `rsfstudy.run` does, and say what came out."""
+    """Run a study on a cluster, and print the verdicts on its claims.
+
+    Parameters
+    ----------
+    study : str
+        Name of the study, or path of a study file.
+    choices : mapping
+        Keyword arguments of ``rsfstudy.run``.
+    cluster : type, optional
+        Class of the cluster.
+    jobs : int, optional
+        Number of jobs.
+    **job : object
+        Options that replace ``JOB_OPTIONS``.
+    """
     with cluster(**{**JOB_OPTIONS, **job}) as nodes, distributed.Client(nodes) as client:
         nodes.scale(jobs=jobs)
         client.wait_for_workers(1)
@@ -57,7 +74,7 @@ def main(
 @options.engine_option
 @options.output_option
 def command(study: str, settings: tuple[str, ...], **choices: Any) -> None:
-    """Run a study on SLURM, by its NAME or file."""
+    """Run a named study or a study file (STUDY) on a SLURM cluster."""
     overrides = assignments.parse_overrides(catalogue.load_study(study), settings)
     main(study, {**choices, **overrides, "command": shlex.join(sys.argv)})
 

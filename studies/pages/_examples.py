@@ -1,8 +1,8 @@
-"""Examples of parts, measures and reductions, for the page of names."""
+"""Examples of parts, measures and reductions for the reference page."""
 
 from __future__ import annotations
 
-#: A scene of each choice of a slot.
+#: Example of a scene for each choice of a slot.
 SCENES = {
     "composite": 'Scene(law="composite", b_over_a=1.5, cutoff_velocity_ratio=0.1)',
     "cut_off": 'Scene(law="cut_off", b_over_a=1.5, cutoff_velocity_ratio=1000)',
@@ -29,7 +29,7 @@ SCENES = {
     "velocity_steps": "Scene(velocity_steps=3, velocity_ratio=3, displacement_between_steps=20)",
 }
 
-#: Examples of measures and reductions that no named study states.
+#: Examples of measures and reductions that are not part of a named study.
 CALLS = {
     "Elasticities": 'Elasticities(LimitCycle(), parameters=("a", "b_over_a"))',
     "Fit": 'Fit(records=(record,), free=("a", "b", "slip_distance"), step=1)',

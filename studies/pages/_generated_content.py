@@ -1,5 +1,7 @@
-"""What the pages of the site say from the code: each line ``<!-- made: NAME -->`` of a page is
-followed by the text of that name.
+"""Content of the site that is generated from the code.
+
+A line ``<!-- made: NAME -->`` of a page is replaced by the text that the function of this name
+returns.
 """
 
 from __future__ import annotations
@@ -30,7 +32,8 @@ from rsfstudy.study import catalogue, study_index
 from rsfstudy.study.verdict_table import format_published_value
 from rsfstudy.vocabulary import QUANTITIES, find_quantity
 
-#: Where classes stand that parts, measures and studies of one's own are derived from or made of.
+#: Modules of the base classes for user-defined parts, measures and reductions, by the name of the
+#: class.
 CLASSES = {
     "Law": "rsfstudy.parts",
     "LawBase": "rsfstudy.parts",
@@ -47,18 +50,43 @@ CLASSES = {
 
 
 def fill_page(text: str) -> str:
-    """A page with what is made.
+    """Insert the generated content into a page.
+
+    Parameters
+    ----------
+    text : str
+        Page in Markdown.
+
+    Returns
+    -------
+    str
+        Page with the generated content.
 
     Raises
     ------
     KeyError
-        For a name that nothing here makes.
+        If there is no generator with the name of a line.
     """
     return re.sub(r"<!-- made: (\w+) -->", lambda found: MADE[found[1]](), text)
 
 
 def escape_asterisks(text: str) -> str:
-    """A page on which the asterisk of V_* begins no emphasis: code is left as it is."""
+    """Escape the asterisks of symbols such as V_*.
+
+    Otherwise the asterisks would start emphasised text.
+
+    Code is not changed.
+
+    Parameters
+    ----------
+    text : str
+        Page in Markdown.
+
+    Returns
+    -------
+    str
+        Page with escaped asterisks.
+    """
     parts = re.split(
         r"((?:^    [^\n]*\n)+|^```.*?^```|`[^`\n]+(?:\n[^`\n]+)*`)",
         text,
@@ -68,7 +96,20 @@ def escape_asterisks(text: str) -> str:
 
 
 def markdown_table(headings: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    """A table in Markdown; empty without rows."""
+    """Format a table in Markdown.
+
+    Parameters
+    ----------
+    headings : sequence of str
+        Headings of the columns.
+    rows : sequence of sequence of object
+        Rows of the table.
+
+    Returns
+    -------
+    str
+        Table. Empty if there are no rows.
+    """
     lines = [[_cell(value) for value in row] for row in rows]
     head = list(headings)
     texts = [head, ["---"] * len(head), *lines] if lines else []
@@ -76,6 +117,7 @@ def markdown_table(headings: Iterable[str], rows: Iterable[Iterable[object]]) ->
 
 
 def _cell(value: object) -> str:
+    """Format a cell of a table."""
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -85,7 +127,20 @@ def _cell(value: object) -> str:
 
 
 def strip_markup(text: str) -> str:
-    """A text without meaning to Markdown but what stands in ``double`` or `single` quotes."""
+    """Escape characters that have a meaning in Markdown.
+
+    Text in single or double backticks is not changed.
+
+    Parameters
+    ----------
+    text : str
+        Text without Markdown.
+
+    Returns
+    -------
+    str
+        Text with escaped characters.
+    """
     parts = re.split(r"(``.+?``|`.+?`)", text, flags=re.DOTALL)
     return "".join(
         part if n % 2 else re.sub(r"([*_<\[])", r"\\\1", part) for n, part in enumerate(parts)
@@ -93,17 +148,50 @@ def strip_markup(text: str) -> str:
 
 
 def html_symbol(formula: str) -> str:
-    """A symbol in HTML that Markdown leaves alone."""
+    """Convert a symbol to HTML that is safe in Markdown.
+
+    Parameters
+    ----------
+    formula : str
+        Symbol in LaTeX.
+
+    Returns
+    -------
+    str
+        Symbol in HTML.
+    """
     return in_html(formula).replace("*", "&ast;")
 
 
 def html_unit(about: Quantity) -> str:
-    """A unit in HTML that Markdown leaves alone."""
+    """Convert the unit of a quantity to HTML that is safe in Markdown.
+
+    Parameters
+    ----------
+    about : Quantity
+        Quantity.
+
+    Returns
+    -------
+    str
+        Unit in HTML.
+    """
     return unit_in_html(about).replace("*", "&ast;")
 
 
 def first_paragraph(thing: object) -> str:
-    """The first paragraph of a docstring."""
+    """Return the first paragraph of a docstring.
+
+    Parameters
+    ----------
+    thing : object
+        Object with a docstring.
+
+    Returns
+    -------
+    str
+        First paragraph with escaped characters.
+    """
     return strip_markup((inspect.getdoc(thing) or "").split("\n\n")[0])
 
 
@@ -111,7 +199,13 @@ def first_paragraph(thing: object) -> str:
 
 
 def scene_fields() -> str:
-    """Every field of a scene, in the order of its parts."""
+    """Format a table of all fields of a scene, in the order of the parts.
+
+    Returns
+    -------
+    str
+        Table in Markdown.
+    """
     abouts = {about.name: about for about in registry.FIELD_QUANTITIES}
     defaults = registry.field_defaults()
     rows = (
@@ -130,11 +224,13 @@ def scene_fields() -> str:
 
 
 def _default(name: str, defaults: Mapping[str, Any]) -> object:
+    """Format the default of a field."""
     value = defaults[name]
     return f"`{value}`" if isinstance(value, str) else value
 
 
 def _rule(name: str) -> str:
+    """Return the rule for the values of a field."""
     owner = registry.FIELD_OWNERS.get(name)
     if owner is None:
         return ""
@@ -146,7 +242,18 @@ def _rule(name: str) -> str:
 
 
 def _parts_with(name: str) -> str:
-    """The parts that bring a field to a scene: nothing where every scene has it."""
+    """Return the parts that have a field.
+
+    Parameters
+    ----------
+    name : str
+        Name of the field.
+
+    Returns
+    -------
+    str
+        Names of the parts. Empty if all scenes have the field.
+    """
     owners = [
         f"`{part.name}`"
         for slot in registry.SLOTS
@@ -157,11 +264,18 @@ def _parts_with(name: str) -> str:
 
 
 def parts() -> str:
-    """Every choice of each slot."""
+    """Format tables of the choices of all slots.
+
+    Returns
+    -------
+    str
+        Sections in Markdown.
+    """
     return "\n\n".join(_slot(slot) for slot in registry.SLOTS)
 
 
 def _slot(slot: registry.Slot) -> str:
+    """Format the section of a slot."""
     rows = (
         (f"`{name}`" + (" (default)" if name == slot.default else ""), first_paragraph(part),
          equation(part), ", ".join(f"`{own}`" for own in field_names(part)), f"`{SCENES[name]}`")
@@ -173,7 +287,18 @@ def _slot(slot: registry.Slot) -> str:
 
 
 def equation(part: type[Part]) -> str:
-    """The equations that the docstrings of a part and of its functions state."""
+    """Return the equations in the docstrings of a part and of its functions.
+
+    Parameters
+    ----------
+    part : type[Part]
+        Class of the part.
+
+    Returns
+    -------
+    str
+        Equations in backticks, separated by commas.
+    """
     functions = [value.__func__ for value in vars(part).values() if isinstance(value, staticmethod)]
     texts = [inspect.getdoc(one) or "" for one in (part, *functions)]
     first = [text.split("\n\nParameters\n")[0] for text in texts]
@@ -182,7 +307,13 @@ def equation(part: type[Part]) -> str:
 
 
 def rig() -> str:
-    """The quantities of a rig."""
+    """Format a table of the quantities of a rig.
+
+    Returns
+    -------
+    str
+        Table in Markdown.
+    """
     must = {name: name in quantities.REQUIRED_QUANTITIES for name in quantities.RIG_QUANTITIES}
     rows = (
         (f"`{name}`", units, must[name], f"{least:g} to {most:g}")
@@ -195,14 +326,23 @@ def rig() -> str:
 
 
 def measure_classes() -> dict[str, type[Measure]]:
-    """The measures of rsfstudy, by name."""
+    """Return the measures of the package.
+
+    Returns
+    -------
+    dict
+        Classes by name.
+    """
     exported = (getattr(measures, name) for name in measures.__all__)
     own = (kind for kind in exported if isinstance(kind, type) and issubclass(kind, Measure))
     return {kind.name: kind for kind in own if "name" in vars(kind)}
 
 
 def _examples() -> dict[type[Measure], Measure]:
-    """A measure of each kind: as it is without fields, or as a named study states it."""
+    """Return an example of each measure.
+
+    The example is a measure with default fields, or else the measure of a named study.
+    """
     stated = {type(study.measure): study.measure for study in _studies().values()}
     for kind in measure_classes().values():
         if all(f.default is not MISSING or f.default_factory is not MISSING for f in fields(kind)):
@@ -211,12 +351,19 @@ def _examples() -> dict[type[Measure], Measure]:
 
 
 def every_measure() -> str:
-    """Every measure: what it finds, its fields, its numbers."""
+    """Format sections with the fields and outputs of all measures.
+
+    Returns
+    -------
+    str
+        Sections in Markdown.
+    """
     examples = _examples()
     return "\n\n".join(_measure(kind, examples.get(kind)) for kind in measure_classes().values())
 
 
 def _measure(kind: type[Measure], example: Measure | None) -> str:
+    """Format the section of a measure."""
     taken = markdown_table(("field", "default", "meaning"), _describe_fields(kind))
     given = markdown_table(
         ("number", "symbol", "unit", "error estimate", "over", "meaning"),
@@ -234,12 +381,16 @@ def _measure(kind: type[Measure], example: Measure | None) -> str:
 
 @cache
 def _studies() -> dict[str, Study]:
-    """The named studies."""
+    """Return the named studies by name."""
     return {name: catalogue.load_study(name) for name in study_index.study_names()}
 
 
 def _format_call(kind: type[Any], stated: Iterable[Measure | Reduction]) -> str:
-    """An example, with what the first study states that leaves not all to defaults."""
+    """Format an example of a measure or reduction.
+
+    The example is the first instance in the named studies that has at least one field with a value
+    other than the default.
+    """
     found = [
         ", ".join(
             f"{one.name}={getattr(each, one.name)!r}"
@@ -254,7 +405,7 @@ def _format_call(kind: type[Any], stated: Iterable[Measure | Reduction]) -> str:
 
 
 def _describe_fields(kind: type[Any]) -> Iterator[tuple[object, ...]]:
-    """Fields of a measure or a reduction, with what its docstring says of them."""
+    """Yield the name, default and meaning of each field of a class."""
     told = parameters(kind)
     for one in fields(kind):
         if one.init:
@@ -264,7 +415,20 @@ def _describe_fields(kind: type[Any]) -> Iterator[tuple[object, ...]]:
 
 
 def parameters(kind: type[Any]) -> dict[str, str]:
-    """What the docstrings of a class and its bases say of each parameter."""
+    """Return the meaning of each parameter from the docstrings of a class.
+
+    The docstrings of the base classes are included.
+
+    Parameters
+    ----------
+    kind : type[Any]
+        Class with Parameters sections.
+
+    Returns
+    -------
+    dict
+        Meanings by parameter.
+    """
     told: dict[str, str] = {}
     for one in reversed(kind.__mro__):
         text = inspect.cleandoc(vars(one).get("__doc__") or "")
@@ -282,13 +446,20 @@ def parameters(kind: type[Any]) -> dict[str, str]:
 
 
 def _output(output: Output) -> tuple[object, ...]:
+    """Return the table row of an output."""
     about: Quantity = output if output.long_name else find_quantity(output.name)
     return (f"`{output.name}`", html_symbol(about.symbol), html_unit(about), output.error,
             ", ".join(output.dims), strip_markup(about.long_name))  # fmt: skip
 
 
 def reductions() -> str:
-    """Every reduction, with its fields."""
+    """Format sections with the fields of all reductions.
+
+    Returns
+    -------
+    str
+        Sections in Markdown.
+    """
     kinds = (getattr(reduce, name) for name in reduce.__all__)
     own = (
         k for k in kinds if isinstance(k, type) and issubclass(k, Reduction) and k is not Reduction
@@ -302,7 +473,13 @@ def reductions() -> str:
 
 
 def claims() -> str:
-    """Every claim of the named studies."""
+    """Format a table of the claims of all named studies.
+
+    Returns
+    -------
+    str
+        Table in Markdown.
+    """
     rows = (
         (f"`{name}`", claim.id, strip_markup(claim.statement), strip_markup(claim.source),
          format_published_value(claim.describe()), claim.tolerance, strip_markup(claim.because))
@@ -314,7 +491,13 @@ def claims() -> str:
 
 
 def statuses() -> str:
-    """Every status of a cell."""
+    """Format a table of all statuses of a cell.
+
+    Returns
+    -------
+    str
+        Table in Markdown.
+    """
     return markdown_table(
         ("status", "flag", "kind", "meaning"),
         ((f"`{s.label}`", int(s), "answer" if s.is_answer else "failure", strip_markup(s.meaning))
@@ -323,7 +506,13 @@ def statuses() -> str:
 
 
 def vocabulary() -> str:
-    """Every number of datasets that several studies share, but for fields of scenes."""
+    """Format a table of the common vocabulary, without fields of scenes.
+
+    Returns
+    -------
+    str
+        Table in Markdown.
+    """
     rows = (
         (
             f"`{about.name}`",
@@ -341,12 +530,19 @@ def vocabulary() -> str:
 
 
 def commands() -> str:
-    """Every command with its arguments and options."""
+    """Format sections with the arguments and options of all commands.
+
+    Returns
+    -------
+    str
+        Sections in Markdown.
+    """
     return "\n\n".join(_command(name, command) for name, command in cli.commands.items())
 
 
 def _command(name: str, command: click.Command) -> str:
-    # without "[OPTIONS]", which the table lists
+    """Format the section of a command."""
+    # The first piece of the usage is "[OPTIONS]", which the table replaces.
     taken = " ".join(command.collect_usage_pieces(click.Context(command))[1:])
     rows = (
         (
@@ -363,23 +559,42 @@ def _command(name: str, command: click.Command) -> str:
 
 
 def _describe_option(option: click.Option) -> str:
+    """Format the default of an option."""
     if option.is_flag or option.default in (None, (), []) or callable(option.default):
         return ""
     return "" if type(option.default).__name__ == "Sentinel" else f"`{option.default}`"
 
 
 def python() -> str:
-    """Entries of the public names, for autodoc."""
+    """Format the autodoc entries of the public names.
+
+    Returns
+    -------
+    str
+        Sections in Markdown.
+    """
     return "\n\n".join(map(_entry, rsfstudy.__all__))
 
 
 def accessor() -> str:
-    """Entry of ``dataset.rsf``."""
+    """Format the autodoc entry of ``dataset.rsf``.
+
+    Returns
+    -------
+    str
+        Directive in Markdown.
+    """
     return _rst("autoclass:: rsfstudy.api.accessor.Accessor", "members:")
 
 
 def classes() -> str:
-    """Entries of what is derived from, or handed over, by studies of one's own."""
+    """Format the autodoc entries of the base classes for user-defined studies.
+
+    Returns
+    -------
+    str
+        Sections in Markdown.
+    """
     return "\n\n".join(
         f"### {name}\n\n" + _rst(f"autoclass:: {home}.{name}", "members:", "show-inheritance:")
         for name, home in CLASSES.items()
@@ -387,6 +602,7 @@ def classes() -> str:
 
 
 def _entry(name: str) -> str:
+    """Format the autodoc entry of a public name."""
     kind = "class" if isinstance(getattr(rsfstudy, name), type) else "function"
     return f"### {name}\n\n" + _rst(
         f"auto{kind}:: rsfstudy.{name}", *["members:"] * (kind == "class")
@@ -394,11 +610,12 @@ def _entry(name: str) -> str:
 
 
 def _rst(directive: str, *options: str) -> str:
+    """Format a reStructuredText directive in Markdown."""
     lines = "".join(f"   :{option}\n" for option in options)
     return f"```{{eval-rst}}\n.. {directive}\n{lines}```"
 
 
-#: What makes the text of each name.
+#: Functions that generate the content, by name.
 MADE: dict[str, Callable[[], str]] = {
     one.__name__: one
     for one in (scene_fields, parts, rig, every_measure, reductions, claims, statuses, vocabulary,

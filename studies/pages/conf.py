@@ -1,8 +1,10 @@
-"""How the site is built, from the README, the pages, the notebook and the docstrings:
+"""Sphinx configuration of the site.
+
+The site consists of the README, the pages, the notebooks and the docstrings. Build it with::
 
     sphinx-build -W --keep-going -c studies/pages . outputs/site
 
-Tables of the page of names, and the entries of the page of Python, are made from the code.
+The tables of the reference page and the entries of the Python page are generated from the code.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from typing import Any
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
-import _generated_content  # type: ignore[import-not-found]  # noqa: E402 (it stands beside this file)
+import _generated_content  # type: ignore[import-not-found]  # noqa: E402 (same directory)
 
 project = "rsfstudy"
 author = copyright = "The rsfstudy developers"
@@ -45,9 +47,10 @@ html_theme = "furo"
 html_title = project
 html_copy_source = False
 html_show_sphinx = False
-#: Style of tables, by which seven columns fit a window of 1200 pixels.
+#: Style of tables. Seven columns fit into a window with a width of 1200 pixels.
 TABLES = "table.docutils { font-size: .78rem } table.docutils :is(td, th) { padding: .2rem .35rem }"
-#: Pages in the order of the contents, under studies/, by caption; those of no caption come last.
+#: Pages below the directory ``studies`` in the order of the contents, by caption. Pages that are
+#: not listed come last.
 CONTENTS = {
     "Use": ["pages/rig", "pages/studies", "pages/running", "pages/own_studies", "clusters/README"],
     "Notebooks": sorted(file.stem for file in HERE.parent.glob("*.ipynb")),
@@ -56,7 +59,7 @@ CONTENTS = {
 
 
 def _site_contents() -> str:
-    """The contents of the site, as the first page has them."""
+    """Return the contents of the site for the first page."""
     named = {page for pages in CONTENTS.values() for page in pages}
     others = {f"pages/{file.stem}" for file in HERE.glob("*.md")} - named
     rooms = CONTENTS | {"More": [*sorted(others), "MISPRINTS"]}
@@ -69,7 +72,11 @@ def _site_contents() -> str:
 
 
 def _fill_source(app: Any, page: str, text: list[str]) -> None:
-    """Fill in what is made; a notebook becomes Markdown, and the first page has the contents."""
+    """Insert generated content into a page.
+
+    Notebooks are converted to Markdown, and the contents of the site are appended to the first
+    page.
+    """
     if str(app.env.doc2path(page)).endswith(".ipynb"):
         text[0] = _notebook_to_markdown(text[0])
     text[0] = _generated_content.fill_page(_generated_content.escape_asterisks(text[0]))
@@ -78,7 +85,7 @@ def _fill_source(app: Any, page: str, text: list[str]) -> None:
 
 
 def _notebook_to_markdown(notebook: str) -> str:
-    """The texts and the code of a notebook, with what it prints and draws."""
+    """Convert a notebook with its outputs to Markdown."""
     parts: list[str] = []
     for cell in json.loads(notebook)["cells"]:
         text = "".join(cell["source"])
@@ -103,12 +110,12 @@ def _notebook_to_markdown(notebook: str) -> str:
 def _add_table_style(
     app: Any, page: str, template: str, context: dict[str, Any], tree: Any
 ) -> None:
-    """Lay the style of tables over that of the theme."""
+    """Add the style of tables to a page."""
     context["metatags"] = context.get("metatags", "") + f"<style>{TABLES}</style>"
 
 
 def _write_redirect(app: Any, error: Exception | None) -> None:
-    """Send who opens the folder to the first page."""
+    """Write an index page that redirects to the first page."""
     if error is None:
         to_first = f'<meta http-equiv="refresh" content="0; url={root_doc}.html">'
         Path(app.outdir, "index.html").write_text(
@@ -117,7 +124,13 @@ def _write_redirect(app: Any, error: Exception | None) -> None:
 
 
 def setup(app: Any) -> None:
-    """Have Sphinx ask for the source and the style of each page, and tell when it has ended."""
+    """Connect the functions of this module to Sphinx events.
+
+    Parameters
+    ----------
+    app : object
+        Sphinx application.
+    """
     app.connect("source-read", _fill_source)
     app.connect("html-page-context", _add_table_style)
     app.connect("build-finished", _write_redirect)
