@@ -1,5 +1,7 @@
-"""Assembly of the parts of a scene from its fields, the place of each field among them, and what
-is made of parts.
+"""Assembly of the parts of a scene from its fields.
+
+The function ``build_parts`` creates the parts, ``build_field_index`` assigns each field to its
+part, and ``SceneBase`` is the base class of ``Scene``.
 """
 
 from __future__ import annotations
@@ -42,7 +44,23 @@ from rsfstudy.slider.slider_parameters import (
 
 
 class SceneParts(NamedTuple):
-    """Parts of a scene: the numbers that every slider has, and what fills each slot."""
+    """Parts of a scene, one per slot, and the slider parameters.
+
+    Parameters
+    ----------
+    slider : SliderParameters
+        Parameters that every slider has.
+    law : LawBase
+        State evolution law.
+    normal_stress : NormalStress
+        Normal stress condition.
+    fluid : Fluid
+        Pore fluid.
+    dynamics : Dynamics
+        Dynamics.
+    loading : Loading
+        Loading history.
+    """
 
     slider: SliderParameters
     law: laws.LawBase
@@ -53,12 +71,22 @@ class SceneParts(NamedTuple):
 
 
 def build_parts(fields: Mapping[str, Any]) -> SceneParts:
-    """The parts that fields of a scene ask for, made of what they hold.
+    """Build the parts of a scene from its fields.
+
+    Parameters
+    ----------
+    fields : mapping of str to object
+        Values of the fields by name. Fields with the value None are ignored.
+
+    Returns
+    -------
+    SceneParts
+        Parts with the values of the fields.
 
     Raises
     ------
     InvalidValue
-        For a name that is no field, and for a value that breaks its rule or has no meaning here.
+        If a name is not a field, or if a value violates its rule or has no meaning in this scene.
     """
     chosen = tuple(_select_part(slot, fields) for slot in SLOTS)
     layout = build_field_index(tuple(map(part_class, chosen)))
@@ -71,12 +99,24 @@ def build_parts(fields: Mapping[str, Any]) -> SceneParts:
 
 
 def replace_field_values(parts: SceneParts, changes: Mapping[str, Any]) -> SceneParts:
-    """Parts of which those that own these fields hold other numbers.
+    """Return parts with new values of some fields.
+
+    Parameters
+    ----------
+    parts : SceneParts
+        Parts of a scene.
+    changes : mapping of str to object
+        New values by field name. The fields must belong to these parts.
+
+    Returns
+    -------
+    SceneParts
+        Parts with the new values. Parts without a changed field are reused.
 
     Raises
     ------
     InvalidValue
-        For a value that breaks its rule or has no meaning for these parts.
+        If a value violates its rule or has no meaning for these parts.
     """
     made: list[Any] = list(parts)
     for place, values in _group_by_part(
@@ -89,7 +129,10 @@ def replace_field_values(parts: SceneParts, changes: Mapping[str, Any]) -> Scene
 
 
 def _group_by_part(given: Mapping[str, Any], layout: FieldIndex) -> dict[int, dict[str, Any]]:
-    """What fields hold that are not None, by the place of the part that owns them."""
+    """Validate field values and group them by the index of their part.
+
+    Fields with the value None are omitted.
+    """
     values: dict[int, dict[str, Any]] = {}
     kinds, places, idle = layout.part_classes, layout.part_index, layout.inactive_values
     for name, value in given.items():
@@ -98,7 +141,7 @@ def _group_by_part(given: Mapping[str, Any], layout: FieldIndex) -> dict[int, di
             if value is not None:
                 values.setdefault(place, {})[name] = validate_value(kinds[place], name, value)
         elif name in idle:
-            # one that calls for another part may be stated, if it does not call
+            # A field that selects another part is accepted if its value does not select the part.
             if value is None or value is idle[name]:
                 continue
             owner = FIELD_OWNERS[name]
@@ -110,7 +153,7 @@ def _group_by_part(given: Mapping[str, Any], layout: FieldIndex) -> dict[int, di
 
 
 def _select_part(slot: Slot, given: Mapping[str, Any]) -> UserPart:
-    """The part that is asked for in a slot."""
+    """Return the part that the fields select for a slot."""
     value = given.get(slot.name)
     if isinstance(value, type | UserLoading):
         return resolve_part(slot, value)
@@ -135,27 +178,27 @@ def _select_part(slot: Slot, given: Mapping[str, Any]) -> UserPart:
 
 
 class FieldIndex(NamedTuple):
-    """Places of the fields of scenes with certain parts.
+    """Assignment of fields to the parts of a scene.
 
-    Attributes
+    Parameters
     ----------
     part_classes : tuple of type
-        The classes of the parts, the numbers of every slider first.
+        Classes of the parts, starting with ``SliderParameters``.
     part_index : mapping of str to int
-        The place of the part that owns each field.
+        Index of the part that owns each field.
     rejecting_part : mapping of str to type
-        The part that refuses each of the others,
-    inactive_values : mapping of str to value
-        and what those hold.
+        For each field without an owner among the parts, the part that rejects the field.
+    inactive_values : mapping of str to object
+        Values of these fields in the scene.
     inapplicable : frozenset of str
-        Those of them without meaning, whatever they hold: all but the idle ones that call for a
-        part by their values.
+        Names of these fields that have no meaning, whatever their value. Fields that would select
+        another part are not included.
     named_slots : tuple of str
-        The slots whose parts are fields of the scene by their names.
+        Names of the slots whose parts are selected by name.
     fields : tuple of str
-        Names of all fields: those of every scene, and those of parts of the user's own.
+        Names of all fields, including the fields of user-defined parts.
     parameters : frozenset of str
-        Those that decide nothing but a number.
+        Names of the fields that do not select a part.
     """
 
     part_classes: tuple[type[Part], ...]
@@ -170,7 +213,23 @@ class FieldIndex(NamedTuple):
 
 @cache
 def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
-    """The layout of scenes with parts of these classes in the slots."""
+    """Build the field index of scenes with the given parts.
+
+    Parameters
+    ----------
+    part_classes : tuple of type
+        Classes of the parts in the order of the slots.
+
+    Returns
+    -------
+    FieldIndex
+        Assignment of the fields to the parts.
+
+    Raises
+    ------
+    InvalidValue
+        If two parts have a field with the same name.
+    """
     kinds: tuple[type[Part], ...] = (SliderParameters, *part_classes)
     filled = list(zip(SLOTS, part_classes, strict=True))
     owned = {slot.name: part for slot, part in filled if part not in slot.choices.values()}
@@ -198,13 +257,20 @@ def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
 def find_inapplicable_fields(
     values: Mapping[str, Any], parts: Iterable[UserPart] = ()
 ) -> frozenset[str]:
-    """Fields that belong to other parts than those that values name; none where these name no part.
+    """Find the fields that have no meaning for the selected parts.
 
     Parameters
     ----------
-    values : mapping of str to value
-    parts : iterable of type or UserLoading
-        Parts of the user's own that may be among those.
+    values : mapping of str to object
+        Field values that select the parts.
+    parts : iterable of type or UserLoading, optional
+        User-defined parts whose fields are also examined.
+
+    Returns
+    -------
+    frozenset of str
+        Names of the fields that belong to other parts. The set is empty if the values do not select
+        valid parts.
     """
     try:
         layout = build_field_index(tuple(part_class(_select_part(slot, values)) for slot in SLOTS))
@@ -215,7 +281,19 @@ def find_inapplicable_fields(
 
 
 def find_user_parts(parts: SceneParts) -> dict[str, UserPart]:
-    """Those of the parts that are the user's own, by slot."""
+    """Find the user-defined parts of a scene.
+
+    Parameters
+    ----------
+    parts : SceneParts
+        Parts of the scene.
+
+    Returns
+    -------
+    dict of str to type or UserLoading
+        User-defined parts by slot. Protocols and sampled histories are included as objects, and
+        other parts as classes.
+    """
     filled = zip(SLOTS, parts[1:], strict=True)
     return {
         slot.name: part if isinstance(part, UserLoading) else type(part)
@@ -224,7 +302,7 @@ def find_user_parts(parts: SceneParts) -> dict[str, UserPart]:
     }
 
 
-#: Attributes of a scene that only its equations and its lattice ask for.
+#: Attributes of a scene that are used only inside the package. They are hidden from ``dir``.
 _HIDDEN_ATTRIBUTES = frozenset(
     {
         "field_index",
@@ -240,16 +318,22 @@ _HIDDEN_ATTRIBUTES = frozenset(
 
 @guard_methods
 class SceneBase(HtmlTableMixin):
-    """Base of a scene: what is made of parts, whose fields it has as its own.
+    """Base class of scenes, which provides the fields of the parts.
 
-    Attributes
+    The fields of all parts are attributes of the scene.
+
+    Parameters
     ----------
-    parts : SceneParts
+    parts : SceneParts, optional
+        Parts of the scene. By default the parts are built from the fields.
+    **given : object
+        Values of the fields.
     """
 
     parts: SceneParts
 
     def __init__(self, parts: SceneParts | None = None, /, **given: Any) -> None:
+        """Build and check the parts of the scene."""
         if parts is None:
             parts = build_parts(given)
         elif not isinstance(parts, SceneParts):
@@ -258,10 +342,10 @@ class SceneBase(HtmlTableMixin):
         self._check()
 
     def _check(self) -> None:
-        """Refuse parts that mean nothing together."""
+        """Raise ``InvalidValue`` if the parts are incompatible."""
 
     def __getattr__(self, name: str) -> Any:
-        """A field, which is that of a part, or of none here."""
+        """Return the value of a field of one of the parts."""
         if name.startswith("_"):
             raise AttributeError(name)
         layout = self.field_index
@@ -276,25 +360,33 @@ class SceneBase(HtmlTableMixin):
         return getattr(self, new)
 
     def __repr__(self) -> str:
+        """Return the call that creates the scene."""
         return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
 
     def __dir__(self) -> list[str]:
-        """Names that users ask for; a field without meaning in this scene is left out."""
-        # what is not stated may follow from other fields
+        """Return the public attributes, without inapplicable fields."""
+        # Fields without a value may be properties that are computed from other fields.
         stated = {name for name, value in self.as_dict().items() if value is not None}
         names = {*super().__dir__(), *stated} - _HIDDEN_ATTRIBUTES
         return [name for name in names if not name.startswith("_")]
 
     def __reduce__(self) -> tuple[Any, ...]:
+        """Return the arguments for unpickling."""
         return type(self), (self.parts,)
 
     @cached_attribute
     def field_index(self) -> FieldIndex:
-        """Places of the fields."""
+        """Index that assigns the fields to the parts."""
         return build_field_index(tuple(map(type, self.parts[1:])))
 
     def as_dict(self) -> dict[str, Any]:
-        """The fields as plain Python values."""
+        """Return the fields as plain Python values.
+
+        Returns
+        -------
+        dict of str to object
+            Values by field name.
+        """
         values = dict(self.field_index.inactive_values)
         for name in self.field_index.named_slots:
             values[name] = getattr(self.parts, name).name
@@ -306,27 +398,53 @@ class SceneBase(HtmlTableMixin):
         return {name: values[name] for name in kept}
 
     def describe(self) -> dict[str, Any]:
-        """The fields, and the segments of a loading of the user's own, as `protocol` takes them; or
-        the digest of its samples.
+        """Return the fields and the history of a user-defined loading.
+
+        Returns
+        -------
+        dict of str to object
+            Values by field name. A protocol adds its segments in the format of ``protocol``, and a
+            sampled history adds the digest of its samples.
         """
         history = self.parts.loading.describe() if "loading" in self.field_index.named_slots else {}
         return self.as_dict() | history
 
     @property
     def user_parts(self) -> tuple[UserPart, ...]:
-        """Those of its parts that are the user's own."""
+        """User-defined parts of the scene."""
         return tuple(find_user_parts(self.parts).values())
 
     def quantities_with_values(self) -> Iterator[tuple[Quantity, object]]:
-        """The fields that mean something in it, with their values."""
+        """Iterate over the fields that have a value.
+
+        Returns
+        -------
+        iterator of (Quantity, object)
+            Pairs of a quantity and the value of the field.
+        """
         return quantities_with_values(self.as_dict(), self.user_parts)
 
     @with_field_signature()
     def with_(self, **changes: Any) -> Self:
-        """A copy with some fields changed, checked anew.
+        """Return a copy of the scene with new values of some fields.
 
-        Changing what fills a slot drops the fields that have no meaning any more; stiffness takes
-        the place of its ratio, and the other way round.
+        The copy is checked like a new scene. If a change replaces a part, fields that lose their
+        meaning are dropped. Setting ``stiffness`` replaces ``stiffness_ratio``, and vice versa.
+
+        Parameters
+        ----------
+        **changes : object
+            New values by field name.
+
+        Returns
+        -------
+        Scene
+            New scene.
+
+        Raises
+        ------
+        InvalidValue
+            If a value is invalid in the new scene.
         """
         if all(
             n in self.field_index.parameters and value is not None for n, value in changes.items()
@@ -341,7 +459,7 @@ class SceneBase(HtmlTableMixin):
 
 
 def _unknown_field_error(name: str, value: Any, layout: FieldIndex) -> InvalidValue:
-    """The error for a name that is no field of a scene with these parts."""
+    """Return the error for an unknown field name."""
     for slot, part in zip(SLOTS, layout.part_classes[1:], strict=True):
         known = map(part_class, slot.user_parts.values())
         owner = next((other for other in known if name in field_names(other)), None)
@@ -350,11 +468,22 @@ def _unknown_field_error(name: str, value: Any, layout: FieldIndex) -> InvalidVa
             remedy = f"Leave it out, or set {slot.name}={owner.name!r}."
             return InvalidValue(name, value, rule, remedy=remedy)
     remedy, rule = suggest_field(name), "is not a field of a scene"
-    # what looks alike would mislead where the name is known to mean something else
+    # Similar names would be misleading if the name is a known synonym of a field.
     return InvalidValue("field", name, rule, choices=() if remedy else layout.fields, remedy=remedy)
 
 
 def unnamed_value_error(value: Any) -> InvalidValue:
-    """The error for a value that is given to a scene without a name."""
+    """Return the error for a positional argument of ``Scene``.
+
+    Parameters
+    ----------
+    value : object
+        Value of the argument.
+
+    Returns
+    -------
+    InvalidValue
+        Error whose message suggests the name of the field.
+    """
     remedy = suggest_keyword(value, {slot.name: slot.choices for slot in NAMED_SLOTS})
     return InvalidValue("Scene", value, "is given without a name", remedy=remedy)

@@ -1,8 +1,9 @@
-"""Indices of the numbers of a scene in the flat tuple ``p``, which its equations read; and bounds
-of what these compute.
+"""Layout of the parameter tuple ``p`` that the equations of a scene read.
 
-Those that every scene has come first. Each slot has places of its own behind them: a law reads
-``p[LAW]``, ``p[LAW + 1]``, ... The law stands last, and may have any number of them.
+Parameters that every scene has come first, followed by the parameters of each slot. The parameters
+of the law are ``p[LAW]``, ``p[LAW + 1]`` and so on. The parameters of the law come last, because a
+law can have any number of parameters. The module also defines the columns of segment tables and
+limits that prevent overflow.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.parts import Numbers, Part, collect_numbers
 from rsfstudy.slider.scene_view import SceneView
 
-#: Direct effect parameter a; how far ln V moves the states, which is b for one; mu_*, K = k
-#: D_c/sigma_*, V_0/V_*, its logarithm, the effect c of shear stress on the state, and by how much
-#: the loading has raised normal stress, over sigma_*.
+#: Indices of the parameters that every scene has: the direct effect parameter a, the change of the
+#: states per unit of ln V (b for a law with one state), the friction coefficient mu_*, the
+#: stiffness K = k D_c/sigma_*, the load point velocity V_0/V_* and its logarithm, the effect c of
+#: shear stress on the state, and the imposed change of normal stress in sigma_*.
 (
     A,
     B,
@@ -29,16 +31,16 @@ from rsfstudy.slider.scene_view import SceneView
     IMPOSED_NORMAL_STRESS,
 ) = range(8)
 
-#: Where the numbers of each slot begin, by its name. A loading that has unknowns has the places of
-#: the fluid, which then has none. There are few: compiled functions hand on all of `p`.
+#: Index of the first parameter of each slot. A loading with unknowns uses the elements of the
+#: fluid. The tuple is short, because compiled functions pass all of its elements on.
 NORMAL_STRESS, FLUID, DYNAMICS, LAW = 8, 10, 13, 15
 LOADING = FLUID
-#: Where both have some, the rate of the loading stands behind the numbers of the fluid.
+#: Index of the rate of the loading if both the loading and the fluid have parameters.
 BOUNDARY_PRESSURE_RATE = DYNAMICS - 1
 
-#: Columns of the table of segments of a loading: when each begins and ends, V_0/V_* and its
-#: logarithm, and the rate and the fall of normal stress that a loading with unknowns imposes as it
-#: begins, NaN of others.
+#: Columns of the segment table of a loading: start time, end time, load point velocity V_0/V_*, its
+#: logarithm, rate of normal stress, and decrease of normal stress at the start. The last two
+#: columns are NaN if the loading has no unknowns.
 (
     SEGMENT_START,
     SEGMENT_END,
@@ -48,18 +50,18 @@ BOUNDARY_PRESSURE_RATE = DYNAMICS - 1
     SEGMENT_STRESS_FALL,
 ) = range(6)
 
-#: Slip rates of which ln(V/V_*) is beyond this occur in trial steps only, which the integrator
-#: rejects: a motion ends at 276 (`slip_rate_unbounded`).
+#: Upper limit of ln(V/V_*). Larger slip rates occur only in trial steps that the integrator
+#: rejects, because a motion ends at 276 with the status ``slip_rate_unbounded``.
 LARGEST_LOG_SLIP_RATE = 300.0
-#: The same of time over slip, 1/V: slip that no load moves stops at 10^-290 V_*.
+#: Upper limit of ln(V_*/V). Slip without loading stops at 10^-290 V_*.
 LARGEST_LOG_SLOWNESS = 680.0
-#: Normal stress over its reference value, less 1: outside of these in trial steps only; clamps keep
-#: it finite.
+#: Limits of the normal stress ratio minus one. Values outside these limits occur only in trial
+#: steps.
 SMALLEST_NORMAL_STRESS_EXCESS, LARGEST_NORMAL_STRESS_EXCESS = 1e-12 - 1.0, 1e12
 
 
 class _NumberSource(Protocol):
-    """Part, or combination of parts, with numbers for the functions of a scene."""
+    """Part, or combination of parts, with parameters for the equations."""
 
     @property
     def name(self) -> str: ...
@@ -68,14 +70,37 @@ class _NumberSource(Protocol):
 
 
 def pack_numbers(scene: SceneView) -> Numbers:
-    """The numbers of a scene, each in its place."""
+    """Collect all parameters of a scene in a tuple.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to convert.
+
+    Returns
+    -------
+    tuple of float
+        Parameters at the indices of this module.
+    """
     p = scene.friction_numbers
     of_load = scene.stiffness, scene.load_velocity, scene.log_load_velocity
     return (*p[:STIFFNESS], *of_load, *p[STRESS_DEPENDENCE:])
 
 
 def pack_friction_numbers(scene: SceneView) -> Numbers:
-    """Numbers for functions that friction alone decides: NaN for spring and load point."""
+    """Collect the parameters that affect friction in a tuple.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to convert.
+
+    Returns
+    -------
+    tuple of float
+        Parameters at the indices of this module. The elements for the spring and the load point are
+        NaN.
+    """
     parts, slider, law = scene.parts, scene.parts.slider, scene.parts.law
     size = slider.a * law.state_change_over_a
     size = math.copysign(size, law.b_over_a) if law.state_count == 1 else size
@@ -91,8 +116,9 @@ def pack_friction_numbers(scene: SceneView) -> Numbers:
 
 
 def _pad_with_nan(part: _NumberSource, scene: SceneView, length: int) -> Numbers:
-    """The numbers of a part, and NaN in the places that it leaves, so that who reads there reads
-    nothing.
+    """Return the parameters of a part, padded with NaN.
+
+    A function that reads an unused element then returns NaN instead of a wrong number.
     """
     own = collect_numbers(part, scene) if isinstance(part, Part) else part.numbers(scene)
     if len(own) > length:

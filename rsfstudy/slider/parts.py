@@ -1,15 +1,22 @@
-"""Parts: each is one choice of a slot of the slider, with its fields and its functions of floats.
+"""Base class and field declarations of the parts of a slider.
 
-A scene fills five slots: state evolution law, normal stress, fluid, dynamics and loading. Each
-choice is one file, with a frozen dataclass derived from `Part` that owns its fields: default, rule,
-symbol, units and description. Its functions are plain functions of floats: they take the numbers of
-a scene as one flat tuple ``p``, in which those of the part begin at the place of its slot, such as
-``p[LAW]`` (see `parameter_layout`). `friction` and `scene_functions` put them together.
+A scene has five slots: the state evolution law, the normal stress condition, the pore fluid, the
+dynamics and the loading. Each choice for a slot is a frozen dataclass derived from ``Part``,
+usually in its own module. The class declares the fields of the part with ``number`` and ``flag``.
 
-What an effect of your own overrides: how the state evolves, a `Law` (`evolution`) or a
-`LawBase` (`evolutions`, `steady_states`; whatever weakens friction may be a state); how normal
-stress follows shear stress, a `NormalStress`; unknowns that end in a pore pressure, a `Fluid`; how
-slip rate follows stress, a `Dynamics`; what moves the load point, a `Loading` or a protocol.
+The functions of a part are plain functions of floats. The functions receive the parameters of a
+scene as a flat tuple ``p``. The parameters of a part start at the index of its slot, for example
+``p[LAW]`` (see ``parameter_layout``). The modules ``friction`` and ``scene_functions`` combine the
+functions of all parts.
+
+To add an effect, derive a class from the base class of a slot:
+
+- ``Law`` or ``LawBase`` defines the evolution of the state. Any quantity that weakens friction can
+  be modelled as a state.
+- ``NormalStress`` defines the dependence of normal stress on shear stress.
+- ``Fluid`` defines unknowns that determine the pore pressure.
+- ``Dynamics`` defines the dependence of the slip rate on stress.
+- ``Loading`` defines the motion of the load point.
 """
 
 from __future__ import annotations
@@ -34,14 +41,14 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.scene_view import SceneView
 
-#: Rules of most fields; counts are of segments of loading.
+#: Rules of most fields. The upper limit of integers bounds the number of loading segments.
 POSITIVE, NON_NEGATIVE = "must be greater than 0", "must be 0 or greater"
 NON_NEGATIVE_INTEGER, POSITIVE_INTEGER = (
     f"must be a whole number from {least} to 100,000" for least in (0, 1)
 )
 _BOOLEAN_RULE = "must be true or false"
 
-#: A function of floats, the last argument being the numbers of a scene.
+#: Function of floats whose last argument is the parameter tuple of a scene.
 Function = Callable[..., Any]
 Numbers = tuple[float, ...]
 
@@ -50,35 +57,56 @@ Numbers = tuple[float, ...]
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """Base of all parts.
+    """Base class of all parts of a slider.
 
-    One of a user's own is given by its class: ``Scene(law=MyLaw)``.
+    To use a user-defined part, pass its class to the scene, for example ``Scene(law=MyLaw)``.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene
+    >>> from rsfstudy.parts import Part
+    >>> scene = Scene(law="slowness")
+    >>> all(isinstance(part, Part) for part in scene.parts)
+    True
+    >>> scene.parts.law.name
+    'slowness'
     """
 
-    #: What the part is called; a part that a field calls for by its value names that field instead.
+    #: Name of the part.
     name: ClassVar[str]
+    #: Name of the field whose value selects the part. Empty if the part is selected by its name.
     selected_by: ClassVar[str] = ""
-    #: What follows from the equations of a part and is stated beside them, and the members that
-    #: hold those: a part with one of them of its own inherits no conclusion from another's.
+    #: Names of members that follow from the equations of the part, such as closed-form solutions.
     derived_properties: ClassVar[tuple[str, ...]] = ()
+    #: Names of members that define the equations. If a subclass overrides one of these members, the
+    #: subclass does not inherit the derived properties.
     defining_methods: ClassVar[frozenset[str]] = frozenset()
-    #: Unknowns of a fluid or a loading, and the functions of them (see `fluid.Fluid`).
+    #: Unknowns of a fluid or a loading. The functions ``auxiliary_rates`` and
+    #: ``auxiliary_steady_states`` below compute the rates and the steady values of the unknowns
+    #: (see ``Fluid``).
     unknowns: ClassVar[tuple[Quantity, ...]] = ()
-    #: Names of unknowns that do not count for the distance from steady sliding, for example because
-    #: their steady values are huge at the slip rate of a rupture. Motions may settle, and limit
-    #: cycles are recognised, whatever these unknowns do.
+    #: Names of unknowns that are excluded from the distance from steady sliding, for example
+    #: because their steady values are extremely large at the slip rate of a rupture. The criteria
+    #: for settled motions and for limit cycles ignore these unknowns.
     excluded_from_distance: ClassVar[tuple[str, ...]] = ()
-    #: Quantities that the rates of a part need, and those that the functions of its slot receive
-    #: (names of `requirements.PART_QUANTITIES`). A scene refuses a part if it cannot provide a
-    #: quantity.
+    #: Names of the quantities in ``requirements.PART_QUANTITIES`` that the rates of the part need.
+    #: A scene rejects the part if it cannot provide a quantity.
     needs: ClassVar[Collection[str]] = frozenset()
+    #: Names of the quantities that the functions of the slot receive.
     received_quantities: ClassVar[frozenset[str]] = frozenset()
     auxiliary_rates: ClassVar[Function | None] = None
     auxiliary_steady_states: ClassVar[Function | None] = None
-    #: Where values of other parts of the slot have no meaning, and what would give them one.
+    #: Words for error messages about fields of other parts of the slot: the circumstance in which
+    #: the fields have no meaning, and a remedy.
     rejection_hint: ClassVar[tuple[str, str]] = ("", "")
 
     def __init_subclass__(cls) -> None:
+        """Reset the derived properties if the subclass changes the equations.
+
+        The derived properties of a part follow from its equations. A subclass that overrides a
+        member of ``defining_methods`` therefore does not inherit the derived properties of another
+        part.
+        """
         super().__init_subclass__()
         adopt_former_members(cls)
         if cls.defining_methods & vars(cls).keys():
@@ -90,36 +118,91 @@ class Part:
     def numbers(self, scene: SceneView) -> Numbers:
         """Return the values that the functions of the part read from ``p``.
 
-        The first value is stored at the place of the slot. A law can have any number of values. The
-        other kinds of part have room for a few values only (see ``parameter_layout``). Fields that
-        a subclass declares with ``number`` are appended in the order of their declaration. Override
+        The first value is stored at the index of the slot. A law can have any number of values. The
+        other parts have room for a few values only (see ``parameter_layout``). Fields that a
+        subclass declares with ``number`` are appended in the order of their declaration. Override
         this method only if the functions read values other than these fields.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the part belongs to.
+
+        Returns
+        -------
+        tuple of float
+            Values in addition to the appended fields. The base class returns an empty tuple.
         """
         return ()
 
     def check(self, scene: SceneView) -> None:
-        """Raise InvalidValue where its values do not go with one another or with the scene."""
+        """Check the field values against each other and against the scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the part belongs to.
+
+        Raises
+        ------
+        InvalidValue
+            If the values contradict each other or the scene. The base class accepts all values.
+        """
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects that act through this part."""
+        """Names of the effects that are active in this part."""
         return ()
 
     @classmethod
     def required_functions(cls) -> tuple[str, ...]:
-        """Names of the functions that the part must state."""
+        """Return the names of the functions that the part must define.
+
+        Returns
+        -------
+        tuple of str
+            Names of class attributes.
+        """
         return ("auxiliary_rates", "auxiliary_steady_states") if cls.unknowns else ()
 
     @classmethod
     def rejection_error(cls, name: str, value: Any) -> InvalidValue:
-        """The error for a value of another part of the slot, which has no meaning here."""
+        """Return the error for a field of another part of the slot.
+
+        Parameters
+        ----------
+        name : str
+            Name of the field.
+        value : object
+            Value of the field.
+
+        Returns
+        -------
+        InvalidValue
+            Error whose message explains that the field has no meaning for this part.
+        """
         where, instead = cls.rejection_hint
         rule = f"has no meaning {where or f'for {cls.name}'}"
         remedy = f"Leave {name} out, or {instead}." if instead else "Leave it out."
         return InvalidValue(name, value, rule, remedy=remedy)
 
     def field_error(self, name: str, rule: str, remedy: str = "") -> InvalidValue:
-        """The error for what one of its fields holds."""
+        """Return the error for an invalid value of a field.
+
+        Parameters
+        ----------
+        name : str
+            Name of the field.
+        rule : str
+            Rule that the value violates.
+        remedy : str, optional
+            Last sentence of the message.
+
+        Returns
+        -------
+        InvalidValue
+            Error with the current value of the field.
+        """
         return InvalidValue(name, getattr(self, name), rule, remedy=remedy)
 
 
@@ -141,16 +224,42 @@ def number(
     ----------
     default : float or None
         Default value.
-    symbol, units, long_name, scale : str
-        Description of the field, for tables, figures and files.
-    rule : str
+    symbol : str
+        Symbol in LaTeX, for tables and figures.
+    units : str
+        Units, or ``"1"`` for a dimensionless field.
+    long_name : str
+        Description, for tables, figures and files.
+    scale : str, optional
+        Scale of a dimensionless field, for example ``"sigma_*"``.
+    rule : str, optional
         Condition that values must satisfy, a key of ``RULES``.
-    remedy : str
+    remedy : str, optional
         Last sentence of the error message if a value violates the rule.
-    omit_if_none : bool
+    omit_if_none : bool, default: False
         If True, the field is included among the values of a scene only if the user sets the field.
         Use True for fields that were introduced later, so that the file names of existing results
         do not change.
+
+    Returns
+    -------
+    dataclasses.Field
+        Field for the dataclass of the part.
+
+    Raises
+    ------
+    InvalidValue
+        If the rule is unknown.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> from rsfstudy.parts import Law, number
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class PowerLaw(Law):
+    ...     power: float = number(2.0, "$n$", "1", "power of the slip rate")
+    >>> PowerLaw().power
+    2.0
     """
     if rule not in RULES:
         raise InvalidValue("rule", rule, "is unknown", choices=RULES)
@@ -160,12 +269,35 @@ def number(
 
 
 def flag(default: bool, long_name: str) -> Any:
-    """A field that is true or false."""
+    """Declare a boolean field of a part.
+
+    Parameters
+    ----------
+    default : bool
+        Default value.
+    long_name : str
+        Description, for tables, figures and files.
+
+    Returns
+    -------
+    dataclasses.Field
+        Field for the dataclass of the part.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> from rsfstudy.parts import Law, flag
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class HealingLaw(Law):
+    ...     heals: bool = flag(True, "whether contacts heal at rest")
+    >>> HealingLaw().heals
+    True
+    """
     about = {"symbol": "", "units": "", "long_name": long_name}
     return field(default=default, metadata={"about": about, "rule": _BOOLEAN_RULE, "remedy": ""})
 
 
-#: What numbers may have to be.
+#: Conditions of numeric fields, by the text of the rule.
 RULES: Mapping[str, Callable[[float], bool]] = {
     "": lambda value: True,
     POSITIVE: lambda value: value > 0.0,
@@ -179,13 +311,37 @@ RULES: Mapping[str, Callable[[float], bool]] = {
 
 
 def is_boolean_field(part: type[Part], name: str) -> bool:
-    """True if a field of a part holds true or false."""
+    """Return True if a field of a part is boolean.
+
+    Parameters
+    ----------
+    part : type
+        Class of the part.
+    name : str
+        Name of the field.
+
+    Returns
+    -------
+    bool
+        True for fields that ``flag`` declares.
+    """
     return bool(part.__dataclass_fields__[name].metadata["rule"] == _BOOLEAN_RULE)
 
 
 def field_names(part: type[Part]) -> tuple[str, ...]:
-    """Names of the fields that a part brings to a scene, made by `number` or `flag`: first that
-    which calls for it, if one does. Cells of journals are known by their fields in this order.
+    """Return the names of the fields that a part adds to a scene.
+
+    Parameters
+    ----------
+    part : type
+        Class of the part.
+
+    Returns
+    -------
+    tuple of str
+        Names of the fields that ``number`` and ``flag`` declare. The field that selects the part
+        comes first. Journals identify cells by the fields in this order, so the order must not
+        change.
     """
     names = (f.name for f in fields(part) if "about" in f.metadata)
     return tuple(sorted(names, key=lambda name: name != part.selected_by))
@@ -193,10 +349,10 @@ def field_names(part: type[Part]) -> tuple[str, ...]:
 
 @cache
 def _appended_fields(part: type[Part]) -> tuple[str, ...]:
-    """Return the names of the fields declared below the last ``numbers`` override.
+    """Return the names of the fields whose values are appended to ``numbers``.
 
-    The list contains number fields only. Their values are appended to the values that the override
-    returns.
+    The fields are numeric and are declared in subclasses of the last class that overrides
+    ``numbers``.
     """
     overriding = next(kind for kind in part.__mro__ if "numbers" in vars(kind))
     known = vars(overriding).get("__dataclass_fields__", {})
@@ -206,14 +362,38 @@ def _appended_fields(part: type[Part]) -> tuple[str, ...]:
 
 
 def collect_numbers(part: Part, scene: SceneView) -> Numbers:
-    """Return the values of ``part.numbers``, followed by the appended fields."""
+    """Return the values of ``part.numbers``, followed by the appended fields.
+
+    Parameters
+    ----------
+    part : Part
+        Part of the scene.
+    scene : Scene
+        Scene that the part belongs to.
+
+    Returns
+    -------
+    tuple of float
+        Parameters of the part. Fields without a value are NaN.
+    """
     values = (getattr(part, name) for name in _appended_fields(type(part)))  # type: ignore[arg-type]
     others = (math.nan if value is None else float(value) for value in values)
     return (*part.numbers(scene), *others)
 
 
 def field_quantities(part: type[Part]) -> list[Quantity]:
-    """Quantities that the fields of a part hold."""
+    """Return the quantities that describe the fields of a part.
+
+    Parameters
+    ----------
+    part : type
+        Class of the part.
+
+    Returns
+    -------
+    list of Quantity
+        Quantities with the names, symbols and units of the fields.
+    """
     stated = (part.__dataclass_fields__[name] for name in field_names(part))
     return [Quantity(f.name, **f.metadata["about"]) for f in stated]
 
@@ -222,26 +402,40 @@ def field_quantities(part: type[Part]) -> list[Quantity]:
 def _field_rule(
     part: type[Part], name: str
 ) -> tuple[Any, str, str, Callable[[float], bool] | None]:
-    """The default of a field, its rule, the remedy, and whether a number keeps to the rule."""
+    """Return the default, rule, remedy and condition of a field."""
     stated = part.__dataclass_fields__[name]
     rule = stated.metadata["rule"]
     return stated.default, rule, stated.metadata["remedy"], RULES.get(rule)
 
 
 def validate_value(part: type[Part], name: str, value: Any) -> Any:
-    """A value for a field of a part, as Python's own number or flag.
+    """Validate the value of a field and convert it to a Python object.
+
+    Parameters
+    ----------
+    part : type
+        Class of the part.
+    name : str
+        Name of the field.
+    value : object
+        Value to validate.
+
+    Returns
+    -------
+    float, bool or None
+        Valid value. None is valid if the default of the field is None.
 
     Raises
     ------
     InvalidValue
-        Where it is none, or breaks the rule of the field.
+        If the value has the wrong type, is not finite or violates the rule of the field.
     """
     default, rule, remedy, allows = _field_rule(part, name)  # type: ignore[arg-type]
     if type(value) is float and math.isfinite(value) and allows and allows(value):
-        return value  # as most are
+        return value  # This shortcut accepts most values.
     if value is None and default is None:
         return None
-    flagged = type(value).__name__ == "bool"  # numpy's too
+    flagged = type(value).__name__ == "bool"  # NumPy booleans have the same type name.
     if rule == _BOOLEAN_RULE:
         if not flagged:
             raise InvalidValue(name, value, rule)
@@ -254,7 +448,7 @@ def validate_value(part: type[Part], name: str, value: Any) -> Any:
         plain = float(value)
     except OverflowError:
         plain = math.inf
-    except TypeError as error:  # NumPy counts intervals of time among its integers
+    except TypeError as error:  # Time differences of NumPy are instances of Real.
         raise InvalidValue(name, value, "must be a number") from error
     if not math.isfinite(plain):
         raise InvalidValue(name, plain, "must be finite")
@@ -264,10 +458,23 @@ def validate_value(part: type[Part], name: str, value: Any) -> Any:
 
 
 def discover_parts(package: str, path: Iterable[str]) -> dict[str, type[Part]]:
-    """The parts of a folder, by name: one in each of its files."""
+    """Import the modules of a package and collect their parts.
+
+    Parameters
+    ----------
+    package : str
+        Name of the package.
+    path : iterable of str
+        Folders of the package, as in the attribute ``__path__``.
+
+    Returns
+    -------
+    dict of str to type
+        Classes of the parts by their names.
+    """
     parts: dict[str, type[Part]] = {}
     for file in sorted(module.name for module in pkgutil.iter_modules(path)):
-        if file.startswith("_"):  # what several share
+        if file.startswith("_"):  # These modules contain shared code.
             continue
         module = importlib.import_module(f"{package}.{file}")
         own = [p for p in vars(module).values() if isinstance(p, type) and issubclass(p, Part)]

@@ -1,4 +1,4 @@
-"""A point of a motion."""
+"""State of a motion at a point in time."""
 
 from __future__ import annotations
 
@@ -9,36 +9,42 @@ from rsfstudy._deprecation import renamed_members
 
 @renamed_members
 class Point(NamedTuple):
-    """The motion at one instant, whatever the unknowns it was computed with.
+    r"""Stress, slip rate and states of a motion at a point in time.
 
-    Attributes
+    The values do not depend on the unknowns of the equations that were integrated.
+
+    Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     log_slip_rate_derivative : float
-        Its derivative with respect to the clock of the equations, length along the path.
-    spring_stress, frictional_stress : float
-        Deviations f and g of spring stress and of frictional stress from tau_*, over sigma_*.
+        Derivative of ``log_slip_rate`` with respect to the independent variable, the length along
+        the path.
+    spring_stress : float
+        Deviation :math:`f` of the spring stress from :math:`\tau_*`, in :math:`\sigma_*`.
+    frictional_stress : float
+        Deviation :math:`g` of the frictional stress from :math:`\tau_*`, in :math:`\sigma_*`.
     psi : float
-        The sum of the states of the law, freed of stress.
+        Sum of the states :math:`\Psi` of the law, which exclude the effect of stress.
     state : float
-        State variable Theta (the sum, where a law has several).
+        State variable :math:`\Theta`. If the law has several states, ``state`` is their sum.
     steady_state_offset : float
-        Its distance from steady sliding at this slip rate, Theta + b ln(V/V_*) for most laws.
+        Difference of ``state`` from steady sliding at this slip rate. For most laws, the difference
+        is :math:`\Theta + b \ln(V/V_*)`.
     distance_from_steady_state : float
-        The largest such distance of a state, without sign. States that a part lists in
-        `excluded_from_distance` are left out.
+        Largest absolute difference of a state from steady sliding. Unknowns in
+        ``excluded_from_distance`` are ignored.
     friction_coefficient : float
         Friction coefficient.
     normal_stress : float
-        Effective normal stress over sigma_*.
+        Effective normal stress in :math:`\sigma_*`.
     apparent_friction : float
-        Friction coefficient as a rig reads it: spring stress over normal stress less the pore
-        pressure outside the fault.
+        Friction coefficient that an experimenter measures. It is the spring stress, divided by the
+        difference between normal stress and the pore pressure outside the fault.
     apparent_friction_derivative : float
-        Its derivative with respect to the clock of the equations.
+        Derivative of ``apparent_friction`` with respect to the independent variable.
     psis : tuple of float
-        States freed of stress, and those of a fluid.
+        States :math:`\Psi_i` of the law, followed by the unknowns of the loading and the fluid.
     """
 
     log_slip_rate: float

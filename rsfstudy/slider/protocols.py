@@ -1,6 +1,7 @@
-"""A loading history of a user's own, from a list of segments.
+"""Protocols, which define a loading history by a list of segments.
 
-Its name stands for it in results, and its segments count for what decided the numbers.
+The main function is ``protocol``. In results, a protocol is identified by its name. The segments
+are part of the provenance of the results.
 """
 
 from __future__ import annotations
@@ -22,25 +23,28 @@ from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parameter_layout import SEGMENT_VELOCITY
 from rsfstudy.slider.scene_view import SceneView
 
-#: What a segment of a protocol may state.
+#: Keys of a mapping that describes a segment.
 SEGMENT_KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
 
 
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class UserLoading(Loading, ABC):
-    """Base of loading histories of a user's own, which are data.
+    """Base class of protocols and sampled histories.
 
-    Attributes
+    Parameters
     ----------
     name : str
-        What stands for it in results.
+        Name of the loading in results.
     """
 
-    name: str  # type: ignore[misc]  # of each, and not of the class
+    name: str  # type: ignore[misc]  # The name belongs to the instance, not to the class.
 
     def check(self, scene: SceneView) -> None:
-        """A load point that moves back only where slip may; see `Loading`."""
+        """Check that the load point moves backwards only if slip may reverse.
+
+        See the base class.
+        """
         back = np.asarray(self.segment_table)[:, SEGMENT_VELOCITY] < 0.0
         if back.any() and not scene.parts.law.regularised:
             name, value, place = self.describe_reversal(int(np.argmax(back)))
@@ -50,64 +54,110 @@ class UserLoading(Loading, ABC):
         super().check(scene)
 
     def describe_reversal(self, index: int) -> tuple[str, float, str]:
-        """Name and value of what was stated of a segment that moves back, and where."""
+        """Describe the input value that moves the load point backwards.
+
+        Parameters
+        ----------
+        index : int
+            Index of the segment.
+
+        Returns
+        -------
+        name : str
+            Name of the input quantity.
+        value : float
+            Input value.
+        place : str
+            Position of the value in the input.
+        """
         return "velocity", self.segments[index].load_velocity, f"segment {index + 1}"
 
     @property
     @abstractmethod
     def duration(self) -> float:
-        """Duration in D_c/V_* of all that was stated."""
+        """Total duration of the input in D_c/V_*."""
 
 
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Protocol(UserLoading):
-    """A loading history as it was stated, segment by segment.
+    """Loading history that consists of user-defined segments.
 
-    Attributes
+    Parameters
     ----------
+    name : str
+        Name of the protocol in results.
     input_segments : tuple of Segment
-        Its segments; the last may say how long it lasts.
+        Segments of the protocol. The last segment may have a finite duration.
     """
 
     input_segments: tuple[Segment, ...]
 
     def describe(self) -> dict[str, Any]:
-        """Its segments as they were stated: the last may say how long it lasts."""
+        """Return the input segments as plain data.
+
+        See the base class. The duration of the last segment is included if it is finite.
+        """
         return {"segments": [segment.as_dict() for segment in self.input_segments]}
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
-        """As they were stated, the last without end."""
+        """Segments of the loading, with an infinite last segment."""
         return *self.input_segments[:-1], self.input_segments[-1]._replace(duration=math.inf)
 
     @property
     def duration(self) -> float:
-        """Duration in D_c/V_* of all segments that state one."""
+        """Total duration of the segments with a finite duration.
+
+        The unit is :math:`D_c/V_*`.
+        """
         return math.fsum(s.duration for s in self.input_segments if s.duration < math.inf)
 
 
 @error_boundary
 def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "protocol") -> Protocol:
-    """A loading history of your own: ``Scene(loading=protocol([...]))``.
+    r"""Create a loading history from a list of segments.
+
+    After the last segment, the load point continues at the same velocity.
 
     Parameters
     ----------
     segments : sequence of Segment or mapping
-        What the load point does, one segment after the other. A mapping states its ``velocity`` in
-        V_* (below 0 it moves back, where the scene is `regularised`), and how long it lasts by its
-        ``duration`` in D_c/V_* or its ``distance`` in D_c; a ``step`` is a sudden displacement of
-        the load point in D_c at its beginning, and ``normal_stress`` what the rig imposes during
-        it, over sigma_* (that of the segment before unless stated; 1 before the first). After the
-        last one, which need not say how long it lasts, the load point goes on at that velocity.
-    name : str
-        What the protocol is called in results.
+        Segments in chronological order. A mapping has the following keys:
+
+        - ``velocity`` is the load point velocity in :math:`V_*`. Negative values move the load
+          point backwards, which requires a scene with ``regularised=True``.
+        - ``duration`` is the duration in :math:`D_c/V_*`. Alternatively, ``distance`` is the load
+          point displacement in :math:`D_c`. Only the last segment may omit both.
+        - ``step`` is a sudden displacement of the load point at the start of the segment, in
+          :math:`D_c`. The default is 0.
+        - ``normal_stress`` is the imposed normal stress in :math:`\sigma_*`. The default is the
+          value of the previous segment, or 1 for the first segment.
+    name : str, default: "protocol"
+        Name of the protocol in results. The name must be a Python identifier.
+
+    Returns
+    -------
+    Protocol
+        Loading history for ``Scene(loading=...)``.
 
     Raises
     ------
     InvalidValue
-        For a protocol without segments, a segment that lasts no time, has no normal stress, or says
-        twice or not at all how long it lasts.
+        If there are no segments, or if a segment has an invalid duration, velocity or normal
+        stress.
+
+    Examples
+    --------
+    >>> import rsfstudy
+    >>> test = rsfstudy.protocol(
+    ...     [{"velocity": 10, "distance": 30}, {"velocity": 0, "duration": 100}, {"velocity": 1}]
+    ... )
+    >>> test.duration
+    103.0
+    >>> scene = rsfstudy.Scene(loading=test)
+    >>> scene.load_velocity
+    1.0
     """
     if not is_variable_name(name):
         raise InvalidValue("name", name, "must be a Python identifier: it names the protocol")
@@ -131,7 +181,11 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
 
 
 def _parse_segment(stated: Any, normal_stress: float, place: str) -> Segment:
-    """A segment that is stated, after one with so much imposed normal stress."""
+    """Convert an input segment to a validated ``Segment``.
+
+    The argument ``normal_stress`` is the value of the previous segment, and ``place`` is the
+    position of the segment in error messages.
+    """
     try:
         if isinstance(stated, Segment):
             return _validated_segment(*stated)
@@ -163,6 +217,7 @@ def _parse_segment(stated: Any, normal_stress: float, place: str) -> Segment:
 
 
 def _read_positive(stated: Mapping[str, Any], name: str, what: str) -> float:
+    """Return a positive finite value of a mapping."""
     value = stated[name]
     if not (_is_number(value) and 0.0 < value < math.inf):
         raise InvalidValue(name, value, f"must be {what}")
@@ -170,6 +225,7 @@ def _read_positive(stated: Mapping[str, Any], name: str, what: str) -> float:
 
 
 def _validated_segment(velocity: Any, step: Any, duration: Any, normal_stress: Any) -> Segment:
+    """Return a ``Segment`` whose values have been validated."""
     if not _is_number(velocity) or not math.isfinite(velocity):
         remedy = "0 holds the load point."
         raise InvalidValue("velocity", velocity, "must be a finite number", remedy=remedy)
@@ -185,4 +241,5 @@ def _validated_segment(velocity: Any, step: Any, duration: Any, normal_stress: A
 
 
 def _is_number(value: Any) -> bool:
+    """Return True if a value is a real number but not a boolean."""
     return isinstance(value, Real) and not isinstance(value, bool)

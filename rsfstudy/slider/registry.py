@@ -1,9 +1,9 @@
-"""The registry of parts and fields: the slots of a slider, what may fill each, and the fields that
-these bring to a scene.
+"""Registry of the slots, parts and fields of scenes.
 
-A part of a user's own is a class that fills a slot as the files of that slot do. It is known by its
-name from its first use on, in this process. A notebook cell that is run again defines it anew; a
-name that stands for something else is refused.
+The registry lists the parts that can fill each slot, and the fields that the parts add to a scene.
+A user-defined part is a class that is derived from the base class of a slot. The part is registered
+by its name when it is first used in a process. If a notebook cell with the class is run again, the
+new class replaces the old class. The registry rejects a name that belongs to another part.
 """
 
 from __future__ import annotations
@@ -25,29 +25,28 @@ from rsfstudy.slider.requirements import check_declared_needs
 from rsfstudy.slider.slider_parameters import SliderParameters
 
 F = TypeVar("F", bound=Callable[..., Any])
-#: A part of a user's own: its class, whose fields are fields of the scene; or a loading, which is
-#: data.
+#: User-defined part: the class of a part, or a loading object such as a protocol.
 UserPart = type[Part] | UserLoading
 
 
 @dataclass(frozen=True)
 class Slot:
-    """A slot of a scene, which one part fills.
+    """Slot of a scene, which is filled by one part.
 
-    Attributes
+    Parameters
     ----------
     name : str
-        What it is called.
+        Name of the slot.
     base : type
-        What all of its parts are derived from.
+        Base class of the parts.
     choices : mapping of str to type
-        The parts of rsfstudy, by name.
+        Built-in parts by name.
     default : str
-        The one that is meant where none is named.
+        Name of the default part.
     long_name : str
-        What it is.
-    user_parts : dict of str to type or UserLoading
-        Parts of the user's own, by name, as far as they are known in this process.
+        Description of the slot.
+    user_parts : dict of str to type or UserLoading, optional
+        User-defined parts by name that have been used in this process.
     """
 
     name: str
@@ -59,12 +58,12 @@ class Slot:
 
     @property
     def quantity(self) -> Quantity:
-        """What its name means as a field."""
+        """Quantity that describes the slot as a field."""
         return Quantity(self.name, "", "", self.long_name)
 
     @cached_property
     def selectors(self) -> Mapping[str, type[Part]]:
-        """The fields that call for a part by their values."""
+        """Mapping from field names to the parts that the fields select."""
         return {part.selected_by: part for part in self.choices.values() if part.selected_by}
 
 
@@ -87,45 +86,63 @@ SLOTS: tuple[Slot, ...] = (
     ),
     Slot("loading", loading.Loading, loading.BUILT_IN_PARTS, "step", "what the load point does"),
 )
-#: Slots whose choice a field of a scene names; that in others is called for by other fields.
+#: Slots whose part is selected by name. In the other slots, the values of fields select the part.
 NAMED_SLOTS = tuple(slot for slot in SLOTS if not slot.selectors)
 _ALL_PARTS: tuple[type[Part], ...] = (
     SliderParameters,
     *(part for slot in SLOTS for part in slot.choices.values()),
 )
-#: The part of rsfstudy that owns each field.
+#: Built-in part that owns each field.
 FIELD_OWNERS: Mapping[str, type[Part]] = {
     name: part for part in reversed(_ALL_PARTS) for name in field_names(part)
 }
-#: What the fields of a scene mean.
+#: Quantities that describe the fields of a scene.
 FIELD_QUANTITIES: tuple[Quantity, ...] = (
     *(slot.quantity for slot in NAMED_SLOTS),
     *(about for part in _ALL_PARTS for about in field_quantities(part)),
 )
-#: Their names.
+#: Names of the fields of a scene.
 FIELD_NAMES: tuple[str, ...] = tuple(dict.fromkeys(about.name for about in FIELD_QUANTITIES))
-#: Those that are among the values of a scene only if they were stated.
+#: Names of the fields that are included among the values of a scene only if the user sets them.
 OMITTED_IF_NONE: frozenset[str] = frozenset(
     name
     for name, part in FIELD_OWNERS.items()
     if part.__dataclass_fields__[name].metadata.get("omit_if_none")
 )
-#: What names a part of the user's own in each slot.
+#: Names of the slots.
 SLOT_NAMES: frozenset[str] = frozenset(slot.name for slot in SLOTS)
-#: Those that call for a part by their values.
+#: Names of the fields whose values select a part.
 SELECTOR_FIELDS: tuple[str, ...] = tuple(name for slot in SLOTS for name in slot.selectors)
 
 
 def field_defaults() -> dict[str, Any]:
-    """What a scene may state, and what is meant where it does not."""
+    """Return the default values of all fields of a scene.
+
+    Returns
+    -------
+    dict of str to object
+        Default values by field name. The default of a slot is None if other fields select the part.
+    """
     choices = {slot.name: slot.default if slot in NAMED_SLOTS else None for slot in SLOTS}
     fields = {name: part.__dataclass_fields__[name].default for name, part in FIELD_OWNERS.items()}
     return {name: {**choices, **fields}[name] for name in dict.fromkeys((*FIELD_NAMES, *choices))}
 
 
 def with_field_signature(*extra_names: str) -> Callable[[F], F]:
-    """A decorator that gives a function which takes fields a signature that names those of every
-    scene, and more: what editors complete.
+    """Return a decorator that adds the fields of scenes to a signature.
+
+    The signature is used for code completion in editors. The decorated function takes the fields as
+    ``**kwargs``.
+
+    Parameters
+    ----------
+    *extra_names : str
+        Further names to add.
+
+    Returns
+    -------
+    callable
+        Decorator.
     """
 
     def decorate(function: F) -> F:
@@ -139,31 +156,66 @@ def with_field_signature(*extra_names: str) -> Callable[[F], F]:
     return decorate
 
 
-# ---- parts of a user's own -----------------------------------------------------------------------
+# ---- user-defined parts --------------------------------------------------------------------------
 
-#: Names that every scene has beside its fields; `scene` states them.
+#: Names of the attributes of every scene, except for its fields. The module ``scene`` adds the
+#: names.
 RESERVED_NAMES: set[str] = set()
-#: Classes that were checked.
+#: Classes that have been checked.
 _CHECKED_CLASSES: set[type[Part]] = set()
 
 
 def part_class(part: UserPart) -> type[Part]:
-    """The class of a part."""
+    """Return the class of a part.
+
+    Parameters
+    ----------
+    part : type or UserLoading
+        Class of a part, or a loading object such as a protocol.
+
+    Returns
+    -------
+    type
+        The class itself, or the class of the loading.
+    """
     return part if isinstance(part, type) else type(part)
 
 
 def find_slot(part_class: type[Part]) -> Slot:
-    """The slot that parts of a class fill."""
+    """Return the slot that a class of parts fills.
+
+    Parameters
+    ----------
+    part_class : type
+        Class of a part.
+
+    Returns
+    -------
+    Slot
+        Slot with a base class of the part.
+    """
     return next(slot for slot in SLOTS if issubclass(part_class, slot.base))
 
 
 def resolve_part(slot: Slot, part: Any) -> UserPart:
-    """A part that is given itself, not by its name; from its first use on, its name stands for it.
+    """Check and register a part that is passed as a class or an object.
+
+    Parameters
+    ----------
+    slot : Slot
+        Slot that the part should fill.
+    part : type or UserLoading
+        Part to check.
+
+    Returns
+    -------
+    type or UserLoading
+        The part.
 
     Raises
     ------
     InvalidValue
-        Where it cannot fill the slot.
+        If the part cannot fill the slot.
     """
     found: UserPart = part
     if part in slot.choices.values() and slot in NAMED_SLOTS:
@@ -177,7 +229,7 @@ def resolve_part(slot: Slot, part: Any) -> UserPart:
 
 
 def _check_part(slot: Slot, part: Any) -> None:
-    """Raise InvalidValue for what cannot fill a slot."""
+    """Raise ``InvalidValue`` if a class cannot fill a slot."""
     if not isinstance(part, type) or not issubclass(part, slot.base):
         rule = f"is no class that fills the slot {slot.name}"
         remedy = f"Derive a class from {slot.base.__module__}.{slot.base.__name__}."
@@ -198,7 +250,7 @@ def _check_part(slot: Slot, part: Any) -> None:
 
 
 def _check_excluded_unknowns(slot: Slot, part: type[Part]) -> None:
-    """Raise ``InvalidValue`` if ``excluded_from_distance`` contains an invalid name.
+    """Raise ``InvalidValue`` if ``excluded_from_distance`` is invalid.
 
     Each name must be the name of an unknown of the part.
     """
@@ -214,7 +266,7 @@ def _check_excluded_unknowns(slot: Slot, part: type[Part]) -> None:
 
 
 def _check_part_name(slot: Slot, part: UserPart) -> None:
-    """Raise InvalidValue for a name that no part may have, or that something else has."""
+    """Raise ``InvalidValue`` if the name of a part is invalid or in use."""
     name: object = getattr(part, "name", None)
     rule = "" if is_variable_name(name) else f"must be named by a Python identifier, not {name!r}"
     for other in SLOTS:
@@ -230,13 +282,16 @@ def _check_part_name(slot: Slot, part: UserPart) -> None:
 def _origin(part: UserPart) -> tuple[str, str]:
     """Return the module and the qualified name of the definition of a part.
 
-    Both remain the same if a notebook cell with the definition is run again.
+    The result is the same if a notebook cell with the definition is run again.
     """
     return part_class(part).__module__, part_class(part).__qualname__
 
 
 def _check_part_fields(slot: Slot, part: type[Part]) -> None:
-    """Refuse fields that say nothing of themselves, or have the name of something else."""
+    """Raise ``InvalidValue`` if a field of a part is invalid.
+
+    A field must have a description, and its name must not be in use.
+    """
     what = f"field of {part.__qualname__}"
     for stated in fields(part):
         name, about, owner = (
@@ -252,7 +307,7 @@ def _check_part_fields(slot: Slot, part: type[Part]) -> None:
             raise InvalidValue(what, name, rule)
         if owner is None:
             taken = name in RESERVED_NAMES | SLOT_NAMES
-        else:  # another part of the slot may have it, with another rule
+        else:  # Another part of the slot may have the same field with another rule.
             known = owner.__dataclass_fields__[name].metadata["about"]
             taken = about != known or owner not in slot.choices.values()
         if taken:
@@ -262,7 +317,15 @@ def _check_part_fields(slot: Slot, part: type[Part]) -> None:
 
 
 def register_parts(parts: Iterable[UserPart]) -> None:
-    """Have the names of parts that were checked stand for them, whatever they stood for."""
+    """Register the names of parts that have been checked.
+
+    An earlier part with the same name is replaced.
+
+    Parameters
+    ----------
+    parts : iterable of type or UserLoading
+        Parts to register.
+    """
     for part in parts:
         slot = find_slot(part_class(part))
         if slot.user_parts.get(part.name) is not part:
@@ -271,13 +334,24 @@ def register_parts(parts: Iterable[UserPart]) -> None:
 
 
 def normalise_field_value(field: str, value: Any) -> Any:
-    """A value of a field; a part that is given itself by its name, which it has from now on, and a
-    law by its name here.
+    """Convert a part or the synonym of a law to a name.
+
+    Parameters
+    ----------
+    field : str
+        Name of the field.
+    value : object
+        Value of the field. A user-defined part is registered.
+
+    Returns
+    -------
+    object
+        Name of the part or law, or the value itself.
 
     Raises
     ------
     InvalidValue
-        Where the part cannot fill the slot.
+        If the part cannot fill the slot.
     """
     for slot in SLOTS if isinstance(value, type | UserLoading) else ():
         if slot.name == field:
@@ -288,7 +362,20 @@ def normalise_field_value(field: str, value: Any) -> Any:
 def find_named_user_parts(
     names: Iterable[str], rows: Iterable[Mapping[str, Any]]
 ) -> dict[str, UserPart]:
-    """The parts of the user's own that rows name in some fields, by name."""
+    """Find the user-defined parts whose names occur in rows of values.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Names of the fields to examine.
+    rows : iterable of mapping of str to object
+        Field values.
+
+    Returns
+    -------
+    dict of str to type or UserLoading
+        User-defined parts by name.
+    """
     slots = [slot for slot in SLOTS if slot.user_parts and slot.name in names]
     places = ((slot, row.get(slot.name)) for row in rows for slot in slots)
     return {
@@ -297,7 +384,20 @@ def find_named_user_parts(
 
 
 def names_to_parts(values: Mapping[str, Any], parts: Mapping[str, UserPart]) -> Mapping[str, Any]:
-    """Values of fields, with these parts themselves instead of their names."""
+    """Replace the names of user-defined parts by the parts themselves.
+
+    Parameters
+    ----------
+    values : mapping of str to object
+        Field values.
+    parts : mapping of str to type or UserLoading
+        User-defined parts by name.
+
+    Returns
+    -------
+    mapping of str to object
+        Field values with parts instead of names.
+    """
     if not parts:
         return values
     texts = {n: values[n] for n in SLOT_NAMES & set(values) if isinstance(values[n], str)}
@@ -305,12 +405,22 @@ def names_to_parts(values: Mapping[str, Any], parts: Mapping[str, UserPart]) -> 
 
 
 def scene_fields(parts: Iterable[UserPart]) -> dict[str, Quantity]:
-    """Fields of scenes that may have these parts of the user's own, by name, with what they mean.
+    """Return the fields of scenes that may contain the given parts.
+
+    Parameters
+    ----------
+    parts : iterable of type or UserLoading
+        User-defined parts.
+
+    Returns
+    -------
+    dict of str to Quantity
+        Quantities by field name.
 
     Raises
     ------
     InvalidValue
-        Where one name means several things.
+        If two parts have different fields with the same name.
     """
     found = {about.name: about for about in FIELD_QUANTITIES}
     for kind in map(part_class, parts):
@@ -322,12 +432,34 @@ def scene_fields(parts: Iterable[UserPart]) -> dict[str, Quantity]:
 
 
 def user_field_quantities(parts: Iterable[UserPart]) -> Iterator[Quantity]:
-    """Quantities of the fields that parts of the user's own add to those of every scene."""
+    """Return the quantities of the fields that user-defined parts add.
+
+    Parameters
+    ----------
+    parts : iterable of type or UserLoading
+        User-defined parts.
+
+    Returns
+    -------
+    iterator of Quantity
+        Quantities of the fields that are not fields of every scene.
+    """
     return (about for name, about in scene_fields(parts).items() if name not in FIELD_NAMES)
 
 
 def field_types(parts: Iterable[UserPart]) -> Mapping[str, Any]:
-    """Types of those fields; with None, where a part that fills the slot does without."""
+    """Return the types of the fields of scenes.
+
+    Parameters
+    ----------
+    parts : iterable of type or UserLoading
+        User-defined parts that the scenes may contain.
+
+    Returns
+    -------
+    mapping of str to type
+        Types by field name. The type includes None if some parts of the slot lack the field.
+    """
     kinds: dict[str, Any] = dict.fromkeys(SLOT_NAMES, str)
     classes = tuple(map(part_class, parts))
     filling: dict[str, list[type[Part]]] = {"": [SliderParameters]}
@@ -344,20 +476,28 @@ def field_types(parts: Iterable[UserPart]) -> Mapping[str, Any]:
     return {name: kinds[name] for name in scene_fields(classes)}
 
 
-#: What the fields of scenes without such parts hold.
+#: Types of the fields of scenes without user-defined parts.
 FIELD_TYPES = field_types(())
 
 
 def quantities_with_values(
     values: Mapping[str, Any], parts: Iterable[UserPart] = ()
 ) -> Iterator[tuple[Quantity, object]]:
-    """Fields that hold something, as quantities, with their values.
+    """Iterate over the fields that have a value.
 
     Parameters
     ----------
-    values : mapping of str to value
-    parts : iterable of type or UserLoading
-        Parts of the user's own whose fields may be among those.
+    values : mapping of str to object
+        Field values.
+    parts : iterable of type or UserLoading, optional
+        User-defined parts whose fields may be included.
+
+    Yields
+    ------
+    quantity : Quantity
+        Description of the field.
+    value : object
+        Value of the field, which is not None.
     """
     about = scene_fields(parts)
     for name, value in values.items():

@@ -2,9 +2,8 @@
 
 The functions of a part receive the quantities in its attribute ``received_quantities``. If
 effective normal stress is constant, shear stress can be computed from the friction coefficient and
-the normal stress. A part can list further quantities in ``needs``. The part is then rejected in
-every scene where these quantities are not known, because the rates would be computed from wrong
-values.
+the normal stress. A part can list further quantities in ``needs``. Scenes in which these quantities
+are unknown then reject the part, because the rates would be computed from wrong values.
 """
 
 from __future__ import annotations
@@ -32,9 +31,10 @@ PART_QUANTITIES: Mapping[str, str] = {
     PORE_PRESSURE: "pore pressure above that of the surroundings, over sigma_*",
     EFFECTIVE_NORMAL_STRESS: "normal stress less pore pressure, over sigma_*",
 }
-#: Quantities that the functions of a law receive; the friction coefficient is a sum of the others.
+#: Quantities that the functions of a law receive. The friction coefficient is computed from the
+#: other two quantities.
 LAW_QUANTITIES = frozenset({SLIP_RATE, STATE, FRICTION_COEFFICIENT})
-#: Quantities that follow from others.
+#: Quantities that can be computed from other quantities.
 _COMPUTED_FROM: Mapping[str, frozenset[str]] = {
     EFFECTIVE_NORMAL_STRESS: frozenset({NORMAL_STRESS, PORE_PRESSURE}),
     SHEAR_STRESS: frozenset({FRICTION_COEFFICIENT, NORMAL_STRESS, PORE_PRESSURE}),
@@ -42,7 +42,22 @@ _COMPUTED_FROM: Mapping[str, frozenset[str]] = {
 
 
 def check_declared_needs(slot: str, part: type[Part]) -> None:
-    """Raise ``InvalidValue`` if ``needs`` of a part is not a set of known quantities."""
+    """Raise ``InvalidValue`` if ``needs`` of a part is invalid.
+
+    The attribute must be a set of known quantities.
+
+    Parameters
+    ----------
+    slot : str
+        Name of the slot.
+    part : type
+        Class of the part.
+
+    Raises
+    ------
+    InvalidValue
+        If ``needs`` is a string or contains an unknown quantity.
+    """
     needs: Any = part.needs
     if isinstance(needs, str):
         raise InvalidValue("needs", needs, "must be a set of names", remedy=f"Write {{{needs!r}}}.")
@@ -53,7 +68,18 @@ def check_declared_needs(slot: str, part: type[Part]) -> None:
 
 
 def check_needs(scene: SceneView) -> None:
-    """Raise ``InvalidValue`` if a scene lacks a quantity that one of its parts needs."""
+    """Raise ``InvalidValue`` if a scene lacks a quantity that a part needs.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the functions of a part do not receive a needed quantity.
+    """
     for slot, part in zip(scene.parts._fields, scene.parts, strict=True):
         missing = sorted(set(part.needs) - provided_quantities(scene, part)) if part.needs else []
         if missing:
@@ -63,26 +89,33 @@ def check_needs(scene: SceneView) -> None:
 def provided_quantities(scene: SceneView, part: Part) -> frozenset[str]:
     """Return the quantities that are known to the functions of a part.
 
-    These are the quantities that the functions receive, and the quantities that can be computed
-    from them because parts of the scene are constant.
+    The result contains the quantities that the functions receive, the quantities that are constant
+    in the scene, and all quantities that can be computed from both.
 
     Parameters
     ----------
     scene : Scene
+        Scene that the part belongs to.
     part : Part
-        One of the parts of the scene.
+        Part of the scene.
+
+    Returns
+    -------
+    frozenset of str
+        Names of quantities in ``PART_QUANTITIES``.
     """
     constant = {NORMAL_STRESS, PORE_PRESSURE} - {
         change.quantity for change in _unknown_quantities(scene)
     }
     found = constant | part.received_quantities
     if scene.parts.law.regularised and part is scene.parts.law:
-        found -= {FRICTION_COEFFICIENT}  # that of forward slip does not hold where slip reverses
+        # The friction coefficient of forward slip is not valid if slip reverses.
+        found -= {FRICTION_COEFFICIENT}
     return frozenset(found | {name for name, terms in _COMPUTED_FROM.items() if found >= terms})
 
 
 class _UnknownQuantity(NamedTuple):
-    """Field of a scene that makes a quantity unknown to the rates, with its remedy."""
+    """Field of a scene that makes a quantity unavailable to the rates."""
 
     quantity: str
     cause: str
@@ -90,7 +123,7 @@ class _UnknownQuantity(NamedTuple):
 
 
 def _unknown_quantities(scene: SceneView) -> list[_UnknownQuantity]:
-    """Return the fields of a scene that make normal stress or friction variable."""
+    """Return the fields of a scene that make a quantity unavailable."""
     parts, found = scene.parts, []
     if parts.normal_stress.normal_stress is not None:
         cause = f"normal_stress={parts.normal_stress.name!r}"
@@ -111,9 +144,9 @@ def _unknown_quantities(scene: SceneView) -> list[_UnknownQuantity]:
 def _missing_quantities_error(
     scene: SceneView, slot: str, part: Part, missing: list[str]
 ) -> InvalidValue:
-    """Return the error for a part that needs quantities its rates do not receive."""
+    """Return the error for a part whose rates lack a needed quantity."""
     known = provided_quantities(scene, part)
-    # terms that are missing, of which a change of the scene may be the cause
+    # Determine the missing terms. A field of the scene may be the reason why they are missing.
     wanted = set[str]().union(*(_COMPUTED_FROM.get(name, {name}) for name in missing)) - known
     changes = [change for change in _unknown_quantities(scene) if change.quantity in wanted]
     causes = "with " + " and ".join(dict.fromkeys(change.cause for change in changes))

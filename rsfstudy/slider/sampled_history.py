@@ -1,7 +1,9 @@
-"""A loading history that was sampled: what the load point does, and normal stress, against time.
+"""Loading histories from sampled records.
 
-Between samples the load point moves at a steady velocity, and normal stress changes at a steady
-rate: what was recorded is linear. Its name stands for it in results; a digest tells its samples.
+The samples contain the load point motion and normal stress as functions of time. Between samples,
+the load point velocity is constant and normal stress changes at a constant rate, so the record is
+interpolated linearly. In results, a history is identified by its name and by a digest of its
+samples.
 """
 
 from __future__ import annotations
@@ -24,8 +26,8 @@ from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.protocols import UserLoading
 from rsfstudy.slider.scene_view import SceneView
 
-#: Columns of samples: time from the first, load point velocity from then on, and by how much normal
-#: stress is below sigma_* then, and at which rate it rises from then on.
+#: Columns of the sample table: time since the first sample, load point velocity after the sample,
+#: decrease of normal stress from sigma_* at the sample, and rate of normal stress after the sample.
 TIME_COLUMN, VELOCITY_COLUMN, STRESS_FALL_COLUMN, STRESS_RATE_COLUMN = range(4)
 _STRESS_UNKNOWNS = (
     Quantity("recorded_fall", "$P$", "1", "imposed fall of normal stress", "sigma_*"),
@@ -33,15 +35,24 @@ _STRESS_UNKNOWNS = (
 
 
 class LazySegments(Sequence[Segment]):
-    """The segments of a table, each made when it is asked for."""
+    """Sequence of segments that are created on access.
+
+    Parameters
+    ----------
+    table : ndarray of shape (segments, 6)
+        Segment table of a loading.
+    """
 
     def __init__(self, table: np.ndarray) -> None:
+        """Store the segment table."""
         self._table = table
 
     def __len__(self) -> int:
+        """Return the number of segments."""
         return len(self._table)
 
     def __getitem__(self, number: Any) -> Any:
+        """Return the segment with an index."""
         begins, ends, velocity, *_others = self._table[number].tolist()
         return Segment(velocity, duration=ends - begins)
 
@@ -49,21 +60,26 @@ class LazySegments(Sequence[Segment]):
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class SampledHistory(UserLoading):
-    """A loading history by its samples.
+    """Loading history that interpolates recorded samples.
 
-    Attributes
+    Parameters
     ----------
+    name : str
+        Name of the history in results.
     samples : bytes
-        Numbers in columns: time, load point velocity, and fall and rate of normal stress.
+        Array of shape (samples, 4) as bytes. The columns are time, load point velocity, and
+        decrease and rate of normal stress.
     digest : str
-        Tells the samples.
+        Digest of the samples.
     of_stress : bool
-        Whether normal stress or pore pressure is among them.
-    of_pressure : bool
-        Whether it is pore pressure alone. Beside a fluid that has pressure too, that is the
-        pressure around the fault; fluid flows in or out until both are the same.
+        If True, the samples include normal stress or pore pressure.
+    of_pressure : bool, default: False
+        If True, the samples include pore pressure but not normal stress. If the scene has a fluid
+        with pore pressure, the samples are the pressure around the fault, and fluid flows until
+        both pressures are equal.
     first_reversal : tuple of (str, float, str), optional
-        Name, value and place of the first sample that moves the load point back.
+        Name, value and position of the first sample that moves the load point backwards, for error
+        messages.
     """
 
     samples: bytes = field(repr=False)
@@ -77,31 +93,47 @@ class SampledHistory(UserLoading):
 
     @property
     def unknowns(self) -> tuple[Quantity, ...]:  # type: ignore[override]
-        """The fall of normal stress, where that is sampled."""
+        """Unknowns of the loading.
+
+        If normal stress is sampled, its decrease is an unknown. Otherwise the loading has no
+        unknowns.
+        """
         return _STRESS_UNKNOWNS if self.of_stress else ()
 
     def describe_reversal(self, index: int) -> tuple[str, float, str]:
+        """Describe the input value that moves the load point backwards.
+
+        See the base class.
+        """
         velocity = float(self.sample_table[index, VELOCITY_COLUMN])
         return self.first_reversal or ("velocity", velocity, f"sample {index + 1}")
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
-        """The fall at the first sample."""
+        """Return the decrease of normal stress at the first sample.
+
+        See the base class.
+        """
         return (float(self.sample_table[0, STRESS_FALL_COLUMN]),) if self.of_stress else ()
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """The rate from the first sample on."""
+        """Return the rate of normal stress after the first sample.
+
+        See the base class.
+        """
         return (float(self.sample_table[0, STRESS_RATE_COLUMN]),) if self.of_stress else ()
 
     def __getstate__(self) -> dict[str, Any]:
+        """Return the fields for pickling, without cached attributes."""
         return {f.name: vars(self)[f.name] for f in fields(self)}
 
     @property
     def sample_table(self) -> np.ndarray:
-        """The samples, shape (samples, 4)."""
+        """Samples as an array of shape (samples, 4)."""
         return np.frombuffer(self.samples).reshape(-1, STRESS_RATE_COLUMN + 1)
 
     @cached_property
     def segment_table(self) -> np.ndarray:
+        """Table of the segments, an array of shape (samples, 6)."""
         columns = self.sample_table
         table = np.full((len(columns), SEGMENT_STRESS_FALL + 1), math.nan)
         table[:, : SEGMENT_LOG_VELOCITY + 1].T[:] = (
@@ -118,38 +150,52 @@ class SampledHistory(UserLoading):
 
     @property
     def segments(self) -> Any:
-        """What is between samples; the last segment goes on for ever."""
+        """Segments between the samples, with an infinite last segment."""
         return LazySegments(self.segment_table)
 
     @property
     def jump_mask(self) -> np.ndarray:
+        """False for every segment, because the record has no jumps."""
         return np.zeros(len(self.sample_table), dtype=bool)
 
     @property
     def reported_segment_count(self) -> int:
-        """The end of the record alone: each sample would be an event."""
+        """Number of segments whose start is reported as an event.
+
+        Only the end of the record is reported, because otherwise every sample would be an event.
+        """
         return min(1, len(self.sample_table) - 1)
 
     def _check_durations(self) -> None:
-        """Nothing: samples are too many, and were checked where they were read."""
+        """Do nothing, because the samples are checked when they are read."""
 
     def describe(self) -> dict[str, Any]:
-        """The digest of its samples."""
+        """Return the digest of the samples.
+
+        See the base class.
+        """
         return {"samples": self.digest}
 
     @property
     def duration(self) -> float:
+        """Duration of the record in D_c/V_*."""
         return float(self.sample_table[-1, TIME_COLUMN])
 
     @property
     def changes_normal_stress(self) -> bool:
+        """True if the history changes normal stress."""
         return self.of_stress
 
     @property
     def perturbs_steady_sliding(self) -> bool:
+        """True, because a record generally differs from steady sliding."""
         return True
 
     def isolate_segment(self, index: int) -> SampledHistory:
+        """Return a history that consists of a single segment.
+
+        See the base class.
+        """
         one = self.sample_table[index].copy()
         one[TIME_COLUMN] = 0.0
         return replace(self, samples=one.tobytes())
@@ -164,27 +210,34 @@ def build_sampled_history(
     of_pressure: bool = False,
     first_reversal: tuple[str, float, str] | None = None,
 ) -> SampledHistory:
-    """A loading history of samples.
+    r"""Build a loading history from samples.
 
     Parameters
     ----------
     time : ndarray
-        In D_c/V_*; the history begins with the first.
+        Sampling times in :math:`D_c/V_*`. The history starts at the first sample.
     velocity : ndarray
-        Of the load point from each sample on, in V_*; the last goes on for ever.
+        Load point velocity between each sample and the next sample, in :math:`V_*`. The last
+        velocity has no end.
     stress_fall : ndarray or None
-        By how much normal stress is below sigma_* at the samples, over that; the last stays.
+        Decrease of normal stress from :math:`\sigma_*` at the samples, in :math:`\sigma_*`. After
+        the last sample, normal stress remains constant.
     name : str
-        What the history is called in results.
-    of_pressure : bool
-        Whether all of the fall is pore pressure.
+        Name of the history in results.
+    of_pressure : bool, default: False
+        If True, the decrease is caused by pore pressure only.
     first_reversal : tuple of (str, float, str), optional
-        Name, value and place of the first sample that moves the load point back.
+        Name, value and position of the first sample that moves the load point backwards.
+
+    Returns
+    -------
+    SampledHistory
+        Loading history.
 
     Raises
     ------
     InvalidValue
-        For a name that is none.
+        If the name is not a Python identifier.
     """
     if not is_variable_name(name):
         raise InvalidValue("name", name, "must be a Python identifier: it names the history")
@@ -200,7 +253,24 @@ def build_sampled_history(
 def history_from_table(
     sample_table: np.ndarray, of_stress: bool, name: str, *, of_pressure: bool = False
 ) -> SampledHistory:
-    """A loading history of its columns (see `SampledHistory.sample_table`)."""
+    """Build a loading history from a table of samples.
+
+    Parameters
+    ----------
+    sample_table : ndarray of shape (samples, 4)
+        Samples with the columns of ``SampledHistory.sample_table``.
+    of_stress : bool
+        If True, the samples include normal stress or pore pressure.
+    name : str
+        Name of the history in results.
+    of_pressure : bool, default: False
+        If True, the samples include pore pressure but not normal stress.
+
+    Returns
+    -------
+    SampledHistory
+        Loading history.
+    """
     samples = np.ascontiguousarray(sample_table, dtype=float).tobytes()
     digest = hashlib.sha256(samples).hexdigest()[:16]
     return SampledHistory(
@@ -209,5 +279,6 @@ def history_from_table(
 
 
 def _log_velocity(velocity: np.ndarray) -> np.ndarray:
+    """Return the logarithm of the magnitude of a velocity."""
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(abs(velocity)))

@@ -1,5 +1,7 @@
-"""The Scene: which slider. The numbers that every slider has and what fills its five slots,
-checked when made.
+"""The class ``Scene``, which describes a spring-slider by its parts.
+
+A scene consists of the slider parameters and one part per slot. All values are checked when the
+scene is created.
 """
 
 from __future__ import annotations
@@ -35,134 +37,184 @@ from rsfstudy.slider.requirements import check_needs
 from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.slider.states import check_steady_states
 
-#: Critical stiffnesses that are kept: studies come back to those along their other axes.
+#: Number of cached critical stiffnesses. Studies request the same values repeatedly along axes that
+#: do not affect friction.
 _CACHE_SIZE = 4096
-#: Table of the one segment of most loadings, which does not end.
+#: Segment table of loadings that consist of a single segment without an end.
 ENDLESS_SEGMENT_TABLE = np.array([[0.0, math.inf, *[math.nan] * 4]])
 
 
 @guard_methods
 @dataclass(frozen=True, init=False, repr=False)
 class Scene(SceneBase):
-    """A spring-slider with rate- and state-dependent friction, sliding steadily at V_* until a step
-    is imposed.
+    r"""Spring-slider with rate- and state-dependent friction.
 
-    Immutable and checked: a scene that exists is meaningful. Quantities are dimensionless, with
-    stress in sigma_*, slip in D_c, time in D_c/V_* and slip rate in V_*.
+    The slider slides steadily at the reference velocity :math:`V_*` until the loading starts. A
+    scene is immutable, and its values are checked when it is created. Quantities are dimensionless,
+    with stress in :math:`\sigma_*`, slip in :math:`D_c`, time in :math:`D_c/V_*` and slip rate in
+    :math:`V_*`.
 
     Parameters
     ----------
-    law : str or type
-        State evolution law: "slip" (default), "slowness" or any other file of
-        `rsfstudy.slider.laws`, or a class of your own, whose fields are then fields of the scene.
-    law_exponent : float, optional
-        Exponent of the family of laws, from 0 (slip law) to 1 (slowness law); 0.5.
-    cutoff_velocity_ratio : float, optional
-        V_c/V_*, above which contact no longer heals by the composite law, and the evolution effect
-        is left behind by the law with a cut-off; 100.
-    stress_dependence : float
-        c of Nagata et al. (2012): shear stress lowers the state variable by c dtau/sigma; 0.
-    normal_stress : {"constant", "imposed", "variable"}, or type
-        Constant; what the loading imposes; or, by default ("variable"), coupled to shear stress by
-        a driving stress inclined at `phi`; or a class of your own.
-    fluid : {"drained", "dilatant"}, or type
-        Pore pressure that never changes ("drained", the default), or that falls where pores open
-        with slip rate; or a class of your own. Stress is in units of the effective normal stress of
-        steady sliding at V_*, so that pore pressure is counted from that of the surroundings, where
-        it begins; a history of pore pressure changes that of the surroundings.
-    dynamics, loading : type, optional
-        A class of your own in these slots; or, as loading, what `rsfstudy.protocol` or
-        `rsfstudy.history` made. Without them other fields fill these slots: by default motion is
-        quasi-static, and the loading a single step, of nothing.
-    alpha : float, optional
-        Strength of the normal stress effect on the state variable (not at constant normal stress;
-        0.56). Zero leaves the effect out.
-    phi : float, optional
-        Angle in degrees between the driving stress and the fault normal (variable normal stress
-        only; 60).
-    dilatancy, drainage : float, optional
-        eps/(beta sigma_*), by which undrained pore pressure falls for each unit of ln V, and rate
-        c* D_c/V_* at which it drains (dilatant fluid only; 0.01 and 1).
-    a, b_over_a : float
-        Direct effect, and evolution effect over direct effect; 0.0145 and 2. Rate weakening is b >
-        a; without it there is no critical stiffness, and `stiffness` must be given.
-    regularised : bool
-        Whether slip reverses with shear stress (arcsinh form; quasi-static motion only); false.
-    b1_over_a, b2_over_a, length_ratio : float, optional
-        The same for each of two states (laws of two states only, instead of `b_over_a`), and the
-        slip distance of the second over D_c, which is that of the first; 1, 0.84 and 1/0.048.
-        Negative b are allowed.
-    mu_star : float
-        Steady-state friction coefficient at V_*; 0.76.
+    law : str or type, default: "slip"
+        State evolution law: "slip", "slowness" or the name of another module of
+        ``rsfstudy.slider.laws``, or a user-defined class. The fields of a user-defined class become
+        fields of the scene.
+    normal_stress : str or type, default: "variable"
+        Normal stress condition. "constant" is constant normal stress. "imposed" is the normal
+        stress that the loading imposes. "variable" is normal stress coupled to shear stress by a
+        driving stress that is inclined at the angle ``phi``. A user-defined class is also accepted.
+    fluid : str or type, default: "drained"
+        Pore fluid. "drained" is constant pore pressure. With "dilatant", pore pressure falls when
+        pores open with slip rate. A user-defined class is also accepted. Stress is normalised by
+        the effective normal stress of steady sliding at :math:`V_*`. Pore pressure is measured from
+        the pressure of the surroundings, which is also its initial value. A history of pore
+        pressure changes the pressure of the surroundings.
+    a : float, default: 0.0145
+        Direct effect parameter.
+    mu_star : float, default: 0.76
+        Steady-state friction coefficient at :math:`V_*`.
     stiffness_ratio : float, optional
-        Stiffness over the critical stiffness at V_* without radiation damping. Above it steady
-        sliding is stable; with damping also a little below. Default: 1. With several states a ratio
-        below 1 need not be unstable.
+        Ratio of the stiffness to the critical stiffness at :math:`V_*` without radiation damping.
+        Steady sliding is stable above 1 and, with radiation damping, also slightly below 1. With
+        several states, steady sliding may also be stable at lower ratios. The default is 1 if
+        ``stiffness`` is not given.
     stiffness : float, optional
-        Stiffness itself, k D_c/sigma_*, instead of its ratio.
+        Stiffness :math:`k D_c/\sigma_*`, as an alternative to ``stiffness_ratio``.
+    period : float, default: 5.0
+        Period :math:`T` of free oscillation in s. The product of ``period`` and ``reference_rate``
+        determines the effect of inertia and the instability norm.
+    reference_rate : float, default: 1.17e-8
+        Reference rate :math:`V_*/D_c` in 1/s.
+    instability_norm : float, default: 5e-4
+        Threshold of instability. A motion is unstable if :math:`V T/(2 \pi D_c)` reaches this norm.
+    initial_stress : float, default: 0.0
+        Initial shear stress, measured from the stress of steady sliding at :math:`V_*`, in
+        :math:`\sigma_*`. The initial values apply before the first step.
+    initial_state : float, default: 0.0
+        Initial state variable :math:`\Theta`, which is zero in steady sliding at :math:`V_*`.
+    stress_dependence : float, default: 0.0
+        Coefficient :math:`c` of Nagata et al. (2012). Shear stress decreases the state variable by
+        :math:`c \, d\tau/\sigma`.
+    regularised : bool, default: False
+        If True, slip reverses with the sign of shear stress (arcsinh form of the friction law).
+        Only quasi-static motions support reversed slip.
+    b_over_a : float, default: 2.0
+        Ratio :math:`b/a` of the evolution effect to the direct effect. Rate weakening requires
+        :math:`b > a`. Without rate weakening, there is no critical stiffness, and ``stiffness``
+        must be given.
+    cutoff_velocity_ratio : float, default: 100.0
+        Cut-off velocity :math:`V_c/V_*` of the composite law and of the law with a cut-off. Above
+        this velocity, the composite law has no healing, and the law with a cut-off has no evolution
+        effect.
+    law_exponent : float, default: 0.5
+        Exponent of the family of laws, from 0 (slip law) to 1 (slowness law).
+    b1_over_a : float, default: 1.0
+        Ratio :math:`b_1/a` of the first state, for laws with two states. These laws do not have the
+        field ``b_over_a``. Negative values are allowed.
+    b2_over_a : float, default: 0.84
+        Ratio :math:`b_2/a` of the second state, for laws with two states. Negative values are
+        allowed.
+    length_ratio : float, default: 1/0.048
+        Ratio of the slip distance of the second state to :math:`D_c`, the slip distance of the
+        first state.
+    alpha : float, default: 0.56
+        Coefficient of the effect of normal stress on the state variable. The field does not apply
+        to constant normal stress. Zero disables the effect.
+    phi : float, default: 60.0
+        Angle in degrees between the driving stress and the fault normal, for variable normal
+        stress.
+    dilatancy : float, default: 0.01
+        Dilatancy :math:`\epsilon/(\beta \sigma_*)` of the dilatant fluid, the decrease of undrained
+        pore pressure per unit of :math:`\ln V`.
+    drainage : float, default: 1.0
+        Drainage rate :math:`c^* D_c/V_*` of the dilatant fluid.
+    inertia : bool, default: False
+        If True, the slider has mass.
+    radiation_damping : float, default: 0.0
+        Damping coefficient :math:`\eta V_*/\sigma_*`, the stress that seismic waves radiate at
+        :math:`V_*`. A scene has either inertia or radiation damping. The impedance of spring and
+        mass is the stiffness, multiplied by :math:`T V_*/(2 \pi D_c)`.
+    oscillation_amplitude : float, default: 0.0
+        Amplitude of an oscillation of imposed normal stress in :math:`\sigma_*`. If the driving
+        stress is inclined, :math:`\sigma_3` oscillates. The field does not apply to constant normal
+        stress.
+    oscillation_period : float, default: 10.0
+        Period of an oscillation of normal stress or load point velocity in :math:`D_c/V_*`.
     load_velocity_ratio : float, optional
-        Load point velocity over V_* after the step. Default: 1, or 0 after a step of displacement
-        or of normal stress.
-    displacement_step : float
-        Instantaneous displacement of the load point in D_c; 0.
-    normal_stress_step : float
-        Sudden change of imposed normal stress over sigma_* (not at constant normal stress); that of
-        sigma_3 where a driving stress is inclined; 0.
-    oscillation_amplitude, oscillation_period : float
-        Amplitude over sigma_*, and period in D_c/V_*, of an oscillation of imposed normal stress
-        that begins as sin(t) under a load point at `load_velocity_ratio` (not at constant normal
-        stress; that of sigma_3 where a driving stress is inclined); 0, which is none, and 10.
-    oscillation_begin, oscillation_phase, oscillation_cycles : float, optional
-        Time in D_c/V_* at which an oscillation begins, of normal stress or of the load point, angle
-        in degrees by which it is ahead of a sine then, and number of cycles after which it ends,
-        whole or not. Default: it begins at once, as a sine, and goes on for ever.
+        Load point velocity in :math:`V_*` after the step. The default is 0 after a step of
+        displacement or normal stress, and 1 otherwise.
+    oscillation_begin : float, optional
+        Time in :math:`D_c/V_*` at which an oscillation begins. By default an oscillation begins
+        immediately.
+    oscillation_phase : float, optional
+        Phase of an oscillation at its start, in degrees. By default an oscillation starts as a
+        sine.
+    oscillation_cycles : float, optional
+        Number of cycles after which an oscillation ends, which may be fractional. By default an
+        oscillation has no end.
+    normal_stress_ramp : float, default: 0.0
+        Change of imposed normal stress in :math:`\sigma_*` at a steady rate. If the driving stress
+        is inclined, :math:`\sigma_3` changes. The field does not apply to constant normal stress.
+    ramp_duration : float, default: 1.0
+        Duration of the ramp of normal stress in :math:`D_c/V_*`.
+    hold_time : float, default: 0.0
+        Duration in :math:`D_c/V_*` of a hold of the load point. After the hold, the load point
+        moves at ``load_velocity_ratio``.
+    displacement_step : float, default: 0.0
+        Sudden displacement of the load point in :math:`D_c`.
+    normal_stress_step : float, default: 0.0
+        Sudden change of imposed normal stress in :math:`\sigma_*`. If the driving stress is
+        inclined, :math:`\sigma_3` changes. The field does not apply to constant normal stress.
     velocity_oscillation : float, optional
-        Amplitude of an oscillation of load point velocity, over its mean at `load_velocity_ratio`,
-        of the period, begin, phase and number of cycles above; none.
-    normal_stress_ramp, ramp_duration : float
-        Change of imposed normal stress over sigma_* at a steady rate, and time in D_c/V_* that it
-        takes, under a load point at `load_velocity_ratio` (not at constant normal stress; that of
-        sigma_3 where a driving stress is inclined); 0, which is none, and 1.
-    hold_time : float
-        Time in D_c/V_* for which the load point is held, before it moves on at
-        `load_velocity_ratio`; 0, which is no hold.
-    velocity_steps, velocity_ratio, displacement_between_steps : float
-        How many steps of load point velocity there are, from V_* to `velocity_ratio` V_* and back
-        in turn, and how far in D_c it moves from one to the next; 0, which is no step, 10 and 20.
-    velocity_ramp, velocity_ramp_duration, velocity_ramp_stairs : float
-        Change of load point velocity over V_* at a steady rate, time in D_c/V_* that it takes, and
-        number of stairs that stand for it; 0, which is none, 10 and 64.
-    inertia : bool
-        Whether the slider has mass; false.
-    radiation_damping : float
-        eta V_*/sigma_*: stress that waves carry away at V_* (quasi-dynamic motion, instead of
-        mass); T V_*/(2 pi D_c) times the stiffness is the impedance of spring and mass. Default: 0.
-    period : float
-        Period of free oscillation T in s; with `reference_rate` it sets inertia and the instability
-        norm; 5.
-    reference_rate : float
-        V_*/D_c in 1/s; 1.17e-8.
-    instability_norm : float
-        A motion counts as unstable once V T/(2 pi D_c) reaches this norm; 5e-4.
-    initial_stress, initial_state : float
-        Shear stress over sigma_* above that of steady sliding at V_*, and state variable Theta,
-        with which the slider begins, before the first step. Default: 0, steady sliding at V_*.
+        Amplitude of an oscillation of the load point velocity, relative to the mean velocity
+        ``load_velocity_ratio``. By default there is no oscillation.
+    velocity_ramp : float, default: 0.0
+        Change of the load point velocity in :math:`V_*` at a steady rate.
+    velocity_ramp_duration : float, default: 10.0
+        Duration of the ramp of load point velocity in :math:`D_c/V_*`.
+    velocity_ramp_stairs : float, default: 64.0
+        Number of steps that approximate the ramp of load point velocity.
+    velocity_steps : float, default: 0.0
+        Number of steps of load point velocity between :math:`V_*` and ``velocity_ratio``.
+    velocity_ratio : float, default: 10.0
+        Load point velocity in :math:`V_*` after the first velocity step.
+    displacement_between_steps : float, default: 20.0
+        Load point displacement between successive velocity steps in :math:`D_c`.
+    dynamics : type, optional
+        User-defined class of dynamics. By default the fields ``inertia`` and ``radiation_damping``
+        select the dynamics, and motion is quasi-static if neither is set.
+    loading : type or UserLoading, optional
+        User-defined class of a loading, or a loading that ``rsfstudy.protocol``,
+        ``rsfstudy.history`` or ``rsfstudy.read_protocol`` returns. By default other fields select
+        the loading.
 
     Attributes
     ----------
     parts : SceneParts
-        What it is made of: ``slider``, ``law``, ``normal_stress``, ``fluid``, ``dynamics`` and
-        ``loading``; each field is that of one of them.
+        Parts of the scene: ``slider``, ``law``, ``normal_stress``, ``fluid``, ``dynamics`` and
+        ``loading``. Each field of the scene belongs to one of the parts.
 
     Raises
     ------
     InvalidValue
-        For a value that is wrong or means nothing, with the rule it breaks and the remedy.
+        If a value violates its rule or has no meaning in the scene. The message contains the rule
+        and a remedy.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene
+    >>> scene = Scene(law="slowness", normal_stress="constant", a=0.01, b_over_a=1.5)
+    >>> round(scene.critical_stiffness, 6)
+    0.005
+    >>> faster = scene.with_(load_velocity_ratio=10.0)
+    >>> faster.load_velocity
+    10.0
     """
 
     parts: SceneParts
 
-    #: What editors complete.
+    #: Signature for code completion in editors.
     __signature__: ClassVar[Signature] = Signature(
         [
             Parameter(n, Parameter.KEYWORD_ONLY, default=d)
@@ -171,8 +223,9 @@ class Scene(SceneBase):
     )
 
     def _check(self) -> None:
+        """Check each part, and the compatibility of the parts."""
         check_needs(self)
-        # the law last: it may ask what all of friction makes of steady sliding
+        # The law is checked last, because its check may compute steady sliding of the whole scene.
         for part in (*self.parts[:1], *reversed(self.parts[2:]), self.parts.law):
             part.check(self)
         if self.parts.law.name not in laws.BUILT_IN_PARTS:
@@ -186,14 +239,31 @@ class Scene(SceneBase):
         initial_stress: float
         initial_state: float
 
-    # ---- other scenes ---------------------------------------------------------------------------
+    # ---- related scenes -------------------------------------------------------------------------
 
     def without_mass(self) -> Scene:
-        """This slider in quasi-static motion, if it has mass."""
+        """Return the scene with quasi-static dynamics instead of inertia.
+
+        Returns
+        -------
+        Scene
+            Scene without mass. If the scene has no mass, the method returns the scene itself.
+        """
         return Scene(self.parts._replace(dynamics=QuasiStatic())) if self.has_mass else self
 
     def with_segment(self, segment: loading.Segment) -> Scene:
-        """This slider, loaded by one segment."""
+        """Return the scene with a loading that consists of a single segment.
+
+        Parameters
+        ----------
+        segment : Segment
+            Segment of a loading.
+
+        Returns
+        -------
+        Scene
+            Scene with a step loading.
+        """
         step = StepLoading(
             load_velocity_ratio=segment.load_velocity,
             displacement_step=segment.displacement,
@@ -203,15 +273,28 @@ class Scene(SceneBase):
 
     @property
     def under_steady_loading(self) -> Scene:
-        """This slider under a load point that moves steadily, where its loading goes on
-        changing normal stress: what steady sliding and its stability are asked of.
+        """Scene under a steadily moving load point, for stability analyses.
+
+        If the loading has unknowns, the load point of the returned scene moves at the velocity of
+        the last segment. Otherwise the property is the scene itself.
         """
         if not self.parts.loading.unknowns:
             return self
         return self.with_segment(loading.Segment(self.load_velocity))
 
     def segment_scene(self, index: int) -> Scene:
-        """The scene as a segment of its loading has it."""
+        """Return the scene during one segment of its loading.
+
+        Parameters
+        ----------
+        index : int
+            Index of the segment.
+
+        Returns
+        -------
+        Scene
+            Scene whose loading is the segment.
+        """
         alone = self.parts.loading.isolate_segment(index)
         if alone is self.parts.loading:
             return self
@@ -221,15 +304,17 @@ class Scene(SceneBase):
 
     @cached_attribute
     def continuous_segments(self) -> tuple[tuple[Scene, np.ndarray], ...]:
-        """Its segments of loading as far as each follows on another without a jump: the scene as
-        the first of them has it, and their table (see `parameter_layout`).
+        """Sequences of segments without jumps between the segments.
+
+        Each sequence is a tuple of the scene during its first segment and the rows of the segment
+        table, an array of shape (segments, 6). The columns are defined in ``parameter_layout``.
         """
         if len(self._segments) == 1:
             return ((self, ENDLESS_SEGMENT_TABLE),)
         table, breaks = map(
             np.array, (self.parts.loading.segment_table, self.parts.loading.jump_mask)
         )
-        if self.parts.law.regularised:  # where slip has reversed, a hold may have no answer
+        if self.parts.law.regularised:  # After reversed slip, a hold may have no solution.
             breaks = breaks | (table[:, parameter_layout.SEGMENT_VELOCITY] == 0.0)
         first = np.flatnonzero(breaks[1:]) + 1
         acting = map(self.segment_scene, (0, *first.tolist()))
@@ -237,41 +322,48 @@ class Scene(SceneBase):
 
     @cached_attribute
     def _segments(self) -> tuple[loading.Segment, ...]:
+        """Segments of the loading."""
         return self.parts.loading.segments
 
-    # ---- its equations --------------------------------------------------------------------------
+    # ---- equations ------------------------------------------------------------------------------
 
     @cached_attribute
     def cache(self) -> dict[tuple[Any, ...], Any]:
-        """Cache of what others make of it once and for all."""
+        """Cache for results that depend only on the scene."""
         return {}
 
     @cached_attribute
     def numbers(self) -> Numbers:
-        """All numbers, as the functions of the equations read them (see `parameter_layout`)."""
+        """Parameters of the equations in the order of ``parameter_layout``."""
         return parameter_layout.pack_numbers(self)
 
     @cached_attribute
     def friction_numbers(self) -> Numbers:
-        """Numbers for functions that friction alone decides."""
+        """Parameters of functions that depend only on friction.
+
+        The elements for the spring and the load point are NaN.
+        """
         return parameter_layout.pack_friction_numbers(self)
 
     @cached_attribute
     def functions(self) -> scene_functions.SceneFunctions:
-        """The functions of the equations, by name (see `scene_functions`)."""
+        """Functions of the equations of motion (see ``scene_functions``)."""
         return scene_functions.build_scene_functions(self)
 
-    # ---- what follows from its fields -----------------------------------------------------------
+    # ---- derived values -------------------------------------------------------------------------
 
     @property
     def dynamics(self) -> dynamics.Dynamics:
-        """The part that balances the spring besides friction."""
+        """Part that defines the dynamics."""
         return self.parts.dynamics
 
     @cached_attribute
     def pressure_source(self) -> fluid.Fluid | loading.Loading | FluidWithBoundaryPressure:
-        """The part whose last unknown takes from normal stress, if any has unknowns; two, where the
-        loading imposes the pressure around a fluid.
+        """Part whose last unknown decreases normal stress.
+
+        The source is the loading, if the loading has unknowns, and otherwise the fluid. If both
+        have unknowns, the source is a combination in which the loading imposes the pressure around
+        the fluid.
         """
         imposed, pores = self.parts.loading, self.parts.fluid
         if not imposed.unknowns:
@@ -280,19 +372,20 @@ class Scene(SceneBase):
 
     @property
     def has_mass(self) -> bool:
-        """True if mass acts in ruptures."""
+        """True if inertia acts during ruptures."""
         return self.parts.dynamics.rupture_rate is not None
 
     @cached_attribute
     def state_count(self) -> int:
-        """Number of states: those of the law, and the unknowns of a loading that goes on changing
-        normal stress and of the fluid.
+        """Total number of states of the scene.
+
+        The number includes the states of the law and the unknowns of the loading and of the fluid.
         """
         return self.parts.law.state_count + len(self.pressure_source.unknowns)
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects that act in this scene."""
+        """Names of the effects that are active in the scene."""
         return tuple(effect for part in self.parts for effect in part.effects)
 
     @cached_attribute
@@ -302,19 +395,20 @@ class Scene(SceneBase):
 
     @cached_attribute
     def b(self) -> float:
-        """Evolution effect parameter, of all states together."""
+        """Evolution effect parameter of all states together."""
         return float(self.parts.slider.a * self.parts.law.b_over_a)
 
     @property
     def stiffness(self) -> float:
-        """K = k D_c/sigma_*."""
+        """Dimensionless stiffness K, in units of sigma_*/D_c."""
         given = self.parts.slider.stiffness
         return float(given) if given is not None else self._stiffness_from_ratio
 
     @cached_attribute
     def _stiffness_from_ratio(self) -> float:
+        """Stiffness computed from the stiffness ratio."""
         ratio = self.parts.slider.stiffness_ratio
-        assert ratio is not None  # one of the two is given
+        assert ratio is not None  # The slider has either a stiffness or a stiffness ratio.
         if not 0.0 < self.critical_stiffness < math.inf:
             rule = f"is of a critical stiffness at V_* that is {self.critical_stiffness:g}"
             raise InvalidValue("stiffness_ratio", ratio, rule, remedy="Give stiffness itself.")
@@ -326,8 +420,11 @@ class Scene(SceneBase):
 
     @property
     def stiffness_ratio(self) -> float:
-        """k/k_cr(V_*); infinite without rate weakening, where no spring is soft enough. One below 1
-        need not be unstable with several states, which may be so between two stiffnesses only.
+        """Ratio of the stiffness to the critical stiffness at V_*.
+
+        The ratio is infinite without rate weakening, because steady sliding is then stable at every
+        stiffness. With several states, steady sliding may be unstable only in a range of stiffness,
+        so a ratio below 1 does not imply instability.
         """
         given = self.parts.slider.stiffness_ratio
         if given is not None:
@@ -336,53 +433,60 @@ class Scene(SceneBase):
 
     @cached_attribute
     def load_velocity(self) -> float:
-        """V_0/V_* after the last step."""
+        """Load point velocity after the last step, in V_*."""
         return self._segments[-1].load_velocity
 
     @cached_attribute
     def log_load_velocity(self) -> float:
-        """ln(V_0/V_*) of the magnitude of V_0, and -inf for a load point at rest."""
+        """Natural logarithm of the magnitude of the load point velocity.
+
+        The value is negative infinity for a stationary load point.
+        """
         return math.log(abs(self.load_velocity)) if self.load_velocity else -math.inf
 
     @cached_attribute
     def imposed_normal_stress(self) -> float:
-        """By how much imposed normal stress exceeds sigma_* after the last step, over sigma_*."""
+        """Change of imposed normal stress after the last step, in sigma_*."""
         return self._segments[-1].normal_stress
 
     @property
     def spring_stress_step(self) -> float:
-        """Change of spring stress over sigma_* by the first displacement step, K d."""
+        r"""Change of spring stress due to the first displacement step.
+
+        The unit is :math:`\sigma_*`.
+        """
         return self.stiffness * self._segments[0].displacement
 
     @property
     def is_perturbed(self) -> bool:
-        """True if it does anything but slide on steadily at V_*."""
+        """True if the motion deviates from steady sliding at V_*."""
         return self.starts_unsteady or self.parts.loading.perturbs_steady_sliding
 
     @property
     def starts_unsteady(self) -> bool:
-        """True if it begins with other stress or state than those of steady sliding at V_*."""
+        """True if the initial stress or state differs from steady sliding."""
         return bool(self.parts.slider.initial_stress or self.parts.slider.initial_state)
 
     @cached_attribute
     def inertial_time(self) -> float:
-        """Time scale of inertia in units of D_c/V_*: T V_*/(2 pi D_c).
+        """Time scale of inertia, T/(2 pi), in units of D_c/V_*.
 
-        Slip rate in V_* times this number is what the instability norm is compared with.
+        The product of the time scale and the slip rate in :math:`V_*` is the slip rate norm, which
+        determines if a motion is unstable.
         """
         slider = self.parts.slider
         return slider.period * slider.reference_rate / (2.0 * math.pi)
 
     @cached_attribute
     def log_instability_rate(self) -> float:
-        """ln(V/V_*) at which the instability norm is reached."""
+        """Natural logarithm of the slip rate at the instability norm."""
         return math.log(self.parts.slider.instability_norm / self.inertial_time)
 
     @cached_attribute
     def critical_stiffness(self) -> float:
-        """Dimensionless critical stiffness k_cr(V_*) D_c/sigma_*.
+        """Critical stiffness at V_*, in units of sigma_*/D_c.
 
-        See ``stability.critical_stiffness``.
+        See ``stability.critical_stiffness`` for the definition.
         """
         slider, law, stress, pores, *_others = self.parts
         return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores)
@@ -399,14 +503,28 @@ def _critical_stiffness(
     stress: normal_stress.NormalStress,
     pores: fluid.Fluid,
 ) -> float:
-    """That of any slider with this friction: of one whose spring is as stiff as a."""
+    """Compute the critical stiffness of all sliders with the same friction.
+
+    The stiffness of the slider does not affect the result and is set to a.
+    """
     slider = SliderParameters(a=a, mu_star=mu_star, stiffness=a)
     scene = Scene(SceneParts(slider, law, stress, pores, QuasiStatic(), StepLoading()))
     return stability.critical_stiffness(scene, 0.0, quasi_static=True)
 
 
 def check_scene(value: object) -> None:
-    """Refuse what is no scene."""
+    """Raise ``InvalidValue`` if an object is not a scene.
+
+    Parameters
+    ----------
+    value : object
+        Object to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the object is not a scene.
+    """
     if not isinstance(value, Scene):
         remedy = "Make one, rsfstudy.Scene(...); rsfstudy.run computes studies."
         raise InvalidValue("scene", value, "is no scene", remedy=remedy)

@@ -1,4 +1,4 @@
-"""The numbers that every slider has."""
+"""Parameters that every slider has."""
 
 from __future__ import annotations
 
@@ -12,7 +12,30 @@ from rsfstudy.slider.scene_view import SceneView
 
 @dataclass(frozen=True, kw_only=True)
 class SliderParameters(Part):
-    """The numbers that every slider has."""
+    r"""Parameters that every slider has, independent of its parts.
+
+    Parameters
+    ----------
+    a : float, default: 0.0145
+        Direct effect parameter.
+    mu_star : float, default: 0.76
+        Steady-state friction coefficient at the reference velocity :math:`V_*`.
+    stiffness_ratio : float, optional
+        Ratio of the stiffness to the critical stiffness at :math:`V_*` without radiation damping.
+    stiffness : float, optional
+        Stiffness :math:`k D_c/\sigma_*`.
+    period : float, default: 5.0
+        Period :math:`T` of free oscillation in s.
+    reference_rate : float, default: 1.17e-8
+        Reference rate :math:`V_*/D_c` in 1/s.
+    instability_norm : float, default: 5e-4
+        Value of :math:`V T/(2 \pi D_c)` at which a motion is unstable.
+    initial_stress : float, default: 0.0
+        Deviation of the initial shear stress from steady sliding at :math:`V_*`, in
+        :math:`\sigma_*`.
+    initial_state : float, default: 0.0
+        Initial state variable :math:`\Theta`, which is zero in steady sliding at :math:`V_*`.
+    """
 
     a: float = number(0.0145, "$a$", "1", "direct effect parameter", rule=POSITIVE)
     mu_star: float = number(
@@ -54,7 +77,10 @@ class SliderParameters(Part):
     name = "slider"
 
     def check(self, scene: SceneView) -> None:
-        """Stress and a state to begin with."""
+        """Check the initial stress and the initial state.
+
+        See the base class.
+        """
         if self.initial_stress <= -self.mu_star:
             rule = f"must exceed -mu_star = {-self.mu_star:g}: shear stress is that of forward slip"
             raise self.field_error("initial_stress", rule)
@@ -64,12 +90,28 @@ class SliderParameters(Part):
             raise self.field_error("initial_state", rule, remedy)
 
 
-#: The fields of which one sets the spring.
+#: Names of the two alternative fields for the stiffness.
 STIFFNESS_FIELDS = ("stiffness_ratio", "stiffness")
 
 
 def with_stiffness_default(values: dict[str, Any]) -> dict[str, Any]:
-    """The numbers of a slider with one field for its spring."""
+    """Return slider parameters with exactly one field for the stiffness.
+
+    Parameters
+    ----------
+    values : dict of str to float
+        Values by field name.
+
+    Returns
+    -------
+    dict of str to float
+        The same values, with a stiffness ratio of 1 if no stiffness is given.
+
+    Raises
+    ------
+    InvalidValue
+        If both the stiffness and the stiffness ratio are given.
+    """
     given = [name for name in STIFFNESS_FIELDS if name in values]
     if len(given) == 2:
         rule = f"give stiffness or stiffness_ratio (here {values['stiffness_ratio']:g}), not both"

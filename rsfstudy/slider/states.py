@@ -1,7 +1,9 @@
-"""The states of a scene: how they evolve, where they rest, and what they add up to.
+"""State variables of a scene: evolution, steady states and sums.
 
-Those of the law come first, which act on friction together; behind them stand those of a fluid, or
-of a loading that goes on changing normal stress, pore pressure P last.
+The states of the law come first, and their sum acts on friction. The unknowns of a loading that
+changes normal stress and of a fluid follow. The last unknown is the pore pressure P, or the stress
+that the loading imposes. Most functions of this module return other functions, which are
+specialised for the number of states so that Numba can compile them.
 """
 
 from __future__ import annotations
@@ -15,14 +17,26 @@ from rsfstudy.slider.parameter_layout import A, B
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.scene_view import SceneView
 
-#: ln(V/V_*) at which a law must rest in its steady states, and the change of a state per slip of
-#: D_c, over a, that is still rest: far above rounding.
+#: Values of ln(V/V_*) at which steady states are checked, and the tolerance of the change of a
+#: state per unit slip in D_c, divided by a. The tolerance is far above rounding errors.
 _CHECKED_LOG_SLIP_RATES, _REST_TOLERANCE = (0.0, -0.5, 0.5), 1e-6
 
 
 @cache
 def evolutions_from_single_state(evolution: Function) -> Function:
-    """``dPsi/d(delta)`` times a fraction, of a law of one state."""
+    r"""Return the function ``evolutions`` of a law with one state.
+
+    Parameters
+    ----------
+    evolution : callable
+        Function ``evolution(log_slip_rate, state, p)`` of the law.
+
+    Returns
+    -------
+    callable
+        Function that returns the derivative of :math:`\Psi` with respect to slip, multiplied by a
+        fraction, as a tuple.
+    """
 
     def evolutions(
         log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
@@ -33,14 +47,44 @@ def evolutions_from_single_state(evolution: Function) -> Function:
 
 
 def default_steady_state(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
-    """Psi in steady sliding by most laws, where Theta = -b ln(V/V_*)."""
+    r"""Compute the default steady state of laws with one state.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    shift : float
+        Decrease of the state variable due to stress.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    tuple of float
+        State :math:`\Psi`. In steady sliding, :math:`\Theta = -b \ln(V/V_*)`.
+    """
     return (shift - p[B] * log_slip_rate,)
 
 
 def with_auxiliary_evolutions(
     evolutions: Function, auxiliary: Function, law_state_count: int
 ) -> Function:
-    """Changes of the states of the law, and of those that end in P behind them."""
+    """Append the rates of unknowns to the rates of the states of the law.
+
+    Parameters
+    ----------
+    evolutions : callable
+        Function ``evolutions`` of the law.
+    auxiliary : callable
+        Function ``auxiliary_rates`` of the fluid or the loading.
+    law_state_count : int
+        Number of states of the law.
+
+    Returns
+    -------
+    callable
+        Function ``evolutions`` of all states.
+    """
 
     def all_evolutions(
         log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
@@ -54,7 +98,20 @@ def with_auxiliary_evolutions(
 
 
 def with_auxiliary_steady_states(steady_states: Function, auxiliary: Function) -> Function:
-    """All states in steady sliding: those of the law, and those that end in P."""
+    """Append the steady unknowns to the steady states of the law.
+
+    Parameters
+    ----------
+    steady_states : callable
+        Function ``steady_states`` of the law.
+    auxiliary : callable
+        Function ``auxiliary_steady_states`` of the fluid or the loading.
+
+    Returns
+    -------
+    callable
+        Function ``steady_states`` of all states.
+    """
 
     def all_steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
         return (*steady_states(log_slip_rate, shift, p), *auxiliary(log_slip_rate, p))
@@ -64,38 +121,88 @@ def with_auxiliary_steady_states(steady_states: Function, auxiliary: Function) -
 
 @cache
 def sum_function(count: int) -> Function:
-    """Sum of the first so many numbers."""
+    """Return a function that sums the first elements of a tuple.
+
+    Parameters
+    ----------
+    count : int
+        Number of elements to sum.
+
+    Returns
+    -------
+    callable
+        Function ``(numbers) -> float``.
+    """
     return _function_from_expression("numbers", _sum_expression("numbers", count))
 
 
 @cache
 def scaling_function(count: int) -> Function:
-    """``(numbers, by) -> tuple``: so many times each of the first so many numbers."""
+    """Return a function that scales the first elements of a tuple.
+
+    Parameters
+    ----------
+    count : int
+        Number of elements to scale.
+
+    Returns
+    -------
+    callable
+        Function ``(numbers, by) -> tuple`` that multiplies each element by ``by``.
+    """
     each = (f"by * numbers[{i}], " for i in range(count))
     return _function_from_expression("numbers, by", f"({''.join(each)})")
 
 
 @cache
 def state_step_function(count: int) -> Function:
-    """``(psis, changes, by) -> tuple``: so many states after so many times their changes."""
+    """Return a function that advances the states by a step.
+
+    Parameters
+    ----------
+    count : int
+        Number of states.
+
+    Returns
+    -------
+    callable
+        Function ``(psis, changes, by) -> tuple`` that returns ``psis + by * changes`` for each
+        state.
+    """
     each = (f"psis[{i}] + by * changes[{i}], " for i in range(count))
     return _function_from_expression("psis, changes, by", f"({''.join(each)})")
 
 
 def _sum_expression(numbers: str, count: int) -> str:
-    """Text of the sum of the first so many numbers."""
+    """Return the source code of a sum of the first elements of a tuple."""
     return " + ".join(f"{numbers}[{i}]" for i in range(count))
 
 
 def _function_from_expression(arguments: str, value: str) -> Function:
-    """A function without a loop, which a compiler needs for tuples."""
+    """Create a function from the source code of its arguments and value.
+
+    The code has no loop, because the compiler cannot iterate over tuples.
+    """
     function: Function = eval(f"lambda {arguments}: {value}", {"__name__": __name__})
     return function
 
 
 def state_contribution_function(count: int, pressure_derivatives: Function | None) -> Function:
-    """``(changes, g, psis, p)``: what changes of so many states of the law take from a ln(V/V_*),
-    less what the change of P, or of imposed shear stress, gives, if there is any.
+    r"""Return a function for the contribution of the states to the slip rate.
+
+    Parameters
+    ----------
+    count : int
+        Number of states of the law.
+    pressure_derivatives : callable or None
+        Function ``(g, psis, p)`` that returns the derivative of the strength with respect to the
+        last unknown as its first value. None if the scene has no such unknown.
+
+    Returns
+    -------
+    callable
+        Function ``(changes, g, psis, p) -> float``. It returns the decrease of :math:`a \ln(V/V_*)`
+        due to changes of the states.
     """
     if pressure_derivatives is None:
         return _function_from_expression("changes, g, psis, p", _sum_expression("changes", count))
@@ -108,8 +215,18 @@ def state_contribution_function(count: int, pressure_derivatives: Function | Non
 
 
 def states_from_strength_function(count: int) -> Function:
-    """``(strength, log_slip_rate, others, p)``: all states, of which so many are of the law, where
-    friction has a strength: the first is what the others leave of it.
+    """Return a function that computes the first state from the strength.
+
+    Parameters
+    ----------
+    count : int
+        Number of states of the law.
+
+    Returns
+    -------
+    callable
+        Function ``(strength, log_slip_rate, others, p) -> tuple`` that returns all states. The
+        argument ``others`` contains all states except the first.
     """
     if count == 1:
 
@@ -131,9 +248,21 @@ def states_from_strength_function(count: int) -> Function:
 
 
 def check_steady_states(scene: SceneView) -> None:
-    """Raise InvalidValue where the law of a scene still changes in the states that it states, or is
-    given, as those of steady sliding, or moves away from them: critical stiffness and cycles would
+    """Check the steady states of a user-defined law.
+
+    The states must not change in steady sliding, must add up to zero at :math:`V_*` and must be
+    stable at constant slip rate. Otherwise the critical stiffness and the limit cycles would
     contradict each other.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the law.
+
+    Raises
+    ------
+    InvalidValue
+        If the law violates one of the conditions.
     """
     law, p, still = scene.parts.law, scene.numbers, _REST_TOLERANCE * scene.a
     evolutions = law.evolutions or evolutions_from_single_state(law.evolution)
@@ -157,7 +286,10 @@ def check_steady_states(scene: SceneView) -> None:
 def _evolution_jacobian(
     evolutions: Function, rate: float, psis: Numbers, size: float, p: Numbers
 ) -> list[list[float]]:
-    """Derivatives of the change of each state by each, central differences of 1e-4 of a size."""
+    """Compute the Jacobian matrix of the evolution by central differences.
+
+    The step is 1e-4 times ``size``.
+    """
     step, rows = 1e-4 * size, list[list[float]]()
     for n, psi in enumerate(psis):
         ahead, behind = (

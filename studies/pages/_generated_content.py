@@ -287,7 +287,10 @@ def _slot(slot: registry.Slot) -> str:
 
 
 def equation(part: type[Part]) -> str:
-    """Return the equations in the docstrings of a part and of its functions.
+    """Return the equations in the docstrings of a part.
+
+    If the docstring of the part contains no equations, the function uses the docstrings of the
+    static methods of the part.
 
     Parameters
     ----------
@@ -297,13 +300,32 @@ def equation(part: type[Part]) -> str:
     Returns
     -------
     str
-        Equations in backticks, separated by commas.
+        Equations in LaTeX between dollar signs, separated by commas.
     """
     functions = [value.__func__ for value in vars(part).values() if isinstance(value, staticmethod)]
-    texts = [inspect.getdoc(one) or "" for one in (part, *functions)]
-    first = [text.split("\n\nParameters\n")[0] for text in texts]
-    found = [one for text in first for one in re.findall(r"``([^`]+=[^`]+)``", text)]
-    return ", ".join(f"`{' '.join(one.split())}`" for one in dict.fromkeys(found))
+    equations = _docstring_equations(part) or [
+        found for function in functions for found in _docstring_equations(function)
+    ]
+    return ", ".join(f"${found}$" for found in dict.fromkeys(equations))
+
+
+def _docstring_equations(documented: object) -> list[str]:
+    """Return the equations in the ``.. math::`` and ``:math:`` markup of a docstring.
+
+    Parameters, results, references and examples are not searched.
+    """
+    text = re.sub(
+        r"^(?!Notes$)[A-Z][A-Za-z ]+\n-{3,}\n.*?(?=^[A-Z][A-Za-z ]+\n-{3,}\n|\Z)",
+        "",
+        inspect.getdoc(documented) or "",
+        flags=re.MULTILINE | re.DOTALL,
+    )
+    displayed = re.findall(r"^\.\. math::\n\n((?: +\S.*\n?|\n)+)", text, flags=re.MULTILINE)
+    paragraphs = [part for block in displayed for part in block.split("\n\n")]
+    inline = [] if displayed else re.findall(r":math:`([^`]+)`", text)
+    joined = (" ".join(found.split()).rstrip(".,") for found in (*paragraphs, *inline))
+    equations = [found for line in joined for found in re.split(r",? \\quad ", line)]
+    return [found for found in equations if "=" in found]
 
 
 def rig() -> str:

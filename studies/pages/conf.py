@@ -20,6 +20,12 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
 import _generated_content  # type: ignore[import-not-found]  # noqa: E402 (same directory)
+from docutils import nodes  # type: ignore[import-untyped]  # noqa: E402
+from docutils.utils.math import MathError  # type: ignore[import-untyped]  # noqa: E402
+from docutils.utils.math.latex2mathml import (  # type: ignore[import-untyped]  # noqa: E402
+    tex2mathml,
+)
+from sphinx.util import logging  # noqa: E402
 
 project = "rsfstudy"
 author = copyright = "The rsfstudy developers"
@@ -38,6 +44,7 @@ include_patterns = [
 exclude_patterns = [".*", "build", "outputs", "rsfstudy", "tests"]
 
 myst_heading_anchors = 3
+myst_enable_extensions = ["dollarmath"]
 default_role = "code"
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
@@ -46,6 +53,7 @@ numpydoc_show_class_members = False
 html_theme = "furo"
 html_title = project
 html_copy_source = False
+html_math_renderer = "mathml"
 html_show_sphinx = False
 #: Style of tables. Seven columns fit into a window with a width of 1200 pixels.
 TABLES = "table.docutils { font-size: .78rem } table.docutils :is(td, th) { padding: .2rem .35rem }"
@@ -114,6 +122,19 @@ def _add_table_style(
     context["metatags"] = context.get("metatags", "") + f"<style>{TABLES}</style>"
 
 
+def _write_math(writer: Any, node: nodes.math | nodes.math_block) -> None:
+    """Write formulas as MathML, which browsers display without a script from the net."""
+    for formula in node.astext().split("\n\n"):
+        source = " ".join(formula.split())
+        try:
+            markup = tex2mathml(source, as_block=isinstance(node, nodes.math_block))
+        except MathError as error:
+            logging.getLogger(__name__).warning("%s: %s", error, source, location=node)
+            markup = writer.encode(source)
+        writer.body.append(markup)
+    raise nodes.SkipNode
+
+
 def _write_redirect(app: Any, error: Exception | None) -> None:
     """Write an index page that redirects to the first page."""
     if error is None:
@@ -131,6 +152,7 @@ def setup(app: Any) -> None:
     app : object
         Sphinx application.
     """
+    app.add_html_math_renderer("mathml", (_write_math, None), (_write_math, None))
     app.connect("source-read", _fill_source)
     app.connect("html-page-context", _add_table_style)
     app.connect("build-finished", _write_redirect)

@@ -1,14 +1,8 @@
-"""Dynamics: the forces that balance the spring besides friction, one file a case.
+"""Dynamics of the slider.
 
-A case states how slip rate follows from spring stress and state, by functions that take the
-friction of a scene (see `friction.FrictionFunctions`) and return functions of floats:
-
-- ``slip_rate(friction) -> (balance, growth)``, where ``balance(spring, psis, p)`` gives ln(V/V_*),
-  frictional stress g and the state lost to stress, and ``growth(state, rates, x, g, p)`` the
-  derivative of x = ln(V/V_*) along the motion, where the state (spring, *psis) changes by `rates`;
-- ``rupture_rate(friction) -> rate``, where ``rate(state, p)`` gives the derivatives of the unknowns
-  f, x, g and the states but the first by the full equations, in inertial time, where the others do
-  not serve.
+Each module of this package defines one choice of dynamics. The dynamics define the forces that
+balance the spring in addition to friction. They determine how the slip rate depends on spring
+stress and state. The base class is ``Dynamics``.
 """
 
 from __future__ import annotations
@@ -25,30 +19,96 @@ from rsfstudy.slider.scene_view import SceneView
 @renamed_members
 @dataclass(frozen=True, kw_only=True)
 class Dynamics(Part):
-    """Base of the cases of dynamics."""
+    r"""Base class of the dynamics.
 
-    #: Name of the form between ruptures, as it appears in results.
+    The dynamics are defined by functions that receive the friction of a scene, an instance of
+    ``rsfstudy.slider.FrictionFunctions``, and return functions of floats:
+
+    - ``slip_rate(friction)`` returns two functions. The function ``balance(spring, psis, p)``
+      returns :math:`\ln(V/V_*)`, the frictional stress g and the decrease of the state due to
+      stress. The function ``growth(state, rates, x, g, p)`` returns the derivative of :math:`x =
+      \ln(V/V_*)` along the motion. The argument ``state`` contains the spring stress and the states
+      ``psis``, and ``rates`` contains the derivatives of ``state``.
+    - ``rupture_rate(friction)`` is optional. It returns a function ``rate(state, p)`` for the full
+      equations of motion during ruptures. This function returns the derivatives of the spring
+      stress f, of x, of g and of all states except the first with respect to inertial time.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene
+    >>> from rsfstudy.parts import Dynamics
+    >>> scene = Scene(inertia=True)
+    >>> isinstance(scene.parts.dynamics, Dynamics)
+    True
+    >>> scene.parts.dynamics.name
+    'inertia'
+    """
+
+    #: Name of the equations of motion between ruptures, as it appears in results.
     regime: ClassVar[str]
     received_quantities = frozenset(PART_QUANTITIES)
     slip_rate: ClassVar[Function]
     rupture_rate: ClassVar[Function | None] = None
-    #: Whether slip may reverse, in the regularised form of friction.
+    #: True if slip may reverse in scenes with the regularised friction law.
     allows_reversed_slip: ClassVar[bool] = False
 
     @classmethod
     def required_functions(cls) -> tuple[str, ...]:
+        """Return the names of the functions that the dynamics must define.
+
+        Returns
+        -------
+        tuple of str
+            ``("slip_rate",)``.
+        """
         return ("slip_rate",)
 
     def radiated_stress(self, log_slip_rate: float) -> float:
-        """Part of the spring stress that waves carry away at ln(V/V_*), over sigma_*."""
+        r"""Compute the part of the spring stress that seismic waves radiate.
+
+        Parameters
+        ----------
+        log_slip_rate : float
+            Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+
+        Returns
+        -------
+        float
+            Radiated stress in :math:`\sigma_*`. The base class returns zero.
+        """
         return 0.0
 
     def radiated_stress_slope(self, log_slip_rate: float) -> float:
-        """Derivative of the radiated stress with respect to ln V."""
+        r"""Compute the derivative of the radiated stress with respect to ln V.
+
+        Parameters
+        ----------
+        log_slip_rate : float
+            Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+
+        Returns
+        -------
+        float
+            Derivative in :math:`\sigma_*`. The base class returns zero.
+        """
         return 0.0
 
     def slip_rate_norm(self, scene: SceneView, log_slip_rate: float) -> float:
-        """w = V T/(2 pi D_c) where mass acts, and 0 where there is none."""
+        r"""Compute the slip rate norm, which measures the effect of inertia.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the dynamics belong to.
+        log_slip_rate : float
+            Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+
+        Returns
+        -------
+        float
+            Norm :math:`w = V T/(2 \pi D_c)`. The base class returns zero, because it has no
+            inertia.
+        """
         return 0.0
 
 

@@ -1,7 +1,7 @@
-"""Inertia: the mass of the slider, through its period of free oscillation T.
+"""Inertia of the slider, defined by the period T of free oscillation.
 
-Where mass hardly acts, the motion follows the slow manifold of the full equations; where it does,
-the full equations themselves.
+If inertia is weak, the motion follows the slow manifold of the full equations (``slip_rate``).
+During ruptures, the full equations are integrated (``rupture_rate``).
 """
 
 from __future__ import annotations
@@ -25,43 +25,80 @@ from rsfstudy.slider.scene_functions import velocity_ratios
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.states import state_step_function
 
-#: Rates beyond this, per inertial time, occur in trial steps only. A motion hands over to the slow
-#: manifold long before its slip rate relaxes that fast.
+#: Upper limit of rates per inertial time. Larger rates occur only in trial steps, because a motion
+#: returns to the slow manifold long before its slip rate relaxes this fast.
 LARGEST_RUPTURE_RATE = 1e30
-#: Weights (K/a) w (w + w_0) of mass below which its second order is nothing, and below which even
-#: the growth of the first is; and the displacement in D_c over which growth is differenced.
+#: Weights of inertia below which the second order, and the derivative of the first order, are
+#: negligible. The third constant is the displacement step of difference quotients, in D_c.
 NEGLIGIBLE_SECOND_ORDER_WEIGHT, NEGLIGIBLE_GROWTH_WEIGHT, DIFFERENCE_STEP = 1e-7, 1e-9, 1e-6
-#: V_0/V between which it says what the slip rate is: not in trial steps far beyond, nor where the
-#: load point rests or contact is stationary.
+#: Range of V_0/V in which the ratio determines the slip rate. The ratio is outside this range in
+#: extreme trial steps, at a stationary load point and in stationary contact.
 MIN_VELOCITY_RATIO, MAX_VELOCITY_RATIO = 1e-60, 1e40
 
 
 def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
-    """Slip rate on the slow manifold, and its derivative.
+    r"""Return the functions of the slip rate on the slow manifold.
 
-    Friction g has the stress f of the spring less what accelerates the mass. With x = ln(V/V_*) and
-    displacement s (slip and load point together), the full equations read
+    Parameters
+    ----------
+    friction : FrictionFunctions
+        Friction of the scene.
 
-        f - g = r = a W(x) dx/ds,    a x = strength(f - r) - Psi,
+    Returns
+    -------
+    balance : callable
+        Function ``balance(spring_stress, psis, p)`` that returns :math:`\ln(V/V_*)`, the frictional
+        stress and the decrease of the state due to stress.
+    growth : callable
+        Function ``growth(state, rates, x, g, p)`` that returns the derivative of :math:`\ln(V/V_*)`
+        along the motion.
 
-    in which W(x) = (K/a) w (w + w_0) is the weight of mass, w = V T/(2 pi D_c), and w_0 the same of
-    the load point velocity. Where W is small, so is r. The series in W begins with motion without
-    mass, x_0, whose derivative along a motion at slip rate x is G(x):
+    Notes
+    -----
+    The frictional stress :math:`g` equals the spring stress :math:`f` minus the stress that
+    accelerates the mass. We write :math:`x = \ln(V/V_*)`, :math:`S` for the function ``strength``
+    and :math:`s` for the sum of slip and load point displacement. The full equations are
 
-        x_0 = [strength(f) - Psi]/a,    G(x) = [strength'(f) df/ds(x) - dPsi/ds(x)]/a;
+    .. math::
 
-        first order:   r_1 = a W(x_0) G(x_0),    x_1 = x_0 - strength'(f) r_1/a;
-        second order:  r_2 = a W(x_1) [G(x_1) - d(x_0 - x_1)/ds],
-                       x_2 = [strength(f - r_2) - Psi]/a.
+        f - g = r = a W(x) \frac{dx}{ds}, \quad a x = S(f - r) - \Psi.
 
-    The error of r_2 and x_2 is of order W**3, that is w**6. In the code `quasi_static_values` gives
-    x_0, G(x_0), strength'(f) and W(x_0). In `inertial_stress`, which is r_2, `first` is r_1,
-    `trails` is x_0
-    - x_1, `slowed` is x_1, `changes` are dPsi/ds(x_1) at the shift of f - r_1, `growing` is G(x_1),
-    and d(x_0 - x_1)/ds is a difference over `DIFFERENCE_STEP`. `balance` gives x_2 and f - r_2;
-    `log_slip_rate_offset` is x_2 - x_0, by the slope of strength halfway; `growth` is dx_2/ds, of G
-    along the motion and a difference of `log_slip_rate_offset`. With pore pressure
-    `state_contribution` stands for dPsi/ds in G.
+    The weight of inertia is :math:`W(x) = (K/a) w (w + w_0)`, with :math:`w = V T/(2 \pi D_c)` and
+    :math:`w_0 = V_0 T/(2 \pi D_c)`. If :math:`W` is small, :math:`r` is small as well, and the
+    solution is a series in :math:`W`. The series starts with the motion without inertia:
+
+    .. math::
+
+        x_0 = \frac{S(f) - \Psi}{a}, \quad
+          G(x) = \frac{1}{a} \left[S'(f) \frac{df}{ds}(x) - \frac{d\Psi}{ds}(x)\right].
+
+    Here :math:`G(x)` is the derivative of :math:`x_0` along a motion with the slip rate :math:`x`.
+    The first and second orders are
+
+    .. math::
+
+        r_1 = a W(x_0) G(x_0), \quad x_1 = x_0 - S'(f) \frac{r_1}{a},
+
+        r_2 = a W(x_1) \left[G(x_1) - \frac{d(x_0 - x_1)}{ds}\right], \quad
+          x_2 = \frac{S(f - r_2) - \Psi}{a}.
+
+    The error of :math:`r_2` and :math:`x_2` is of order :math:`W^3`, which is of order :math:`w^6`.
+
+    The inner functions compute the following terms:
+
+    - ``quasi_static_values`` returns :math:`x_0`, :math:`G(x_0)`, :math:`S'(f)` and :math:`W(x_0)`.
+    - ``inertial_stress`` returns :math:`r_2`. In this function, ``first`` is :math:`r_1`,
+      ``trails`` is :math:`x_0 - x_1`, ``slowed`` is :math:`x_1`, ``changes`` are the derivatives
+      :math:`d\Psi/ds` at :math:`x_1` and at the shift of :math:`f - r_1`, and ``growing`` is
+      :math:`G(x_1)`. The derivative :math:`d(x_0 - x_1)/ds` is a difference quotient with the step
+      ``DIFFERENCE_STEP``.
+    - ``balance`` returns :math:`x_2` and :math:`f - r_2`.
+    - ``log_slip_rate_offset`` returns :math:`x_2 - x_0`, computed with the slope of :math:`S` at
+      the midpoint.
+    - ``growth`` returns :math:`dx_2/ds`, the sum of :math:`G` along the motion and a difference
+      quotient of ``log_slip_rate_offset``.
+
+    With pore pressure, ``state_contribution`` replaces :math:`d\Psi/ds` in :math:`G`.
     """
     strength, state_sum, evolutions = friction.strength, friction.state_sum, friction.evolutions
     contribution, ahead = friction.state_contribution, state_step_function(friction.state_count)
@@ -69,13 +106,16 @@ def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
     def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
         alone = quasi_static_values(spring_stress, psis, p)
         g = spring_stress - inertial_stress(spring_stress, psis, alone, p)
-        if g == spring_stress:  # mass is lost to rounding
+        if g == spring_stress:  # The effect of inertia is below the rounding error.
             return alone[0], g, alone[4]
         value, _slope, shift, _shift_slope = strength(g, psis, p)
         return (value - state_sum(psis)) / p[A], g, shift
 
     def inertial_stress(spring_stress: float, psis: Numbers, alone: Numbers, p: Numbers) -> float:
-        """The stress that accelerates the mass, over sigma_*, from what is so without mass."""
+        """Compute the stress that accelerates the mass, in sigma_*.
+
+        The motion without inertia is passed as a tuple, the result of ``quasi_static_values``.
+        """
         x, growing, slope, weight, _shift = alone
         first = clamped_inertial_stress(weight, growing, p)
         if weight <= NEGLIGIBLE_SECOND_ORDER_WEIGHT:
@@ -97,8 +137,10 @@ def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
         )
 
     def quasi_static_values(spring_stress: float, psis: Numbers, p: Numbers) -> Numbers:
-        """ln(V/V_*) and its growth, both quasi-static, the slope of strength, the weight of mass
-        there, and the state lost to stress.
+        """Compute the motion without inertia and the weight of inertia.
+
+        The result contains ln(V/V_*), its derivative, the slope of the strength, the weight of
+        inertia and the decrease of the state due to stress.
         """
         a = p[A]
         value, slope, shift, _shift_slope = strength(spring_stress, psis, p)
@@ -110,15 +152,19 @@ def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
         return x, growing, slope, compute_inertia_weight(x, slower, p), shift
 
     def log_slip_rate_offset(spring_stress: float, psis: Numbers, p: Numbers) -> float:
-        """ln V on the slow manifold less its quasi-static value; a difference of both would leave
-        rounding errors that show in its growth.
+        """Compute the difference of ln V from its quasi-static value.
+
+        Subtracting two values of ln V instead would produce rounding errors that are visible in the
+        derivative.
         """
         taken = inertial_stress(spring_stress, psis, quasi_static_values(spring_stress, psis, p), p)
         return -strength(spring_stress - 0.5 * taken, psis, p)[1] * taken / p[A]
 
     def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
-        """The quasi-static one along the motion, and the change of what ln V differs by from its
-        quasi-static value: without that, slip would be fastest ``(K/a) w**2`` D_c too early.
+        """Compute the derivative of ln V along the motion.
+
+        The derivative includes the change of ``log_slip_rate_offset``. Without this term, the peak
+        slip rate would occur too early, by a slip of ``(K/a) w**2`` in D_c.
         """
         spring_stress, psis = state[0], state[1:]
         slope = strength(spring_stress, psis, p)[1]
@@ -138,17 +184,50 @@ def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
 def clamped_inertial_stress(
     inertia_weight: float, log_slip_rate_derivative: float, p: Numbers
 ) -> float:
-    """The stress that accelerates the mass where ln V grows so: no more than a, which is far more
-    than the motion meets before it leaves the slow manifold, so that trial steps beyond keep their
-    sense of direction.
+    r"""Compute the bounded stress that accelerates the mass.
+
+    The magnitude of the stress is limited to :math:`a`. A motion leaves the slow manifold long
+    before the stress reaches the limit. In trial steps beyond that point, the limit keeps the
+    stress finite and preserves its sign.
+
+    Parameters
+    ----------
+    inertia_weight : float
+        Weight :math:`W` of inertia.
+    log_slip_rate_derivative : float
+        Derivative of :math:`\ln V` with respect to displacement.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    float
+        Stress in :math:`\sigma_*`, between :math:`-a` and :math:`a`.
     """
     stress = p[A] * inertia_weight * log_slip_rate_derivative
     return stress if abs(stress) < p[A] else max(-p[A], min(stress, p[A]))
 
 
 def compute_inertia_weight(x: float, slower: float, p: Numbers) -> float:
-    """(K/a) w (w + w_0): how much ln V trails its quasi-static value per unit growth. Of the
-    exponentials, that of V_0/V serves where there is one.
+    r"""Compute the weight of inertia.
+
+    The weight is the lag of :math:`\ln V` behind its quasi-static value, divided by the derivative
+    of :math:`\ln V`. If possible, the function computes the slip rate from the ratio ``slower``,
+    because this saves the evaluation of an exponential function.
+
+    Parameters
+    ----------
+    x : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    slower : float
+        Ratio :math:`V_0/V`.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    float
+        Weight :math:`W = (K/a) w (w + w_0)`.
     """
     load = p[LOAD_VELOCITY] * p[DYNAMICS]
     if MIN_VELOCITY_RATIO < slower < MAX_VELOCITY_RATIO:
@@ -159,13 +238,38 @@ def compute_inertia_weight(x: float, slower: float, p: Numbers) -> float:
 
 
 def rupture_rate(friction: FrictionFunctions) -> Function:
-    """The full equations: unknowns f, x = ln(V/V_*) and g, in inertial time T/(2 pi), and the
-    states but the first.
+    r"""Return the rate function of the full equations of motion.
 
-        df = K (w_0 - w),   dx = (f - g)/(K w),   strength'(g) dg = a dx + w dPsi/d(delta),
+    The unknowns are :math:`f`, :math:`x = \ln(V/V_*)`, :math:`g` and all states except the first.
+    The independent variable is inertial time in units of :math:`T/(2 \pi)`. Because :math:`g` is an
+    unknown, the function does not need the inverse of ``strength``.
 
-    with w = V T/(2 pi D_c), from m d2(delta)/dt2 = k (delta_0 - delta) - tau and m/k = (T/2 pi)**2.
-    Keeping g as an unknown needs no inverse of `strength`.
+    Parameters
+    ----------
+    friction : FrictionFunctions
+        Friction of the scene.
+
+    Returns
+    -------
+    callable
+        Function ``rates(state, p)`` that returns the derivatives of the unknowns.
+
+    Notes
+    -----
+    The equation of motion and the mass are
+
+    .. math::
+
+        m \frac{d^2\delta}{dt^2} = k (\delta_0 - \delta) - \tau, \quad
+          \frac{m}{k} = \left(\frac{T}{2 \pi}\right)^2.
+
+    With :math:`w = V T/(2 \pi D_c)` and the function ``strength``, written as :math:`S`, the
+    derivatives with respect to inertial time are
+
+    .. math::
+
+        \dot{f} = K (w_0 - w), \quad \dot{x} = \frac{f - g}{K w}, \quad
+          S'(g) \, \dot{g} = a \dot{x} + w \frac{d\Psi}{d\delta}.
     """
     strength, states_at = friction.strength, friction.states_from_strength
     evolutions, contribution = friction.evolutions, friction.state_contribution
@@ -191,7 +295,18 @@ def rupture_rate(friction: FrictionFunctions) -> Function:
 
 
 def clamp_rate(rate: float) -> float:
-    """A rate that a motion meets, or the largest."""
+    """Limit a rate to ``LARGEST_RUPTURE_RATE`` in magnitude.
+
+    Parameters
+    ----------
+    rate : float
+        Rate per inertial time.
+
+    Returns
+    -------
+    float
+        The rate, or the limit with the sign of the rate.
+    """
     return (
         rate
         if abs(rate) < LARGEST_RUPTURE_RATE
@@ -201,7 +316,22 @@ def clamp_rate(rate: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Inertia(Dynamics):
-    """A slider with mass: ``m dV/dt = tau - sigma mu``, with ``m = k (T/2 pi)**2``."""
+    r"""Slider with mass.
+
+    Parameters
+    ----------
+    inertia : bool, default: False
+        If True, the slider has mass. The mass follows from the fields ``period`` and
+        ``reference_rate`` of the scene.
+
+    Notes
+    -----
+    With the shear stress :math:`\tau` of the spring, the equation of motion is
+
+    .. math::
+
+        m \frac{dV}{dt} = \tau - \sigma \mu, \quad m = k \left(\frac{T}{2 \pi}\right)^2.
+    """
 
     inertia: bool = flag(False, "whether the slider has mass")
 
@@ -213,16 +343,28 @@ class Inertia(Dynamics):
 
     @property
     def effects(self) -> tuple[str, ...]:
+        """Names of the effects that are active."""
         return ("inertia",)
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """T V_*/(2 pi D_c) and its logarithm."""
+        r"""Return the time scale of inertia and its logarithm.
+
+        See the base class. The time scale is :math:`T V_*/(2 \pi D_c)`.
+        """
         return scene.inertial_time, math.log(scene.inertial_time)
 
     def slip_rate_norm(self, scene: SceneView, log_slip_rate: float) -> float:
+        """Compute the slip rate norm, which measures the effect of inertia.
+
+        See the base class.
+        """
         return scene.inertial_time * math.exp(log_slip_rate)
 
     @classmethod
     def rejection_error(cls, name: str, value: Any) -> InvalidValue:
+        """Return the error for a field of another dynamics class.
+
+        See the base class.
+        """
         rule = "stands in for mass, and this scene has mass"
         return InvalidValue(name, value, rule, remedy="Leave one of them out.")

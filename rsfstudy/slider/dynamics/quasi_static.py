@@ -1,4 +1,4 @@
-"""Quasi-static motion: friction alone balances the spring."""
+"""Quasi-static motion, in which only friction balances the spring."""
 
 from __future__ import annotations
 
@@ -11,8 +11,30 @@ from rsfstudy.slider.parts import Function, Numbers
 
 
 def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
-    """``a ln(V/V_*) = strength(f) - Psi`` with f the deviation of spring stress, and its
-    derivative, ``a d ln V = strength'(f) df - dPsi``.
+    r"""Return the functions of the quasi-static slip rate.
+
+    Parameters
+    ----------
+    friction : FrictionFunctions
+        Friction of the scene.
+
+    Returns
+    -------
+    balance : callable
+        Function ``balance(spring_stress, psis, p)`` that returns :math:`\ln(V/V_*)`, the frictional
+        stress and the decrease of the state due to stress.
+    growth : callable
+        Function ``growth(state, rates, x, g, p)`` that returns the derivative of :math:`\ln(V/V_*)`
+        along the motion.
+
+    Notes
+    -----
+    With the deviation :math:`f` of the spring stress and the function ``strength``, written as
+    :math:`S`, the slip rate and its derivative follow from
+
+    .. math::
+
+        a \ln\frac{V}{V_*} = S(f) - \Psi, \quad a \, d\ln V = S'(f) \, df - d\Psi.
     """
     strength, state_sum = friction.strength, friction.state_sum
     contribution = friction.state_contribution
@@ -31,7 +53,7 @@ def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
 
 @dataclass(frozen=True, kw_only=True)
 class QuasiStatic(Dynamics):
-    """Neither mass nor radiation."""
+    """Quasi-static dynamics without inertia and radiation damping."""
 
     name = "quasi_static"
     regime = "quasi_static"

@@ -1,4 +1,7 @@
-"""Radiation damping: waves carry stress away in proportion to slip rate (quasi-dynamic motion)."""
+"""Radiation damping by seismic waves (quasi-dynamic motion).
+
+The radiated waves remove a stress that is proportional to the slip rate.
+"""
 
 from __future__ import annotations
 
@@ -13,22 +16,28 @@ from rsfstudy.slider.scene_view import SceneView
 
 _MAX_ITERATIONS = 200
 _STEP_TOLERANCE = 1e-15
-#: How far strength may be off where Newton's steps have become small, over its size: on the floor
-#: of normal stress, which only trial steps meet, slopes are so steep that they are small anywhere.
+#: Relative tolerance of the strength for convergence. Small Newton steps are not sufficient,
+#: because slopes are very steep at the lower limit of normal stress, which only trial steps reach.
 _BALANCE_TOLERANCE = 1e-6
-#: ln V beyond which only trial steps look for a balance: radiation would be 10^300 eta.
+#: Upper limit of ln V. Only trial steps reach the limit, where the radiated stress is 10^300 eta.
 _MAX_LOG_SLIP_RATE = 690.0
 
 
 def compute_radiated_stress(log_slip_rate: float, damping: float) -> float:
-    """Stress that waves carry away, over sigma_*: ``eta (V - V_*)``, so that it vanishes at V_*.
+    r"""Compute the stress that seismic waves radiate.
 
     Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     damping : float
-        eta V_*/sigma_*; for an elastic half-space eta = G/(2 c_s).
+        Damping coefficient :math:`\eta V_*/\sigma_*`. For an elastic half-space with shear modulus
+        :math:`G` and shear wave velocity :math:`c_s`, :math:`\eta = G/(2 c_s)`.
+
+    Returns
+    -------
+    float
+        Stress :math:`\eta (V - V_*)` in :math:`\sigma_*`, which is zero at :math:`V_*`.
 
     References
     ----------
@@ -38,25 +47,48 @@ def compute_radiated_stress(log_slip_rate: float, damping: float) -> float:
 
 
 def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
-    """ln(V/V_*) at which friction and radiation together balance the spring, the frictional stress
-    there, and the state lost to stress; and its derivative, ``[a + strength'(g) eta V] d ln V =
-    strength'(g) df - dPsi``.
+    r"""Return the functions of the slip rate with radiation damping.
 
-    Solves ``strength(f - eta (V - 1)) = a ln V + Psi`` by Newton's method. The left side falls with
-    V and the right side grows, so there is one root, which bisection keeps in its bracket where
-    Newton's steps would leave it or shrink too slowly.
+    Parameters
+    ----------
+    friction : FrictionFunctions
+        Friction of the scene.
+
+    Returns
+    -------
+    balance : callable
+        Function ``balance(spring_stress, psis, p)`` that returns :math:`\ln(V/V_*)`, the frictional
+        stress and the decrease of the state due to stress.
+    growth : callable
+        Function ``growth(state, rates, x, g, p)`` that returns the derivative of :math:`\ln(V/V_*)`
+        along the motion.
+
+    Notes
+    -----
+    With the function ``strength``, written as :math:`S`, and the slip rate in :math:`V_*`, the
+    balance of stress and the derivative of :math:`\ln V` are
+
+    .. math::
+
+        S(f - \eta (V - 1)) = a \ln V + \Psi, \quad
+          \left[a + S'(g) \eta V\right] d\ln V = S'(g) \, df - d\Psi.
+
+    We solve the balance by Newton's method. The left side decreases with :math:`V` and the right
+    side increases, so the equation has a unique root. If a Newton step leaves the bracket or the
+    steps shrink too slowly, the solver bisects the bracket.
     """
     strength, state_sum = friction.strength, friction.state_sum
     contribution = friction.state_contribution
 
     def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
         a, damping, psi = p[A], p[DYNAMICS], state_sum(psis)
-        # slip backwards is no part of it: radiation is at least -eta, which bounds ln V from above
+        # Slip is always forward, so the radiated stress is at least -eta. This bounds ln V from
+        # above.
         low, high = (
             -math.inf,
             min((strength(spring_stress + damping, psis, p)[0] - psi) / a, _MAX_LOG_SLIP_RATE),
         )
-        # a good guess where radiation takes most of the stress
+        # This initial value is accurate if radiation balances most of the spring stress.
         x = min(high, math.log(max(a * high / damping, 1.0))) if high > 0.0 else high
         before = math.inf
         for _ in range(_MAX_ITERATIONS):
@@ -71,7 +103,8 @@ def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
             balanced = abs(missing) <= _BALANCE_TOLERANCE * (1.0 + abs(psi) + a * abs(x))
             if balanced and abs(change) <= _STEP_TOLERANCE * (1.0 + abs(x)):
                 return x, g, shift
-            # where normal stress is nearly lost, slopes are so steep that such steps lead nowhere
+            # If normal stress is almost zero, slopes are very steep, and Newton steps shrink
+            # slowly.
             slow = abs(change) > 0.5 * abs(before) or abs(change) <= _STEP_TOLERANCE * (
                 1.0 + abs(x)
             )
@@ -95,7 +128,21 @@ def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
 
 @dataclass(frozen=True, kw_only=True)
 class RadiationDamping(Dynamics):
-    """Friction and radiation share the stress of the spring, ``f = g + eta (V - V_*)``."""
+    r"""Slider with radiation damping.
+
+    Parameters
+    ----------
+    radiation_damping : float, default: 0.0
+        Damping coefficient :math:`\eta V_*/\sigma_*`.
+
+    Notes
+    -----
+    The spring stress :math:`f` balances the frictional stress :math:`g` and the radiated stress:
+
+    .. math::
+
+        f = g + \eta (V - V_*).
+    """
 
     radiation_damping: float = number(
         0.0,
@@ -113,14 +160,26 @@ class RadiationDamping(Dynamics):
 
     @property
     def effects(self) -> tuple[str, ...]:
+        """Names of the effects that are active."""
         return ("radiation_damping",)
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """eta V_*/sigma_*."""
+        """Return the damping coefficient.
+
+        See the base class.
+        """
         return (self.radiation_damping,)
 
     def radiated_stress(self, log_slip_rate: float) -> float:
+        """Compute the part of the spring stress that seismic waves radiate.
+
+        See the base class.
+        """
         return compute_radiated_stress(log_slip_rate, self.radiation_damping)
 
     def radiated_stress_slope(self, log_slip_rate: float) -> float:
+        """Compute the derivative of the radiated stress with respect to ln V.
+
+        See the base class.
+        """
         return self.radiation_damping * math.exp(log_slip_rate)

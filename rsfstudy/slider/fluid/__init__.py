@@ -1,7 +1,9 @@
-"""The fluid in the pores of the fault, one file a case.
+r"""Pore fluids of the fault.
 
-Stress is in units of the effective normal stress sigma_* = sigma - p_inf of steady sliding at V_*,
-and pore pressure is P = (p - p_inf)/sigma_*: no part needs p_inf itself.
+Each module of this package defines one pore fluid. Stress is normalised by the effective normal
+stress :math:`\sigma_* = \sigma - p_\infty` of steady sliding at :math:`V_*`. The pore pressure is
+:math:`P = (p - p_\infty)/\sigma_*`, so the fluids do not depend on :math:`p_\infty` itself. The
+base class is ``Fluid``.
 """
 
 from __future__ import annotations
@@ -15,20 +17,30 @@ from rsfstudy.slider.requirements import PORE_PRESSURE, SLIP_RATE
 
 @dataclass(frozen=True, kw_only=True)
 class Fluid(Part):
-    """Base class of all pore fluid cases.
+    """Base class of all pore fluids.
 
-    A case with unknowns declares them in ``unknowns``, with pore pressure P as the last unknown.
-    Such a case defines two functions:
+    A fluid with unknowns declares them in ``unknowns``. The last unknown must be the pore pressure
+    P. Such a fluid defines two functions as static methods:
 
     - ``auxiliary_rates(log_slip_rate, states, fraction, p)`` returns the changes of the unknowns
-      per unit slip in D_c, multiplied by a fraction.
+      per unit slip in :math:`D_c`, multiplied by ``fraction``, which is the slip per unit of the
+      independent variable.
     - ``auxiliary_steady_states(log_slip_rate, p)`` returns the unknowns in steady sliding, where P
       is zero.
 
     The distance from steady sliding determines if a motion has settled and if a cycle repeats. A
-    case can exclude unknowns from this distance by listing their names in
+    fluid can exclude unknowns from this distance by listing their names in
     ``excluded_from_distance``. Exclude an unknown if its steady value at the slip rate of a rupture
     is extremely large.
+
+    Examples
+    --------
+    >>> from rsfstudy.parts import Fluid
+    >>> from rsfstudy.slider.fluid.dilatant import DilatantFluid
+    >>> issubclass(DilatantFluid, Fluid)
+    True
+    >>> [unknown.name for unknown in DilatantFluid.unknowns]
+    ['porosity', 'pore_pressure']
     """
 
     derived_properties = ("highest_pressure",)
@@ -36,15 +48,20 @@ class Fluid(Part):
     received_quantities = frozenset({SLIP_RATE, PORE_PRESSURE})
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
-        """Bound of pore pressure from now on, while ln(V/V_*) is at most `log_slip_rate`; infinite
-        where none is known.
+        r"""Compute an upper bound of the future pore pressure.
 
         Parameters
         ----------
         log_slip_rate : float
-            ln(V/V_*).
+            Upper limit of the future :math:`\ln(V/V_*)`.
         states : tuple of float
-            The unknowns of the fluid now.
+            Current unknowns of the fluid.
+
+        Returns
+        -------
+        float
+            Upper bound of the pore pressure P. The base class returns infinity, because the bound
+            is unknown.
         """
         return math.inf
 

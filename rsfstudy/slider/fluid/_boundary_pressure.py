@@ -1,4 +1,4 @@
-"""A fluid whose surroundings have a pore pressure that the loading changes."""
+"""Combination of a pore fluid and a loading that imposes pressure."""
 
 from __future__ import annotations
 
@@ -24,10 +24,27 @@ if TYPE_CHECKING:
 
 @cache
 def rates_with_boundary_pressure(rates: Function) -> Function:
-    """Changes of the pressure R of the surroundings, and of the unknowns of a fluid behind it.
+    r"""Extend the rates of a fluid by the pressure of the surroundings.
 
-    The fluid knows of pressure as far as it exceeds that of the surroundings, P - R, as in
-    ``dP/dt = c* (R - P) - (dphi/dt)/beta``; what it says of the changes holds for P itself.
+    Parameters
+    ----------
+    rates : callable
+        Function ``auxiliary_rates`` of the fluid.
+
+    Returns
+    -------
+    callable
+        Function ``auxiliary_rates`` of the combination. The first unknown is the pressure R of the
+        surroundings, and the unknowns of the fluid follow.
+
+    Notes
+    -----
+    The rates of the fluid depend on the difference :math:`P - R` between the pore pressure and the
+    pressure of the surroundings, for example
+
+    .. math::
+
+        \frac{dP}{dt} = c^* (R - P) - \frac{1}{\beta} \frac{d\varphi}{dt}.
     """
 
     def auxiliary_rates(
@@ -42,7 +59,19 @@ def rates_with_boundary_pressure(rates: Function) -> Function:
 
 @cache
 def steady_states_with_boundary_pressure(steady_states: Function) -> Function:
-    """The same in steady sliding before the loading: pressures are counted from there."""
+    """Extend the steady states of a fluid by the surrounding pressure.
+
+    Parameters
+    ----------
+    steady_states : callable
+        Function ``auxiliary_steady_states`` of the fluid.
+
+    Returns
+    -------
+    callable
+        Function ``auxiliary_steady_states`` of the combination. The pressure of the surroundings is
+        zero, because pressures are measured from steady sliding before the loading.
+    """
 
     def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
         return (0.0, *steady_states(log_slip_rate, p))
@@ -52,12 +81,14 @@ def steady_states_with_boundary_pressure(steady_states: Function) -> Function:
 
 @dataclass(frozen=True)
 class FluidWithBoundaryPressure:
-    """A fluid together with a loading that imposes the pressure around it.
+    """Fluid combined with a loading that imposes the surrounding pressure.
 
-    Attributes
+    Parameters
     ----------
-    loading, fluid : Loading, Fluid
-        Its parts, both of which have unknowns.
+    loading : Loading
+        Loading with unknowns, the last of which is the pressure of the surroundings.
+    fluid : Fluid
+        Fluid with unknowns, the last of which is the pore pressure in the fault.
     """
 
     loading: Loading
@@ -65,36 +96,53 @@ class FluidWithBoundaryPressure:
 
     @property
     def name(self) -> str:
-        """That of the fluid."""
+        """Name of the fluid."""
         return self.fluid.name
 
     @property
     def unknowns(self) -> tuple[Quantity, ...]:
-        """Pressure of the surroundings first, and that inside the fault last."""
+        """Unknowns of the loading, followed by the unknowns of the fluid.
+
+        The first unknown is the pressure of the surroundings, and the last unknown is the pore
+        pressure in the fault.
+        """
         return (*self.loading.unknowns, *self.fluid.unknowns)
 
     @property
     def excluded_from_distance(self) -> tuple[str, ...]:
-        """Names of the unknowns that are excluded from the distance from steady sliding.
+        """Names of the unknowns that are excluded from the distance.
 
-        The names come from both the loading and the fluid.
+        The distance from steady sliding ignores these unknowns. The names come from both the
+        loading and the fluid.
         """
         return (*self.loading.excluded_from_distance, *self.fluid.excluded_from_distance)
 
     @property
     def auxiliary_rates(self) -> Function:
-        """Theirs."""
+        """Function that computes the rates of all unknowns."""
         assert self.fluid.auxiliary_rates is not None
         return rates_with_boundary_pressure(self.fluid.auxiliary_rates)
 
     @property
     def auxiliary_steady_states(self) -> Function:
-        """Theirs."""
+        """Function that returns all unknowns in steady sliding."""
         assert self.fluid.auxiliary_steady_states is not None
         return steady_states_with_boundary_pressure(self.fluid.auxiliary_steady_states)
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """Those of the fluid, and the rate of the loading in the last place."""
+        """Return the parameters of the fluid and the rate of the loading.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the fluid and the loading belong to.
+
+        Returns
+        -------
+        tuple of float
+            Parameters of the fluid, padded with NaN, and the rate of the surrounding pressure as
+            the last element.
+        """
         own = collect_numbers(self.fluid, scene)
         between = (math.nan,) * (DYNAMICS - FLUID - 1 - len(own))
         return (*own, *between, *collect_numbers(self.loading, scene))

@@ -1,5 +1,7 @@
-"""Dilatancy with drainage: pores that open with slip rate lower pore pressure until fluid flows in
-(Segall and Rice 1995).
+"""Dilatancy with drainage (Segall and Rice 1995).
+
+Pores open when the slip rate increases. The pore pressure then falls until fluid flows in from the
+surroundings.
 """
 
 from __future__ import annotations
@@ -16,21 +18,37 @@ from rsfstudy.slider.scene_view import SceneView
 
 
 def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
-    """Changes of porosity and of pore pressure per unit slip in D_c, times a fraction.
-
-    ``D_c dphi/d(delta) = -(phi - phi_0 - eps ln(V/V_*))`` and ``dp/dt = c* (p_inf - p) -
-    (dphi/dt)/beta``, with dt = d(delta)/V; porosity is in units of beta sigma_*.
+    r"""Compute the rates of porosity and pore pressure.
 
     Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     states : tuple of float
-        Porosity (phi - phi_0)/(beta sigma_*), and pore pressure P.
+        Porosity :math:`(\varphi - \varphi_0)/(\beta \sigma_*)` and pore pressure :math:`P`.
     fraction : float
-        What the changes are multiplied by: zero times infinity, where slip stops, has a limit.
+        Factor of the result, equal to the slip per unit of the independent variable. When slip
+        stops, the changes per unit slip are infinite, but their product with ``fraction`` remains
+        finite.
     p : tuple of float
-        Dilatancy eps/(beta sigma_*) at FLUID, and drainage c* D_c/V_* behind it.
+        Parameters of the scene. The function reads the dilatancy :math:`\epsilon/(\beta \sigma_*)`
+        from ``p[FLUID]`` and the drainage :math:`c^* D_c/V_*` from ``p[FLUID + 1]``.
+
+    Returns
+    -------
+    tuple of float
+        Changes of porosity and pore pressure per unit slip in :math:`D_c`, multiplied by
+        ``fraction``.
+
+    Notes
+    -----
+    With :math:`dt = d\delta/V`, the rates are
+
+    .. math::
+
+        D_c \frac{d\varphi}{d\delta}
+          = -\left(\varphi - \varphi_0 - \epsilon \ln\frac{V}{V_*}\right), \quad
+          \frac{dp}{dt} = c^* (p_\infty - p) - \frac{1}{\beta} \frac{d\varphi}{dt}.
 
     References
     ----------
@@ -43,16 +61,45 @@ def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: N
 
 
 def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
-    """Porosity of steady sliding, and no pore pressure: phi = phi_0 + eps ln(V/V_*)."""
+    r"""Compute porosity and pore pressure in steady sliding.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    tuple of float
+        Porosity :math:`(\varphi - \varphi_0)/(\beta \sigma_*)`, and a pore pressure of zero.
+
+    Notes
+    -----
+    In steady sliding, the porosity is
+
+    .. math::
+
+        \varphi = \varphi_0 + \epsilon \ln\frac{V}{V_*}.
+    """
     return p[FLUID] * log_slip_rate, 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class DilatantFluid(Fluid):
-    """Pores that open with slip rate, in a fault that exchanges fluid with what surrounds it.
+    r"""Dilatant pore fluid with drainage to the surroundings.
 
-    Pore pressure begins at that of the surroundings, as in steady sliding, where porosity is
-    ``phi = phi_0 + eps ln(V/V_*)``.
+    The pores open when the slip rate increases, which decreases the pore pressure. The initial pore
+    pressure is the pressure of the surroundings, as in steady sliding.
+
+    Parameters
+    ----------
+    dilatancy : float, default: 0.01
+        Dilatancy :math:`\epsilon/(\beta \sigma_*)`. Without drainage, the pore pressure decreases
+        by this value, in :math:`\sigma_*`, per unit increase of :math:`\ln V`.
+    drainage : float, default: 1.0
+        Drainage rate :math:`c^* D_c/V_*`.
 
     References
     ----------
@@ -98,22 +145,31 @@ class DilatantFluid(Fluid):
     auxiliary_steady_states = staticmethod(auxiliary_steady_states)
 
     def check(self, scene: SceneView) -> None:
-        """Some critical stiffness, where the spring is given by its ratio to that."""
+        """Check that the stiffness ratio of the scene is defined.
+
+        See the base class.
+        """
         if lacks_critical_stiffness(scene):
             rule = f"leaves no critical stiffness with dilatancy = {self.dilatancy:g}"
             raise self.field_error("drainage", rule, "Give stiffness itself, or raise drainage.")
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
-        """Pores close by ``V (phi - phi_0 - eps ln(V/V_*))`` at most, which drainage holds at a
-        pressure of that over c*.
+        r"""Compute an upper bound of the future pore pressure.
+
+        See the base class. The bound follows from the largest rate at which pores can close,
+        :math:`V (\varphi - \varphi_0 - \epsilon \ln(V/V_*))`, and the drainage rate.
         """
         closing = max(states[0] - self.dilatancy * log_slip_rate, self.dilatancy)
         return max(states[1], math.exp(log_slip_rate) * closing / self.drainage)
 
     @property
     def effects(self) -> tuple[str, ...]:
+        """Names of the effects that are active."""
         return ("dilatancy",)
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """Dilatancy and drainage."""
+        """Return the dilatancy and the drainage rate.
+
+        See the base class.
+        """
         return self.dilatancy, self.drainage

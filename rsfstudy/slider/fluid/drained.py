@@ -1,4 +1,4 @@
-"""A drained fault: pore pressure never changes."""
+"""Drained fault with constant pore pressure."""
 
 from __future__ import annotations
 
@@ -9,7 +9,16 @@ from rsfstudy.slider.fluid import Fluid
 
 @dataclass(frozen=True, kw_only=True)
 class DrainedFluid(Fluid):
-    """Constant pore pressure, ``dp/dt = 0``: nothing to add to the friction relation."""
+    r"""Constant pore pressure of a drained fault.
+
+    Notes
+    -----
+    The pore pressure satisfies
+
+    .. math::
+
+        \frac{dp}{dt} = 0.
+    """
 
     name = "drained"
     rejection_hint = "while the fault is drained", "set fluid='dilatant'"

@@ -1,11 +1,15 @@
-"""State evolution laws, one file each.
+r"""State evolution laws of rate- and state-dependent friction.
 
-The state variable is written so that every law shares
+Each module of this package defines one law. In all laws, the state variable :math:`\Theta` is a
+contribution to the friction coefficient:
 
-    tau = sigma (mu_* + a ln(V/V_*) + Theta),
+.. math::
 
-which for the slowness law means Theta = b ln(theta/theta_*). Friction is mu_* at V_* by any law:
-the state variable is measured from its value in steady sliding at V_*.
+    \tau = \sigma \left(\mu_* + a \ln \frac{V}{V_*} + \Theta\right).
+
+For the slowness law, :math:`\Theta = b \ln(\theta/\theta_*)`. Every law sets :math:`\Theta = 0` in
+steady sliding at the reference velocity :math:`V_*`, so the friction coefficient there is
+:math:`\mu_*`. The base classes are ``LawBase`` and ``Law``.
 """
 
 from __future__ import annotations
@@ -28,18 +32,38 @@ from rsfstudy.slider.parts import (
 from rsfstudy.slider.requirements import LAW_QUANTITIES
 from rsfstudy.slider.scene_view import SceneView
 
-#: Exponents of evolution laws beyond this occur in trial steps only, which the integrator rejects:
-#: the equations of motion stop at slip rates of 10^-290 V_*.
+#: Upper limit of exponents in evolution laws. Larger exponents occur only in trial steps that the
+#: integrator rejects, because the equations of motion stop at slip rates of 10^-290 V_*.
 LARGEST_EXPONENT = 700.0
 
 
 def fast_expm1(exponent: float) -> float:
-    """exp(x) - 1 to all digits, in a third of the time of `expm1` where x is far from 0."""
+    """Compute exp(x) - 1 to full precision, faster than ``math.expm1``.
+
+    For arguments that are not close to zero, the function subtracts 1 from ``math.exp``, which
+    takes a third of the time of ``math.expm1``.
+
+    Parameters
+    ----------
+    exponent : float
+        Exponent x.
+
+    Returns
+    -------
+    float
+        Value of exp(x) - 1.
+    """
     return math.expm1(exponent) if abs(exponent) < 0.5 else math.exp(exponent) - 1.0
 
 
 def cutoff_velocity_field() -> Any:
-    """The field that laws with a slip rate of their own have in common."""
+    """Declare the field ``cutoff_velocity_ratio`` of laws with a cut-off.
+
+    Returns
+    -------
+    dataclasses.Field
+        Field for a dataclass, with a default of 100.
+    """
     return number(
         100.0,
         "$V_c/V_*$",
@@ -53,34 +77,59 @@ def cutoff_velocity_field() -> Any:
 @renamed_members
 @dataclass(frozen=True, kw_only=True)
 class LawBase(Part):
-    """Base class of all state evolution laws.
+    r"""Base class of all state evolution laws.
 
-    Laws with a single b are derived from ``Law``, which is a subclass of this class.
+    Laws with a single parameter b are derived from ``Law``, which is a subclass of this class.
 
-    The functions of a law receive ln(V/V_*), the state variables and the parameters of the law. The
-    friction coefficient of forward slip, ``tau/sigma = mu_* + a ln(V/V_*) + sum of Theta_i``, can
-    be computed from these arguments. The functions do not receive shear stress, normal stress or
-    pore pressure. If the state evolution depends on one of these quantities, list the quantity in
-    ``needs``, for example ``needs = {"shear_stress"}``. The law is then rejected in scenes with
-    variable effective normal stress. If effective normal stress is constant, shear stress divided
-    by sigma_* equals the friction coefficient.
+    The functions of a law receive :math:`\ln(V/V_*)`, the state variables and the parameters of the
+    law. From these arguments, a function can compute the friction coefficient of forward slip,
+    :math:`\tau/\sigma = \mu_* + a \ln(V/V_*) + \sum_i \Theta_i`. The functions do not receive shear
+    stress, normal stress or pore pressure. If the state evolution depends on one of these
+    quantities, list the quantity in ``needs``, for example ``needs = {"shear_stress"}``. Scenes
+    with variable effective normal stress then reject the law. If effective normal stress is
+    constant, shear stress divided by :math:`\sigma_*` equals the friction coefficient.
 
     A law with one state defines ``evolution(log_slip_rate, state, p)``. The function returns the
-    change of the state variable per unit slip in D_c at constant normal stress. The steady state is
-    ``Theta = -b ln(V/V_*)`` unless the law also defines ``steady_states(log_slip_rate, shift, p)``,
-    which returns the states Psi in steady sliding. The argument ``shift`` is the amount by which
-    stress has lowered the state variable. At V_* the states must add up to zero, because friction
-    is mu_* there. A scene rejects a law whose evolution does not vanish at its steady states.
+    change of the state variable per unit slip in :math:`D_c` at constant normal stress. The default
+    steady state is :math:`\Theta = -b \ln(V/V_*)`. If the steady state of a law differs from the
+    default, the law also defines ``steady_states(log_slip_rate, shift, p)``, which returns the
+    states :math:`\Psi` in steady sliding. The argument ``shift`` is the decrease of the state
+    variable that stress causes. At :math:`V_*`, the states must add up to zero, because the
+    friction coefficient is :math:`\mu_*` there. A scene rejects a law if its evolution does not
+    vanish at its steady states.
 
-    A law with several states sets their number, for example ``states = 3``. Such a law must define
-    ``steady_states`` and ``evolutions(log_slip_rate, psis, shift, fraction, p)``. The latter
-    function returns a tuple with the change of each state, multiplied by ``fraction``, which is the
-    ratio of slip to the clock of the integration. Both functions distribute the shift among the
-    states, and the parts must add up to the whole shift. The field or property ``b_over_a`` is the
-    evolution effect of all states together, divided by a. See ``two_slip_states`` for an example.
+    A law with several states sets their number, for example ``state_count = 3``. Such a law must
+    define ``steady_states`` and ``evolutions(log_slip_rate, psis, shift, fraction, p)``. The
+    function ``evolutions`` returns a tuple with the change of each state, multiplied by
+    ``fraction``, which is the slip per unit of the independent variable. Both functions distribute
+    the shift among the states, and the contributions must add up to the whole shift. The field or
+    property ``b_over_a`` is the evolution effect of all states together, divided by a. See the
+    module ``two_slip_states`` for an example.
 
-    Any unknown that affects friction, such as temperature, can be modelled as a state. Its value
-    must be expressed as a contribution to the friction coefficient.
+    Any unknown that affects friction, such as temperature, can be modelled as a state. The value of
+    the state must be expressed as a contribution to the friction coefficient.
+
+    Parameters
+    ----------
+    stress_dependence : float, default: 0.0
+        Effect :math:`c` of shear stress on the state variable. A change :math:`d\tau` of shear
+        stress decreases the state variable by :math:`c \, d\tau/\sigma`. Zero disables the effect.
+    regularised : bool, default: False
+        If True, slip reverses with the sign of shear stress (regularised friction law).
+
+    References
+    ----------
+    Nagata, Nakatani and Yoshida (2012), J. Geophys. Res. 117, B02314.
+
+    Examples
+    --------
+    >>> from rsfstudy.parts import LawBase
+    >>> from rsfstudy.slider.laws.two_slip_states import TwoStateSlipLaw
+    >>> issubclass(TwoStateSlipLaw, LawBase)
+    True
+    >>> law = TwoStateSlipLaw(b1_over_a=1.0, b2_over_a=0.5)
+    >>> law.state_count, law.b_over_a
+    (2, 1.5)
     """
 
     stress_dependence: float = number(
@@ -96,60 +145,101 @@ class LawBase(Part):
     derived_properties = ("has_closed_orbits", "scale_free", "relaxation")
     defining_methods = frozenset({"evolution", "evolutions"})
     received_quantities = LAW_QUANTITIES
-    #: How many states the law has.
+    #: Number of states of the law.
     state_count: ClassVar[int] = 1
-    #: Whether every orbit closes at critical stiffness, where friction alone acts and stress has no
-    #: effect on it: where evolution changes with its own state in proportion to itself.
+    #: True if every orbit around steady sliding is closed at the critical stiffness, provided that
+    #: the motion is quasi-static and stress does not affect the state. The derivative of the
+    #: evolution with respect to the state must be a linear function of the evolution.
     has_closed_orbits: ClassVar[bool] = False
-    #: Whether the state is ``Theta = b ln(theta/theta_*)``, so that there is a theta to tell of.
+    #: True if Theta = b ln(theta/theta_*), so that theta can be computed from the state variable.
     has_logarithmic_state: ClassVar[bool] = True
-    #: Whether the law has no slip rate of its own, so that V_* could be any other.
+    #: True if the law contains no characteristic slip rate, so the choice of V_* is arbitrary.
     scale_free: ClassVar[bool] = False
-    #: ``relaxation(rate, slip)``: the stress in units of b that is left above its steady value
-    #: after so much slip at constant ln(V/V_*), at constant normal stress; closed forms only. A
-    #: method where it draws on numbers of the law.
+    #: Closed-form solution ``relaxation(rate, slip)`` at constant normal stress and constant slip
+    #: rate, with rate = ln(V/V_*) and slip in D_c: the difference between the stress and its steady
+    #: value, divided by b. The solution is a method if it uses fields of the law.
     relaxation: ClassVar[Function | None] = None
     evolution: ClassVar[Function | None] = None
     evolutions: ClassVar[Function | None] = None
     steady_states: ClassVar[Function | None] = None
-    #: ``state_effect(friction, ratio, change, p) -> (shift, slope)``: by how much stress lowers the
-    #: state variable, and its derivative with respect to friction; none for most laws.
+    #: Function ``state_effect(friction, ratio, change, p) -> (shift, slope)``: decrease of the
+    #: state variable due to stress, and its derivative with respect to frictional stress. Most laws
+    #: do not define this function.
     state_effect: ClassVar[Function | None] = None
 
     @classmethod
     def required_functions(cls) -> tuple[str, ...]:
+        """Return the names of the functions that the law must define.
+
+        Returns
+        -------
+        tuple of str
+            ``("evolution",)`` for a law with one state, and ``("evolutions", "steady_states")`` for
+            a law with several states.
+        """
         return ("evolution",) if cls.state_count == 1 else ("evolutions", "steady_states")
 
     @property
     def b_over_a(self) -> float:
-        """Evolution effect of all states together, over the direct effect."""
+        """Ratio of the total evolution effect to the direct effect.
+
+        Subclasses must override this property or define a field with this name.
+        """
         raise TypeError(f"{type(self).__name__} states no b_over_a")
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """Return the parameters that precede the fields of a law.
+        """Return the parameters that precede the fields of the law in ``p``.
 
         The base class has no such parameters.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the law belongs to.
+
+        Returns
+        -------
+        tuple of float
+            Values for ``p[LAW]`` and the following elements.
         """
         return ()
 
     @property
     def state_change_over_a(self) -> float:
-        """Change of the states by a unit of ln V, over the direct effect; positive."""
+        """Change of the states per unit of ln V, divided by a.
+
+        The value is always positive.
+        """
         return abs(self.b_over_a) or VANISHING_B_OVER_A
 
     @property
     def depends_on_stress(self) -> bool:
-        """True if stress itself changes the state variable."""
+        """True if stress directly changes the state variable."""
         return self.state_effect is not None or self.stress_dependence > 0.0
 
     @property
     def effects(self) -> tuple[str, ...]:
+        """Names of the optional effects that are active."""
         named = {"stress_dependence": self.stress_dependence, "regularised": self.regularised}
         return tuple(name for name, acts in named.items() if acts)
 
     def check(self, scene: SceneView) -> None:
-        """Normal stress of which the integral of ``dtau/sigma`` is known, and motion that may
-        reverse, where that matters.
+        r"""Check that the scene supports the stress effect and reversed slip.
+
+        The effect of shear stress requires that the integral of :math:`d\tau/\sigma` is known, so
+        normal stress must be proportional to shear stress or constant. Reversed slip requires
+        dynamics that allow a negative slip rate.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the law belongs to.
+
+        Raises
+        ------
+        InvalidValue
+            If ``stress_dependence`` or ``regularised`` is incompatible with another part of the
+            scene.
         """
         stress, fluid = scene.parts.normal_stress, scene.parts.fluid
         loading, source = scene.parts.loading, scene.pressure_source
@@ -173,18 +263,19 @@ class LawBase(Part):
 @renamed_members
 @dataclass(frozen=True, kw_only=True)
 class Law(LawBase):
-    """Base class of the laws with a single b.
+    r"""Base class of the laws with a single b.
 
-    A law is defined by a plain function of floats, which is stored in the class as
-    ``evolution = staticmethod(evolution)``::
+    A law is defined by a plain function of floats, which is stored in the class as ``evolution =
+    staticmethod(evolution)``::
 
         evolution(log_slip_rate, state, p) -> float
 
-    The function returns the change of Theta per unit slip in D_c at constant normal stress. The
-    argument ``log_slip_rate`` is ln(V/V_*), and ``state`` is Theta. The element ``p[LAW]`` is b
-    (``rsfstudy.slider.parameter_layout.LAW``). Declare the parameters of the law as fields, with
-    ``rsfstudy.slider.parts.number``. The parameters follow b in the order of their declaration, as
-    ``p[LAW + 1]``, ``p[LAW + 2]`` and so on. Two methods are optional::
+    The function returns the change of :math:`\Theta` per unit slip in :math:`D_c` at constant
+    normal stress. The argument ``log_slip_rate`` is :math:`\ln(V/V_*)`, and ``state`` is
+    :math:`\Theta`. The element ``p[LAW]`` is b, where the constant ``LAW`` can be imported from
+    ``rsfstudy.parts``. Declare the parameters of the law as fields, with ``rsfstudy.parts.number``.
+    The parameters follow b in the order of their declaration, as ``p[LAW + 1]``, ``p[LAW + 2]`` and
+    so on. Two methods are optional::
 
         numbers(self, scene) -> tuple[float, ...]
         check(self, scene) -> None
@@ -195,22 +286,79 @@ class Law(LawBase):
     the name of the law. The attributes ``relaxation``, ``steady_states`` and ``state_effect`` are
     optional as well. A law with one b can have several states. Such a law defines ``evolutions``
     and ``steady_states``, as described for ``LawBase``.
+
+    Parameters
+    ----------
+    stress_dependence : float, default: 0.0
+        Effect :math:`c` of shear stress on the state variable (see ``LawBase``).
+    regularised : bool, default: False
+        If True, slip reverses with the sign of shear stress.
+    b_over_a : float, default: 2.0
+        Ratio :math:`b/a` of the evolution effect to the direct effect.
+
+    Examples
+    --------
+    Define a law that is symmetric about steady sliding:
+
+    >>> import math
+    >>> from dataclasses import dataclass
+    >>> from rsfstudy import Scene
+    >>> from rsfstudy.parts import LAW, Law
+    >>> def evolution(log_slip_rate, state, p):
+    ...     return -p[LAW] * math.tanh(state / p[LAW] + log_slip_rate)
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class TanhLaw(Law):
+    ...     name = "tanh_law"
+    ...     evolution = staticmethod(evolution)
+    >>> scene = Scene(law=TanhLaw, normal_stress="constant", a=0.01, b_over_a=1.5)
+    >>> round(scene.critical_stiffness, 6)
+    0.005
     """
 
     b_over_a: float = number(2.0, "$b/a$", "1", "ratio of evolution effect to direct effect")
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """b; of no effect at all, one that nothing feels, because equations divide by it."""
+        """Return b as the first parameter of the law.
+
+        If ``b_over_a`` is zero, the method returns a negligible positive value, because equations
+        divide by b.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the law belongs to.
+
+        Returns
+        -------
+        tuple of float
+            Evolution effect parameter b.
+        """
         return (scene.a * (self.b_over_a or VANISHING_B_OVER_A),)
 
     @property
     def min_weakening_b_over_a(self) -> float:
-        """Smallest b/a for steady friction to fall with slip rate at V_*."""
+        """Smallest b/a for which steady friction decreases with slip rate.
+
+        The value refers to steady sliding at :math:`V_*`.
+        """
         return 1.0
 
     def check(self, scene: SceneView) -> None:
-        """A critical stiffness, where the spring is given by its ratio to it; rate weakening is
-        enough.
+        """Check ``b_over_a`` against the other fields of the scene.
+
+        If the stiffness is given relative to the critical stiffness, the friction must be rate
+        weakening. If ``b_over_a`` is zero, the state variable has no effect, so stress effects on
+        the state and an initial state are not allowed.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the law belongs to.
+
+        Raises
+        ------
+        InvalidValue
+            If ``b_over_a`` is incompatible with the scene.
         """
         super().check(scene)
         if not self.b_over_a and (self.depends_on_stress or scene.parts.normal_stress.state_effect):
@@ -230,17 +378,31 @@ class Law(LawBase):
             raise self.field_error("b_over_a", rule, STIFFNESS_REMEDY)
 
 
-#: b/a in equations that divide by b, of a state variable without effect: by far less than rounding.
+#: Value of b/a that replaces zero in equations that divide by b. Its effect on the results is far
+#: smaller than rounding errors.
 VANISHING_B_OVER_A = 1e-60
-#: The smallest b/a but 0: below it, powers and quotients of it are lost to the range of numbers.
+#: Smallest nonzero b/a. Powers and quotients of smaller values would underflow or overflow.
 MIN_B_OVER_A = 1e-30
-#: What to do where there is no critical stiffness.
+#: Remedy in error messages about a missing critical stiffness.
 STIFFNESS_REMEDY = "Sliding is then stable at every stiffness, or at none: give stiffness itself."
 
 
 def lacks_critical_stiffness(scene: SceneView) -> bool:
-    """True if the spring is given by its ratio to a critical stiffness that there is not: stable or
-    unstable is then every spring.
+    """Return True if the stiffness ratio of a scene is undefined.
+
+    The stiffness ratio is undefined if the critical stiffness is zero or infinite, because steady
+    sliding then has the same stability at every stiffness.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to examine.
+
+    Returns
+    -------
+    bool
+        True if the scene has no explicit stiffness and its critical stiffness is not a positive
+        finite number.
     """
     stated = scene.parts.slider.stiffness is not None
     return not stated and not 0.0 < scene.critical_stiffness < math.inf

@@ -1,4 +1,4 @@
-"""Two states with slip distances of their own, which laws of different evolution share."""
+"""Base class and steady states of the laws with two state variables."""
 
 from __future__ import annotations
 
@@ -10,13 +10,36 @@ from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import POSITIVE, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
 
-#: Places of the numbers of the law: b of each state, the part each has in what stress takes from
-#: the state variable, and L_1/L_2.
+#: Indices of the law parameters in ``p``: b of each state, the share of each state in the effect of
+#: stress, and L_1/L_2.
 FIRST_B, SECOND_B, FIRST_SHARE, SECOND_SHARE, LENGTH_QUOTIENT = range(LAW, LAW + 5)
 
 
 def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
-    """The states of steady sliding, ``Psi_i = c_i shift - b_i ln(V/V_*)``, c_i being the shares."""
+    r"""Compute both state variables in steady sliding.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    shift : float
+        Decrease of the sum of the states due to stress.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    tuple of float
+        States :math:`\Psi_1` and :math:`\Psi_2`.
+
+    Notes
+    -----
+    With the shares :math:`c_i` of the two states in the shift, the steady states are
+
+    .. math::
+
+        \Psi_i = c_i \, \mathrm{shift} - b_i \ln\frac{V}{V_*}.
+    """
     return (
         p[FIRST_SHARE] * shift - p[FIRST_B] * log_slip_rate,
         p[SECOND_SHARE] * shift - p[SECOND_B] * log_slip_rate,
@@ -25,13 +48,36 @@ def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
 
 @dataclass(frozen=True, kw_only=True)
 class TwoStateLaw(LawBase):
-    """Base of the laws of two states, tau = sigma (mu_* + a ln(V/V_*) + Theta_1 + Theta_2), each
-    with a b of its own; the first evolves over D_c, the second over L_2.
+    r"""Base class of the laws with two state variables.
 
-    What stress takes from the state variable, such as alpha ln s, it takes from the two in the
-    shares |b_i|/(|b_1| + |b_2|). That is a choice, which experiments do not decide: with it two
-    states of one sign and one length are one, and no share exceeds 1 where b_1 + b_2 is small. The
-    default numbers are those of Gu et al. (1984), which Becker (2000) found to be chaotic.
+    Each state has its own b. The first state evolves over the slip distance :math:`D_c`, and the
+    second state evolves over :math:`L_2`. The default values are taken from Gu et al. (1984).
+    Becker (2000) found chaotic motions for these values.
+
+    Parameters
+    ----------
+    b1_over_a : float, default: 1.0
+        Ratio :math:`b_1/a` of the evolution effect of the first state to the direct effect.
+        Negative values are allowed.
+    b2_over_a : float, default: 0.84
+        Ratio :math:`b_2/a` of the evolution effect of the second state to the direct effect.
+        Negative values are allowed.
+    length_ratio : float, default: 1/0.048
+        Ratio :math:`L_2/D_c` of the slip distances of the second and the first state.
+
+    Notes
+    -----
+    The friction law is
+
+    .. math::
+
+        \tau = \sigma \left(\mu_* + a \ln\frac{V}{V_*} + \Theta_1 + \Theta_2\right).
+
+    Effects of stress on the state, such as :math:`\alpha \ln(\sigma/\sigma_*)`, are distributed to
+    the two states in proportion to :math:`\lvert b_i \rvert`. Experiments do not determine this
+    distribution. With this choice, two states with equal slip distances and coefficients of equal
+    sign are equivalent to a single state. In addition, no share exceeds 1 if :math:`b_1 + b_2` is
+    small.
 
     References
     ----------
@@ -58,29 +104,41 @@ class TwoStateLaw(LawBase):
 
     @property
     def b_over_a(self) -> float:
+        """Ratio of the total evolution effect to the direct effect."""
         return self.b1_over_a + self.b2_over_a
 
     @property
     def state_change_over_a(self) -> float:
+        """Sum of the magnitudes of both evolution effects, divided by a."""
         return abs(self.b1_over_a) + abs(self.b2_over_a)
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """b_1, b_2, their shares in what stress takes, and L_1/L_2."""
+        """Return the parameters of both states and the length ratio.
+
+        See the base class. The parameters of a state are its b and its share of the shift. The last
+        value is :math:`L_1/L_2`, the inverse of ``length_ratio``.
+        """
         both, size = (self.b1_over_a, self.b2_over_a), self.state_change_over_a
-        # of two states without effect there are no shares: see `check`
+        # If both b are zero, the shares are undefined. The method ``check`` rejects this case.
         shares = (abs(b) / size if size else 0.5 for b in both)
         return (*(scene.a * b for b in both), *shares, 1.0 / self.length_ratio)
 
     @classmethod
     def rejection_error(cls, name: str, value: object) -> InvalidValue:
+        """Return the error for a field of another law.
+
+        See the base class. The message for ``b_over_a`` names the two fields that replace it.
+        """
         if name == "b_over_a":
             rule = f"is b1_over_a + b2_over_a for {cls.name}, and follows from them"
             return InvalidValue(name, value, rule, remedy="Give those.")
         return super().rejection_error(name, value)
 
     def check(self, scene: SceneView) -> None:
-        """States that do something, and a critical stiffness where the spring is given by its ratio
-        to it.
+        """Check the evolution effects and the critical stiffness.
+
+        See the base class. The critical stiffness is required only if the stiffness is given by
+        ``stiffness_ratio``.
         """
         super().check(scene)
         if not self.state_change_over_a:

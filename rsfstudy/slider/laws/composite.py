@@ -1,5 +1,7 @@
-"""The composite law (Kato and Tullis 2001): contact heals at rest, as by the slowness law, and
-slips as by the slip law.
+"""The composite law of Kato and Tullis (2001).
+
+At rest, the state variable grows with time, as in the slowness law. During slip, the state variable
+evolves as in the slip law.
 """
 
 from __future__ import annotations
@@ -12,30 +14,49 @@ from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 
-#: Steps of third order that take Lambert's W to rounding from the guess below.
+#: Number of Halley iterations. From the initial value in ``lambert_w``, four iterations reach
+#: rounding accuracy.
 HALLEY_STEPS = 4
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
-    """Evolution of the state variable per unit slip at constant normal stress.
-
-    ``dtheta/dt = exp(-V/V_c) - (theta V/D_c) ln(theta V/D_c)`` reads, with u = ln(theta V/D_c),
-    ``D_c dTheta/d(delta) = b [exp(-V/V_c) exp(-u) - u]``. Theta is measured from its value in
-    steady sliding at V_*: ``u = Theta/b + ln(V/V_*) + u_*``.
+    r"""Compute the state evolution per unit slip at constant normal stress.
 
     Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     state : float
-        State variable Theta.
+        State variable :math:`\Theta`.
     p : tuple of float
-        Evolution effect parameter b at LAW, then ln(V_c/V_*) and u_*.
+        Parameters of the scene. The function reads :math:`b` from ``p[LAW]``, followed by
+        :math:`\ln(V_c/V_*)` and :math:`u_*`.
 
     Returns
     -------
     float
-        dTheta over slip in D_c.
+        Rate :math:`D_c \, d\Theta/d\delta`.
+
+    Notes
+    -----
+    With :math:`u = \ln(\theta V/D_c)`, the composite law
+
+    .. math::
+
+        \frac{d\theta}{dt} = e^{-V/V_c} - \frac{\theta V}{D_c} \ln\frac{\theta V}{D_c}
+
+    has the form
+
+    .. math::
+
+        D_c \frac{d\Theta}{d\delta} = b \left(e^{-V/V_c} e^{-u} - u\right).
+
+    The state variable :math:`\Theta` is zero in steady sliding at :math:`V_*`, where :math:`u` has
+    the value :math:`u_*`. Therefore
+
+    .. math::
+
+        u = \frac{\Theta}{b} + \ln\frac{V}{V_*} + u_*.
 
     References
     ----------
@@ -49,23 +70,83 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
 
 
 def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
-    """Steady sliding, where ``u exp(u) = exp(-V/V_c)``."""
+    r"""Compute the state variable in steady sliding.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    shift : float
+        Decrease of the state variable due to stress.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    tuple of float
+        State :math:`\Psi`.
+
+    Notes
+    -----
+    In steady sliding, :math:`u` is the solution of
+
+    .. math::
+
+        u \, e^u = e^{-V/V_c}.
+    """
     ahead = lambert_w(healing_factor(log_slip_rate, p[LAW + 1]))
     return (shift + p[LAW] * (ahead - p[LAW + 2] - log_slip_rate),)
 
 
 def healing_factor(log_slip_rate: float, log_cutoff: float) -> float:
-    """``exp(-V/V_c)``."""
+    r"""Compute the factor that reduces healing at high slip rates.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    log_cutoff : float
+        Natural logarithm of the cut-off velocity, :math:`\ln(V_c/V_*)`.
+
+    Returns
+    -------
+    float
+        Factor :math:`\exp(-V/V_c)`.
+    """
     return math.exp(-math.exp(clamp_exponent(log_slip_rate - log_cutoff)))
 
 
 def clamp_exponent(exponent: float) -> float:
-    """An exponent that a motion meets, or the largest."""
+    """Limit an exponent to ``LARGEST_EXPONENT``.
+
+    Larger exponents occur only in trial steps of the integrator.
+
+    Parameters
+    ----------
+    exponent : float
+        Exponent to limit.
+
+    Returns
+    -------
+    float
+        Smaller value of the exponent and the limit.
+    """
     return min(exponent, LARGEST_EXPONENT)
 
 
 def lambert_w(value: float) -> float:
-    """The solution w of ``w exp(w) = value`` between 0 and 1, by Halley's method."""
+    """Compute the Lambert W function of a number between 0 and 1.
+
+    Parameters
+    ----------
+    value : float
+        Argument of the function.
+
+    Returns
+    -------
+    float
+        Solution w of ``w * exp(w) = value``, computed by Halley's method.
+    """
     w = value / (1.0 + value)
     for _ in range(HALLEY_STEPS):
         grown = math.exp(w)
@@ -76,7 +157,14 @@ def lambert_w(value: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class CompositeLaw(Law):
-    """The composite law."""
+    """Composite law with a cut-off velocity for healing.
+
+    Parameters
+    ----------
+    cutoff_velocity_ratio : float, default: 100.0
+        Ratio :math:`V_c/V_*` of the cut-off velocity to the reference velocity. At slip rates above
+        :math:`V_c`, contacts no longer heal.
+    """
 
     cutoff_velocity_ratio: float = cutoff_velocity_field()
 
@@ -86,12 +174,19 @@ class CompositeLaw(Law):
 
     @property
     def min_weakening_b_over_a(self) -> float:
-        """Steady friction falls as ``b - a + b u_*/(1 + u_*) V_*/V_c`` with ln V, at V_*."""
+        r"""Smallest b/a for which steady friction decreases with slip rate.
+
+        At :math:`V_*`, the steady friction coefficient decreases with :math:`\ln V` at the rate
+        :math:`b - a + b \, u_* V_*/[(1 + u_*) V_c]`.
+        """
         ahead = self._reference_steady_offset()
         return 1.0 / (1.0 + ahead / ((1.0 + ahead) * self.cutoff_velocity_ratio))
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """b, ln(V_c/V_*), and u_* of steady sliding at V_*."""
+        """Return b, the logarithm of the cut-off velocity, and the offset.
+
+        See the base class. The offset is the value :math:`u_*` in steady sliding at :math:`V_*`.
+        """
         logarithm = math.log(self.cutoff_velocity_ratio)
         return (*super().numbers(scene), logarithm, self._reference_steady_offset())
 

@@ -1,4 +1,8 @@
-"""The slowness law with a cut-off: slip faster than V_c leaves the evolution effect behind."""
+"""The slowness law with a cut-off of the evolution effect.
+
+At slip rates far above the cut-off velocity, the friction coefficient no longer depends on the
+state variable.
+"""
 
 from __future__ import annotations
 
@@ -12,26 +16,39 @@ from rsfstudy.slider.scene_view import SceneView
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
-    """Evolution of the state variable per unit slip at constant normal stress.
-
-    Friction is ``mu_* + a ln(V/V_*) + b ln(1 + theta V_c/D_c)``, less its last term in steady
-    sliding at V_*, and ``dtheta/dt = 1 - theta V/D_c``. With ``Theta = b ln[(1 + theta V_c/D_c)/(1
-    + V_c/V_*)]`` this reads, per unit slip, ``D_c dTheta/d(delta) = b expm1[(Theta_ss -
-    Theta)/b]``, Theta_ss being that of steady sliding at V.
+    r"""Compute the state evolution per unit slip at constant normal stress.
 
     Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     state : float
-        State variable Theta.
+        State variable :math:`\Theta`.
     p : tuple of float
-        Evolution effect parameter b at LAW, then the parts V_c/(V_c + V_*) and V_*/(V_c + V_*).
+        Parameters of the scene. The function reads :math:`b` from ``p[LAW]``, followed by the
+        fractions :math:`V_c/(V_c + V_*)` and :math:`V_*/(V_c + V_*)`.
 
     Returns
     -------
     float
-        dTheta over slip in D_c.
+        Rate :math:`D_c \, d\Theta/d\delta`.
+
+    Notes
+    -----
+    The friction coefficient is :math:`\mu_* + a \ln(V/V_*) + \Theta`. The state variable and its
+    evolution are
+
+    .. math::
+
+        \Theta = b \ln\frac{1 + \theta V_c/D_c}{1 + V_c/V_*}, \quad
+          \frac{d\theta}{dt} = 1 - \frac{\theta V}{D_c}.
+
+    With the steady state :math:`\Theta_{\mathrm{ss}}` at the slip rate :math:`V`, the evolution per
+    unit slip is
+
+    .. math::
+
+        D_c \frac{d\Theta}{d\delta} = b \left[e^{(\Theta_{\mathrm{ss}} - \Theta)/b} - 1\right].
 
     References
     ----------
@@ -43,15 +60,57 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
 
 
 def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
-    """Steady sliding, ``Theta_ss = b ln[(1 + V_c/V)/(1 + V_c/V_*)]``."""
+    r"""Compute the state variable in steady sliding.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    shift : float
+        Decrease of the state variable due to stress.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    tuple of float
+        State :math:`\Psi`.
+
+    Notes
+    -----
+    The steady state is
+
+    .. math::
+
+        \Theta_{\mathrm{ss}} = b \ln\frac{1 + V_c/V}{1 + V_c/V_*}.
+    """
     return (shift + p[LAW] * steady_state_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]),)
 
 
 def steady_state_over_b(
     log_slip_rate: float, cutoff_fraction: float, reference_fraction: float
 ) -> float:
-    """``ln(healing V_*/V + reference_fraction)``, which adds up to 0 at V_*: in each direction the
-    form of which no digits are lost, and exponents that overflow are left out of it.
+    r"""Compute the state variable in steady sliding, divided by b.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    cutoff_fraction : float
+        Fraction :math:`V_c/(V_c + V_*)`.
+    reference_fraction : float
+        Fraction :math:`V_*/(V_c + V_*)`.
+
+    Returns
+    -------
+    float
+        Ratio :math:`\Theta_{\mathrm{ss}}/b`, which is zero at :math:`V_*`.
+
+    Notes
+    -----
+    The function uses two equivalent formulas, one for slip rates below :math:`V_*` and one for
+    higher slip rates. Each formula avoids the cancellation of digits in its range. Exponents are
+    limited to ``LARGEST_EXPONENT`` to avoid overflow.
     """
     if log_slip_rate < 0.0:
         exponent = min(-log_slip_rate, LARGEST_EXPONENT)
@@ -62,26 +121,61 @@ def steady_state_over_b(
 
 @dataclass(frozen=True, kw_only=True)
 class CutOffLaw(Law):
-    """The slowness law with a cut-off."""
+    """Slowness law with a cut-off velocity for the evolution effect.
+
+    Parameters
+    ----------
+    cutoff_velocity_ratio : float, default: 100.0
+        Ratio :math:`V_c/V_*` of the cut-off velocity to the reference velocity. At slip rates above
+        :math:`V_c`, the evolution effect vanishes.
+    """
 
     cutoff_velocity_ratio: float = cutoff_velocity_field()
 
     name = "cut_off"
     evolution = staticmethod(evolution)
     steady_states = staticmethod(steady_states)
-    has_logarithmic_state = False  # in 1 + theta V_c/D_c
+    has_logarithmic_state = False  # The state is a logarithm of 1 + theta V_c/D_c.
 
     @property
     def min_weakening_b_over_a(self) -> float:
-        """Steady friction falls as ``b/(1 + V_*/V_c) - a`` with ln V, at V_*."""
+        r"""Smallest b/a for which steady friction decreases with slip rate.
+
+        At :math:`V_*`, the steady friction coefficient decreases with :math:`\ln V` at the rate
+        :math:`b/(1 + V_*/V_c) - a`.
+        """
         return 1.0 + 1.0 / self.cutoff_velocity_ratio
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """b, V_c/(V_c + V_*) and V_*/(V_c + V_*)."""
+        """Return b and the two velocity fractions.
+
+        See the base class. The fractions are :math:`V_c/(V_c + V_*)` and :math:`V_*/(V_c + V_*)`.
+        """
         return (*super().numbers(scene), *self._velocity_fractions())
 
     def relaxation(self, rate: float, slip: float) -> float:
-        """``ln{1 + [(1 + V_c/V_*)/(1 + V_c/V) - 1] exp(-slip/D_c)}``."""
+        r"""Compute the relaxation of stress at constant slip rate.
+
+        Parameters
+        ----------
+        rate : float
+            Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+        slip : float
+            Slip since the velocity step from :math:`V_*`, in :math:`D_c`.
+
+        Returns
+        -------
+        float
+            Difference between the friction coefficient and its steady value, divided by b.
+
+        Notes
+        -----
+        The relaxation is
+
+        .. math::
+
+            \ln\left[1 + \left(\frac{1 + V_c/V_*}{1 + V_c/V} - 1\right) e^{-\delta/D_c}\right].
+        """
         ahead = -steady_state_over_b(rate, *self._velocity_fractions())
         return math.log(-math.expm1(-slip) + math.exp(ahead - slip))
 

@@ -12,24 +12,35 @@ from rsfstudy.slider.scene_view import SceneView
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
-    """Evolution of the state variable per unit slip at constant normal stress.
-
-    ``D_c dTheta/d(delta) = b expm1[-eps (Theta/b + ln(V/V_*))]/eps``: the slowness law at eps = 1
-    and, as eps goes to 0, the slip law.
+    r"""Compute the state evolution per unit slip at constant normal stress.
 
     Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     state : float
-        State variable Theta.
+        State variable :math:`\Theta`.
     p : tuple of float
-        Evolution effect parameter b at LAW, and eps.
+        Parameters of the scene. The function reads :math:`b` from ``p[LAW]`` and :math:`\epsilon`
+        from ``p[LAW + 1]``.
 
     Returns
     -------
     float
-        dTheta over slip in D_c.
+        Rate :math:`D_c \, d\Theta/d\delta`.
+
+    Notes
+    -----
+    The evolution is
+
+    .. math::
+
+        D_c \frac{d\Theta}{d\delta}
+          = \frac{b}{\epsilon} \left\{\exp\left[-\epsilon \left(\frac{\Theta}{b}
+          + \ln\frac{V}{V_*}\right)\right] - 1\right\}.
+
+    The value :math:`\epsilon = 1` gives the slowness law. The limit :math:`\epsilon \to 0` is the
+    slip law.
 
     References
     ----------
@@ -43,7 +54,13 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class LawFamily(Law):
-    """The family between the slip law and the slowness law."""
+    r"""Family of laws between the slip law and the slowness law.
+
+    Parameters
+    ----------
+    law_exponent : float, default: 0.5
+        Exponent :math:`\epsilon` from 0 (slip law) to 1 (slowness law).
+    """
 
     law_exponent: float = number(
         0.5,
@@ -56,15 +73,40 @@ class LawFamily(Law):
     name = "family"
     evolution = staticmethod(evolution)
     scale_free = True
-    has_closed_orbits = True  # dh/du = -(1 + eps h), as at both ends
+    has_closed_orbits = True  # The derivative dh/du = -(1 + eps h) is linear in h.
 
     def relaxation(self, rate: float, slip: float) -> float:
-        """``ln[1 + ((V/V_*)**eps - 1) exp(-slip/D_c)]/eps``."""
+        r"""Compute the relaxation of stress at constant slip rate.
+
+        Parameters
+        ----------
+        rate : float
+            Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+        slip : float
+            Slip since the velocity step from :math:`V_*`, in :math:`D_c`.
+
+        Returns
+        -------
+        float
+            Difference between the friction coefficient and its steady value, divided by b.
+
+        Notes
+        -----
+        The relaxation is
+
+        .. math::
+
+            \frac{1}{\epsilon} \ln\left\{1
+              + \left[\left(\frac{V}{V_*}\right)^\epsilon - 1\right] e^{-\delta/D_c}\right\}.
+        """
         power = self.law_exponent * rate
         if self.law_exponent == 0.0:
             return rate * math.exp(-slip)
         return math.log(-math.expm1(-slip) + math.exp(power - slip)) / self.law_exponent
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """b and eps."""
+        """Return b and the exponent of the law.
+
+        See the base class.
+        """
         return (*super().numbers(scene), self.law_exponent)

@@ -1,4 +1,7 @@
-"""The law of Perrin, Rice and Zheng (1995), symmetric about steady sliding."""
+"""The evolution law of Perrin, Rice and Zheng (1995).
+
+The evolution is an odd function of the distance from steady sliding.
+"""
 
 from __future__ import annotations
 
@@ -9,31 +12,43 @@ from rsfstudy.slider.laws import LARGEST_EXPONENT, Law
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers
 
-#: Distance above steady sliding that only trial steps exceed: a motion ends at ln(V/V_*) = 276, and
-#: the square of what is larger overflows in an estimate of the first step.
+#: Upper limit of the distance from steady sliding. Larger distances occur only in trial steps,
+#: because a motion ends at ln(V/V_*) = 276. The limit also prevents an overflow when the integrator
+#: squares the rate to estimate the first step.
 LARGEST_STEADY_STATE_OFFSET = 300.0
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
-    """Evolution of the state variable per unit slip at constant normal stress.
-
-    ``dtheta/dt = 1 - [V theta/(2 D_c)]**2`` with ``Theta = b ln[theta V_*/(2 D_c)]``, which is 0 in
-    steady sliding at V_*, reads, per unit slip, ``D_c dTheta/d(delta) = -b sinh(Theta/b +
-    ln(V/V_*))``.
+    r"""Compute the state evolution per unit slip at constant normal stress.
 
     Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     state : float
-        State variable Theta.
+        State variable :math:`\Theta`.
     p : tuple of float
-        Evolution effect parameter b, at LAW.
+        Parameters of the scene. The function reads :math:`b` from ``p[LAW]``.
 
     Returns
     -------
     float
-        dTheta over slip in D_c.
+        Rate :math:`D_c \, d\Theta/d\delta`.
+
+    Notes
+    -----
+    The state variable :math:`\Theta` is zero in steady sliding at :math:`V_*`:
+
+    .. math::
+
+        \frac{d\theta}{dt} = 1 - \left(\frac{V \theta}{2 D_c}\right)^2, \quad
+          \Theta = b \ln\frac{\theta V_*}{2 D_c}.
+
+    The evolution per unit slip is
+
+    .. math::
+
+        D_c \frac{d\Theta}{d\delta} = -b \sinh\left(\frac{\Theta}{b} + \ln\frac{V}{V_*}\right).
 
     References
     ----------
@@ -46,8 +61,30 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
 
 
 def relaxation(rate: float, slip: float) -> float:
-    """``2 artanh[tanh(ln(V/V_*)/2) exp(-slip/D_c)]``, written so that it holds digits however far
-    the step.
+    r"""Compute the relaxation of stress at constant slip rate.
+
+    Parameters
+    ----------
+    rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    slip : float
+        Slip since the velocity step from :math:`V_*`, in :math:`D_c`.
+
+    Returns
+    -------
+    float
+        Difference between the friction coefficient and its steady value, divided by b.
+
+    Notes
+    -----
+    The relaxation is
+
+    .. math::
+
+        2 \operatorname{artanh}\left[\tanh\left(\frac{1}{2} \ln\frac{V}{V_*}\right)
+          e^{-\delta/D_c}\right].
+
+    The code uses an equivalent formula that remains accurate for very large velocity steps.
     """
     small, gone = math.exp(-abs(rate)), -math.expm1(-slip)
     above, below = 2.0 - gone + small * gone, gone + small * (2.0 - gone)
@@ -56,7 +93,7 @@ def relaxation(rate: float, slip: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class PerrinRiceZhengLaw(Law):
-    """The law of Perrin, Rice and Zheng."""
+    """Evolution law of Perrin, Rice and Zheng."""
 
     name = "perrin_rice_zheng"
     evolution = staticmethod(evolution)

@@ -1,4 +1,7 @@
-"""The slip law (Ruina 1983): the state variable evolves with slip only."""
+"""The slip law (Ruina 1983).
+
+The state variable evolves only with slip.
+"""
 
 from __future__ import annotations
 
@@ -11,23 +14,29 @@ from rsfstudy.slider.parts import Numbers
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
-    """Evolution of the state variable per unit slip at constant normal stress.
-
-    ``D_c dTheta/d(delta) = -(Theta + b ln(V/V_*))``
+    r"""Compute the state evolution per unit slip at constant normal stress.
 
     Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     state : float
-        State variable Theta.
+        State variable :math:`\Theta`.
     p : tuple of float
-        Evolution effect parameter b, at LAW.
+        Parameters of the scene. The function reads :math:`b` from ``p[LAW]``.
 
     Returns
     -------
     float
-        dTheta over slip in D_c.
+        Rate :math:`D_c \, d\Theta/d\delta`.
+
+    Notes
+    -----
+    The evolution is
+
+    .. math::
+
+        D_c \frac{d\Theta}{d\delta} = -\left(\Theta + b \ln\frac{V}{V_*}\right).
 
     References
     ----------
@@ -38,16 +47,41 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
 
 
 def relaxation(rate: float, slip: float) -> float:
-    """``ln(V/V_*) exp(-slip/D_c)`` (eq. 17b of the paper, less its steady value)."""
+    r"""Compute the relaxation of stress at constant slip rate.
+
+    Parameters
+    ----------
+    rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    slip : float
+        Slip since the velocity step from :math:`V_*`, in :math:`D_c`.
+
+    Returns
+    -------
+    float
+        Difference between the friction coefficient and its steady value, divided by b.
+
+    Notes
+    -----
+    The relaxation is
+
+    .. math::
+
+        \ln\frac{V}{V_*} \, e^{-\delta/D_c}.
+
+    References
+    ----------
+    Eq. 17b of doi:10.1007/s11589-014-0098-4, minus its steady value.
+    """
     return rate * math.exp(-slip)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SlipLaw(Law):
-    """The slip law."""
+    """Slip law, in which the state variable evolves only with slip."""
 
     name = "slip"
     evolution = staticmethod(evolution)
     relaxation = staticmethod(relaxation)
     scale_free = True
-    has_closed_orbits = True  # Gu et al. (1984)
+    has_closed_orbits = True  # See Gu et al. (1984).

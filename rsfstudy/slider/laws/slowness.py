@@ -1,4 +1,7 @@
-"""The slowness (ageing) law (Dieterich): the state variable also evolves in stationary contact."""
+"""The slowness (ageing) law of Dieterich.
+
+The state variable also evolves in stationary contact.
+"""
 
 from __future__ import annotations
 
@@ -11,25 +14,39 @@ from rsfstudy.slider.parts import Numbers
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
-    """Evolution of the state variable per unit slip at constant normal stress.
-
-    ``dtheta/dt = 1 - theta V/D_c`` with ``Theta = b ln(theta V_*/D_c)`` reads, per unit slip,
-    ``D_c dTheta/d(delta) = b [D_c/(theta V) - 1] = b expm1(-(Theta/b + ln(V/V_*)))``;
-    `expm1` keeps all digits close to the steady state theta = D_c/V.
+    r"""Compute the state evolution per unit slip at constant normal stress.
 
     Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     state : float
-        State variable Theta = b ln(theta/theta_*).
+        State variable :math:`\Theta = b \ln(\theta/\theta_*)`.
     p : tuple of float
-        Evolution effect parameter b, at LAW.
+        Parameters of the scene. The function reads :math:`b` from ``p[LAW]``.
 
     Returns
     -------
     float
-        dTheta over slip in D_c.
+        Rate :math:`D_c \, d\Theta/d\delta`.
+
+    Notes
+    -----
+    The slowness law and its state variable are
+
+    .. math::
+
+        \frac{d\theta}{dt} = 1 - \frac{\theta V}{D_c}, \quad \Theta = b \ln\frac{\theta V_*}{D_c}.
+
+    The evolution per unit slip is
+
+    .. math::
+
+        D_c \frac{d\Theta}{d\delta} = b \left(\frac{D_c}{\theta V} - 1\right)
+          = b \left\{\exp\left[-\left(\frac{\Theta}{b} + \ln\frac{V}{V_*}\right)\right] - 1\right\}.
+
+    Close to the steady state :math:`\theta = D_c/V`, the function ``expm1`` avoids the cancellation
+    of digits.
 
     References
     ----------
@@ -41,16 +58,41 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
 
 
 def relaxation(rate: float, slip: float) -> float:
-    """``ln[1 + (V/V_* - 1) exp(-slip/D_c)]`` (eq. 17a of the paper, less its steady value)."""
+    r"""Compute the relaxation of stress at constant slip rate.
+
+    Parameters
+    ----------
+    rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    slip : float
+        Slip since the velocity step from :math:`V_*`, in :math:`D_c`.
+
+    Returns
+    -------
+    float
+        Difference between the friction coefficient and its steady value, divided by b.
+
+    Notes
+    -----
+    The relaxation is
+
+    .. math::
+
+        \ln\left[1 + \left(\frac{V}{V_*} - 1\right) e^{-\delta/D_c}\right].
+
+    References
+    ----------
+    Eq. 17a of doi:10.1007/s11589-014-0098-4, minus its steady value.
+    """
     return math.log(-math.expm1(-slip) + math.exp(rate - slip))
 
 
 @dataclass(frozen=True, kw_only=True)
 class SlownessLaw(Law):
-    """The slowness law."""
+    """Slowness (ageing) law, in which contacts also heal at rest."""
 
     name = "slowness"
     evolution = staticmethod(evolution)
     relaxation = staticmethod(relaxation)
     scale_free = True
-    has_closed_orbits = True  # Ranjith and Rice (1999)
+    has_closed_orbits = True  # See Ranjith and Rice (1999).

@@ -1,4 +1,4 @@
-"""The slip law with two states (Ruina 1983; Gu et al. 1984)."""
+"""The slip law with two state variables (Ruina 1983; Gu et al. 1984)."""
 
 from __future__ import annotations
 
@@ -18,27 +18,33 @@ from rsfstudy.slider.parts import Numbers
 def evolutions(
     log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
 ) -> Numbers:
-    """Evolution of the two states per unit slip at constant normal stress, times a fraction.
-
-    ``L_i dTheta_i/d(delta) = -(Theta_i + b_i ln(V/V_*))``
+    r"""Compute the evolution of both states at constant normal stress.
 
     Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     psis : tuple of float
-        States freed of stress.
+        States :math:`\Psi_1` and :math:`\Psi_2`, which exclude the effect of stress.
     shift : float
-        What stress has taken from both together.
+        Decrease of the sum of the states due to stress.
     fraction : float
-        Slip over what the clock counts.
+        Factor of the result, equal to the slip per unit of the independent variable.
     p : tuple of float
-        Numbers of the law, from `LAW` on.
+        Parameters of the scene. The parameters of the law start at ``p[LAW]``.
 
     Returns
     -------
     tuple of float
-        dTheta_1 and dTheta_2 over slip in D_c = L_1, times the fraction.
+        Rates :math:`D_c \, d\Theta_i/d\delta`, multiplied by ``fraction``.
+
+    Notes
+    -----
+    With :math:`L_1 = D_c`, the evolution is
+
+    .. math::
+
+        L_i \frac{d\Theta_i}{d\delta} = -\left(\Theta_i + b_i \ln\frac{V}{V_*}\right).
     """
     first = psis[0] - p[FIRST_SHARE] * shift + p[FIRST_B] * log_slip_rate
     second = psis[1] - p[SECOND_SHARE] * shift + p[SECOND_B] * log_slip_rate
@@ -47,7 +53,10 @@ def evolutions(
 
 @dataclass(frozen=True, kw_only=True)
 class TwoStateSlipLaw(TwoStateLaw):
-    """The slip law with two states."""
+    """Slip law with two state variables.
+
+    The fields are described in the base class ``TwoStateLaw``.
+    """
 
     name = "two_slip_states"
     evolutions = staticmethod(evolutions)

@@ -1,4 +1,4 @@
-"""The slowness (ageing) law with two states."""
+"""The slowness (ageing) law with two state variables."""
 
 from __future__ import annotations
 
@@ -21,28 +21,42 @@ from rsfstudy.slider.scene_view import SceneView
 def evolutions(
     log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
 ) -> Numbers:
-    """Evolution of the two states per unit slip at constant normal stress, times a fraction.
-
-    ``dtheta_i/dt = 1 - theta_i V/L_i`` with ``Theta_i = b_i ln(theta_i V_*/L_i)`` reads, per unit
-    slip, ``L_i dTheta_i/d(delta) = b_i expm1(-(Theta_i/b_i + ln(V/V_*)))``.
+    r"""Compute the evolution of both states at constant normal stress.
 
     Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     psis : tuple of float
-        States freed of stress.
+        States :math:`\Psi_1` and :math:`\Psi_2`, which exclude the effect of stress.
     shift : float
-        What stress has taken from both together.
+        Decrease of the sum of the states due to stress.
     fraction : float
-        Slip over what the clock counts.
+        Factor of the result, equal to the slip per unit of the independent variable.
     p : tuple of float
-        Numbers of the law, from `LAW` on.
+        Parameters of the scene. The parameters of the law start at ``p[LAW]``.
 
     Returns
     -------
     tuple of float
-        dTheta_1 and dTheta_2 over slip in D_c = L_1, times the fraction.
+        Rates :math:`D_c \, d\Theta_i/d\delta`, multiplied by ``fraction``.
+
+    Notes
+    -----
+    With :math:`L_1 = D_c`, the law and its state variables are
+
+    .. math::
+
+        \frac{d\theta_i}{dt} = 1 - \frac{\theta_i V}{L_i}, \quad
+          \Theta_i = b_i \ln\frac{\theta_i V_*}{L_i}.
+
+    The evolution per unit slip is
+
+    .. math::
+
+        L_i \frac{d\Theta_i}{d\delta}
+          = b_i \left\{\exp\left[-\left(\frac{\Theta_i}{b_i}
+          + \ln\frac{V}{V_*}\right)\right] - 1\right\}.
     """
     first = (psis[0] - p[FIRST_SHARE] * shift) / p[FIRST_B] + log_slip_rate
     second = (psis[1] - p[SECOND_SHARE] * shift) / p[SECOND_B] + log_slip_rate
@@ -54,13 +68,20 @@ def evolutions(
 
 @dataclass(frozen=True, kw_only=True)
 class TwoStateSlownessLaw(TwoStateLaw):
-    """The slowness law with two states."""
+    """Slowness (ageing) law with two state variables.
+
+    The fields are described in the base class ``TwoStateLaw``.
+    """
 
     name = "two_slowness_states"
     evolutions = staticmethod(evolutions)
 
     def check(self, scene: SceneView) -> None:
-        """And no state without effect, which theta would be unknown of."""
+        """Check that both states have an effect.
+
+        See the base class. A state without an effect is rejected because the evolution equations
+        divide by its parameter b.
+        """
         for name in ("b1_over_a", "b2_over_a"):
             if not getattr(self, name):
                 remedy = "One state is law='slowness'."

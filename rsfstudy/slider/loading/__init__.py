@@ -1,6 +1,8 @@
-"""Loading histories of the load point, one file each.
+"""Loading histories of the load point.
 
-A history is a sequence of segments. Before the first, the slider slides steadily at V_*.
+Each module of this package defines one loading history. A loading history is a sequence of
+segments. Before the first segment, the slider slides steadily at the reference velocity
+:math:`V_*`. The base classes are ``Loading`` and ``LoadingAtVelocity``.
 """
 
 from __future__ import annotations
@@ -16,27 +18,34 @@ from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, Part, discover_parts, n
 from rsfstudy.slider.requirements import SLIP_RATE
 from rsfstudy.slider.scene_view import SceneView
 
-#: Duration of a segment in D_c/V_* below which no step of an integrator is taken; from a time of 1
-#: on rounding is longer.
+#: Minimum duration of a segment in D_c/V_*. The integrator cannot resolve shorter segments. At
+#: times above 1, rounding errors of the time exceed this value.
 MIN_SEGMENT_DURATION = 1e-16
 
 
 @guard_methods
 class Segment(NamedTuple):
-    """A part of a loading history.
+    r"""Segment of a loading history.
 
-    Attributes
+    Parameters
     ----------
     load_velocity : float
-        V_0/V_* during the segment.
-    displacement : float
-        Sudden displacement of the load point at its beginning, in D_c.
-    duration : float
-        In D_c/V_*.
-    normal_stress : float
-        By how much imposed normal stress exceeds sigma_* during the segment, over sigma_*. Where a
-        driving stress is inclined to the fault, that is a change of sigma_3, to which what shear
-        stress brings is added.
+        Load point velocity :math:`V_0/V_*` during the segment.
+    displacement : float, default: 0.0
+        Sudden displacement of the load point at the start of the segment, in :math:`D_c`.
+    duration : float, default: inf
+        Duration of the segment in :math:`D_c/V_*`.
+    normal_stress : float, default: 0.0
+        Deviation of the imposed normal stress from :math:`\sigma_*` during the segment, divided by
+        :math:`\sigma_*`. If the driving stress is inclined to the fault, the deviation is a change
+        of :math:`\sigma_3`, and changes of shear stress contribute further to the normal stress.
+
+    Examples
+    --------
+    >>> from rsfstudy import Segment
+    >>> segment = Segment(load_velocity=10.0, duration=2.0)
+    >>> segment.as_dict()
+    {'velocity': 10.0, 'duration': 2.0}
     """
 
     load_velocity: float
@@ -45,7 +54,15 @@ class Segment(NamedTuple):
     normal_stress: float = 0.0
 
     def as_dict(self) -> dict[str, float]:
-        """The segment as `protocol` takes it."""
+        r"""Return the segment as a mapping that ``protocol`` accepts.
+
+        Returns
+        -------
+        dict of str to float
+            Values for the keys ``velocity``, ``step``, ``duration`` and ``normal_stress``. Values
+            that equal the default are omitted. The value of ``normal_stress`` is the imposed normal
+            stress in :math:`\sigma_*`.
+        """
         stated = {"velocity": self.load_velocity}
         if self.displacement:
             stated["step"] = self.displacement
@@ -60,38 +77,79 @@ class Segment(NamedTuple):
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Loading(Part):
-    """Base of the loading histories.
+    r"""Base class of the loading histories.
 
-    What one writes, in a frozen dataclass whose fields are made by `rsfstudy.slider.parts.number`::
+    To define a loading history, write a frozen dataclass with the class attribute ``name`` and the
+    property ``segments``, which returns a tuple of ``Segment``. Declare the fields of the class
+    with ``rsfstudy.parts.number``. A segment has the velocity :math:`V_0/V_*`, a sudden
+    displacement in :math:`D_c`, a duration in :math:`D_c/V_*` and an imposed normal stress in
+    :math:`\sigma_*`. The last segment must have an infinite duration.
 
-        name: ClassVar[str]
-        segments: property -> tuple[Segment, ...]
+    If a loading changes normal stress continuously, the changes are described by unknowns. Such a
+    loading defines the class attributes ``unknowns``, ``auxiliary_rates`` and
+    ``auxiliary_steady_states`` in the same way as ``Fluid``, and the method ``initial_unknowns``.
+    All unknowns must be zero in steady sliding. The last unknown is the decrease of imposed normal
+    stress, divided by :math:`\sigma_*`. The unknowns describe the first segment of the loading, and
+    the other segments have no unknowns.
 
-    ``Segment(load_velocity, displacement=0, duration=inf, normal_stress=0)`` is in V_*, D_c,
-    D_c/V_* and sigma_*. The last segment goes on for ever.
+    Examples
+    --------
+    Define a hold of the load point, followed by reloading:
 
-    One that goes on changing normal stress says by which unknowns: the last of them takes from
-    imposed normal stress, over sigma_*, as pore pressure does. It states `auxiliary_rates` and
-    `auxiliary_steady_states` as a fluid does (see `fluid`), all unknowns being 0 in steady sliding,
-    and what they begin with. They are those of its first segment; what that imposes is beside them,
-    and is what the last one does. Others are without unknowns.
+    >>> from dataclasses import dataclass
+    >>> from rsfstudy import Scene, Segment
+    >>> from rsfstudy.parts import Loading, number
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class Hold(Loading):
+    ...     rest_time: float = number(100.0, "$t_h$", "1", "time of the hold")
+    ...     name = "hold"
+    ...     @property
+    ...     def segments(self):
+    ...         return Segment(0.0, duration=self.rest_time), Segment(1.0)
+    >>> scene = Scene(loading=Hold, rest_time=50.0)
+    >>> scene.parts.loading.segments[0].duration
+    50.0
     """
 
-    #: Whether the last of them is, instead, shear stress by a load point that is ahead of its mean
-    #: motion, less what stands as third of its numbers.
+    #: True if the last unknown determines a shear stress instead of a decrease of normal stress.
+    #: The load point then moves ahead of its mean motion. The shear stress is the unknown minus the
+    #: third value of ``numbers``.
     has_load_point_unknown: ClassVar[bool] = False
     received_quantities = frozenset({SLIP_RATE})
-    #: Whether the fall of normal stress is pore pressure: beside a fluid that has unknowns, that of
-    #: its surroundings.
+    #: True if the decrease of normal stress is a rise of pore pressure. If the fluid has unknowns,
+    #: this is the pore pressure around the fault.
     of_pressure: ClassVar[bool] = True
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
-        """Initial values of its unknowns."""
+        """Return the initial values of the unknowns of the loading.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the loading belongs to.
+
+        Returns
+        -------
+        tuple of float
+            One value per unknown. The base class has no unknowns.
+        """
         return ()
 
     def check(self, scene: SceneView) -> None:
-        """Segments that take time; no fluid that changes normal stress too, unless it is its
-        pressure that is loaded.
+        """Check the segment durations and the fluid of the scene.
+
+        A fluid with unknowns and a loading with unknowns can be combined only if the loading
+        changes the pore pressure around the fault.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the loading belongs to.
+
+        Raises
+        ------
+        InvalidValue
+            If a segment is too short, or if the loading and the fluid both change normal stress.
         """
         if len(self.segments) > 1:
             self._check_durations()
@@ -104,6 +162,7 @@ class Loading(Part):
             raise InvalidValue(name or "loading", value, rule, remedy=remedy)
 
     def _check_durations(self) -> None:
+        """Raise ``InvalidValue`` if a segment is too short."""
         for n, (begins, ends, *_others) in enumerate(self.segment_table):
             if ends - begins < MIN_SEGMENT_DURATION and ends > 0.0:
                 least = f"{MIN_SEGMENT_DURATION:g} D_c/V_*"
@@ -114,21 +173,37 @@ class Loading(Part):
 
     @property
     def has_stress_unknowns(self) -> bool:
-        """True if it has unknowns that change normal stress."""
+        """True if the loading has unknowns that change normal stress."""
         return bool(self.unknowns) and not self.has_load_point_unknown
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """The history; its last segment goes on for ever."""
+        """Segments of the loading, with an infinite last segment."""
         raise TypeError(f"{type(self).__name__} loads nothing")
 
     def describe(self) -> dict[str, Any]:
-        """The history as plain data: its segments, as `protocol` takes them."""
+        """Return the loading history as plain data.
+
+        Returns
+        -------
+        dict
+            List of segments under the key ``"segments"``, in the format that ``protocol`` accepts.
+        """
         return {"segments": [segment.as_dict() for segment in self.segments]}
 
     def isolate_segment(self, index: int) -> Loading | Segment:
-        """One of its segments without the others; the history itself, if it has one only, or
-        unknowns in the first.
+        """Return the loading of a single segment.
+
+        Parameters
+        ----------
+        index : int
+            Index of the segment.
+
+        Returns
+        -------
+        Loading or Segment
+            The segment. The method returns the loading itself if the loading has only one segment,
+            or if the segment is the first and the loading has unknowns.
         """
         history = self.segments
         if len(history) == 1 or (self.unknowns and index == 0):
@@ -137,12 +212,19 @@ class Loading(Part):
 
     @property
     def reported_segment_count(self) -> int:
-        """How many segments a motion tells the beginning of; these are the last ones."""
+        """Number of segments whose start is reported as an event of a motion.
+
+        The reported segments are the last segments of the loading.
+        """
         return len(self.segments) - 1
 
     @property
     def segment_table(self) -> Any:
-        """The segments as motions read them, a row each (see `parameter_layout`)."""
+        """Table of the segments, with one row per segment.
+
+        The columns are the constants ``SEGMENT_START`` to ``SEGMENT_STRESS_FALL`` of
+        ``rsfstudy.parts``.
+        """
         rows, begins = [], 0.0
         for velocity, _step, lasts, _stress in self.segments:
             log = math.log(abs(velocity)) if velocity else -math.inf
@@ -152,37 +234,62 @@ class Loading(Part):
 
     @property
     def jump_mask(self) -> Any:
-        """Whether each segment begins with a jump, of the load point or of normal stress."""
+        """True for each segment that starts with a jump.
+
+        A jump is a sudden change of load point displacement or normal stress, or the end of a
+        segment with unknowns.
+        """
         before, found = 0.0, []
         for place, segment in enumerate(self.segments):
-            ends = place == 1 and bool(self.unknowns)  # which the first segment has
+            ends = place == 1 and bool(self.unknowns)  # Only the first segment has unknowns.
             found.append(ends or segment.displacement != 0.0 or segment.normal_stress != before)
             before = segment.normal_stress
         return found
 
     @property
     def perturbs_steady_sliding(self) -> bool:
-        """True if it changes anything about steady sliding at V_*."""
+        """True if the loading perturbs steady sliding."""
         return bool(self.unknowns) or any(
             s.load_velocity != 1.0 or s.displacement or s.normal_stress for s in self.segments
         )
 
     @property
     def changes_normal_stress(self) -> bool:
-        """True if it changes normal stress."""
+        """True if the loading changes normal stress."""
         return self.has_stress_unknowns or any(segment.normal_stress for segment in self.segments)
 
     @classmethod
     def rejection_error(cls, name: str, value: Any) -> InvalidValue:
+        """Return the error for a field of another loading.
+
+        Parameters
+        ----------
+        name : str
+            Name of the field.
+        value : object
+            Value of the field.
+
+        Returns
+        -------
+        InvalidValue
+            Error whose message names the field that selects the other loading.
+        """
         owners = (p for p in BUILT_IN_PARTS.values() if str(name) in p.__dataclass_fields__)
         wanted = " or ".join(p.selected_by for p in owners if p.selected_by not in ("", name))
         remedy = f"Leave it out, or state {wanted} too." if wanted else "Leave it out."
-        of = getattr(cls, "name", cls.__name__)  # each protocol has a name of its own
+        # A protocol has its name in the instance, not in the class.
+        of = getattr(cls, "name", cls.__name__)
         return InvalidValue(name, value, f"has no meaning for {of}", remedy=remedy)
 
 
 def load_velocity_field() -> Any:
-    """The field of the load point velocity that a history ends with, or is of."""
+    """Declare the field ``load_velocity_ratio`` of a loading.
+
+    Returns
+    -------
+    dataclasses.Field
+        Field for a dataclass, with a default of None.
+    """
     return number(
         None,
         "$V_0/V_*$",
@@ -196,16 +303,22 @@ def load_velocity_field() -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class LoadingAtVelocity(Loading):
-    """Base of the histories that end with a load point velocity, or are of one: V_* unless
-    stated.
+    """Base class of the loadings with a load point velocity.
+
+    The velocity applies to the whole loading or to its last segment. The default is the reference
+    velocity :math:`V_*`.
     """
 
-    if TYPE_CHECKING:  # each states it, so that fields stay in the order that files know
+    # Each subclass declares this field, because the order of the fields must match existing files.
+    if TYPE_CHECKING:
         load_velocity_ratio: float | None
 
     @property
     def load_velocity(self) -> float:
-        """V_0/V_*, but for what oscillates."""
+        """Load point velocity divided by the reference velocity.
+
+        The velocity excludes oscillations.
+        """
         return 1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio
 
 

@@ -1,6 +1,7 @@
-"""A train of waves: what oscillations of normal stress and of the load point share.
+r"""Base class of the oscillations of normal stress and of the load point.
 
-It begins as ``sin(2 pi (t - t_b)/T_o + phase)`` at the time t_b, and ends after some cycles.
+The oscillation is a train of waves. The oscillation begins at the time :math:`t_b` as :math:`\sin[2
+\pi (t - t_b)/T_o + \phi_o]` and ends after a given number of cycles.
 """
 
 from __future__ import annotations
@@ -15,22 +16,37 @@ from rsfstudy.slider.scene_view import SceneView
 
 
 def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
-    """Changes of a harmonic pair (y, P) per unit slip in D_c, times a fraction: ``dy/dt = omega P``
-    and ``dP/dt = -omega y``, so that P = -A sin(omega t) where it begins with y = A and P = 0.
-
-    What numerical errors make of the amplitude decays in a period: to both is added ``(omega/2) [1
-    - (y**2 + P**2)/A**2]`` times y or P, which vanishes along the exact solution.
+    r"""Compute the rates of the two unknowns of a harmonic oscillation.
 
     Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     states : tuple of float
-        y and P.
+        Unknowns :math:`y` and :math:`P`.
     fraction : float
-        What the changes are multiplied by (see `fluid.dilatant.auxiliary_rates`).
+        Factor of the result, equal to the slip per unit of the independent variable.
     p : tuple of float
-        omega D_c/V_* at LOADING, and A behind it.
+        Parameters of the scene. The function reads :math:`\omega D_c/V_*` from ``p[LOADING]`` and
+        the amplitude :math:`A` from ``p[LOADING + 1]``.
+
+    Returns
+    -------
+    tuple of float
+        Changes of :math:`y` and :math:`P` per unit slip in :math:`D_c`, multiplied by ``fraction``.
+
+    Notes
+    -----
+    The unknowns oscillate according to
+
+    .. math::
+
+        \frac{dy}{dt} = \omega P, \quad \frac{dP}{dt} = -\omega y.
+
+    With the initial values :math:`y = A` and :math:`P = 0`, the solution is :math:`P = -A \sin
+    \omega t`. To correct numerical errors of the amplitude within about one period, the function
+    adds the term :math:`(\omega/2) [1 - (y^2 + P^2)/A^2]`, multiplied by :math:`y` or :math:`P`, to
+    each rate. The term vanishes for the exact solution.
     """
     ahead, relief = states
     turn = p[LOADING] * fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
@@ -40,14 +56,40 @@ def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: N
 
 
 def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
-    """No oscillation in steady sliding."""
+    r"""Return the unknowns of the oscillation in steady sliding.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    tuple of float
+        Two zeros, because steady sliding has no oscillation.
+    """
     return 0.0, 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class OscillationBase(LoadingAtVelocity):
-    """Base of the oscillations, under a load point at `load_velocity_ratio`, V_* unless stated: a
-    harmonic pair of unknowns.
+    r"""Base class of the oscillations, with two harmonic unknowns.
+
+    Parameters
+    ----------
+    oscillation_period : float, default: 10.0
+        Period :math:`T_o` in :math:`D_c/V_*`.
+    load_velocity_ratio : float, optional
+        Mean load point velocity :math:`V_0/V_*`. The default is 1.
+    oscillation_begin : float, optional
+        Time :math:`t_b` in :math:`D_c/V_*` at which the oscillation begins. By default the
+        oscillation begins immediately.
+    oscillation_phase : float, optional
+        Initial phase :math:`\phi_o` in degrees. The default is 0.
+    oscillation_cycles : float, optional
+        Number :math:`N_o` of cycles. By default the oscillation has no end.
     """
 
     oscillation_period: float = number(
@@ -90,7 +132,11 @@ class OscillationBase(LoadingAtVelocity):
     auxiliary_steady_states = staticmethod(auxiliary_steady_states)
 
     def check(self, scene: SceneView) -> None:
-        """Slow enough where there is no mass; see `Loading`."""
+        """Check that the scene has inertia if the oscillation is fast.
+
+        See the base class. Without inertia, the period must not be shorter than the period of free
+        oscillation of the slider.
+        """
         super().check(scene)
         free = 2.0 * math.pi * scene.inertial_time
         if self.oscillation_period < free and not scene.has_mass:
@@ -100,23 +146,26 @@ class OscillationBase(LoadingAtVelocity):
 
     @property
     def initial_phase(self) -> float:
-        """Phase where it begins."""
+        """Initial phase of the oscillation in radians."""
         return math.radians(self.oscillation_phase or 0.0)
 
     @property
     def angular_frequency(self) -> float:
-        """omega D_c/V_*."""
+        """Dimensionless angular frequency of the oscillation.
+
+        The unit is :math:`V_*/D_c`.
+        """
         return 2.0 * math.pi / self.oscillation_period
 
     @property
     def oscillation_duration(self) -> float:
-        """How long it oscillates."""
+        """Duration of the oscillation in :math:`D_c/V_*`."""
         cycles = self.oscillation_cycles
         return math.inf if cycles is None else cycles * self.oscillation_period
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """What is before it, itself, and what follows."""
+        """Segments before, during and after the oscillation."""
         steady, begin = Segment(self.load_velocity), self.oscillation_begin
         before = [steady._replace(duration=begin)] if begin else []
         after = [steady] if self.oscillation_duration < math.inf else []
@@ -124,10 +173,19 @@ class OscillationBase(LoadingAtVelocity):
 
     @property
     def jump_mask(self) -> list[bool]:
-        """Its unknowns are those of itself alone, and its phase is one at once."""
+        """True for every segment.
+
+        Every segment starts with a jump, because only the oscillation has unknowns and because its
+        initial phase may be nonzero.
+        """
         return [True] * len(self.segments)
 
     def isolate_segment(self, index: int) -> Loading | Segment:
+        """Return the loading of a single segment.
+
+        See the base class. For the oscillation itself, the method returns a loading that oscillates
+        from the start without an end.
+        """
         segments = self.segments
         if index % len(segments) != bool(self.oscillation_begin):
             return segments[index]

@@ -1,5 +1,6 @@
-"""Oscillating normal stress: what the rig, a tide or a passing wave imposes, for ever or for some
-cycles.
+"""Oscillation of imposed normal stress.
+
+Examples of such oscillations are tides, passing waves and modulations by the testing machine.
 """
 
 from __future__ import annotations
@@ -15,12 +16,27 @@ from rsfstudy.slider.scene_view import SceneView
 
 @dataclass(frozen=True, kw_only=True)
 class NormalStressOscillation(_oscillation_base.OscillationBase):
-    """Oscillation of imposed normal stress under a steady load point velocity V_0.
+    r"""Oscillation of imposed normal stress at a steady load point velocity.
 
-    ``sigma/sigma_* = 1 + A sin(2 pi (t - t_b)/T_o + phi_o)`` for t from t_b to t_b + N_o T_o, with
-    amplitude A, period T_o, phase phi_o in degrees and N_o cycles; sigma = sigma_* before and
-    after. The defaults are t_b = 0, phi_o = 0, no end and V_0 = V_*. Of a driving stress inclined
-    to the fault it is sigma_3 that changes so.
+    If the driving stress is inclined to the fault, the oscillation changes the stress
+    :math:`\sigma_3`. The other fields are described in ``OscillationBase``.
+
+    Parameters
+    ----------
+    oscillation_amplitude : float, default: 0.0
+        Amplitude :math:`A` in :math:`\sigma_*`.
+
+    Notes
+    -----
+    For times from :math:`t_b` to :math:`t_b + N_o T_o`, the imposed normal stress is
+
+    .. math::
+
+        \frac{\sigma}{\sigma_*} = 1 + A \sin\left[\frac{2 \pi (t - t_b)}{T_o} + \phi_o\right].
+
+    Before and after the oscillation, the imposed normal stress is :math:`\sigma_*`. By default the
+    oscillation begins immediately with zero phase, has no end, and the load point velocity is
+    :math:`V_*`.
 
     References
     ----------
@@ -44,17 +60,26 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
     )
 
     def check(self, scene: SceneView) -> None:
-        """Normal stress that stays positive; see `Train`."""
+        """Check that normal stress remains positive.
+
+        See the base class.
+        """
         if self.oscillation_amplitude >= 1.0:
             remedy = "Normal stress stays positive: it oscillates by less than all of it."
             raise self.field_error("oscillation_amplitude", "must be less than 1", remedy)
         super().check(scene)
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
-        """y and P of its phase."""
+        """Return the unknowns y and P for the initial phase.
+
+        See the base class.
+        """
         amplitude, angle = self.oscillation_amplitude, self.initial_phase
         return amplitude * math.cos(angle), -amplitude * math.sin(angle)
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """omega D_c/V_*, and A."""
+        """Return the angular frequency and the amplitude.
+
+        See the base class.
+        """
         return self.angular_frequency, self.oscillation_amplitude

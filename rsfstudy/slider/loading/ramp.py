@@ -1,4 +1,7 @@
-"""A ramp of normal stress: imposed normal stress changes at a steady rate, and then stays."""
+"""Ramp of imposed normal stress.
+
+The imposed normal stress changes at a steady rate and then remains constant.
+"""
 
 from __future__ import annotations
 
@@ -13,35 +16,77 @@ from rsfstudy.slider.scene_view import SceneView
 
 
 def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
-    """Change of P per unit slip in D_c, times a fraction: at a steady rate in time, by which it
-    goes to 0 from all that normal stress is yet to change by, ``dP/dt = -Delta_sigma/t_r``.
+    r"""Compute the rate of the unknown of a ramp.
 
     Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     states : tuple of float
-        P.
+        Unknown :math:`P`, the remaining change of normal stress.
     fraction : float
-        What the change is multiplied by (see `fluid.dilatant.auxiliary_rates`).
+        Factor of the result, equal to the slip per unit of the independent variable.
     p : tuple of float
-        Rate of imposed normal stress in sigma_* V_*/D_c, at LOADING.
+        Parameters of the scene. The function reads the rate of imposed normal stress, in
+        :math:`\sigma_* V_*/D_c`, from ``p[LOADING]``.
+
+    Returns
+    -------
+    tuple of float
+        Change of :math:`P` per unit slip in :math:`D_c`, multiplied by ``fraction``.
+
+    Notes
+    -----
+    The unknown decreases at a steady rate from the total change of normal stress to zero:
+
+    .. math::
+
+        \frac{dP}{dt} = -\frac{\Delta\sigma}{t_r}.
     """
     return (-p[LOADING] * fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS)),)
 
 
 def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
-    """Nothing is left to change in steady sliding."""
+    r"""Return the unknown of the ramp in steady sliding.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    tuple of float
+        Zero, because normal stress is constant in steady sliding.
+    """
     return (0.0,)
 
 
 @dataclass(frozen=True, kw_only=True)
 class NormalStressRamp(LoadingAtVelocity):
-    """Ramp of imposed normal stress under a steady load point velocity V_0, V_* unless stated.
+    r"""Ramp of imposed normal stress at a steady load point velocity.
 
-    ``sigma(t) = sigma_* + Delta_sigma min(t/t_r, 1)`` from steady sliding at t = 0 on, with the
-    change Delta_sigma over sigma_* and the duration t_r in D_c/V_*. Of a driving stress inclined to
-    the fault it is sigma_3 that changes so.
+    The slider slides steadily until the ramp starts. If the driving stress is inclined to the
+    fault, the ramp changes the stress :math:`\sigma_3`.
+
+    Parameters
+    ----------
+    normal_stress_ramp : float, default: 0.0
+        Change :math:`\Delta\sigma` of imposed normal stress in :math:`\sigma_*`.
+    ramp_duration : float, default: 1.0
+        Duration :math:`t_r` of the ramp in :math:`D_c/V_*`.
+    load_velocity_ratio : float, optional
+        Load point velocity :math:`V_0/V_*`. The default is 1.
+
+    Notes
+    -----
+    The imposed normal stress is
+
+    .. math::
+
+        \sigma(t) = \sigma_* + \Delta\sigma \min(t/t_r, 1).
     """
 
     normal_stress_ramp: float = number(
@@ -75,14 +120,20 @@ class NormalStressRamp(LoadingAtVelocity):
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """The ramp, and what follows it."""
+        """Segment of the ramp and the segment after the ramp."""
         last = Segment(self.load_velocity, normal_stress=self.normal_stress_ramp)
         return last._replace(duration=self.ramp_duration), last
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
-        """All of the change is yet to come."""
+        """Return the total change of normal stress.
+
+        See the base class.
+        """
         return (self.normal_stress_ramp,)
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """Its rate."""
+        """Return the rate of imposed normal stress.
+
+        See the base class.
+        """
         return (self.normal_stress_ramp / self.ramp_duration,)

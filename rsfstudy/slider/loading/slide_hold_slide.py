@@ -1,4 +1,4 @@
-"""Slide, hold, slide: the load point stops, and moves on after a while."""
+"""Slide-hold-slide test, in which the load point stops for a given time."""
 
 from __future__ import annotations
 
@@ -10,10 +10,23 @@ from rsfstudy.slider.parts import NON_NEGATIVE, number
 
 @dataclass(frozen=True, kw_only=True)
 class SlideHoldSlide(LoadingAtVelocity):
-    """Hold of the load point for a time, then reloading.
+    r"""Hold of the load point, followed by reloading.
 
-    ``V_load(t) = 0`` for t from 0 to t_h, and ``V_load(t) = V_0`` for t > t_h; t_h is in D_c/V_*,
-    and V_0 is V_* unless stated.
+    Parameters
+    ----------
+    hold_time : float, default: 0.0
+        Duration :math:`t_h` of the hold in :math:`D_c/V_*`.
+    load_velocity_ratio : float, optional
+        Load point velocity :math:`V_0/V_*` after the hold. The default is 1.
+
+    Notes
+    -----
+    The load point velocity is
+
+    .. math::
+
+        V_{\mathrm{load}}(t) = 0 \text{ for } 0 < t < t_h, \quad
+          V_{\mathrm{load}}(t) = V_0 \text{ for } t > t_h.
 
     References
     ----------
@@ -35,5 +48,5 @@ class SlideHoldSlide(LoadingAtVelocity):
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """The hold, and the reloading."""
+        """Segments of the hold and of the reloading."""
         return Segment(0.0, duration=self.hold_time), Segment(self.load_velocity)

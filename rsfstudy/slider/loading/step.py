@@ -1,6 +1,4 @@
-"""A step at the start: of load point velocity, load point displacement, normal stress, or several
-of them.
-"""
+"""Step of velocity, displacement or normal stress at time zero."""
 
 from __future__ import annotations
 
@@ -13,11 +11,28 @@ from rsfstudy.slider.parts import number
 
 @dataclass(frozen=True, kw_only=True)
 class StepLoading(LoadingAtVelocity):
-    """Step of load point velocity, load point displacement or normal stress at t = 0.
+    r"""Step of load velocity, load displacement or normal stress at time zero.
 
-    ``V_load(t) = V_0`` and ``sigma(t) = sigma_* + Delta_sigma`` for t > 0, and the load point moves
-    by ``Delta_delta_0`` at t = 0, by which spring stress changes by k Delta_delta_0. Velocities are
-    over V_*, displacements over D_c and stresses over sigma_*.
+    A displacement step changes the spring stress by :math:`k \Delta\delta_0`. Several steps can be
+    combined.
+
+    Parameters
+    ----------
+    load_velocity_ratio : float, optional
+        Load point velocity :math:`V_0/V_*` after the step. By default the load point stops (0)
+        after a step of displacement or normal stress. Otherwise the default is 1.
+    displacement_step : float, default: 0.0
+        Displacement :math:`\Delta\delta_0` of the load point at time zero, in :math:`D_c`.
+    normal_stress_step : float, default: 0.0
+        Change :math:`\Delta\sigma` of imposed normal stress at time zero, in :math:`\sigma_*`.
+
+    Notes
+    -----
+    For :math:`t > 0`, the load point velocity and the imposed normal stress are
+
+    .. math::
+
+        V_{\mathrm{load}}(t) = V_0, \quad \sigma(t) = \sigma_* + \Delta\sigma.
     """
 
     load_velocity_ratio: float | None = load_velocity_field()
@@ -38,10 +53,10 @@ class StepLoading(LoadingAtVelocity):
 
     @property
     def load_velocity(self) -> float:
-        """V_0/V_* after the step.
+        """Load point velocity after the step, in units of V_*.
 
-        A scene that does not say otherwise holds its load point after a step of displacement or of
-        normal stress (V_0 = 0) and otherwise goes on at the reference rate (V_0 = V_*).
+        By default the load point stops after a step of displacement or normal stress. Otherwise the
+        load point continues at the reference velocity.
         """
         if self.load_velocity_ratio is None and (self.displacement_step or self.normal_stress_step):
             return 0.0
@@ -49,10 +64,11 @@ class StepLoading(LoadingAtVelocity):
 
     @property
     def changes_normal_stress(self) -> bool:
+        """True if the step changes normal stress."""
         return self.normal_stress_step != 0.0
 
     @cached_attribute
     def segments(self) -> tuple[Segment, ...]:
-        """The step, and what follows it."""
+        """Single segment that starts with the step."""
         moved, pressed = self.displacement_step, self.normal_stress_step
         return (Segment(self.load_velocity, moved, normal_stress=pressed),)

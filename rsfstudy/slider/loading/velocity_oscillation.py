@@ -1,4 +1,4 @@
-"""Oscillating load point velocity, for ever or for some cycles."""
+"""Oscillation of the load point velocity."""
 
 from __future__ import annotations
 
@@ -13,14 +13,35 @@ from rsfstudy.slider.scene_view import SceneView
 
 @dataclass(frozen=True, kw_only=True)
 class VelocityOscillation(_oscillation_base.OscillationBase):
-    """Oscillation of load point velocity about its mean V_0.
+    r"""Oscillation of the load point velocity about a mean velocity.
 
-    ``V_load(t) = V_0 [1 + A_V sin(2 pi (t - t_b)/T_o + phi_o)]`` for t from t_b to t_b + N_o T_o,
-    with amplitude A_V over the mean, period T_o, phase phi_o in degrees and N_o cycles, and V_0
-    before and after. The load point is ahead of its mean motion by
-    ``D = R [cos(phi_o) - cos(omega (t - t_b) + phi_o)]`` with ``R = A_V V_0/omega`` and
-    ``omega = 2 pi/T_o``, and so imposes shear stress K D, which its last unknown follows (see
-    `friction`).
+    The other fields are described in ``OscillationBase``.
+
+    Parameters
+    ----------
+    velocity_oscillation : float, optional
+        Amplitude :math:`A_V` of the oscillation, relative to the mean velocity. By default there is
+        no oscillation.
+
+    Notes
+    -----
+    For times from :math:`t_b` to :math:`t_b + N_o T_o`, the load point velocity is
+
+    .. math::
+
+        V_{\mathrm{load}}(t) = V_0 \left\{1 + A_V \sin\left[\frac{2 \pi (t - t_b)}{T_o}
+          + \phi_o\right]\right\}.
+
+    The velocity is :math:`V_0` before and after the oscillation. The displacement of the load point
+    relative to its mean motion is
+
+    .. math::
+
+        D = R \left\{\cos \phi_o - \cos[\omega (t - t_b) + \phi_o]\right\}, \quad
+          R = \frac{A_V V_0}{\omega}, \quad \omega = \frac{2 \pi}{T_o}.
+
+    The displacement imposes the shear stress :math:`K D`, which is represented by the last unknown
+    (see the module ``friction``).
     """
 
     velocity_oscillation: float | None = number(
@@ -41,7 +62,11 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
     )
 
     def check(self, scene: SceneView) -> None:
-        """A load point that moves, back only where slip may; see `Train`."""
+        """Check the amplitude and the mean velocity of the oscillation.
+
+        See the base class. The load point may move backwards only if the law allows reversed slip.
+        The mean velocity must not be zero.
+        """
         if (self.velocity_oscillation or 0.0) > 1.0 and not scene.parts.law.regularised:
             rule = "must be 1 or less: the load point moves back, and friction is of forward slip"
             remedy = "Set regularised=True, by which slip reverses with shear stress."
@@ -52,15 +77,35 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
         super().check(scene)
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
-        """The pair whose last is ``-K R cos(omega t + phase)``."""
+        r"""Return the unknowns for the initial phase.
+
+        See the base class. The last unknown is :math:`-K R \cos(\omega t + \phi_o)`.
+        """
         stress = self.stress_amplitude(scene)
         return -stress * math.sin(self.initial_phase), -stress * math.cos(self.initial_phase)
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """omega D_c/V_*, K R, and what the last unknown begins with."""
+        """Return the parameters of the oscillation.
+
+        The parameters are the angular frequency, the stress amplitude and the initial value of the
+        last unknown.
+
+        See the base class.
+        """
         return self.angular_frequency, self.stress_amplitude(scene), self.initial_unknowns(scene)[1]
 
     def stress_amplitude(self, scene: SceneView) -> float:
-        """K R."""
+        r"""Compute the amplitude of the imposed shear stress.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the loading belongs to.
+
+        Returns
+        -------
+        float
+            Amplitude :math:`K R` in :math:`\sigma_*`.
+        """
         amplitude = (self.velocity_oscillation or 0.0) * self.load_velocity
         return scene.stiffness * amplitude / self.angular_frequency

@@ -1,4 +1,7 @@
-"""A ramp of load point velocity: it changes from V_* at a steady rate, and then stays."""
+"""Ramp of the load point velocity.
+
+The load point velocity changes from :math:`V_*` at a steady rate and then remains constant.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,29 @@ from rsfstudy.slider.parts import POSITIVE, POSITIVE_INTEGER, number
 
 @dataclass(frozen=True, kw_only=True)
 class VelocityRamp(Loading):
-    """Ramp of load point velocity from V_*, divided into stairs.
+    r"""Ramp of the load point velocity, approximated by small steps.
 
-    ``V_load(t) = V_* + Delta_V_0 min(t/t_r, 1)``, with the change Delta_V_0 over V_* and the
-    duration t_r in D_c/V_*. In each of n stairs the load point moves at the mean velocity of the
-    ramp there, ``V_j = V_* + Delta_V_0 (j - 1/2)/n``, so that it is where it should be at the end
-    of each. What that leaves falls with the square of their number.
+    Parameters
+    ----------
+    velocity_ramp : float, default: 0.0
+        Change :math:`\Delta V_0` of the load point velocity in :math:`V_*`.
+    velocity_ramp_duration : float, default: 10.0
+        Duration :math:`t_r` of the ramp in :math:`D_c/V_*`.
+    velocity_ramp_stairs : float, default: 64.0
+        Number :math:`n` of steps that approximate the ramp.
+
+    Notes
+    -----
+    The load point velocity and its approximation by :math:`n` steps are
+
+    .. math::
+
+        V_{\mathrm{load}}(t) = V_* + \Delta V_0 \min(t/t_r, 1), \quad
+          V_j = V_* + \Delta V_0 \frac{j - 1/2}{n}.
+
+    The velocity :math:`V_j` is the mean velocity of the ramp during step :math:`j`, so the load
+    point displacement is exact at the end of each step. The error of the approximation decreases
+    with the square of :math:`n`.
     """
 
     velocity_ramp: float = number(
@@ -48,7 +68,7 @@ class VelocityRamp(Loading):
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """The stairs, and what follows them."""
+        """Segments of the velocity steps and the segment after the ramp."""
         count, change = int(self.velocity_ramp_stairs), self.velocity_ramp
         velocities = [1.0 + change * (stair + 0.5) / count for stair in range(count)]
         lasts = self.velocity_ramp_duration / count

@@ -1,4 +1,4 @@
-"""Velocity steps: the load point velocity steps from V_* to another and back, again and again."""
+"""Sequence of load point velocity steps between two velocities."""
 
 from __future__ import annotations
 
@@ -11,11 +11,28 @@ from rsfstudy.slider.parts import NON_NEGATIVE_INTEGER, POSITIVE, number
 
 @dataclass(frozen=True, kw_only=True)
 class VelocitySteps(Loading):
-    """Steps of load point velocity from V_* to r V_* and back in turn.
+    r"""Alternating steps of the load point velocity between two values.
 
-    ``V_load(t) = r V_*`` after the first step and each second one from there, ``V_load(t) = V_*``
-    after the others. The load point moves by ``Delta_delta_0`` (over D_c) from one step to the
-    next; the velocity that the last leads to goes on for ever.
+    The velocity alternates between :math:`V_*` and :math:`r V_*`. The load point moves by the same
+    displacement between successive steps. After the last step, the velocity remains constant.
+
+    Parameters
+    ----------
+    velocity_steps : float, default: 0.0
+        Number of velocity steps.
+    velocity_ratio : float, default: 10.0
+        Ratio :math:`r` of the load point velocity after the first step to :math:`V_*`.
+    displacement_between_steps : float, default: 20.0
+        Load point displacement :math:`\Delta\delta_0` between successive steps, in :math:`D_c`.
+
+    Notes
+    -----
+    The load point velocity is
+
+    .. math::
+
+        V_{\mathrm{load}}(t) = r V_* \text{ after steps } 1, 3, \ldots, \quad
+          V_{\mathrm{load}}(t) = V_* \text{ after steps } 2, 4, \ldots
     """
 
     velocity_steps: float = number(
@@ -47,7 +64,7 @@ class VelocitySteps(Loading):
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """One after each step."""
+        """Segments of the loading, with one segment per step."""
         count, moves = int(self.velocity_steps), self.displacement_between_steps
         velocities = [1.0 if number_ % 2 else self.velocity_ratio for number_ in range(count)]
         lasts = [*(moves / velocity for velocity in velocities[:-1]), math.inf]

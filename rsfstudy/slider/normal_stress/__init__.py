@@ -1,4 +1,8 @@
-"""Normal stress while shear stress changes, one file a case."""
+"""Normal stress conditions of the fault.
+
+Each module of this package defines one normal stress condition. A normal stress condition defines
+how normal stress depends on shear stress and on the loading. The base class is ``NormalStress``.
+"""
 
 from __future__ import annotations
 
@@ -15,11 +19,21 @@ from rsfstudy.slider.scene_view import SceneView
 @renamed_members
 @dataclass(frozen=True, kw_only=True)
 class NormalStress(Part):
-    """Base of the cases of normal stress.
+    r"""Base class of the normal stress conditions.
 
-    A case states ``normal_stress(friction, p) -> (excess, change)``: normal stress over its
-    reference value less 1, and its derivative with respect to frictional stress over sigma_*. None
-    where normal stress is constant.
+    If normal stress is not constant, define the function ``normal_stress(friction, p) -> (excess,
+    change)`` as a static method. The argument ``friction`` is the deviation of frictional stress
+    from its reference value, divided by :math:`\sigma_*`. The function returns
+    :math:`\sigma/\sigma_* - 1` and its derivative with respect to ``friction``.
+
+    Examples
+    --------
+    >>> from rsfstudy.parts import NormalStress
+    >>> from rsfstudy.slider.normal_stress.variable import VariableNormalStress
+    >>> issubclass(VariableNormalStress, NormalStress)
+    True
+    >>> round(VariableNormalStress(phi=45.0).coupling[0], 6)
+    1.0
     """
 
     derived_properties = ("depends_on_shear_stress", "coupling", "min_frictional_stress")
@@ -29,23 +43,44 @@ class NormalStress(Part):
 
     @property
     def state_effect(self) -> Function | None:
-        """``state_effect(friction, ratio, change, p) -> (shift, slope)``: by how much normal stress
-        lowers the state variable, and its derivative with respect to friction.
+        """Effect of normal stress on the state variable.
+
+        The property is None if normal stress has no effect on the state. Otherwise the effect is a
+        function ``state_effect(friction, ratio, change, p) -> (shift, slope)``. The shift is the
+        decrease of the state variable due to normal stress, and the slope is the derivative of the
+        shift with respect to frictional stress.
         """
         return None
 
     @property
     def depends_on_shear_stress(self) -> bool:
-        """True if normal stress changes while slip goes on, and not by the loading alone."""
+        """True if normal stress changes during slip under steady loading."""
         return bool(self.effects)
 
     @property
     def coupling(self) -> tuple[float, float] | None:
-        """d sigma/d tau, and the effect alpha of normal stress on the state, if that is all."""
+        r"""Coupling coefficients of normal stress.
+
+        The coefficients are the derivative of normal stress with respect to shear stress, and the
+        coefficient :math:`\alpha` of the effect of normal stress on the state. The value is None if
+        two coefficients do not describe the condition completely.
+        """
         return None
 
     def min_frictional_stress(self, scene: SceneView) -> float:
-        """Deviation of frictional stress, over sigma_*, at which normal stress vanishes."""
+        r"""Compute the frictional stress at which normal stress vanishes.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the condition belongs to.
+
+        Returns
+        -------
+        float
+            Deviation of frictional stress from its reference value, in :math:`\sigma_*`. The base
+            class returns negative infinity.
+        """
         return -math.inf
 
 

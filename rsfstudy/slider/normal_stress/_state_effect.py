@@ -1,4 +1,7 @@
-"""The effect of normal stress on the state variable, which a rise of normal stress lowers."""
+"""Effect of normal stress on the state variable (Linker and Dieterich 1992).
+
+An increase of normal stress decreases the state variable.
+"""
 
 from __future__ import annotations
 
@@ -13,21 +16,36 @@ from rsfstudy.slider.parts import NON_NEGATIVE, Function, Numbers, number
 def linker_dieterich_effect(
     friction: float, ratio: float, change: float, p: Numbers
 ) -> tuple[float, float]:
-    """State variable lost to the present normal stress, and its derivative with respect to shear
-    stress.
-
-    ``dTheta = -alpha dsigma/sigma`` integrates to ``Theta = Psi - alpha ln(sigma/sigma_*)``, where
-    Psi knows nothing of normal stress, and does not change where that is changed suddenly; the
-    derivative of the shift is ``alpha s'/s`` with s the normal stress ratio.
+    r"""Compute the decrease of the state variable due to normal stress.
 
     Parameters
     ----------
     friction : float
-        Deviation of shear stress, over sigma_*.
-    ratio, change : float
-        Normal stress ratio s, and its derivative with respect to shear stress.
+        Deviation of frictional stress from its reference value, in :math:`\sigma_*`.
+    ratio : float
+        Normal stress ratio :math:`s = \sigma/\sigma_*`.
+    change : float
+        Derivative :math:`s'` of the normal stress ratio with respect to frictional stress.
     p : tuple of float
-        Strength of the effect alpha, at NORMAL_STRESS.
+        Parameters of the scene. The function reads :math:`\alpha` from ``p[NORMAL_STRESS]``.
+
+    Returns
+    -------
+    shift : float
+        Decrease of the state variable, :math:`\Psi - \Theta`.
+    slope : float
+        Derivative of the shift with respect to frictional stress.
+
+    Notes
+    -----
+    The integral of :math:`d\Theta = -\alpha \, d\sigma/\sigma` is
+
+    .. math::
+
+        \Theta = \Psi - \alpha \ln s, \quad \text{slope} = \frac{\alpha s'}{s}.
+
+    The state :math:`\Psi` does not depend on normal stress, so :math:`\Psi` remains constant when
+    normal stress changes suddenly.
 
     References
     ----------
@@ -39,7 +57,13 @@ def linker_dieterich_effect(
 
 @dataclass(frozen=True, kw_only=True)
 class NormalStressWithStateEffect(NormalStress):
-    """Base of the cases in which normal stress changes: the strength `alpha` of the effect."""
+    r"""Base class of the conditions with variable normal stress.
+
+    Parameters
+    ----------
+    alpha : float, default: 0.56
+        Coefficient :math:`\alpha` of the effect of normal stress on the state variable.
+    """
 
     alpha: float = number(
         0.56, r"$\alpha$", "1", "normal stress effect on the state variable", rule=NON_NEGATIVE
@@ -47,8 +71,13 @@ class NormalStressWithStateEffect(NormalStress):
 
     @property
     def state_effect(self) -> Function | None:
+        """Effect of normal stress on the state variable.
+
+        The property is None if ``alpha`` is zero.
+        """
         return linker_dieterich_effect if self.alpha else None
 
     @property
     def effects(self) -> tuple[str, ...]:
+        """Names of the effects that are active."""
         return ("linker_dieterich",) if self.alpha else ()

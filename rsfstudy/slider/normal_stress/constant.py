@@ -11,14 +11,26 @@ from rsfstudy.slider.scene_view import SceneView
 
 @dataclass(frozen=True, kw_only=True)
 class ConstantNormalStress(NormalStress):
-    """Constant normal stress, ``sigma = sigma_*``: nothing to add to the friction relation."""
+    r"""Constant normal stress.
+
+    Notes
+    -----
+    The normal stress is
+
+    .. math::
+
+        \sigma = \sigma_*.
+    """
 
     name = "constant"
     rejection_hint = "while normal stress is constant", "set normal_stress='variable'"
     coupling = (0.0, 0.0)
 
     def check(self, scene: SceneView) -> None:
-        """Nothing that changes it."""
+        """Check that the loading does not change normal stress.
+
+        See the base class.
+        """
         if scene.parts.loading.changes_normal_stress:
             remedy = "Set normal_stress='imposed', or 'variable' where it follows shear stress too."
             rule = "is changed by the loading"

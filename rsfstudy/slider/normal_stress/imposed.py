@@ -1,5 +1,6 @@
-"""Imposed normal stress: constant but where the loading changes it, as on a rig with a normal load
-of its own; a rise of it lowers the state variable.
+"""Normal stress imposed by the loading, independent of shear stress.
+
+An example is a testing machine that applies normal load and shear load separately.
 """
 
 from __future__ import annotations
@@ -13,18 +14,39 @@ from rsfstudy.slider.scene_view import SceneView
 
 
 def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
-    """Normal stress over its reference value less 1: what the loading has made of it, whatever
-    shear stress does.
+    r"""Compute the imposed normal stress.
+
+    Parameters
+    ----------
+    friction : float
+        Deviation of frictional stress. The function ignores this argument.
+    p : tuple of float
+        Parameters of the scene. The function reads the imposed change of normal stress from
+        ``p[IMPOSED_NORMAL_STRESS]``.
+
+    Returns
+    -------
+    excess : float
+        Normal stress ratio minus one, :math:`\sigma/\sigma_* - 1`.
+    change : float
+        Derivative of the excess with respect to frictional stress, which is zero.
     """
     return p[IMPOSED_NORMAL_STRESS], 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class ImposedNormalStress(NormalStressWithStateEffect):
-    """Normal stress that the loading imposes, with an effect `alpha` of it on the state.
+    r"""Imposed normal stress with an effect on the state variable.
 
-    ``sigma = sigma_* + Delta_sigma(t)`` and ``dTheta = -alpha dsigma/sigma`` beside the evolution
-    law.
+    The field ``alpha`` is described in ``NormalStressWithStateEffect``.
+
+    Notes
+    -----
+    The normal stress and its effect on the state variable, in addition to the evolution law, are
+
+    .. math::
+
+        \sigma = \sigma_* + \Delta\sigma(t), \quad d\Theta = -\alpha \frac{d\sigma}{\sigma}.
 
     References
     ----------
@@ -41,8 +63,16 @@ class ImposedNormalStress(NormalStressWithStateEffect):
 
     @property
     def coupling(self) -> tuple[float, float]:
+        r"""Coupling coefficients of normal stress.
+
+        The first coefficient is zero, because normal stress does not depend on shear stress. The
+        second coefficient is :math:`\alpha`.
+        """
         return 0.0, self.alpha
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """alpha."""
+        """Return the coefficient of the effect on the state.
+
+        See the base class.
+        """
         return (self.alpha,)

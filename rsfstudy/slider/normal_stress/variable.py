@@ -1,5 +1,7 @@
-"""Variable normal stress: a driving stress inclined to the fault couples normal to shear stress,
-and a rise of normal stress lowers the state variable. What the loading imposes adds to sigma_3.
+r"""Normal stress that varies with shear stress.
+
+A driving stress inclined to the fault couples normal stress to shear stress. Changes of normal
+stress that the loading imposes are changes of :math:`\sigma_3`.
 """
 
 from __future__ import annotations
@@ -19,19 +21,32 @@ from rsfstudy.slider.scene_view import SceneView
 
 
 def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
-    """Normal stress over its reference value less 1, and its derivative with respect to shear
-    stress.
-
-    ``sigma/sigma_* = 1 + e + cot(phi) (tau - tau_*)/sigma_*``, from sigma = sigma_3 + tau cot(phi),
-    where the loading has changed sigma_3 by e sigma_*; shear stress knows nothing of that.
+    r"""Compute the normal stress under an inclined driving stress.
 
     Parameters
     ----------
     friction : float
-        Deviation of shear stress, (tau - tau_*)/sigma_*.
+        Deviation of frictional stress, :math:`(\tau - \tau_*)/\sigma_*`.
     p : tuple of float
-        Cotangent of the angle between the driving stress and the fault normal, at NORMAL_STRESS
-        + 1.
+        Parameters of the scene. The function reads :math:`\cot\phi` from ``p[NORMAL_STRESS + 1]``.
+
+    Returns
+    -------
+    excess : float
+        Normal stress ratio minus one, :math:`\sigma/\sigma_* - 1`.
+    change : float
+        Derivative of the excess with respect to frictional stress.
+
+    Notes
+    -----
+    If the loading changes :math:`\sigma_3` by :math:`e \sigma_*`, the relation :math:`\sigma =
+    \sigma_3 + \tau \cot\phi` gives
+
+    .. math::
+
+        \frac{\sigma}{\sigma_*} = 1 + e + \cot\phi \, \frac{\tau - \tau_*}{\sigma_*}.
+
+    The change of :math:`\sigma_3` does not affect shear stress.
     """
     cot_phi = p[NORMAL_STRESS + 1]
     excess = cot_phi * friction + p[IMPOSED_NORMAL_STRESS]
@@ -42,10 +57,22 @@ def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class VariableNormalStress(NormalStressWithStateEffect):
-    """A driving stress inclined at `phi`, with an effect `alpha` of normal stress on the state.
+    r"""Normal stress coupled to shear stress by an inclined driving stress.
 
-    ``sigma = sigma_3 + tau cot(phi)``, and ``dTheta = -alpha dsigma/sigma`` beside the evolution
-    law.
+    Parameters
+    ----------
+    alpha : float, default: 0.56
+        Coefficient :math:`\alpha` of the effect of normal stress on the state variable.
+    phi : float, default: 60.0
+        Angle :math:`\phi` between the driving stress and the fault normal, in degrees.
+
+    Notes
+    -----
+    The normal stress and its effect on the state variable, in addition to the evolution law, are
+
+    .. math::
+
+        \sigma = \sigma_3 + \tau \cot\phi, \quad d\Theta = -\alpha \frac{d\sigma}{\sigma}.
 
     References
     ----------
@@ -66,26 +93,42 @@ class VariableNormalStress(NormalStressWithStateEffect):
 
     @property
     def cot_phi(self) -> float:
-        """d sigma/d tau."""
+        """Derivative of normal stress with respect to shear stress."""
         return 1.0 / math.tan(math.radians(self.phi))
 
     @property
     def coupling(self) -> tuple[float, float]:
+        r"""Coupling coefficients of normal stress.
+
+        The coefficients are :math:`\cot\phi` and :math:`\alpha`.
+        """
         return self.cot_phi, self.alpha
 
     @property
     def effects(self) -> tuple[str, ...]:
+        """Names of the effects that are active."""
         return ("inclined_driving", *super().effects)
 
     def numbers(self, scene: SceneView) -> Numbers:
-        """alpha and cot(phi)."""
+        """Return the coefficient alpha and the cotangent of phi.
+
+        See the base class.
+        """
         return self.alpha, self.cot_phi
 
     def min_frictional_stress(self, scene: SceneView) -> float:
+        """Compute the frictional stress at which normal stress vanishes.
+
+        See the base class.
+        """
         return -(1.0 + scene.imposed_normal_stress) / self.cot_phi
 
     def check(self, scene: SceneView) -> None:
-        """An angle at which normal stress varies, and sigma_3 is positive."""
+        r"""Check the angle of the driving stress.
+
+        See the base class. The angle must be greater than :math:`\arctan\mu_*`, because
+        :math:`\sigma_3` must be positive, and less than 90 degrees.
+        """
         if self.phi >= 90.0:
             remedy = "At 90 degrees it no longer varies: set normal_stress='constant'."
             raise self.field_error("phi", "must lie between 0 and 90 degrees", remedy)
