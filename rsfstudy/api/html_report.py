@@ -17,6 +17,7 @@ from urllib.parse import quote
 import xarray as xr
 
 from rsfstudy.api import study_runs
+from rsfstudy.api.result_paths import output_directory
 from rsfstudy.defaults import FIGURE_FORMATS, OUTPUT_DIRECTORY
 from rsfstudy.error_boundary import check_regular_file, error_boundary, format_exception
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, shorten
@@ -36,7 +37,7 @@ from rsfstudy.reporting import (
     summary_pieces,
 )
 from rsfstudy.status import Status
-from rsfstudy.storage import is_single_scene, output_directory, read_dataset, read_declaration
+from rsfstudy.storage import is_single_scene, read_dataset, read_declaration
 
 _UNREADABLE = "cannot be read"
 #: What begins a page of ours, and a figure.

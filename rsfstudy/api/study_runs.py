@@ -14,22 +14,19 @@ import xarray as xr
 
 from rsfstudy.api import export
 from rsfstudy.api.progress import compile_with_notice, show_progress
+from rsfstudy.api.result_paths import find_results, output_directory
 from rsfstudy.defaults import CELL_TIME_LIMIT, OUTPUT_DIRECTORY
 from rsfstudy.error_boundary import error_boundary, user_stacklevel
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning
 from rsfstudy.execution import (
     OutputOptions,
-    StudyRun,
-    Task,
     Workers,
-    code_fingerprint,
-    compute_serially,
     count_failures,
+    prepare_study_run,
     run_fingerprint,
-    serialize_task,
 )
 from rsfstudy.measures import Outcome
-from rsfstudy.motion import COMPILED, check_engine, user_stepper
+from rsfstudy.motion import COMPILED, check_engine
 from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.quantities import html_table
 from rsfstudy.reporting import refusal_reasons, slow_norm_note
@@ -41,9 +38,7 @@ from rsfstudy.storage import (
     compare_same_lattice,
     find_cell_number,
     find_differences,
-    find_results,
     is_single_scene,
-    output_directory,
     read_dataset,
     read_declaration,
     read_provenance,
@@ -194,18 +189,7 @@ def prepare_run(
     Raises `InvalidValue` for anything wrong with the study or the options.
     """
     check_engine(study.accuracy.engine)
-    task = Task(
-        study.base,
-        study.measure,
-        study.accuracy,
-        workers.time_limit,
-        user_parts=tuple(study.user_parts.values()),
-        steppers=user_stepper(study.accuracy.engine),
-        code_fingerprint=code_fingerprint(study.accuracy.engine, study.user_classes),
-    )
-    if workers.cell_mapper() is not compute_serially:
-        serialize_task(task)  # raises before any work if it cannot be sent
-    ready = StudyRun(study, keeping, task, workers.count_concurrent_cells())
+    ready = prepare_study_run(study, keeping, workers)
 
     def run() -> xr.Dataset:
         if study.accuracy.engine == COMPILED:

@@ -29,7 +29,6 @@ from rsfstudy.reporting import (
     Table,
     all_answered,
     claims_table,
-    contents_table,
     count_pending,
     count_verdicts,
     describe_fields,
@@ -423,3 +422,16 @@ def _print_agreement_table(frame: pd.DataFrame) -> None:
         for row in frame.to_dict("records")
     ]
     table_layout.print_piece(Table(rows))
+
+
+def contents_table(dataset: xr.Dataset) -> Table:
+    """The results that a file holds, what they are and along what."""
+    rows = [
+        {
+            "it holds": str(name),  # what a notebook added may have no words
+            "what": f"{v.attrs.get('long_name', '')} ({', '.join(map(str, v.dims))})".strip(),
+        }
+        for name, v in dataset.data_vars.items()
+        if coverage_content_type(str(name)) == "modelResult"
+    ]
+    return Table(rows, wrappable={"what"})

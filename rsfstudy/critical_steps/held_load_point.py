@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+from rsfstudy.critical_steps.slow_manifold import inertia_matters
 from rsfstudy.motion import (
     Accuracy,
     Event,
@@ -18,7 +19,6 @@ from rsfstudy.motion import (
     MotionStopped,
     WorkMeter,
     fall,
-    inertia_matters,
     integrate_events,
     maximum,
     rise,

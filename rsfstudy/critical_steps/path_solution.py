@@ -12,13 +12,8 @@ from dataclasses import dataclass, replace
 from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.forward_motion import stability_margin
 from rsfstudy.critical_steps.shooting import LOOSE_TOLERANCE, StepFamily
-from rsfstudy.motion import (
-    MIN_LOCAL_TOLERANCE,
-    Accuracy,
-    WorkMeter,
-    estimate_error,
-    slow_manifold_error,
-)
+from rsfstudy.critical_steps.slow_manifold import slow_manifold_error
+from rsfstudy.motion import MIN_LOCAL_TOLERANCE, Accuracy, WorkMeter, estimate_error
 
 #: Part of the accuracy asked for to which the errors of two paths may agree by chance.
 _COINCIDENCE_FLOOR = 0.004

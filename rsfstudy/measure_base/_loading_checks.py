@@ -1,71 +1,9 @@
-"""Checks of scenes: of one step, after which a motion decides, and of what settles or repeats."""
+"""Checks of scenes: of what settles or repeats."""
 
 from __future__ import annotations
 
-import math
-
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base.measure import Outcome
-from rsfstudy.slider import Scene, SliderParameters
-from rsfstudy.status import Status
-
-#: Slip rate over that of the load point from which on a norm is that of an instability.
-_MIN_NORM_TO_LOAD_RATIO = 1e3
-#: How a text begins that tells of a slower one.
-SLOW_NORM_PREFIX = "the instability norm "
-
-
-def check_single_step(scene: Scene) -> None:
-    """Refuse a loading of several segments, and one that changes normal stress all along."""
-    check_steady_loading(scene)
-    loading = scene.parts.loading
-    if len(loading.segments) > 1:
-        rule = "is no single step, after which a motion decides"
-        remedy = "Read its peaks by step_response, or by simulate."
-        raise InvalidValue("loading", loading.name, rule, remedy=remedy)
-
-
-def norm_below_loading_outcome(scene: Scene, load_velocity: float = 0.0) -> Outcome:
-    """The outcome where steady sliding before the step, or the load point after it, has the norm
-    already.
-
-    Parameters
-    ----------
-    scene : Scene
-    load_velocity : float
-        That after the step, over V_*.
-    """
-    norm, least = scene.instability_norm, scene.inertial_time * max(1.0, abs(load_velocity))
-    return Outcome(
-        Status.NORM_BELOW_LOADING_RATE,
-        message=f"norm {norm:g} is reached by the loading alone, whose norm is {least:.3g}: give "
-        f"instability_norm= well above that, or period= (here {scene.period:g} s) well below "
-        f"{scene.period * norm / least:.3g} s",
-    )
-
-
-def slow_norm_warning(scene: Scene, load_velocity: float) -> str:
-    """A text where the norm is so slow that it tells little: within a thousand times the load point
-    velocity. Scenes at the default reference rate are those of published studies, and of no rig.
-
-    Parameters
-    ----------
-    scene : Scene
-    load_velocity : float
-        That after the step, over V_*.
-    """
-    rate, load = math.exp(scene.log_instability_rate), max(1.0, abs(load_velocity))
-    if (
-        rate >= _MIN_NORM_TO_LOAD_RATIO * load
-        or scene.reference_rate == SliderParameters.reference_rate
-    ):
-        return ""
-    return (
-        f"{SLOW_NORM_PREFIX}{scene.instability_norm:g} is a slip rate of {rate:.3g} V_*, only "
-        f"{rate / load:.3g} times that of the load point: what reaches it may be no instability. "
-        f"Give one above {_MIN_NORM_TO_LOAD_RATIO * load:.3g} V_*, of a rig as a slip rate, as in "
-        "rig.scene(instability_norm='10 mm/s')"
-    )
+from rsfstudy.slider import Scene
 
 
 def check_steady_loading(scene: Scene) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from rsfstudy.critical_steps import SLOW_NORM_PREFIX
 from rsfstudy.execution import count_failures, count_statuses
 from rsfstudy.formatting import (
     format_fields,
@@ -22,7 +23,6 @@ from rsfstudy.formatting import (
     pluralize,
     read_flag_meanings,
 )
-from rsfstudy.measure_base import SLOW_NORM_PREFIX
 from rsfstudy.quantities import units_or_scale
 from rsfstudy.rig import (
     AXIS_NAME,
@@ -35,9 +35,9 @@ from rsfstudy.rig import (
     unit_factor,
 )
 from rsfstudy.status import STATUS_LABELS, Status
-from rsfstudy.storage import find_primary_output, read_declaration, read_provenance, thin_dimensions
+from rsfstudy.storage import find_primary_output, read_declaration, read_provenance
 from rsfstudy.study import NOT_APPLICABLE, VERDICTS, format_claim_row
-from rsfstudy.vocabulary import coverage_content_type, find_quantity
+from rsfstudy.vocabulary import find_quantity
 
 #: Most cells of a lattice that are shown, unless few more are all; and most that failed.
 MAX_CELLS, _MAX_CELLS_SHOWN_ENTIRELY, _MAX_FAILURES = 24, 36, 20
@@ -396,14 +396,19 @@ def count_pending(dataset: xr.Dataset) -> int:
     return int((dataset["status"] == int(Status.PENDING)).sum())
 
 
-def contents_table(dataset: xr.Dataset) -> Table:
-    """The results that a file holds, what they are and along what."""
-    rows = [
-        {
-            "it holds": str(name),  # what a notebook added may have no words
-            "what": f"{v.attrs.get('long_name', '')} ({', '.join(map(str, v.dims))})".strip(),
-        }
-        for name, v in dataset.data_vars.items()
-        if coverage_content_type(str(name)) == "modelResult"
-    ]
-    return Table(rows, wrappable={"what"})
+def thin_dimensions(sizes: Mapping[str, int], most: int) -> dict[str, np.ndarray]:
+    """Points of each dimension, both ends and some between, that make so many cells at most.
+
+    Parameters
+    ----------
+    sizes : mapping of str to int
+    most : int
+        The longest dimensions are thinned first.
+    """
+    kept = {dimension: min(size, most) for dimension, size in sizes.items()}
+    while math.prod(kept.values()) > most:
+        kept[max(kept, key=kept.__getitem__)] -= 1
+    return {
+        dimension: np.unique(np.linspace(0, size - 1, kept[dimension]).round().astype(int))
+        for dimension, size in sizes.items()
+    }

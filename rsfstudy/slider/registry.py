@@ -285,17 +285,6 @@ def normalise_field_value(field: str, value: Any) -> Any:
     return canonical_law_name(value) if field == "law" and isinstance(value, str) else value
 
 
-def find_named_user_parts(
-    names: Iterable[str], rows: Iterable[Mapping[str, Any]]
-) -> dict[str, UserPart]:
-    """The parts of the user's own that rows name in some fields, by name."""
-    slots = [slot for slot in SLOTS if slot.user_parts and slot.name in names]
-    places = ((slot, row.get(slot.name)) for row in rows for slot in slots)
-    return {
-        n: slot.user_parts[n] for slot, n in places if isinstance(n, str) and n in slot.user_parts
-    }
-
-
 def names_to_parts(values: Mapping[str, Any], parts: Mapping[str, UserPart]) -> Mapping[str, Any]:
     """Values of fields, with these parts themselves instead of their names."""
     if not parts:
@@ -319,11 +308,6 @@ def scene_fields(parts: Iterable[UserPart]) -> dict[str, Quantity]:
                 rule = "is the name of something else, of another part"
                 raise InvalidValue(f"field of {kind.name}", about.name, rule)
     return found
-
-
-def user_field_quantities(parts: Iterable[UserPart]) -> Iterator[Quantity]:
-    """Quantities of the fields that parts of the user's own add to those of every scene."""
-    return (about for name, about in scene_fields(parts).items() if name not in FIELD_NAMES)
 
 
 def field_types(parts: Iterable[UserPart]) -> Mapping[str, Any]:

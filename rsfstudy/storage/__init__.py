@@ -28,16 +28,14 @@ if TYPE_CHECKING:
         find_differences,
         read_timings,
     )
-    from rsfstudy.storage.lattice import assemble_dataset, build_coordinates, thin_dimensions
+    from rsfstudy.storage.lattice import assemble_dataset, build_coordinates
     from rsfstudy.storage.loadings import read_loadings
     from rsfstudy.storage.rebuild import (
         find_primary_output,
         has_user_code,
-        load_user_figure,
         rebuild_study,
         study_from_declaration,
     )
-    from rsfstudy.storage.result_paths import find_results, output_directory
     from rsfstudy.storage.schema import (
         build_axis,
         build_scene,
@@ -71,16 +69,14 @@ else:
                 "find_differences",
                 "read_timings",
             ),
-            "storage.lattice": ("assemble_dataset", "build_coordinates", "thin_dimensions"),
+            "storage.lattice": ("assemble_dataset", "build_coordinates"),
             "storage.loadings": ("read_loadings",),
             "storage.rebuild": (
                 "find_primary_output",
                 "has_user_code",
-                "load_user_figure",
                 "rebuild_study",
                 "study_from_declaration",
             ),
-            "storage.result_paths": ("find_results", "output_directory"),
             "storage.schema": (
                 "build_axis",
                 "build_scene",
@@ -118,12 +114,9 @@ __all__ = [
     "find_cell_number",
     "find_differences",
     "find_primary_output",
-    "find_results",
     "has_user_code",
     "invalid_part_error",
     "is_single_scene",
-    "load_user_figure",
-    "output_directory",
     "read_dataset",
     "read_declaration",
     "read_json_attribute",
@@ -134,7 +127,6 @@ __all__ = [
     "read_timings",
     "rebuild_study",
     "study_from_declaration",
-    "thin_dimensions",
     "write_dataset",
     "write_store",
 ]
