@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from rsfstudy.api.export import to_dataframe
     from rsfstudy.api.html_report import write_report
     from rsfstudy.api.result_paths import find_results
     from rsfstudy.api.simulation import BEYOND_NORM_ATTRIBUTE
@@ -21,7 +20,6 @@ else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
-            "api.export": ("to_dataframe",),
             "api.html_report": ("write_report",),
             "api.result_paths": ("find_results",),
             "api.simulation": ("BEYOND_NORM_ATTRIBUTE",),
@@ -34,7 +32,6 @@ __all__ = [
     "apply_overrides",
     "find_results",
     "prepare_run",
-    "to_dataframe",
     "write_report",
 ]
 from rsfstudy.api import accessor as accessor  # registers the accessor of datasets

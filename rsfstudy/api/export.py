@@ -11,7 +11,7 @@ import xarray as xr
 from rsfstudy.api.simulation import simulate
 from rsfstudy.errors import DataError
 from rsfstudy.rig import SCALES_ATTRIBUTE, Rig
-from rsfstudy.storage import compare_motions
+from rsfstudy.storage import compare_same_lattice
 
 
 def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
@@ -77,4 +77,4 @@ def rerun_motion(motion: xr.Dataset) -> pd.DataFrame:
         units = {"stress": "shear_stress", "length": "slip", "time": "time"}
         units = {of: str(motion[name].attrs["units"]) for of, name in units.items()}
         ours = Rig(**json.loads(about["laboratory"])).in_units(ours, **units)
-    return compare_motions(motion, ours)
+    return compare_same_lattice(motion, ours)

@@ -37,9 +37,7 @@ from rsfstudy.reporting import (
     format_number,
     format_status_counts,
     is_fit,
-    missing_result_reasons,
-    reduction_tables,
-    rerun_command,
+    reduction_pieces,
     slow_norm_note,
     summarise_in_lines,
     summarise_verdicts,
@@ -150,10 +148,8 @@ def run_summary(dataset: xr.Dataset, name: str, seconds: float, drawn: bool) -> 
 
 def print_report(dataset: xr.Dataset, end: RunSummary, files: Sequence[Path]) -> None:
     """Print what a run ends with: slopes, claims, failures and where the files are."""
-    for table in reduction_tables(dataset):
-        table_layout.print_piece(table)
-    for name, why in missing_result_reasons(dataset).items():
-        console.print(f"no {name}: {why}")
+    for piece in reduction_pieces(dataset):
+        table_layout.print_piece(piece)
     if slow := slow_norm_note(dataset):
         console.print(slow, style="yellow")
     _print_verdicts(_collect_claims([dataset]))
@@ -219,13 +215,13 @@ def print_failures(dataset: xr.Dataset, file: str = "") -> int:
     if undone := count_pending(dataset):
         size = dataset["status"].size
         console.print(f"{undone} of {pluralize(size, 'cell')} not computed yet", style="red")
-    failed, places = failures_table(dataset)
+    failed, commands = failures_table(dataset, file)
     table_layout.print_piece(failed)
-    if places and file:
+    if commands and file:
         console.print("each alone, in one process:")
-        for place in places:
-            console.print(f"  {rerun_command(dataset, file, place)}", soft_wrap=True)
-    return FAILED if undone or places else OK
+        for command in commands:
+            console.print(f"  {command}", soft_wrap=True)
+    return FAILED if undone or commands else OK
 
 
 def print_outcome(

@@ -17,12 +17,7 @@ if TYPE_CHECKING:
     from rsfstudy.execution.plan import Plan, estimate_cost
     from rsfstudy.execution.preparation import prepare_study_run
     from rsfstudy.execution.provenance import provenance_attributes, run_fingerprint
-    from rsfstudy.execution.runner import (
-        OutputOptions,
-        ProgressCallback,
-        count_failures,
-        count_statuses,
-    )
+    from rsfstudy.execution.runner import OutputOptions, ProgressCallback
     from rsfstudy.execution.workers import Workers
 else:
     __getattr__, __dir__ = lazy_exports(
@@ -32,12 +27,7 @@ else:
             "execution.plan": ("Plan", "estimate_cost"),
             "execution.preparation": ("prepare_study_run",),
             "execution.provenance": ("provenance_attributes", "run_fingerprint"),
-            "execution.runner": (
-                "OutputOptions",
-                "ProgressCallback",
-                "count_failures",
-                "count_statuses",
-            ),
+            "execution.runner": ("OutputOptions", "ProgressCallback"),
             "execution.workers": ("Workers",),
         },
     )
@@ -48,8 +38,6 @@ __all__ = [
     "ProgressCallback",
     "Workers",
     "connect_to_cluster",
-    "count_failures",
-    "count_statuses",
     "estimate_cost",
     "prepare_study_run",
     "provenance_attributes",

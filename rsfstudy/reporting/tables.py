@@ -15,7 +15,6 @@ import pandas as pd
 import xarray as xr
 
 from rsfstudy.critical_steps import SLOW_NORM_PREFIX
-from rsfstudy.execution import count_failures, count_statuses
 from rsfstudy.formatting import (
     format_fields,
     format_list,
@@ -266,6 +265,13 @@ def reduction_tables(dataset: xr.Dataset) -> Iterator[Table]:
         yield Table(build_rows(dataset, dims, columns), wrappable={"problem", "cheapest"})
 
 
+def reduction_pieces(dataset: xr.Dataset) -> Iterator[Table | str]:
+    """The tables of reductions, and a sentence on each reduction that has no results."""
+    yield from reduction_tables(dataset)
+    for name, why in missing_result_reasons(dataset).items():
+        yield f"no {name}: {why}"
+
+
 def refusal_reasons(dataset: xr.Dataset) -> dict[str, str]:
     """Why reductions refuse to draw on cells, by their names."""
     named = [str(reduction["name"]) for reduction in read_declaration(dataset).reductions]
@@ -276,6 +282,16 @@ def refusal_reasons(dataset: xr.Dataset) -> dict[str, str]:
         if name and "refused" in values.attrs:
             found.setdefault(name, str(values.attrs["refused"]))
     return found
+
+
+def incomplete_notes(results: xr.Dataset) -> list[str]:
+    """How many cells failed, with which status, and which reductions refused to draw on cells."""
+    told = [f"no {name}: {why}" for name, why in refusal_reasons(results).items()]
+    if failed := count_failures(results):
+        each = ", ".join(f"{label} {number}" for label, number in failed.items())
+        first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
+        told = [first, *told, "dataset.rsf.failures() lists them"]
+    return told
 
 
 def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
@@ -363,8 +379,8 @@ def cells_frame(dataset: xr.Dataset, where: xr.DataArray, axes: Sequence[str]) -
     return pd.DataFrame(columns | {"message": dataset["message"].values[at]})
 
 
-def failures_table(dataset: xr.Dataset) -> tuple[Table, list[dict[Any, Any]]]:
-    """The first cells that failed, and the place of each on the axes."""
+def failures_table(dataset: xr.Dataset, file: str) -> tuple[Table, list[str]]:
+    """The first cells that failed, and the commands that compute each alone from a file."""
     status = dataset["status"]
     failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
     found = cells_frame(dataset, failed, list(map(str, failed.dims)))
@@ -377,7 +393,9 @@ def failures_table(dataset: xr.Dataset) -> tuple[Table, list[dict[Any, Any]]]:
     caption = f"{pluralize(len(found), 'cell')} failed"
     if len(found) > len(rows):
         caption += f", of which the first {len(rows)}"
-    return Table(rows, caption, wrappable={"cell", "message"}), places
+    return Table(rows, caption, wrappable={"cell", "message"}), [
+        rerun_command(dataset, file, place) for place in places
+    ]
 
 
 def rerun_command(dataset: xr.Dataset, file: str, place: Mapping[str, Any]) -> str:
@@ -411,4 +429,19 @@ def thin_dimensions(sizes: Mapping[str, int], most: int) -> dict[str, np.ndarray
     return {
         dimension: np.unique(np.linspace(0, size - 1, kept[dimension]).round().astype(int))
         for dimension, size in sizes.items()
+    }
+
+
+def count_statuses(dataset: xr.Dataset) -> Mapping[str, int]:
+    """Number of cells that ended with each status."""
+    status = np.asarray(dataset["status"].values)
+    return {s.label: int((status == int(s)).sum()) for s in Status if (status == int(s)).any()}
+
+
+def count_failures(dataset: xr.Dataset) -> Mapping[str, int]:
+    """Number of cells that failed with each status."""
+    return {
+        label: n
+        for label, n in count_statuses(dataset).items()
+        if not Status[label.upper()].is_answer
     }

@@ -71,6 +71,22 @@ def rebuild_study(results: xr.Dataset, file: str | Path | None = None) -> Study:
     return study
 
 
+def study_of_dataset(results: xr.Dataset) -> Study:
+    """The study that made a dataset, all of it, whatever is selected.
+
+    Raises
+    ------
+    InvalidValue
+        Where the study has code of a user's own.
+    """
+    declared, about = schema.read_declaration(results), schema.read_provenance(results)
+    if has_user_code(results):
+        rule = "has code of a user's own, and code is never taken from a dataset"
+        remedy = f"Import the study from the file that declares it. {about['declared_in']}"
+        raise InvalidValue("study", declared.name, rule, remedy=remedy.strip())
+    return study_from_declaration(declared, loadings.read_loadings(results))
+
+
 def has_user_code(results: xr.Dataset) -> bool:
     """True where code of the user decided a dataset; loadings, which it holds, are data."""
     if schema.read_provenance(results)["fingerprint"]["own_code"] == "none":
