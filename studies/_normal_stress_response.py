@@ -16,10 +16,11 @@ import numpy as np
 
 from rsfstudy import Accuracy, Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base import RecordingMeasure, estimate_instant_errors, phase_outputs
+from rsfstudy.measure_base import RecordingMeasure, phase_outputs
 from rsfstudy.measure_base._recorded_motion import PHASE_VARIABLES
 from rsfstudy.measures import Outcome, Output, Status
 from rsfstudy.motion import Event, WorkMeter, integrate_events
+from rsfstudy.responses import estimate_instant_errors
 from rsfstudy.slider import Point, growth_rates, steady_sliding
 from rsfstudy.slider.loading.oscillation import NormalStressOscillation
 from rsfstudy.slider.stability import response_to_normal_stress

@@ -14,13 +14,7 @@ import numpy as np
 
 from rsfstudy import Accuracy, Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base import (
-    RecordingMeasure,
-    check_steady_loading,
-    estimate_instant_errors,
-    phase_outputs,
-    settled_flag,
-)
+from rsfstudy.measure_base import RecordingMeasure, check_steady_loading, phase_outputs
 from rsfstudy.measure_base._recorded_motion import PHASE_VARIABLES
 from rsfstudy.measures import Outcome, Output, Status
 from rsfstudy.motion import (
@@ -34,6 +28,7 @@ from rsfstudy.motion import (
     integrate_events,
     sample_along_path,
 )
+from rsfstudy.responses import estimate_instant_errors, settled_flag
 
 #: Final fraction of the record over which friction must be constant, and the tolerance of this
 #: condition relative to the remaining transient at ``fit_from``.

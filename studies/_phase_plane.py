@@ -14,10 +14,10 @@ from rsfstudy import Scene
 from rsfstudy.slider import (
     field_types,
     find_inapplicable_fields,
-    find_named_user_parts,
     steady_friction_excess,
     stress_for_friction,
 )
+from rsfstudy.study import find_named_user_parts
 from rsfstudy.study.figure_declarations import Axes
 
 LN10 = math.log(10.0)

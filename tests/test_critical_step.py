@@ -16,13 +16,12 @@ from time_domain_reference import TimeDomainMotion
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.critical_steps import critical_step, forward_motion
-from rsfstudy.critical_steps.critical_path import CriticalPath
+from rsfstudy.critical_steps.critical_path import CriticalPath, scalar_function
 from rsfstudy.critical_steps.critical_step import CriticalStep
+from rsfstudy.critical_steps.slow_manifold import slow_manifold_error
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.engine_factory import scalar_function
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.motion.regime_switching import slow_manifold_error
 from rsfstudy.motion.roots import build_root_finder
 from rsfstudy.slider.equations import equations_between_ruptures, log_slip_rate_at
 from rsfstudy.slider.point import Point

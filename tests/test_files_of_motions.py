@@ -12,7 +12,7 @@ from study_runs import call_main, study_of
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.api import export
+from rsfstudy.cli import export_files
 from rsfstudy.errors import DataError
 from rsfstudy.execution import provenance
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
@@ -125,7 +125,8 @@ def test_other_programs_read_what_is_exported(place, tmp_path):
 def test_codes_are_words_in_a_table(tmp_path):
     values = xr.DataArray([20, 0], dims="time", attrs={"flag_values": [0, 20]})
     values.attrs["flag_meanings"] = "ok work_budget_spent"
-    export.to_csv(xr.Dataset({"status": values}, {"time": [0.0, 1.0]}), tmp_path / "it.csv")
+    dataset = xr.Dataset({"status": values}, {"time": [0.0, 1.0]}, {"scene": "{}"})
+    export_files.to_csv(dataset, tmp_path / "it.csv")
     assert pd.read_csv(tmp_path / "it.csv")["status"].tolist() == ["work_budget_spent", "ok"]
 
 

@@ -10,6 +10,7 @@ from rsfstudy.named_studies._normal_stress_transient import NormalStressTransien
 
 from rsfstudy import Scene, simulate
 from rsfstudy.critical_steps.critical_step import CriticalStep
+from rsfstudy.critical_steps.monotone_approach import single_state_evolution
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
@@ -19,7 +20,7 @@ from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import laws, steady_state
-from rsfstudy.slider.equations import compute_steady_states, single_state_evolution, state_evolution
+from rsfstudy.slider.equations import compute_steady_states, state_evolution
 from rsfstudy.slider.laws.composite import lambert_w
 from rsfstudy.slider.scene_functions import build_scene_functions, velocity_ratios
 from rsfstudy.status import Status

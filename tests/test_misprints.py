@@ -12,7 +12,8 @@ from conftest import cot_phi
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.slider.equations import friction_relation, single_state_evolution
+from rsfstudy.critical_steps.monotone_approach import single_state_evolution
+from rsfstudy.slider.equations import friction_relation
 
 PAGE = (Path(__file__).parent.parent / "studies" / "MISPRINTS.md").read_text()
 

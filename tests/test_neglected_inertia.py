@@ -11,8 +11,8 @@ from rsfstudy.motion.events import maximum
 from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.neglected_inertia import estimate_neglected_inertia
-from rsfstudy.motion.readings import growth_rate_along_path
 from rsfstudy.motion.recording import REGIME_COLUMN, Recording
+from rsfstudy.responses._readings import growth_rate_along_path
 from rsfstudy.responses.healing import Healing
 from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.slider.equations import RUPTURE_REGIME

@@ -13,7 +13,7 @@ from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.events import EventKind, maximum, minimum
 from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.motion.readings import friction_event_quantity
+from rsfstudy.responses._readings import friction_event_quantity
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import friction_relation

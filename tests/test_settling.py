@@ -10,13 +10,14 @@ import pytest
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
-from rsfstudy.measure_base.settling_checks import settled_flag, settles_to_steady_sliding
+from rsfstudy.measure_base.settling_checks import settles_to_steady_sliding
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
 from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.quantities import Quantity
+from rsfstudy.responses._recorded_motion import settled_flag
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS

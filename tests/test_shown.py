@@ -18,10 +18,11 @@ from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
 from rsfstudy.quantities import html_symbol, html_table
 from rsfstudy.reductions import SobolIndices
+from rsfstudy.reporting import tables
 from rsfstudy.reporting.tables import answer_table, format_to_error
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
-from rsfstudy.storage import lattice, rebuild, store
+from rsfstudy.storage import rebuild, store
 from rsfstudy.study import catalogue
 from rsfstudy.study.claims import Claim, build_verdict_table
 from rsfstudy.study.verdict_table import VerdictTable
@@ -247,9 +248,9 @@ def test_indices_that_are_refused_say_why(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("sizes", [{"x": 5}, {"x": 3, "y": 28}, {"x": 9, "y": 9, "z": 2, "u": 7}])
 def test_a_sample_has_both_ends_and_so_many_cells_at_most(sizes):
-    at = lattice.thin_dimensions(sizes, 24)
+    at = tables.thin_dimensions(sizes, 24)
     assert math.prod(map(len, at.values())) <= 24
     for name, size in sizes.items():
         assert at[name][0] == 0
         assert len(at[name]) == 1 or at[name][-1] == size - 1
-    assert len(lattice.thin_dimensions({"x": 5}, 24)["x"]) == 5
+    assert len(tables.thin_dimensions({"x": 5}, 24)["x"]) == 5

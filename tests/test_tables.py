@@ -55,7 +55,7 @@ def test_results_of_every_study(name, printed, tmp_path_factory):
     shown = [
         tables.headline_table(dataset),
         *tables.reduction_tables(dataset),
-        tables.contents_table(dataset),
+        printing.contents_table(dataset),
     ]
     shown += [tables.claims_table(study_runs.check(dataset))]
     for table in (table for table in shown if table.rows):

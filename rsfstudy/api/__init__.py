@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from rsfstudy.api.export import to_csv, to_mat
     from rsfstudy.api.html_report import write_report
+    from rsfstudy.api.result_paths import find_results
     from rsfstudy.api.simulation import BEYOND_NORM_ATTRIBUTE
     from rsfstudy.api.study_runs import apply_overrides, prepare_run
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
-            "api.export": ("to_csv", "to_mat"),
             "api.html_report": ("write_report",),
+            "api.result_paths": ("find_results",),
             "api.simulation": ("BEYOND_NORM_ATTRIBUTE",),
             "api.study_runs": ("apply_overrides", "prepare_run"),
         },
@@ -30,9 +30,8 @@ else:
 __all__ = [
     "BEYOND_NORM_ATTRIBUTE",
     "apply_overrides",
+    "find_results",
     "prepare_run",
-    "to_csv",
-    "to_mat",
     "write_report",
 ]
 from rsfstudy.api import accessor as accessor  # registers the accessor of datasets

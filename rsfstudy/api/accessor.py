@@ -14,7 +14,7 @@ from xarray.backends import BackendEntrypoint
 
 from rsfstudy._deprecation import renamed_members
 from rsfstudy.error_boundary import error_boundary
-from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.errors import DataError
 
 # all else is loaded when asked for: xarray imports this module whatever file it opens
 if TYPE_CHECKING:
@@ -66,14 +66,13 @@ class Accessor:
         InvalidValue
             Where no single cell is selected, or a part is a user's own and not known here.
         """
-        from rsfstudy.api import file_scenes
-        from rsfstudy.reporting import fitted_scene, is_fit
+        from rsfstudy.api.fitted_parameters import fitted_scene
+        from rsfstudy.reporting import is_fit
+        from rsfstudy.storage import scene_of_dataset
 
         if is_fit(self._dataset):
             return fitted_scene(self._dataset)
-        if self._is_study:
-            return self.study.scene(file_scenes.selected_cell_number(self._dataset, self.study))
-        return file_scenes.described_scene(self._dataset)
+        return scene_of_dataset(self._dataset, self.study if self._is_study else None)
 
     @property
     @error_boundary
@@ -89,7 +88,7 @@ class Accessor:
         InvalidValue
             Where several fits are selected, or the record does not tell normal stress.
         """
-        from rsfstudy.reporting import fitted_rig
+        from rsfstudy.api.fitted_parameters import fitted_rig
 
         return fitted_rig(self._dataset)
 
@@ -105,24 +104,10 @@ class Accessor:
         InvalidValue
             Where the study has code of a user's own.
         """
-        from rsfstudy.storage import (
-            has_user_code,
-            read_declaration,
-            read_loadings,
-            read_provenance,
-            study_from_declaration,
-        )
+        from rsfstudy.storage import study_of_dataset
 
         self._require_study()
-        declared, about = (
-            read_declaration(self._dataset),
-            read_provenance(self._dataset),
-        )
-        if has_user_code(self._dataset):
-            rule = "has code of a user's own, and code is never taken from a dataset"
-            remedy = f"Import the study from the file that declares it. {about['declared_in']}"
-            raise InvalidValue("study", declared.name, rule, remedy=remedy.strip())
-        return study_from_declaration(declared, read_loadings(self._dataset))
+        return study_of_dataset(self._dataset)
 
     @error_boundary
     def to_si(self, **scales: Any) -> xr.Dataset:
@@ -311,7 +296,7 @@ class Accessor:
         InvalidValue
             Where several fits are selected, or the record does not tell a parameter at all.
         """
-        from rsfstudy.reporting import sample_parameters
+        from rsfstudy.api.fitted_parameters import sample_parameters
 
         return sample_parameters(self._dataset, n, seed)
 

@@ -17,10 +17,11 @@ from urllib.parse import quote
 import xarray as xr
 
 from rsfstudy.api import study_runs
+from rsfstudy.api.result_paths import output_directory
 from rsfstudy.defaults import FIGURE_FORMATS, OUTPUT_DIRECTORY
 from rsfstudy.error_boundary import check_regular_file, error_boundary, format_exception
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, shorten
-from rsfstudy.execution import count_statuses, provenance_attributes
+from rsfstudy.execution import provenance_attributes
 from rsfstudy.formatting import format_overrides, pluralize
 from rsfstudy.quantities import HtmlMarkup, escape_html, html_table
 from rsfstudy.reporting import (
@@ -28,15 +29,15 @@ from rsfstudy.reporting import (
     Table,
     claims_table,
     count_pending,
+    count_statuses,
     describe_origin,
     failures_table,
     is_fit,
-    rerun_command,
     summarise_verdicts,
     summary_pieces,
 )
 from rsfstudy.status import Status
-from rsfstudy.storage import is_single_scene, output_directory, read_dataset, read_declaration
+from rsfstudy.storage import is_single_scene, read_dataset, read_declaration
 
 _UNREADABLE = "cannot be read"
 #: What begins a page of ours, and a figure.
@@ -179,10 +180,10 @@ def _summarise_dataset(path: Path, dataset: xr.Dataset) -> _ResultSection:
     verdicts, wrong = summarise_verdicts(dataset, study_runs.check(dataset))
     if undone := count_pending(dataset):
         wrong.append(f"{undone} cells not computed")
-    failed, cells = failures_table(dataset)
-    if cells:
-        commands = "\n".join(rerun_command(dataset, path.name, cell) for cell in cells)
-        parts.append(f"<h3>Failures</h3>\n{_piece_html(failed)}<pre>{_escape(commands)}</pre>")
+    failed, commands = failures_table(dataset, path.name)
+    if commands:
+        lines = _escape("\n".join(commands))
+        parts.append(f"<h3>Failures</h3>\n{_piece_html(failed)}<pre>{lines}</pre>")
     parts.append(f"<h3>Provenance</h3>\n{_piece_html(describe_origin(dataset))}")
     found = _ResultSection(path, title, verdicts, html_parts=tuple(parts))
     if wrong:

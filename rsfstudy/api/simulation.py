@@ -21,6 +21,7 @@ from rsfstudy.motion import (
     FIRST_STATE_COLUMN,
     MOTION_VARIABLES,
     REGIME_COLUMN,
+    SAMPLE_COLUMN,
     SCIPY,
     Accuracy,
     Event,
@@ -34,14 +35,17 @@ from rsfstudy.motion import (
     larger_budget_remedy,
     load_point_displacement,
     rise,
-    with_increasing_times,
 )
 from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.parts import SEGMENT_START, SEGMENT_VELOCITY
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider import RUPTURE_REGIME, Point, SampledHistory, Scene, UserLoading, check_scene
+from rsfstudy.slider import RUPTURE_REGIME, Point, SampledHistory, Scene, UserLoading
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import find_quantity
+
+#: Times that follow each other differ by so many floating-point numbers, and by so much, at least:
+#: they still differ in other units, where each is rounded anew.
+_MIN_TIME_ULPS, _MIN_TIME_DIFFERENCE = 4, 1e-290
 
 #: Time that a step is followed for, and load point displacement beyond what a protocol states.
 _DEFAULT_DURATION, _EXTRA_DISPLACEMENT = 50.0, 20.0
@@ -335,3 +339,40 @@ def _check_times(times: Any, duration: float | None, began: float) -> np.ndarray
         rule = f"must increase from {began:g} or later, and be finite"
         raise InvalidValue("times", times, rule)
     return at
+
+
+def with_increasing_times(table: np.ndarray) -> np.ndarray:
+    """A recorded motion whose times strictly increase.
+
+    A regime or segment begins with a row at the time at which another has ended. It takes the place
+    of one that holds the same; where they differ, it follows a few floating-point numbers later, as
+    do rows of a rupture shorter than the spacing of those numbers.
+    """
+    same = (np.diff(np.delete(table, [REGIME_COLUMN, SAMPLE_COLUMN], axis=1), axis=0) == 0.0).all(
+        axis=1
+    )
+    table = table[~np.append(same, np.zeros(min(len(table), 1), dtype=bool))]
+    times, earliest = table[:, 0].tolist(), -math.inf
+    for place, time in enumerate(times):
+        times[place] = max(time, earliest)
+        earliest = times[place] + max(_MIN_TIME_ULPS * math.ulp(times[place]), _MIN_TIME_DIFFERENCE)
+    table[:, 0] = times
+    return table
+
+
+def check_scene(value: object) -> None:
+    """Raise ``InvalidValue`` if an object is not a scene.
+
+    Parameters
+    ----------
+    value : object
+        Object to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the object is not a scene.
+    """
+    if not isinstance(value, Scene):
+        remedy = "Make one, rsfstudy.Scene(...); rsfstudy.run computes studies."
+        raise InvalidValue("scene", value, "is no scene", remedy=remedy)

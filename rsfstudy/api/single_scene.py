@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.api.simulation import motion_variable_attributes
+from rsfstudy.api.simulation import check_scene, motion_variable_attributes
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import NoResultWarning, RsfStudyWarning
 from rsfstudy.execution import provenance_attributes
@@ -18,7 +18,7 @@ from rsfstudy.measures import CriticalStep, LimitCycle, Measure
 from rsfstudy.motion import DEFAULT_BUDGET, DEFAULT_RTOL, SCIPY, Accuracy, check_engine
 from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.rig import convert_to_si, convert_units, read_scales
-from rsfstudy.slider import Scene, check_scene
+from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import find_quantity
 

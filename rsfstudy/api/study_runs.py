@@ -14,25 +14,16 @@ import xarray as xr
 
 from rsfstudy.api import export
 from rsfstudy.api.progress import compile_with_notice, show_progress
+from rsfstudy.api.result_paths import find_results, output_directory
 from rsfstudy.defaults import CELL_TIME_LIMIT, OUTPUT_DIRECTORY
 from rsfstudy.error_boundary import error_boundary, user_stacklevel
-from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning
-from rsfstudy.execution import (
-    OutputOptions,
-    StudyRun,
-    Task,
-    Workers,
-    code_fingerprint,
-    compute_serially,
-    count_failures,
-    run_fingerprint,
-    serialize_task,
-)
+from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning, shorten
+from rsfstudy.execution import OutputOptions, Workers, prepare_study_run, run_fingerprint
 from rsfstudy.measures import Outcome
-from rsfstudy.motion import COMPILED, check_engine, user_stepper
+from rsfstudy.motion import COMPILED, check_engine
 from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.quantities import html_table
-from rsfstudy.reporting import refusal_reasons, slow_norm_note
+from rsfstudy.reporting import incomplete_notes, slow_norm_note
 from rsfstudy.slider import Scene, with_field_signature
 from rsfstudy.storage import (
     Comparison,
@@ -41,13 +32,10 @@ from rsfstudy.storage import (
     compare_same_lattice,
     find_cell_number,
     find_differences,
-    find_results,
     is_single_scene,
-    output_directory,
     read_dataset,
     read_declaration,
     read_provenance,
-    read_results,
     rebuild_study,
 )
 from rsfstudy.study import Study, build_verdict_table, load_study, study_names
@@ -162,12 +150,7 @@ def run(
     )
     with Workers(workers, client, time_limit) as where:
         results = with_cf_encoding(prepare_run(declared, keeping, where, progress)())
-    told = [f"no {name}: {why}" for name, why in refusal_reasons(results).items()]
-    if failed := count_failures(results):
-        each = ", ".join(f"{label} {number}" for label, number in failed.items())
-        first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
-        told = [first, *told, "dataset.rsf.failures() lists them"]
-    if told:
+    if told := incomplete_notes(results):
         warnings.warn("; ".join(told), IncompleteWarning, stacklevel=user_stacklevel())
     if slow := slow_norm_note(results):
         warnings.warn(slow, RsfStudyWarning, stacklevel=user_stacklevel())
@@ -194,18 +177,7 @@ def prepare_run(
     Raises `InvalidValue` for anything wrong with the study or the options.
     """
     check_engine(study.accuracy.engine)
-    task = Task(
-        study.base,
-        study.measure,
-        study.accuracy,
-        workers.time_limit,
-        user_parts=tuple(study.user_parts.values()),
-        steppers=user_stepper(study.accuracy.engine),
-        code_fingerprint=code_fingerprint(study.accuracy.engine, study.user_classes),
-    )
-    if workers.cell_mapper() is not compute_serially:
-        serialize_task(task)  # raises before any work if it cannot be sent
-    ready = StudyRun(study, keeping, task, workers.count_concurrent_cells())
+    ready = prepare_study_run(study, keeping, workers)
 
     def run() -> xr.Dataset:
         if study.accuracy.engine == COMPILED:
@@ -228,6 +200,19 @@ def open(name: str | Path, output: str | Path = OUTPUT_DIRECTORY) -> xr.Dataset:
     if not isinstance(name, str | Path):
         raise InvalidValue("name", name, "must be the name of a study, or a path")
     return read_results(find_results(name, output))
+
+
+def read_results(path: Path) -> xr.Dataset:
+    """Load the results of a study, as `read_dataset` does.
+
+    Raises
+    ------
+    DataError
+        If it is missing, unreadable, not written by rsfstudy, damaged, or of one scene.
+    """
+    dataset = read_dataset(path)
+    check_is_study(dataset, shorten(path))
+    return dataset
 
 
 def _load_results(dataset: xr.Dataset | str | Path) -> xr.Dataset:

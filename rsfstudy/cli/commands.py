@@ -22,28 +22,27 @@ from rsfstudy import Study, recompute_cell
 from rsfstudy import compare as compare_results
 from rsfstudy import open as open_results
 from rsfstudy import rerun as rerun_file
-from rsfstudy.api import apply_overrides, prepare_run, to_csv, to_mat, write_report
+from rsfstudy.api import apply_overrides, find_results, prepare_run, write_report
 from rsfstudy.cli import assignments, printing
 from rsfstudy.cli.console import console, stderr
-from rsfstudy.cli.cost import format_duration
+from rsfstudy.cli.cost import format_duration, missing_packages
+from rsfstudy.cli.export_files import to_csv, to_mat
 from rsfstudy.cli.options import CommandOptions
 from rsfstudy.cli.printing import FAILED, OK, RunSummary
 from rsfstudy.defaults import FIGURE_FORMATS, OUTPUT_DIRECTORY
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError
 from rsfstudy.execution import OutputOptions, Workers, connect_to_cluster
-from rsfstudy.motion import missing_packages
 from rsfstudy.plots import FIGURE_NAMES, save_figure
 from rsfstudy.rig import RIG_QUANTITIES, parse_number
 from rsfstudy.storage import (
     find_cell_number,
-    find_results,
     is_single_scene,
-    load_user_figure,
     read_dataset,
     read_declaration,
+    read_provenance,
 )
-from rsfstudy.study import load_study, study_names, with_rig
+from rsfstudy.study import figure_name, load_study, study_names, with_rig
 
 _FILE_SUFFIXES = {"netcdf": "nc", "zarr": "zarr"}
 _RESULT_SUFFIXES = (".nc", ".zarr")
@@ -326,3 +325,26 @@ def _save_figure(dataset: xr.Dataset, path: Path, given: CommandOptions, own: An
         stderr.print(f"no figure: {error}")
         return []
     return [path]
+
+
+def load_user_figure(results: xr.Dataset, file: str | Path | None = None) -> Any:
+    """The figure that a user wrote for a dataset, from the file that declares the study. The file
+    that the dataset names is not run unasked, because the results may come from a stranger.
+
+    Raises
+    ------
+    InvalidValue
+        Where no file is given, or it has no such figure.
+    """
+    name, named_in = (
+        read_declaration(results).plot,
+        read_provenance(results)["declared_in"],
+    )
+    if file is None:
+        remedy = f"Name the file that declares it: --study {named_in or 'FILE'}."
+        raise InvalidValue("plot", name, "is no figure of rsfstudy", remedy=remedy)
+    study = load_study(str(file))
+    if study.name != results.attrs["id"] or figure_name(study.plot, study.name) != name:
+        rule = f"does not draw {name!r} of {results.attrs['id']!r}"
+        raise InvalidValue("study", str(file), rule)
+    return None if isinstance(study.plot, str) else study.plot

@@ -21,11 +21,9 @@ from rsfstudy.fitting import LoadingStep, Record
 from rsfstudy.plots import save_figure
 from rsfstudy.reporting import (
     Table,
-    describe_stability,
-    events_table,
     is_fit,
     is_motion,
-    summarise_motion,
+    motion_pieces,
     summary_pieces,
 )
 from rsfstudy.rig import DISPLAY_BASE_UNITS
@@ -93,9 +91,8 @@ def _write_motion(motion: xr.Dataset, laboratory: Rig | None, given: CommandOpti
         found = [motion, motion.rsf.events()]
         if laboratory:
             found = [laboratory.in_units(of, **DISPLAY_BASE_UNITS) for of in found]
-        table_layout.print_piece(summarise_motion(found[0]))
-        table_layout.print_piece(describe_stability(motion.rsf.scene))
-        table_layout.print_piece(events_table(found[1]))
+        for piece in motion_pieces(found[0], motion.rsf.scene, found[1]):
+            table_layout.print_piece(piece)
     console.print(f"{said}\nwrote {given.output} and {data}")
 
 

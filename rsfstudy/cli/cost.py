@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rsfstudy.errors import InvalidValue
 from rsfstudy.execution import Plan, estimate_cost
-from rsfstudy.motion import COMPILED, SCIPY, missing_packages
+from rsfstudy.motion import COMPILED, SCIPY, check_engine
 from rsfstudy.storage import CellTimings, read_timings
 
 #: How many times as long a call takes with SciPy as compiled, by measure. The page of benchmarks
@@ -89,3 +90,14 @@ def _has_same_accuracy(plan: Plan, took: CellTimings) -> bool:
     return took.fingerprint.get("rtol") == asked.rtol and took.fingerprint.get("engine") == (
         asked.engine
     )
+
+
+def missing_packages(name: str) -> str:
+    """Packages that an engine lacks, in words; empty where none."""
+    try:
+        check_engine(name)
+    except InvalidValue:
+        if name != COMPILED:
+            raise
+        return "needs Numba (pip install 'rsfstudy[fast]')"
+    return ""

@@ -29,7 +29,6 @@ from rsfstudy.reporting import (
     Table,
     all_answered,
     claims_table,
-    contents_table,
     count_pending,
     count_verdicts,
     describe_fields,
@@ -38,9 +37,7 @@ from rsfstudy.reporting import (
     format_number,
     format_status_counts,
     is_fit,
-    missing_result_reasons,
-    reduction_tables,
-    rerun_command,
+    reduction_pieces,
     slow_norm_note,
     summarise_in_lines,
     summarise_verdicts,
@@ -151,10 +148,8 @@ def run_summary(dataset: xr.Dataset, name: str, seconds: float, drawn: bool) -> 
 
 def print_report(dataset: xr.Dataset, end: RunSummary, files: Sequence[Path]) -> None:
     """Print what a run ends with: slopes, claims, failures and where the files are."""
-    for table in reduction_tables(dataset):
-        table_layout.print_piece(table)
-    for name, why in missing_result_reasons(dataset).items():
-        console.print(f"no {name}: {why}")
+    for piece in reduction_pieces(dataset):
+        table_layout.print_piece(piece)
     if slow := slow_norm_note(dataset):
         console.print(slow, style="yellow")
     _print_verdicts(_collect_claims([dataset]))
@@ -220,13 +215,13 @@ def print_failures(dataset: xr.Dataset, file: str = "") -> int:
     if undone := count_pending(dataset):
         size = dataset["status"].size
         console.print(f"{undone} of {pluralize(size, 'cell')} not computed yet", style="red")
-    failed, places = failures_table(dataset)
+    failed, commands = failures_table(dataset, file)
     table_layout.print_piece(failed)
-    if places and file:
+    if commands and file:
         console.print("each alone, in one process:")
-        for place in places:
-            console.print(f"  {rerun_command(dataset, file, place)}", soft_wrap=True)
-    return FAILED if undone or places else OK
+        for command in commands:
+            console.print(f"  {command}", soft_wrap=True)
+    return FAILED if undone or commands else OK
 
 
 def print_outcome(
@@ -423,3 +418,16 @@ def _print_agreement_table(frame: pd.DataFrame) -> None:
         for row in frame.to_dict("records")
     ]
     table_layout.print_piece(Table(rows))
+
+
+def contents_table(dataset: xr.Dataset) -> Table:
+    """The results that a file holds, what they are and along what."""
+    rows = [
+        {
+            "it holds": str(name),  # what a notebook added may have no words
+            "what": f"{v.attrs.get('long_name', '')} ({', '.join(map(str, v.dims))})".strip(),
+        }
+        for name, v in dataset.data_vars.items()
+        if coverage_content_type(str(name)) == "modelResult"
+    ]
+    return Table(rows, wrappable={"what"})

@@ -24,9 +24,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rsfstudy.motion import (
+    COMPILED,
     SCIPY,
     Event,
     EventKind,
@@ -34,12 +35,11 @@ from rsfstudy.motion import (
     MotionDriver,
     MotionStopped,
     WorkMeter,
-    build_point_function,
     build_root_finder,
+    compiled_engine,
     fall,
     maximum,
     rise,
-    scalar_function,
 )
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS, A, B
 from rsfstudy.slider import (
@@ -370,3 +370,25 @@ def _build_tangency_solver(friction: FrictionFunctions) -> Function:
         return g, strength(g, (0.0,), p)[0] - p[A] * x
 
     return tangency
+
+
+@cache
+def build_point_function(rate: Function, point: Function) -> Function:
+    """``(state, p) -> Point``."""
+
+    def at(state: Numbers, p: Numbers) -> Point:
+        now: Point = point(state, rate(state, p), p)
+        return now
+
+    return at
+
+
+def scalar_function(function: Callable[..., Any], name: str, *arguments: float | Numbers) -> Any:
+    """A function of floats and of tuples of floats as an engine calls it: compiled, for arguments
+    of this form, where its loop is.
+    """
+    return (
+        compiled_engine().compile_scalar_function(function, *arguments)
+        if name == COMPILED
+        else function
+    )

@@ -21,30 +21,23 @@ from typing import Any, ClassVar
 from scipy.optimize import toms748
 
 from rsfstudy.critical_steps import forward_motion
+from rsfstudy.critical_steps.loading_checks import (
+    check_single_step,
+    norm_below_loading_outcome,
+    slow_norm_warning,
+)
 from rsfstudy.critical_steps.path_solution import (
     StepBoundary,
     find_by_critical_path,
     find_by_touching_cycle,
 )
 from rsfstudy.critical_steps.shooting import StepFamily
+from rsfstudy.critical_steps.slow_manifold import inertia_matters
 from rsfstudy.critical_steps.step_types import DisplacementSteps, NormalStressSteps, RateSteps
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base import (
-    Measure,
-    Outcome,
-    check_single_step,
-    norm_below_loading_outcome,
-    slow_norm_warning,
-)
-from rsfstudy.motion import (
-    MIN_RTOL,
-    ROUNDING_ERROR,
-    Accuracy,
-    MotionStopped,
-    WorkMeter,
-    inertia_matters,
-)
+from rsfstudy.measure_base import Measure, Outcome
+from rsfstudy.motion import MIN_RTOL, ROUNDING_ERROR, Accuracy, MotionStopped, WorkMeter
 from rsfstudy.quantities import Output
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status

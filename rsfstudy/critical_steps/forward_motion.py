@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.held_load_point import peak_excess
 from rsfstudy.critical_steps.monotone_approach import monotone_rise_events, rises_monotonically
+from rsfstudy.critical_steps.slow_manifold import inertia_matters
 from rsfstudy.motion import (
     Accuracy,
     EventKind,
@@ -19,7 +20,6 @@ from rsfstudy.motion import (
     WorkMeter,
     approach_to_steady_state,
     events_along,
-    inertia_matters,
     initial_point,
     integrate_events,
     manifold_point,

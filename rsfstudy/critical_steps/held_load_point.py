@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 
+from rsfstudy.critical_steps.slow_manifold import inertia_matters
 from rsfstudy.motion import (
     Accuracy,
     Event,
@@ -21,7 +22,6 @@ from rsfstudy.motion import (
     MotionStopped,
     WorkMeter,
     fall,
-    inertia_matters,
     integrate_events,
     maximum,
     rise,

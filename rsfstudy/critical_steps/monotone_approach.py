@@ -23,7 +23,7 @@ from rsfstudy.slider import (
     Scene,
     compute_steady_states,
     friction_relation,
-    single_state_evolution,
+    state_evolution,
     steady_friction_excess,
     stress_for_friction,
 )
@@ -142,3 +142,9 @@ def _build_change_function(scene: Scene) -> Callable[[float, float], tuple[float
         return faster, evolves - shift_slope * (pulled - damping * faster) - follows * faster
 
     return at
+
+
+def single_state_evolution(scene: Scene) -> Callable[[float, float], float]:
+    """The law of a scene with one state: (ln(V/V_*), Theta) -> dTheta per unit slip."""
+    evolve = state_evolution(scene)
+    return lambda log_slip_rate, state: evolve(log_slip_rate, (state,), 0.0)[0]

@@ -14,13 +14,8 @@ from dataclasses import dataclass, replace
 from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.forward_motion import stability_margin
 from rsfstudy.critical_steps.shooting import LOOSE_TOLERANCE, StepFamily
-from rsfstudy.motion import (
-    MIN_LOCAL_TOLERANCE,
-    Accuracy,
-    WorkMeter,
-    estimate_error,
-    slow_manifold_error,
-)
+from rsfstudy.critical_steps.slow_manifold import slow_manifold_error
+from rsfstudy.motion import MIN_LOCAL_TOLERANCE, Accuracy, WorkMeter, estimate_error
 
 #: Error that two paths may share by chance, as a fraction of the requested relative accuracy.
 _COINCIDENCE_FLOOR = 0.004

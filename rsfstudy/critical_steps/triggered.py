@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy.critical_steps.forward_motion import is_neutral, reaches_norm
-from rsfstudy.error_boundary import guard_methods
-from rsfstudy.measure_base import (
-    Measure,
-    Outcome,
+from rsfstudy.critical_steps.loading_checks import (
     check_single_step,
     norm_below_loading_outcome,
     slow_norm_warning,
 )
+from rsfstudy.error_boundary import guard_methods
+from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import Accuracy, WorkMeter
 from rsfstudy.quantities import Output
 from rsfstudy.slider import Scene

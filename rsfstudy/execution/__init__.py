@@ -13,41 +13,21 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from rsfstudy.execution.cells import Task, compute_serially, serialize_task
     from rsfstudy.execution.clusters import connect_to_cluster
     from rsfstudy.execution.plan import Plan, estimate_cost
-    from rsfstudy.execution.provenance import (
-        code_fingerprint,
-        provenance_attributes,
-        run_fingerprint,
-    )
-    from rsfstudy.execution.runner import (
-        OutputOptions,
-        ProgressCallback,
-        StudyRun,
-        count_failures,
-        count_statuses,
-    )
+    from rsfstudy.execution.preparation import prepare_study_run
+    from rsfstudy.execution.provenance import provenance_attributes, run_fingerprint
+    from rsfstudy.execution.runner import OutputOptions, ProgressCallback
     from rsfstudy.execution.workers import Workers
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
-            "execution.cells": ("Task", "compute_serially", "serialize_task"),
             "execution.clusters": ("connect_to_cluster",),
             "execution.plan": ("Plan", "estimate_cost"),
-            "execution.provenance": (
-                "code_fingerprint",
-                "provenance_attributes",
-                "run_fingerprint",
-            ),
-            "execution.runner": (
-                "OutputOptions",
-                "ProgressCallback",
-                "StudyRun",
-                "count_failures",
-                "count_statuses",
-            ),
+            "execution.preparation": ("prepare_study_run",),
+            "execution.provenance": ("provenance_attributes", "run_fingerprint"),
+            "execution.runner": ("OutputOptions", "ProgressCallback"),
             "execution.workers": ("Workers",),
         },
     )
@@ -56,16 +36,10 @@ __all__ = [
     "OutputOptions",
     "Plan",
     "ProgressCallback",
-    "StudyRun",
-    "Task",
     "Workers",
-    "code_fingerprint",
-    "compute_serially",
     "connect_to_cluster",
-    "count_failures",
-    "count_statuses",
     "estimate_cost",
+    "prepare_study_run",
     "provenance_attributes",
     "run_fingerprint",
-    "serialize_task",
 ]

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsfstudy.execution import code_digest
-from rsfstudy.motion import SCIPY, package_versions
+from rsfstudy.motion import COMPILED, SCIPY
 
 if TYPE_CHECKING:
     from rsfstudy.study import Study
@@ -157,3 +157,16 @@ def git_state(root: Path) -> str:
             return f"{run_git('rev-parse', 'HEAD')} {state}"
     stamp = _PACKAGE_DIRECTORY / "commit.txt"  # as `stamp` writes it into a wheel
     return stamp.read_text().strip() if stamp.exists() else "none"
+
+
+def package_versions(name: str) -> dict[str, str]:
+    """Versions of what decides the numbers of an engine, beside those of SciPy."""
+    if name != COMPILED:
+        return {}
+    # loading it would make each command wait
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return {"numba": version("numba"), "llvmlite": version("llvmlite")}
+    except PackageNotFoundError:
+        return {"numba": "not installed"}

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import contextlib
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -266,18 +266,3 @@ class StudyRun:
             return f"{text}; nothing was to be kept (no output directory)."
         where = self.output_path(".cells.sqlite")
         return f"{text} and kept in {where}; the same command goes on from there."
-
-
-def count_statuses(dataset: xr.Dataset) -> Mapping[str, int]:
-    """Number of cells that ended with each status."""
-    status = np.asarray(dataset["status"].values)
-    return {s.label: int((status == int(s)).sum()) for s in Status if (status == int(s)).any()}
-
-
-def count_failures(dataset: xr.Dataset) -> Mapping[str, int]:
-    """Number of cells that failed with each status."""
-    return {
-        label: n
-        for label, n in count_statuses(dataset).items()
-        if label.upper() not in _ANSWER_STATUSES
-    }

@@ -17,19 +17,17 @@ if TYPE_CHECKING:
     from rsfstudy.fitting.drop_measurements import read_drops
     from rsfstudy.fitting.filters import LOW_PASS_ORDERS, MEAN, TRAILING_MEAN, Filter
     from rsfstudy.fitting.fit_measure import Fit
-    from rsfstudy.fitting.joint_model import split_window_number, strip_window_number, window_values
+    from rsfstudy.fitting.joint_model import fitted_fields, split_window_number, strip_window_number
     from rsfstudy.fitting.record import RECORD_COLUMNS, Record
     from rsfstudy.fitting.stress_drops import EVENT_QUANTITIES, EventNumbers
-    from rsfstudy.fitting.validity import SIGNIFICANCE_LEVEL
+    from rsfstudy.fitting.validity import describe_whiteness
     from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
-    from rsfstudy.fitting.whiteness_test import LAG_COUNT
     from rsfstudy.fitting.window import FitWindow
     from rsfstudy.fitting.window_model import (
         LOGARITHMIC_PARAMETERS,
         PARAMETERS,
         check_free_parameters,
         parameters_of_law,
-        parameters_to_fields,
         scene_to_parameters,
     )
 else:
@@ -40,19 +38,17 @@ else:
             "fitting.drop_measurements": ("read_drops",),
             "fitting.filters": ("Filter", "LOW_PASS_ORDERS", "MEAN", "TRAILING_MEAN"),
             "fitting.fit_measure": ("Fit",),
-            "fitting.joint_model": ("split_window_number", "strip_window_number", "window_values"),
+            "fitting.joint_model": ("fitted_fields", "split_window_number", "strip_window_number"),
             "fitting.record": ("RECORD_COLUMNS", "Record"),
             "fitting.stress_drops": ("EVENT_QUANTITIES", "EventNumbers"),
-            "fitting.validity": ("SIGNIFICANCE_LEVEL",),
+            "fitting.validity": ("describe_whiteness",),
             "fitting.velocity_steps": ("LoadingStep", "noise_variance"),
-            "fitting.whiteness_test": ("LAG_COUNT",),
             "fitting.window": ("FitWindow",),
             "fitting.window_model": (
                 "LOGARITHMIC_PARAMETERS",
                 "PARAMETERS",
                 "check_free_parameters",
                 "parameters_of_law",
-                "parameters_to_fields",
                 "scene_to_parameters",
             ),
         },
@@ -65,7 +61,6 @@ __all__ = [
     "Filter",
     "Fit",
     "FitWindow",
-    "LAG_COUNT",
     "LOGARITHMIC_PARAMETERS",
     "LOW_PASS_ORDERS",
     "LoadingStep",
@@ -74,15 +69,14 @@ __all__ = [
     "PARAMETERS",
     "RECORD_COLUMNS",
     "Record",
-    "SIGNIFICANCE_LEVEL",
     "TRAILING_MEAN",
     "check_free_parameters",
+    "describe_whiteness",
+    "fitted_fields",
     "noise_variance",
     "parameters_of_law",
-    "parameters_to_fields",
     "read_drops",
     "scene_to_parameters",
     "split_window_number",
     "strip_window_number",
-    "window_values",
 ]

@@ -6,7 +6,7 @@ before the step, trend and step time, with names such as ``mu_star_1``.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
@@ -16,8 +16,16 @@ from scipy.linalg import block_diag
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.filters import LOW_PASS_ORDERS
-from rsfstudy.fitting.window_model import FINE_DIFFERENCES, DifferenceScheme, Values, WindowModel
+from rsfstudy.fitting.window_model import (
+    FINE_DIFFERENCES,
+    DifferenceScheme,
+    Values,
+    WindowModel,
+    parameters_to_fields,
+    scene_to_parameters,
+)
 from rsfstudy.motion import MotionStopped
+from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 T = TypeVar("T")
@@ -336,3 +344,32 @@ class JointModel:
         for number, (part, factor) in enumerate(zip(self.models, factors, strict=True), start=1):
             own = window_values(values, number)
             yield part, own | {"stiffness": factor * own["stiffness"]}
+
+
+def fitted_fields(
+    scene: Scene,
+    distances: Iterable[float],
+    found: Mapping[str, float],
+    stiffness: float | None,
+    velocity: float,
+) -> dict[str, float]:
+    """Fields of the scene of the first window with the parameters that a fit found.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene at which the fit started.
+    distances : iterable of float
+        First guesses of the slip distances in um.
+    found : mapping of str to float
+        Values of the fitted parameters.
+    stiffness : float or None
+        Stiffness of the window, if it was not fitted.
+    velocity : float
+        Load point velocity before the step in um/s.
+    """
+    values = scene_to_parameters(scene, *distances)
+    if stiffness is not None:
+        values["stiffness"] = stiffness
+    values |= {n: value for n, value in window_values(found, 1).items() if n in values}
+    return parameters_to_fields(values, velocity)

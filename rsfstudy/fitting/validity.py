@@ -15,6 +15,7 @@ import numpy as np
 from rsfstudy.fitting.fit_solution import FitSolution
 from rsfstudy.fitting.joint_model import strip_window_number
 from rsfstudy.fitting.noise import ljung_box_p_value
+from rsfstudy.fitting.whiteness_test import LAG_COUNT
 from rsfstudy.fitting.window_model import LOGARITHMIC_PARAMETERS
 from rsfstudy.formatting import pluralize
 
@@ -276,3 +277,12 @@ def describe_unidentified(
         text += "; friction does not change at the step as velocity does: "
         text += "see whether columns (time and displacement, say) are exchanged"
     return text
+
+
+def describe_whiteness(p_value: float, noise_order: int, rows: int) -> str:
+    """Describe the result of the autocorrelation test of whitened residuals."""
+    verdict = (
+        "are still autocorrelated" if p_value < SIGNIFICANCE_LEVEL else "show no autocorrelation"
+    )
+    last = min(LAG_COUNT + noise_order, rows // 4)
+    return f"whitened residuals {verdict} up to lag {last} (p = {p_value:.2g})"

@@ -28,10 +28,8 @@ from rsfstudy.motion import (
     integrate_events,
     maximum,
     minimum,
-    pack_row,
+    recorded_row,
     rise,
-    to_recorded_units,
-    truncate_table,
 )
 from rsfstudy.slider import RUPTURE_REGIME, Point, Scene
 
@@ -233,11 +231,11 @@ def cycle_record(scene: Scene, cycles: Sequence[Cycle], recording: Recording | N
     slip = (
         scene.load_velocity * passed - (end.spring_stress - begin.spring_stress) / scene.stiffness
     )
-    last = to_recorded_units(scene, np.array(pack_row(passed, slip, end, 0)))
+    last = recorded_row(scene, passed, slip, end, 0)
     if recording is None:
-        return np.stack([to_recorded_units(scene, np.array(pack_row(0.0, 0.0, begin, 0))), last])
+        return np.stack([recorded_row(scene, 0.0, 0.0, begin, 0), last])
     # The last integration step extends beyond the end of the last cycle.
-    return truncate_table(recording.table(scene), last)
+    return recording.table_up_to_row(scene, last)
 
 
 @lru_cache(maxsize=256)

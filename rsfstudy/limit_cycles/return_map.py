@@ -52,10 +52,8 @@ from rsfstudy.motion import (
     MotionStopped,
     Recording,
     WorkMeter,
-    check_start,
-    inertia_weight,
-    switch_thresholds,
-    unevaluated_point,
+    inertia_matters_at,
+    restart_point,
     with_slip_rate,
 )
 from rsfstudy.slider import Numbers, Point, Scene, equations_without_mass
@@ -264,10 +262,7 @@ class ReturnMap:
             If forward slip is impossible at this spring stress.
         """
         spring_stress, *psis = section.tolist()
-        scene, states = self.scene, tuple(psis)
-        x, friction, _shift = scene.functions.balance_function(spring_stress, states, scene.numbers)
-        point = unevaluated_point(scene, spring_stress, states, x, friction)
-        check_start(self.scene, point)
+        point = restart_point(self.scene, spring_stress, tuple(psis))
         return (
             with_slip_rate(self.scene, point, self.scene.log_load_velocity)
             if self._inertia_matters_at(point)
@@ -276,11 +271,7 @@ class ReturnMap:
 
     def _inertia_matters_at(self, point: Point) -> bool:
         """Return True if inertia is too important for the slow manifold."""
-        if not self.scene.has_mass:
-            return False
-        inertial_stress = point.spring_stress - point.frictional_stress
-        given = switch_thresholds(self.scene, self.accuracy)
-        return inertia_weight(point.log_slip_rate, inertial_stress, given) >= 1.0
+        return inertia_matters_at(self.scene, self.accuracy, point)
 
     def follow_cycles(
         self, start: np.ndarray, count: int, recording: Recording | None = None

@@ -14,72 +14,31 @@ from rsfstudy._lazy import lazy_exports
 
 if TYPE_CHECKING:
     from rsfstudy.measure_base._declaration_checks import OutputValue
-    from rsfstudy.measure_base._loading_checks import (
-        SLOW_NORM_PREFIX,
-        check_single_step,
-        check_steady_loading,
-        norm_below_loading_outcome,
-        slow_norm_warning,
-    )
-    from rsfstudy.measure_base._recorded_motion import (
-        COINCIDENCE_FLOOR,
-        RecordedMotion,
-        RecordingMeasure,
-        estimate_instant_error,
-        estimate_instant_errors,
-        phase_outputs,
-        record_motion,
-        relative_to_start,
-    )
+    from rsfstudy.measure_base._loading_checks import check_steady_loading
+    from rsfstudy.measure_base._recorded_motion import RecordingMeasure, phase_outputs
     from rsfstudy.measure_base.elasticities import Elasticities
     from rsfstudy.measure_base.measure import Measure, Outcome
-    from rsfstudy.measure_base.settling_checks import settled_flag, settles_to_steady_sliding
+    from rsfstudy.measure_base.settling_checks import settles_to_steady_sliding
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
             "measure_base._declaration_checks": ("OutputValue",),
-            "measure_base._loading_checks": (
-                "SLOW_NORM_PREFIX",
-                "check_single_step",
-                "check_steady_loading",
-                "norm_below_loading_outcome",
-                "slow_norm_warning",
-            ),
-            "measure_base._recorded_motion": (
-                "COINCIDENCE_FLOOR",
-                "RecordedMotion",
-                "RecordingMeasure",
-                "estimate_instant_error",
-                "estimate_instant_errors",
-                "phase_outputs",
-                "record_motion",
-                "relative_to_start",
-            ),
+            "measure_base._loading_checks": ("check_steady_loading",),
+            "measure_base._recorded_motion": ("RecordingMeasure", "phase_outputs"),
             "measure_base.elasticities": ("Elasticities",),
             "measure_base.measure": ("Measure", "Outcome"),
-            "measure_base.settling_checks": ("settled_flag", "settles_to_steady_sliding"),
+            "measure_base.settling_checks": ("settles_to_steady_sliding",),
         },
     )
 
 __all__ = [
-    "COINCIDENCE_FLOOR",
     "Elasticities",
     "Measure",
     "Outcome",
     "OutputValue",
-    "RecordedMotion",
     "RecordingMeasure",
-    "SLOW_NORM_PREFIX",
-    "check_single_step",
     "check_steady_loading",
-    "estimate_instant_error",
-    "estimate_instant_errors",
-    "norm_below_loading_outcome",
     "phase_outputs",
-    "record_motion",
-    "relative_to_start",
-    "settled_flag",
     "settles_to_steady_sliding",
-    "slow_norm_warning",
 ]

@@ -31,7 +31,6 @@ from rsfstudy.motion import (
     MotionStopped,
     WorkMeter,
     larger_budget_remedy,
-    relative_work,
 )
 from rsfstudy.quantities import Output, Quantity, is_variable_name
 from rsfstudy.slider import FIELD_NAMES, Scene, cached_attribute
@@ -556,3 +555,14 @@ def _check_names(measure: Measure) -> None:
             raise InvalidValue(
                 "solved_fields", name, "is not a field of a scene", choices=FIELD_NAMES
             )
+
+
+def relative_work(rtol: float, work_by_digits: Mapping[float, float]) -> float:
+    """Cost of an accuracy over that of the default one, from measured costs by digits."""
+    known = sorted(work_by_digits)
+    digits = min(-math.log10(rtol), known[-1] + 2.0)
+    above = next((d for d in known[1:] if d >= digits), known[-1])
+    below = known[known.index(above) - 1]
+    share = (digits - below) / (above - below)
+    low, high = work_by_digits[below], work_by_digits[above]
+    return float(low * (high / low) ** share)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from rsfstudy.motion import MotionStopped
 from rsfstudy.slider import Scene, largest_growth_rate
 from rsfstudy.status import Status
@@ -40,29 +38,3 @@ def settles_to_steady_sliding(scene: Scene) -> bool:
             f"{growth.error:.1e}. Change stiffness= by more than that.",
         )
     return growth.value < 0.0
-
-
-def settled_flag(scene: Scene, *, is_flat: bool) -> float:
-    """Return 1 if friction has settled at the end of a record, and 0 if not.
-
-    Friction has settled if it is nearly constant and if small perturbations of steady sliding do
-    not grow.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with the last loading segment of the record.
-    is_flat : bool
-        True if friction is nearly constant at the end of the record.
-
-    Returns
-    -------
-    float
-        1, 0, or NaN if the growth rate of small perturbations is zero within its error.
-    """
-    if not is_flat:
-        return 0.0
-    growth = largest_growth_rate(scene, scene.log_load_velocity)
-    if growth is not None and growth.is_undecided:
-        return math.nan
-    return 0.0 if growth is not None and growth.is_positive else 1.0

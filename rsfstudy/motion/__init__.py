@@ -22,15 +22,9 @@ if TYPE_CHECKING:
         ROUNDING_ERROR,
         Accuracy,
         estimate_error,
-        relative_work,
     )
     from rsfstudy.motion.driver import MotionDriver, events_along
-    from rsfstudy.motion.engine_factory import (
-        check_engine,
-        compiled_engine,
-        missing_packages,
-        scalar_function,
-    )
+    from rsfstudy.motion.engine_factory import check_engine, compiled_engine
     from rsfstudy.motion.engines import (
         COMPILED,
         ENGINES,
@@ -38,7 +32,6 @@ if TYPE_CHECKING:
         SCIPY,
         compilation_log,
         is_installed,
-        package_versions,
         register_steppers,
         user_stepper,
     )
@@ -53,12 +46,10 @@ if TYPE_CHECKING:
         rise,
     )
     from rsfstudy.motion.initial_points import (
-        build_point_function,
-        check_start,
         initial_point,
         manifold_point,
         point_before_start,
-        unevaluated_point,
+        restart_point,
         with_slip_rate,
     )
     from rsfstudy.motion.integrate import integrate_events
@@ -70,10 +61,7 @@ if TYPE_CHECKING:
     )
     from rsfstudy.motion.neglected_inertia import estimate_neglected_inertia
     from rsfstudy.motion.readings import (
-        distance_from_steady,
         friction_coefficient,
-        friction_event_quantity,
-        growth_rate_along_path,
         load_point_displacement,
         sample_along_path,
     )
@@ -84,17 +72,9 @@ if TYPE_CHECKING:
         REGIME_COLUMN,
         SAMPLE_COLUMN,
         Recording,
-        pack_row,
-        to_recorded_units,
-        truncate_table,
-        with_increasing_times,
+        recorded_row,
     )
-    from rsfstudy.motion.regime_switching import (
-        inertia_matters,
-        inertia_weight,
-        slow_manifold_error,
-        switch_thresholds,
-    )
+    from rsfstudy.motion.regime_switching import inertia_matters_at
     from rsfstudy.motion.roots import build_root_finder
 else:
     __getattr__, __dir__ = lazy_exports(
@@ -109,15 +89,9 @@ else:
                 "MIN_RTOL",
                 "ROUNDING_ERROR",
                 "estimate_error",
-                "relative_work",
             ),
             "motion.driver": ("MotionDriver", "events_along"),
-            "motion.engine_factory": (
-                "check_engine",
-                "compiled_engine",
-                "missing_packages",
-                "scalar_function",
-            ),
+            "motion.engine_factory": ("check_engine", "compiled_engine"),
             "motion.engines": (
                 "COMPILED",
                 "ENGINES",
@@ -125,7 +99,6 @@ else:
                 "SCIPY",
                 "compilation_log",
                 "is_installed",
-                "package_versions",
                 "register_steppers",
                 "user_stepper",
             ),
@@ -140,12 +113,10 @@ else:
                 "rise",
             ),
             "motion.initial_points": (
-                "build_point_function",
-                "check_start",
                 "initial_point",
                 "manifold_point",
                 "point_before_start",
-                "unevaluated_point",
+                "restart_point",
                 "with_slip_rate",
             ),
             "motion.integrate": ("integrate_events",),
@@ -157,10 +128,7 @@ else:
             ),
             "motion.neglected_inertia": ("estimate_neglected_inertia",),
             "motion.readings": (
-                "distance_from_steady",
                 "friction_coefficient",
-                "friction_event_quantity",
-                "growth_rate_along_path",
                 "load_point_displacement",
                 "sample_along_path",
             ),
@@ -171,17 +139,9 @@ else:
                 "REGIME_COLUMN",
                 "Recording",
                 "SAMPLE_COLUMN",
-                "pack_row",
-                "to_recorded_units",
-                "truncate_table",
-                "with_increasing_times",
+                "recorded_row",
             ),
-            "motion.regime_switching": (
-                "inertia_matters",
-                "inertia_weight",
-                "slow_manifold_error",
-                "switch_thresholds",
-            ),
+            "motion.regime_switching": ("inertia_matters_at",),
             "motion.roots": ("build_root_finder",),
         },
     )
@@ -212,22 +172,16 @@ __all__ = [
     "SCIPY",
     "WorkMeter",
     "approach_to_steady_state",
-    "build_point_function",
     "build_root_finder",
     "check_engine",
-    "check_start",
     "compilation_log",
     "compiled_engine",
-    "distance_from_steady",
     "estimate_error",
     "estimate_neglected_inertia",
     "events_along",
     "fall",
     "friction_coefficient",
-    "friction_event_quantity",
-    "growth_rate_along_path",
-    "inertia_matters",
-    "inertia_weight",
+    "inertia_matters_at",
     "initial_point",
     "integrate_events",
     "is_installed",
@@ -236,21 +190,12 @@ __all__ = [
     "manifold_point",
     "maximum",
     "minimum",
-    "missing_packages",
-    "pack_row",
-    "package_versions",
     "point_before_start",
+    "recorded_row",
     "register_steppers",
-    "relative_work",
+    "restart_point",
     "rise",
     "sample_along_path",
-    "scalar_function",
-    "slow_manifold_error",
-    "switch_thresholds",
-    "to_recorded_units",
-    "truncate_table",
-    "unevaluated_point",
     "user_stepper",
-    "with_increasing_times",
     "with_slip_rate",
 ]

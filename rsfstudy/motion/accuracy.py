@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from numbers import Real
@@ -155,14 +154,3 @@ def estimate_error(value: float, refined: float, floor: float, scale: float | No
     value = float(value)
     hidden = (floor + ROUNDING_ERROR) * abs(value if scale is None else scale)
     return 3.0 * abs(value - float(refined)) + hidden
-
-
-def relative_work(rtol: float, work_by_digits: Mapping[float, float]) -> float:
-    """Cost of an accuracy over that of the default one, from measured costs by digits."""
-    known = sorted(work_by_digits)
-    digits = min(-math.log10(rtol), known[-1] + 2.0)
-    above = next((d for d in known[1:] if d >= digits), known[-1])
-    below = known[known.index(above) - 1]
-    share = (digits - below) / (above - below)
-    low, high = work_by_digits[below], work_by_digits[above]
-    return float(low * (high / low) ** share)

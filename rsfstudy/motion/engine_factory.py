@@ -16,21 +16,9 @@ from rsfstudy.motion.engines import (
     unknown_engine_error,
     user_stepper,
 )
-from rsfstudy.slider import Numbers
 
 if TYPE_CHECKING:
     import numpy as np
-
-
-def missing_packages(name: str) -> str:
-    """Packages that an engine lacks, in words; empty where none."""
-    try:
-        check_engine(name)
-    except InvalidValue:
-        if name != COMPILED:
-            raise
-        return "needs Numba (pip install 'rsfstudy[fast]')"
-    return ""
 
 
 def check_engine(name: str) -> None:
@@ -76,17 +64,6 @@ def compiled_engine() -> Any:
         rule = f"needs Numba, which cannot be imported ({error})"
         remedy = "Install it: pip install 'rsfstudy[fast]'."
         raise InvalidValue("engine", COMPILED, rule, remedy=remedy) from error
-
-
-def scalar_function(function: Callable[..., Any], name: str, *arguments: float | Numbers) -> Any:
-    """A function of floats and of tuples of floats as an engine calls it: compiled, for arguments
-    of this form, where its loop is.
-    """
-    return (
-        compiled_engine().compile_scalar_function(function, *arguments)
-        if name == COMPILED
-        else function
-    )
 
 
 def call_with_arrays(function: Callable[..., None], name: str, *arrays: np.ndarray) -> None:

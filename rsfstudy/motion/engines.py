@@ -96,16 +96,3 @@ compilation_log = CompilationLog()
 def is_installed(name: str) -> bool:
     """True if an engine can be used here, as far as one can tell without loading it."""
     return name != COMPILED or importlib.util.find_spec("numba") is not None
-
-
-def package_versions(name: str) -> dict[str, str]:
-    """Versions of what decides the numbers of an engine, beside those of SciPy."""
-    if name != COMPILED:
-        return {}
-    # loading it would make each command wait
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return {"numba": version("numba"), "llvmlite": version("llvmlite")}
-    except PackageNotFoundError:
-        return {"numba": "not installed"}

@@ -6,7 +6,6 @@ When motions change between their regimes is for `regime_switching` to say.
 from __future__ import annotations
 
 import math
-from functools import cache
 
 from scipy.optimize import newton
 
@@ -14,7 +13,6 @@ from rsfstudy.motion import regime_switching
 from rsfstudy.motion.meter import MotionStopped
 from rsfstudy.parts import Segment
 from rsfstudy.slider import (
-    Function,
     Numbers,
     Point,
     Scene,
@@ -73,6 +71,21 @@ def unevaluated_point(
     return Point._make((*known, *_UNEVALUATED_FIELDS, psis))
 
 
+def restart_point(scene: Scene, spring_stress: float, psis: Numbers) -> Point:
+    """The point at which a motion may begin again with this spring stress and these states, which
+    is on the slow manifold.
+
+    Raises
+    ------
+    MotionStopped
+        If the spring stress is incompatible with friction of forward slip.
+    """
+    x, friction, _shift = scene.functions.balance_function(spring_stress, psis, scene.numbers)
+    point = unevaluated_point(scene, spring_stress, psis, x, friction)
+    check_start(scene, point)
+    return point
+
+
 def _with_loading_states(scene: Scene, psis: Numbers) -> Numbers:
     """States with those of the loading, behind those of the law, as it begins with them; without
     those of a loading that has ended.
@@ -125,17 +138,6 @@ def with_slip_rate(scene: Scene, point: Point, log_slip_rate: float) -> Point:
 def manifold_point(scene: Scene, spring_stress: float, psis: Numbers) -> Point:
     """The point with this spring stress and these states, where mass hardly acts."""
     return equations_between_ruptures(scene, clock=False).evaluate_point((spring_stress, *psis))
-
-
-@cache
-def build_point_function(rate: Function, point: Function) -> Function:
-    """``(state, p) -> Point``."""
-
-    def at(state: Numbers, p: Numbers) -> Point:
-        now: Point = point(state, rate(state, p), p)
-        return now
-
-    return at
 
 
 def check_start(scene: Scene, start: Point | None = None) -> None:

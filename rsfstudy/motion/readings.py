@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from rsfstudy.motion.engine_factory import call_with_arrays
 from rsfstudy.motion.engines import SCIPY
-from rsfstudy.motion.events import Event
 from rsfstudy.motion.recording import (
     MOTION_VARIABLES,
     RECORDED_VARIABLES,
@@ -17,62 +15,12 @@ from rsfstudy.motion.recording import (
     SAMPLES_PER_STEP,
     resample_along_path,
 )
-from rsfstudy.slider import PATH_LOG_RATE_SCALE, RUPTURE_REGIME, Point, Scene, path_metric
+from rsfstudy.slider import Scene
 
-#: Smallest square of a direction cosine of the path in a rupture, where ln V changes at once.
-MIN_SQUARED_COSINE = 1e-12
 #: Columns of a recorded motion that the length of its path depends on.
 _PATH_COLUMNS = tuple(
     MOTION_VARIABLES.index(name) for name in ("time", "log10_slip_rate", "shear_stress")
 )
-
-
-def distance_from_steady(scene: Scene, point: Point, load_velocity: float) -> float:
-    """Distance of a point from steady sliding at a load point velocity, in ln V or in the state
-    over b.
-    """
-    size = scene.a * scene.parts.law.state_change_over_a
-    return max(
-        abs(point.log_slip_rate - math.log(abs(load_velocity))),
-        point.distance_from_steady_state / size,
-    )
-
-
-def growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> float:
-    """Compute the growth rate of ln V at an event with respect to path length.
-
-    During a rupture the clock is the path length in inertial time. The growth rate is converted to
-    the unit of path length that is used between ruptures.
-
-    Parameters
-    ----------
-    scene : Scene
-    event : Event
-    load_velocity : float
-        Load point velocity V_0/V_*.
-    """
-    growth = event.point.log_slip_rate_derivative
-    if event.regime != RUPTURE_REGIME:
-        return growth
-    norm = scene.inertial_time * (math.exp(event.point.log_slip_rate) + load_velocity)
-    slant = growth / (
-        PATH_LOG_RATE_SCALE
-        * math.sqrt(max(1.0 - (growth / PATH_LOG_RATE_SCALE) ** 2, MIN_SQUARED_COSINE))
-        * norm
-    )
-    return PATH_LOG_RATE_SCALE * slant * path_metric(slant)
-
-
-def friction_event_quantity(scene: Scene) -> tuple[str, float]:
-    """Quantity that an engine watches to tell extrema and levels of the friction coefficient that
-    is read, and what it is above it: spring stress itself where nothing changes normal stress and
-    slip rate alone tells where that is extreme.
-    """
-    parts = scene.parts
-    stressed = parts.normal_stress.normal_stress is not None or parts.loading.unknowns
-    if not stressed and not parts.law.regularised:
-        return "spring_stress", scene.mu_star
-    return "apparent_friction", 0.0
 
 
 def friction_coefficient(table: np.ndarray) -> np.ndarray:

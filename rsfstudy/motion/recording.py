@@ -34,9 +34,6 @@ RECORDED_VARIABLES = (*MOTION_VARIABLES, "friction_coefficient")
 REGIME_COLUMN, SAMPLE_COLUMN, FIRST_STATE_COLUMN = range(
     len(RECORDED_VARIABLES), len(RECORDED_VARIABLES) + 3
 )
-#: Times that follow each other differ by so many floating-point numbers, and by so much, at least:
-#: they still differ in other units, where each is rounded anew.
-_MIN_TIME_ULPS, _MIN_TIME_DIFFERENCE = 4, 1e-290
 #: Samples within each integration step of a recorded motion: enough for a smooth curve.
 SAMPLES_PER_STEP = 6
 
@@ -105,6 +102,10 @@ class Recording:
             table = truncate_table(table, np.array(last[:columns]))
         return to_recorded_units(scene, table)
 
+    def table_up_to_row(self, scene: Scene, last_row: np.ndarray) -> np.ndarray:
+        """The same, up to a row within a step or at its end."""
+        return truncate_table(self.table(scene), last_row)
+
 
 def to_recorded_units(scene: Scene, rows: np.ndarray) -> np.ndarray:
     """The same rows, of which slip rates become decimal logarithms, and stresses those that act."""
@@ -124,23 +125,9 @@ def pack_row(time: float, slip: float, point: Point, regime: int) -> tuple[float
     )
 
 
-def with_increasing_times(table: np.ndarray) -> np.ndarray:
-    """A recorded motion whose times strictly increase.
-
-    A regime or segment begins with a row at the time at which another has ended. It takes the place
-    of one that holds the same; where they differ, it follows a few floating-point numbers later, as
-    do rows of a rupture shorter than the spacing of those numbers.
-    """
-    same = (np.diff(np.delete(table, [REGIME_COLUMN, SAMPLE_COLUMN], axis=1), axis=0) == 0.0).all(
-        axis=1
-    )
-    table = table[~np.append(same, np.zeros(min(len(table), 1), dtype=bool))]
-    times, earliest = table[:, 0].tolist(), -math.inf
-    for place, time in enumerate(times):
-        times[place] = max(time, earliest)
-        earliest = times[place] + max(_MIN_TIME_ULPS * math.ulp(times[place]), _MIN_TIME_DIFFERENCE)
-    table[:, 0] = times
-    return table
+def recorded_row(scene: Scene, time: float, slip: float, point: Point, regime: int) -> np.ndarray:
+    """Row of a point as `Recording.table` has it."""
+    return to_recorded_units(scene, np.array(pack_row(time, slip, point, regime)))
 
 
 def truncate_table(table: np.ndarray, last_row: np.ndarray) -> np.ndarray:

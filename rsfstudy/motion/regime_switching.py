@@ -10,7 +10,13 @@ from typing import NamedTuple
 
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import MotionStopped
-from rsfstudy.slider import LARGEST_LOG_SLIP_RATE, STOPPED_LOG_SLIP_RATE, Scene, cached_per_scene
+from rsfstudy.slider import (
+    LARGEST_LOG_SLIP_RATE,
+    STOPPED_LOG_SLIP_RATE,
+    Point,
+    Scene,
+    cached_per_scene,
+)
 from rsfstudy.status import Status
 
 #: Normal stress over sigma_* at which the fault counts as open, and as locked.
@@ -72,23 +78,6 @@ def switch_thresholds(scene: Scene, accuracy: Accuracy) -> SwitchThresholds:
     )
 
 
-def inertia_matters(scene: Scene, accuracy: Accuracy) -> bool:
-    """True if mass matters up to the instability norm, beyond what the slow manifold holds of
-    it.
-    """
-    return scene.has_mass and slow_manifold_error(scene) > 0.1 * accuracy.rtol
-
-
-def slow_manifold_error(scene: Scene) -> float:
-    """Relative error of a boundary computed on the slow manifold up to the norm w of a scene:
-    ``3 [(K/a) w**2]**2``.
-
-    Mass moves a boundary in proportion to (K/a) w**2, by up to 0.8 of it where the norm is a slip
-    rate of a few V_*; the slow manifold leaves up to 0.9 of its square (the tests measure it).
-    """
-    return 3.0 * (scene.stiffness / scene.a * scene.instability_norm**2) ** 2
-
-
 def slip_rate_norm(log_slip_rate: float, thresholds: SwitchThresholds) -> float:
     """w = V T/(2 pi D_c)."""
     return thresholds.inertial_time * math.exp(min(log_slip_rate, LARGEST_LOG_SLIP_RATE))
@@ -102,6 +91,15 @@ def inertia_weight(
     """
     correction = abs(inertial_stress) / thresholds.a / thresholds.max_correction
     return max(slip_rate_norm(log_slip_rate, thresholds) / thresholds.max_norm, correction)
+
+
+def inertia_matters_at(scene: Scene, accuracy: Accuracy, point: Point) -> bool:
+    """Return True if the effect of inertia at a point exceeds that on the slow manifold."""
+    if not scene.has_mass:
+        return False
+    inertial_stress = point.spring_stress - point.frictional_stress
+    given = switch_thresholds(scene, accuracy)
+    return inertia_weight(point.log_slip_rate, inertial_stress, given) >= 1.0
 
 
 def slip_during_transition(

@@ -15,10 +15,10 @@ from rsfstudy.motion.layout import (
     NORMAL_STRESS_RATIO,
     STEP_TAKEN,
 )
+from rsfstudy.motion.longest_step import LONGEST_STEP, compute_longest_step
 from rsfstudy.motion.steppers import attempt, retake, step_to_segment_end, unknowns_at
 from rsfstudy.motion.workspace import count_evaluations, step_rates
 from rsfstudy.parts import LOG_LOAD_VELOCITY
-from rsfstudy.slider import LONGEST_STEP, compute_longest_step
 
 #: What slopes of dense output may differ by from rates over a step, in local tolerances; how often
 #: a step is halved for that, and by how much the next may be longer; and how far apart, over the

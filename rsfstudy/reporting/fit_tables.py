@@ -4,7 +4,6 @@ command prints them and a report shows them, those of one step beside each other
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -13,25 +12,16 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.execution import provenance_attributes
+from rsfstudy.errors import DataError
 from rsfstudy.fitting import (
-    LAG_COUNT,
-    LOGARITHMIC_PARAMETERS,
     PARAMETERS,
-    SIGNIFICANCE_LEVEL,
-    parameters_to_fields,
-    scene_to_parameters,
-    strip_window_number,
-    window_values,
+    describe_whiteness,
+    split_window_number,
 )
 from rsfstudy.formatting import pluralize
-from rsfstudy.netcdf import with_cf_encoding
 from rsfstudy.reporting.tables import Table
-from rsfstudy.rig import Rig
-from rsfstudy.slider import Scene
 from rsfstudy.status import STATUS_LABELS, Status
-from rsfstudy.storage import build_scene, read_declaration
+from rsfstudy.storage import read_declaration
 
 #: What laboratories call parameters, where not as they are called here.
 _LABORATORY_NAMES = {
@@ -71,15 +61,6 @@ def split_fits(dataset: xr.Dataset) -> list[xr.Dataset]:
     return [dataset.isel(dict(zip(dims, at, strict=True))) for at in np.ndindex(*sizes)]
 
 
-def _single_fit(dataset: xr.Dataset) -> xr.Dataset:
-    """The one fit that a dataset holds."""
-    found = split_fits(dataset)
-    if len(found) != 1:
-        remedy = "Select one first, as in dataset.sel(law='slip')."
-        raise InvalidValue("dataset", len(found), "holds several fits", remedy=remedy)
-    return found[0]
-
-
 def record_and_step(one: xr.Dataset) -> dict[str, Any]:
     """Record and step of a fit, where there are several."""
     found = {n: one[n].item() for n in ("record", "step") if n in one.coords}
@@ -97,7 +78,7 @@ def parameter_headings(one: xr.Dataset) -> dict[str, str]:
     """
     names, found = [*map(str, one["parameter"].values), "a_minus_b"], {}
     for short in dict.fromkeys(("a", "b", "b1", "b2", "a_minus_b", *PARAMETERS)):
-        for name in (n for n in names if strip_window_number(n) == short):
+        for name in (n for n in names if split_window_number(n)[0] == short):
             found[name] = _LABORATORY_NAMES.get(short, short) + name.removeprefix(short)
     return found
 
@@ -147,79 +128,6 @@ def _normal_stresses_in_mpa(one: xr.Dataset) -> dict[str, float]:
 def status_label(one: xr.Dataset) -> str:
     """Label of the status of a fit."""
     return STATUS_LABELS[int(one["status"])]
-
-
-def sample_parameters(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
-    """Samples of the parameters of one fit, as `Accessor.sample_parameters` says."""
-    one = _single_fit(dataset)
-    if not isinstance(n, int) or n < 1:
-        raise InvalidValue("n", n, "must be a whole number, 1 or more")
-    has = one["covariance"].notnull().any("other_parameter").values  # of other laws: NaN
-    names = [str(name) for name in one["parameter"].values[has]]
-    at = np.array([one[name].item() for name in names])
-    covariance = one["covariance"].values[np.ix_(has, has)]
-    if not (has.any() and np.isfinite(covariance).all()):
-        raise InvalidValue("dataset", status_label(one), "has no covariance to draw from")
-    logs = np.array([name in LOGARITHMIC_PARAMETERS for name in names])
-    scales = np.where(logs, at, 1.0)
-    rng = np.random.default_rng(seed)
-    degrees = one["degrees_of_freedom"].item()
-    spread = rng.multivariate_normal(np.zeros(len(at)), covariance / np.outer(scales, scales), n)
-    spread /= np.sqrt(rng.chisquare(degrees, n) / degrees)[:, None]
-    drawn = np.where(logs, at * np.exp(np.where(logs, spread, 0.0)), at + spread)
-    data = {
-        name: (
-            "draw",
-            drawn[:, place],
-            {key: one[name].attrs[key] for key in ("long_name", "units") if key in one[name].attrs},
-        )
-        for place, name in enumerate(names)
-    }
-    number = {"long_name": "number of the sample", "units": "1"}
-    about = {
-        "title": "Samples of the parameters of a fit",
-        "Conventions": "CF-1.11",
-        **provenance_attributes("dataset.rsf.draw"),
-    }
-    return with_cf_encoding(xr.Dataset(data, {"draw": ("draw", np.arange(n), number)}, about))
-
-
-def fitted_scene(dataset: xr.Dataset) -> Scene:
-    """The scene of one fit, with the parameters that it found and the velocity step that it is of,
-    in units of its slip distance and of the velocity before the step.
-    """
-    one = _single_fit(dataset)
-    plain = json.loads(dataset.attrs["declaration"])
-    first = build_scene(plain["base"], {})
-    if "law" in one.coords:
-        first = first.with_(law=str(one["law"].item()))
-    distances = (
-        float(plain["measure"][f"{n}_guess"]) for n in ("slip_distance", "slip_distance_2")
-    )
-    values = scene_to_parameters(first, *distances)
-    found = {n: one[n].item() for n in map(str, one["parameter"].values)}
-    if "window_stiffness" in one:
-        values["stiffness"] = one["window_stiffness"].item()
-    values |= {n: value for n, value in window_values(found, 1).items() if n in values}
-    before, after = one["velocity_before"].item(), one["velocity_after"].item()
-    return first.with_(**parameters_to_fields(values, before), load_velocity_ratio=after / before)
-
-
-def fitted_rig(dataset: xr.Dataset) -> Rig:
-    """The rig of one fit, as `Accessor.rig` says."""
-    one, slider = _single_fit(dataset), fitted_scene(dataset)
-    stress = one["normal_stress_before"].item() if "normal_stress_before" in one else math.nan
-    if not stress > 0.0:
-        remedy = "Read the record with normal_stress=, or make a rsfstudy.Rig that states it."
-        raise InvalidValue("normal_stress", None, "is not in the record", remedy=remedy)
-    velocity = one["velocity_before"].item() * 1e-6
-    distance = velocity / slider.reference_rate
-    return Rig(
-        normal_stress=stress,
-        slip_distance=distance,
-        reference_velocity=velocity,
-        stiffness=slider.stiffness * stress / distance,
-    )
 
 
 # ---- as it is printed and shown -----------------------------------------------------------------
@@ -290,7 +198,7 @@ def _parameter_table(where: str, fits: Sequence[xr.Dataset]) -> Table:
 def _parameter_column(one: xr.Dataset) -> dict[str, str]:
     """The parameters of a fit, how well it explains its rows, and the noise that is left."""
     found = {
-        n + _bracketed_units(strip_window_number(name)): format_with_stderr(one, name)
+        n + _bracketed_units(split_window_number(name)[0]): format_with_stderr(one, name)
         for name, n in parameter_headings(one).items()
     }
     if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
@@ -383,10 +291,5 @@ def _remarks(one: xr.Dataset) -> Iterator[str]:
         yield f"{law}: 95 % of the posterior: {each} (autocorrelation time {time})"
     p_value = one["whiteness"].item()
     if math.isfinite(p_value):
-        verdict = (
-            "are still autocorrelated"
-            if p_value < SIGNIFICANCE_LEVEL
-            else "show no autocorrelation"
-        )
-        last = min(LAG_COUNT + int(one["noise_order"]), int(one["rows_fitted"]) // 4)
-        yield f"{law}: whitened residuals {verdict} up to lag {last} (p = {p_value:.2g})"
+        order, rows = int(one["noise_order"]), int(one["rows_fitted"])
+        yield f"{law}: {describe_whiteness(p_value, order, rows)}"

@@ -42,6 +42,11 @@ def summary_pieces(dataset: xr.Dataset) -> Iterator[SummaryPiece]:
         yield tables.answer_table(dataset)
 
 
+def motion_pieces(motion: xr.Dataset, scene: Scene, catalogue: xr.Dataset) -> list[SummaryPiece]:
+    """What a reader of a motion looks for first, the stability of its scene, and its events."""
+    return [summarise_motion(motion), describe_stability(scene), events_table(catalogue)]
+
+
 def is_motion(dataset: xr.Dataset) -> bool:
     """True of a motion, or a part of one that still holds what is told of it."""
     told = {"load_point_displacement", "friction_coefficient", "log10_slip_rate", "shear_stress"}

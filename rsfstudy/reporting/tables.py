@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.execution import count_failures, count_statuses
+from rsfstudy.critical_steps import SLOW_NORM_PREFIX
 from rsfstudy.formatting import (
     format_fields,
     format_list,
@@ -22,7 +22,6 @@ from rsfstudy.formatting import (
     pluralize,
     read_flag_meanings,
 )
-from rsfstudy.measure_base import SLOW_NORM_PREFIX
 from rsfstudy.quantities import units_or_scale
 from rsfstudy.rig import (
     DIMENSIONLESS_PREFIX,
@@ -31,9 +30,9 @@ from rsfstudy.rig import (
     in_display_units,
 )
 from rsfstudy.status import STATUS_LABELS, Status
-from rsfstudy.storage import find_primary_output, read_declaration, read_provenance, thin_dimensions
+from rsfstudy.storage import find_primary_output, read_declaration, read_provenance
 from rsfstudy.study import NOT_APPLICABLE, VERDICTS, format_claim_row
-from rsfstudy.vocabulary import coverage_content_type, find_quantity
+from rsfstudy.vocabulary import find_quantity
 
 #: Most cells of a lattice that are shown, unless few more are all; and most that failed.
 MAX_CELLS, _MAX_CELLS_SHOWN_ENTIRELY, _MAX_FAILURES = 24, 36, 20
@@ -258,6 +257,13 @@ def reduction_tables(dataset: xr.Dataset) -> Iterator[Table]:
         yield Table(build_rows(dataset, dims, columns), wrappable={"problem", "cheapest"})
 
 
+def reduction_pieces(dataset: xr.Dataset) -> Iterator[Table | str]:
+    """The tables of reductions, and a sentence on each reduction that has no results."""
+    yield from reduction_tables(dataset)
+    for name, why in missing_result_reasons(dataset).items():
+        yield f"no {name}: {why}"
+
+
 def refusal_reasons(dataset: xr.Dataset) -> dict[str, str]:
     """Why reductions refuse to draw on cells, by their names."""
     named = [str(reduction["name"]) for reduction in read_declaration(dataset).reductions]
@@ -268,6 +274,16 @@ def refusal_reasons(dataset: xr.Dataset) -> dict[str, str]:
         if name and "refused" in values.attrs:
             found.setdefault(name, str(values.attrs["refused"]))
     return found
+
+
+def incomplete_notes(results: xr.Dataset) -> list[str]:
+    """How many cells failed, with which status, and which reductions refused to draw on cells."""
+    told = [f"no {name}: {why}" for name, why in refusal_reasons(results).items()]
+    if failed := count_failures(results):
+        each = ", ".join(f"{label} {number}" for label, number in failed.items())
+        first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
+        told = [first, *told, "dataset.rsf.failures() lists them"]
+    return told
 
 
 def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
@@ -355,8 +371,8 @@ def cells_frame(dataset: xr.Dataset, where: xr.DataArray, axes: Sequence[str]) -
     return pd.DataFrame(columns | {"message": dataset["message"].values[at]})
 
 
-def failures_table(dataset: xr.Dataset) -> tuple[Table, list[dict[Any, Any]]]:
-    """The first cells that failed, and the place of each on the axes."""
+def failures_table(dataset: xr.Dataset, file: str) -> tuple[Table, list[str]]:
+    """The first cells that failed, and the commands that compute each alone from a file."""
     status = dataset["status"]
     failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
     found = cells_frame(dataset, failed, list(map(str, failed.dims)))
@@ -369,7 +385,9 @@ def failures_table(dataset: xr.Dataset) -> tuple[Table, list[dict[Any, Any]]]:
     caption = f"{pluralize(len(found), 'cell')} failed"
     if len(found) > len(rows):
         caption += f", of which the first {len(rows)}"
-    return Table(rows, caption, wrappable={"cell", "message"}), places
+    return Table(rows, caption, wrappable={"cell", "message"}), [
+        rerun_command(dataset, file, place) for place in places
+    ]
 
 
 def rerun_command(dataset: xr.Dataset, file: str, place: Mapping[str, Any]) -> str:
@@ -388,14 +406,34 @@ def count_pending(dataset: xr.Dataset) -> int:
     return int((dataset["status"] == int(Status.PENDING)).sum())
 
 
-def contents_table(dataset: xr.Dataset) -> Table:
-    """The results that a file holds, what they are and along what."""
-    rows = [
-        {
-            "it holds": str(name),  # what a notebook added may have no words
-            "what": f"{v.attrs.get('long_name', '')} ({', '.join(map(str, v.dims))})".strip(),
-        }
-        for name, v in dataset.data_vars.items()
-        if coverage_content_type(str(name)) == "modelResult"
-    ]
-    return Table(rows, wrappable={"what"})
+def thin_dimensions(sizes: Mapping[str, int], most: int) -> dict[str, np.ndarray]:
+    """Points of each dimension, both ends and some between, that make so many cells at most.
+
+    Parameters
+    ----------
+    sizes : mapping of str to int
+    most : int
+        The longest dimensions are thinned first.
+    """
+    kept = {dimension: min(size, most) for dimension, size in sizes.items()}
+    while math.prod(kept.values()) > most:
+        kept[max(kept, key=kept.__getitem__)] -= 1
+    return {
+        dimension: np.unique(np.linspace(0, size - 1, kept[dimension]).round().astype(int))
+        for dimension, size in sizes.items()
+    }
+
+
+def count_statuses(dataset: xr.Dataset) -> Mapping[str, int]:
+    """Number of cells that ended with each status."""
+    status = np.asarray(dataset["status"].values)
+    return {s.label: int((status == int(s)).sum()) for s in Status if (status == int(s)).any()}
+
+
+def count_failures(dataset: xr.Dataset) -> Mapping[str, int]:
+    """Number of cells that failed with each status."""
+    return {
+        label: n
+        for label, n in count_statuses(dataset).items()
+        if not Status[label.upper()].is_answer
+    }

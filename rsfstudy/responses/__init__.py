@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from rsfstudy.responses._recorded_motion import estimate_instant_errors, settled_flag
     from rsfstudy.responses.healing import Healing
     from rsfstudy.responses.linear_stability import LinearStability
     from rsfstudy.responses.rigid_response import RigidResponse
@@ -21,6 +22,7 @@ else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
+            "responses._recorded_motion": ("estimate_instant_errors", "settled_flag"),
             "responses.healing": ("Healing",),
             "responses.linear_stability": ("LinearStability",),
             "responses.rigid_response": ("RigidResponse",),
@@ -35,4 +37,6 @@ __all__ = [
     "RigidResponse",
     "StepResponse",
     "VelocityStep",
+    "estimate_instant_errors",
+    "settled_flag",
 ]

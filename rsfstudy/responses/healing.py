@@ -13,12 +13,8 @@ from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import (
     Outcome,
-    RecordedMotion,
     RecordingMeasure,
-    estimate_instant_errors,
     phase_outputs,
-    record_motion,
-    relative_to_start,
     settles_to_steady_sliding,
 )
 from rsfstudy.motion import (
@@ -29,16 +25,24 @@ from rsfstudy.motion import (
     MotionStopped,
     WorkMeter,
     approach_to_steady_state,
-    distance_from_steady,
     friction_coefficient,
-    friction_event_quantity,
-    growth_rate_along_path,
     load_point_displacement,
     maximum,
     sample_along_path,
 )
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
+from rsfstudy.responses._readings import (
+    distance_from_steady,
+    friction_event_quantity,
+    growth_rate_along_path,
+)
+from rsfstudy.responses._recorded_motion import (
+    RecordedMotion,
+    estimate_instant_errors,
+    record_motion,
+    relative_to_start,
+)
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base import Measure, Outcome, estimate_instant_error
+from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import (
     RECORDED_VARIABLES,
     Accuracy,
@@ -24,6 +24,7 @@ from rsfstudy.motion import (
     rise,
 )
 from rsfstudy.quantities import Output
+from rsfstudy.responses._recorded_motion import estimate_instant_error
 from rsfstudy.slider import (
     Scene,
     compute_steady_states,

@@ -12,7 +12,6 @@ import numpy as np
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import (
-    COINCIDENCE_FLOOR,
     Outcome,
     RecordingMeasure,
     check_steady_loading,
@@ -34,6 +33,7 @@ from rsfstudy.motion import (
     sample_along_path,
 )
 from rsfstudy.quantities import Output, Quantity
+from rsfstudy.responses._recorded_motion import COINCIDENCE_FLOOR
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 

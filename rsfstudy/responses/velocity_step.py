@@ -11,17 +11,7 @@ import numpy as np
 
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base import (
-    Outcome,
-    RecordedMotion,
-    RecordingMeasure,
-    check_steady_loading,
-    estimate_instant_errors,
-    phase_outputs,
-    record_motion,
-    relative_to_start,
-    settled_flag,
-)
+from rsfstudy.measure_base import Outcome, RecordingMeasure, check_steady_loading, phase_outputs
 from rsfstudy.motion import (
     MOTION_VARIABLES,
     RECORDED_VARIABLES,
@@ -29,10 +19,8 @@ from rsfstudy.motion import (
     Event,
     MotionStopped,
     WorkMeter,
-    distance_from_steady,
     fall,
     friction_coefficient,
-    friction_event_quantity,
     integrate_events,
     maximum,
     minimum,
@@ -41,6 +29,14 @@ from rsfstudy.motion import (
 )
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
+from rsfstudy.responses._readings import distance_from_steady, friction_event_quantity
+from rsfstudy.responses._recorded_motion import (
+    RecordedMotion,
+    estimate_instant_errors,
+    record_motion,
+    relative_to_start,
+    settled_flag,
+)
 from rsfstudy.slider import Scene, steady_friction_excess
 from rsfstudy.status import Status
 

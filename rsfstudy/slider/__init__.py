@@ -53,14 +53,17 @@ from rsfstudy._lazy import lazy_exports
 if TYPE_CHECKING:
     from rsfstudy.slider.assembly import find_inapplicable_fields, replace_field_values
     from rsfstudy.slider.caching import cached_attribute, cached_per_scene
-    from rsfstudy.slider.closed_forms import CLOSED_FORMS, effective_friction
-    from rsfstudy.slider.closed_forms import critical_stiffness as critical_stiffness_closed_form
+    from rsfstudy.slider.closed_forms import (
+        CLOSED_FORMS,
+        effective_friction,
+    )
+    from rsfstudy.slider.closed_forms import (
+        critical_stiffness as critical_stiffness_closed_form,
+    )
     from rsfstudy.slider.dynamics.inertia import NEGLIGIBLE_SECOND_ORDER_WEIGHT
     from rsfstudy.slider.equations import (
-        LONGEST_STEP,
         RUPTURE_REGIME,
         Equations,
-        compute_longest_step,
         compute_steady_states,
         equations_between_ruptures,
         equations_by_displacement,
@@ -71,7 +74,6 @@ if TYPE_CHECKING:
         friction_relation,
         log_slip_rate_at,
         normal_stress_at,
-        single_state_evolution,
         state_evolution,
     )
     from rsfstudy.slider.fluid import BUILT_IN_PARTS
@@ -93,13 +95,11 @@ if TYPE_CHECKING:
         UserPart,
         field_defaults,
         field_types,
-        find_named_user_parts,
         names_to_parts,
         normalise_field_value,
         quantities_with_values,
         register_parts,
         scene_fields,
-        user_field_quantities,
         with_field_signature,
     )
     from rsfstudy.slider.sampled_history import (
@@ -108,12 +108,13 @@ if TYPE_CHECKING:
         build_sampled_history,
         history_from_table,
     )
-    from rsfstudy.slider.scene import ENDLESS_SEGMENT_TABLE, Scene, check_scene
+    from rsfstudy.slider.scene import ENDLESS_SEGMENT_TABLE, Scene
     from rsfstudy.slider.scene_functions import (
         PATH_LOG_RATE_SCALE,
         STOPPED_LOG_SLIP_RATE,
         path_metric,
     )
+    from rsfstudy.slider.scene_view import SceneView
     from rsfstudy.slider.slider_parameters import STIFFNESS_FIELDS, SliderParameters
     from rsfstudy.slider.stability import (
         critical_stiffness,
@@ -143,9 +144,7 @@ else:
             "slider.dynamics.inertia": ("NEGLIGIBLE_SECOND_ORDER_WEIGHT",),
             "slider.equations": (
                 "Equations",
-                "LONGEST_STEP",
                 "RUPTURE_REGIME",
-                "compute_longest_step",
                 "compute_steady_states",
                 "equations_between_ruptures",
                 "equations_by_displacement",
@@ -156,7 +155,6 @@ else:
                 "friction_relation",
                 "log_slip_rate_at",
                 "normal_stress_at",
-                "single_state_evolution",
                 "state_evolution",
             ),
             "slider.fluid": ("BUILT_IN_PARTS",),
@@ -178,13 +176,11 @@ else:
                 "UserPart",
                 "field_defaults",
                 "field_types",
-                "find_named_user_parts",
                 "names_to_parts",
                 "normalise_field_value",
                 "quantities_with_values",
                 "register_parts",
                 "scene_fields",
-                "user_field_quantities",
                 "with_field_signature",
             ),
             "slider.sampled_history": (
@@ -193,12 +189,13 @@ else:
                 "build_sampled_history",
                 "history_from_table",
             ),
-            "slider.scene": ("ENDLESS_SEGMENT_TABLE", "Scene", "check_scene"),
+            "slider.scene": ("ENDLESS_SEGMENT_TABLE", "Scene"),
             "slider.scene_functions": (
                 "PATH_LOG_RATE_SCALE",
                 "STOPPED_LOG_SLIP_RATE",
                 "path_metric",
             ),
+            "slider.scene_view": ("SceneView",),
             "slider.slider_parameters": ("STIFFNESS_FIELDS", "SliderParameters"),
             "slider.stability": (
                 "critical_stiffness",
@@ -228,7 +225,6 @@ __all__ = [
     "FrictionFunctions",
     "Function",
     "LARGEST_LOG_SLIP_RATE",
-    "LONGEST_STEP",
     "MIN_SEGMENT_DURATION",
     "NEGLIGIBLE_SECOND_ORDER_WEIGHT",
     "Numbers",
@@ -246,6 +242,7 @@ __all__ = [
     "STRESS_RATE_COLUMN",
     "SampledHistory",
     "Scene",
+    "SceneView",
     "SliderParameters",
     "SteadySliding",
     "UserLoading",
@@ -253,8 +250,6 @@ __all__ = [
     "build_sampled_history",
     "cached_attribute",
     "cached_per_scene",
-    "check_scene",
-    "compute_longest_step",
     "compute_steady_states",
     "critical_stiffness",
     "critical_stiffness_closed_form",
@@ -270,7 +265,6 @@ __all__ = [
     "field_names",
     "field_types",
     "find_inapplicable_fields",
-    "find_named_user_parts",
     "friction_relation",
     "growth_rates",
     "history_from_table",
@@ -286,13 +280,11 @@ __all__ = [
     "register_parts",
     "replace_field_values",
     "scene_fields",
-    "single_state_evolution",
     "state_evolution",
     "steady_friction_excess",
     "steady_sliding",
     "stress_after_jump",
     "stress_for_friction",
     "suggest_field",
-    "user_field_quantities",
     "with_field_signature",
 ]

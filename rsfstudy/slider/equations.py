@@ -16,20 +16,6 @@ from rsfstudy.slider.scene_view import SceneView
 #: The regime of the full equations of a scene with mass, and that of a rigid slider.
 RUPTURE_REGIME, RIGID_REGIME = "inertial", "rigid"
 
-#: Longest step of any clock. A motion at rest would otherwise double its steps until they overflow.
-LONGEST_STEP = 1e9
-
-#: Longest step along the path, as far as slip of D_c is: longer ones may pass a turn of the motion
-#: that none of their stages sees. Stationary contact has no turns, up to a few units of ln V before
-#: slip takes up again; and normal stress stretches them all.
-LONGEST_PATH_STEP, STATIONARY_LOG_RATE_SCALE = 3.0, 10.0
-
-
-def compute_longest_step(log_slip_rate: float, normal_stress: float, log_load_rate: float) -> float:
-    """Longest step of a form whose clock is length along the path."""
-    stationary = max(1.0, (log_load_rate - log_slip_rate) / STATIONARY_LOG_RATE_SCALE)
-    return min(LONGEST_PATH_STEP * stationary * max(1.0, normal_stress), LONGEST_STEP)
-
 
 @renamed_members
 class Equations(NamedTuple):
@@ -204,12 +190,6 @@ def log_slip_rate_at(scene: SceneView, spring_stress: float, psi: float) -> floa
     forms = build_scene_functions(scene, QuasiStatic()) if scene.has_mass else scene.functions
     psis = (psi, *(0.0,) * (scene.state_count - 1))
     return float(forms.balance_function(spring_stress, psis, scene.numbers)[0])
-
-
-def single_state_evolution(scene: SceneView) -> Callable[[float, float], float]:
-    """The law of a scene with one state: (ln(V/V_*), Theta) -> dTheta per unit slip."""
-    evolve = state_evolution(scene)
-    return lambda log_slip_rate, state: evolve(log_slip_rate, (state,), 0.0)[0]
 
 
 def state_evolution(scene: SceneView) -> Callable[[float, Numbers, float], Numbers]:

@@ -359,30 +359,6 @@ def normalise_field_value(field: str, value: Any) -> Any:
     return canonical_law_name(value) if field == "law" and isinstance(value, str) else value
 
 
-def find_named_user_parts(
-    names: Iterable[str], rows: Iterable[Mapping[str, Any]]
-) -> dict[str, UserPart]:
-    """Find the user-defined parts whose names occur in rows of values.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Names of the fields to examine.
-    rows : iterable of mapping of str to object
-        Field values.
-
-    Returns
-    -------
-    dict of str to type or UserLoading
-        User-defined parts by name.
-    """
-    slots = [slot for slot in SLOTS if slot.user_parts and slot.name in names]
-    places = ((slot, row.get(slot.name)) for row in rows for slot in slots)
-    return {
-        n: slot.user_parts[n] for slot, n in places if isinstance(n, str) and n in slot.user_parts
-    }
-
-
 def names_to_parts(values: Mapping[str, Any], parts: Mapping[str, UserPart]) -> Mapping[str, Any]:
     """Replace the names of user-defined parts by the parts themselves.
 
@@ -429,22 +405,6 @@ def scene_fields(parts: Iterable[UserPart]) -> dict[str, Quantity]:
                 rule = "is the name of something else, of another part"
                 raise InvalidValue(f"field of {kind.name}", about.name, rule)
     return found
-
-
-def user_field_quantities(parts: Iterable[UserPart]) -> Iterator[Quantity]:
-    """Return the quantities of the fields that user-defined parts add.
-
-    Parameters
-    ----------
-    parts : iterable of type or UserLoading
-        User-defined parts.
-
-    Returns
-    -------
-    iterator of Quantity
-        Quantities of the fields that are not fields of every scene.
-    """
-    return (about for name, about in scene_fields(parts).items() if name not in FIELD_NAMES)
 
 
 def field_types(parts: Iterable[UserPart]) -> Mapping[str, Any]:

@@ -510,21 +510,3 @@ def _critical_stiffness(
     slider = SliderParameters(a=a, mu_star=mu_star, stiffness=a)
     scene = Scene(SceneParts(slider, law, stress, pores, QuasiStatic(), StepLoading()))
     return stability.critical_stiffness(scene, 0.0, quasi_static=True)
-
-
-def check_scene(value: object) -> None:
-    """Raise ``InvalidValue`` if an object is not a scene.
-
-    Parameters
-    ----------
-    value : object
-        Object to check.
-
-    Raises
-    ------
-    InvalidValue
-        If the object is not a scene.
-    """
-    if not isinstance(value, Scene):
-        remedy = "Make one, rsfstudy.Scene(...); rsfstudy.run computes studies."
-        raise InvalidValue("scene", value, "is no scene", remedy=remedy)

@@ -14,11 +14,11 @@ from rsfstudy._lazy import lazy_exports
 if TYPE_CHECKING:
     from rsfstudy.storage.comparison import (
         Comparison,
-        compare_motions,
         compare_results,
         compare_same_lattice,
         find_cell_number,
     )
+    from rsfstudy.storage.dataset_scenes import scene_of_dataset
     from rsfstudy.storage.journal import (
         CellColumns,
         CellRow,
@@ -28,28 +28,19 @@ if TYPE_CHECKING:
         find_differences,
         read_timings,
     )
-    from rsfstudy.storage.lattice import assemble_dataset, build_coordinates, thin_dimensions
-    from rsfstudy.storage.loadings import read_loadings
-    from rsfstudy.storage.rebuild import (
-        find_primary_output,
-        has_user_code,
-        load_user_figure,
-        rebuild_study,
-        study_from_declaration,
-    )
-    from rsfstudy.storage.result_paths import find_results, output_directory
+    from rsfstudy.storage.lattice import assemble_dataset
+    from rsfstudy.storage.rebuild import find_primary_output, rebuild_study, study_of_dataset
     from rsfstudy.storage.schema import (
         build_axis,
         build_scene,
         check_is_study,
-        invalid_part_error,
         is_single_scene,
         read_declaration,
         read_json_attribute,
         read_provenance,
         read_scene_fields,
     )
-    from rsfstudy.storage.store import clean_attributes, read_dataset, read_results, write_dataset
+    from rsfstudy.storage.store import clean_attributes, read_dataset, write_dataset
     from rsfstudy.storage.zarr_store import check_not_existing, check_zarr_installed, write_store
 else:
     __getattr__, __dir__ = lazy_exports(
@@ -57,11 +48,11 @@ else:
         {
             "storage.comparison": (
                 "Comparison",
-                "compare_motions",
                 "compare_results",
                 "compare_same_lattice",
                 "find_cell_number",
             ),
+            "storage.dataset_scenes": ("scene_of_dataset",),
             "storage.journal": (
                 "CellColumns",
                 "CellRow",
@@ -71,28 +62,19 @@ else:
                 "find_differences",
                 "read_timings",
             ),
-            "storage.lattice": ("assemble_dataset", "build_coordinates", "thin_dimensions"),
-            "storage.loadings": ("read_loadings",),
-            "storage.rebuild": (
-                "find_primary_output",
-                "has_user_code",
-                "load_user_figure",
-                "rebuild_study",
-                "study_from_declaration",
-            ),
-            "storage.result_paths": ("find_results", "output_directory"),
+            "storage.lattice": ("assemble_dataset",),
+            "storage.rebuild": ("find_primary_output", "rebuild_study", "study_of_dataset"),
             "storage.schema": (
                 "build_axis",
                 "build_scene",
                 "check_is_study",
-                "invalid_part_error",
                 "is_single_scene",
                 "read_declaration",
                 "read_json_attribute",
                 "read_provenance",
                 "read_scene_fields",
             ),
-            "storage.store": ("clean_attributes", "read_dataset", "read_results", "write_dataset"),
+            "storage.store": ("clean_attributes", "read_dataset", "write_dataset"),
             "storage.zarr_store": ("check_not_existing", "check_zarr_installed", "write_store"),
         },
     )
@@ -106,35 +88,26 @@ __all__ = [
     "OutputPacking",
     "assemble_dataset",
     "build_axis",
-    "build_coordinates",
     "build_scene",
     "check_is_study",
     "check_not_existing",
     "check_zarr_installed",
     "clean_attributes",
-    "compare_motions",
     "compare_results",
     "compare_same_lattice",
     "find_cell_number",
     "find_differences",
     "find_primary_output",
-    "find_results",
-    "has_user_code",
-    "invalid_part_error",
     "is_single_scene",
-    "load_user_figure",
-    "output_directory",
     "read_dataset",
     "read_declaration",
     "read_json_attribute",
-    "read_loadings",
     "read_provenance",
-    "read_results",
     "read_scene_fields",
     "read_timings",
     "rebuild_study",
-    "study_from_declaration",
-    "thin_dimensions",
+    "scene_of_dataset",
+    "study_of_dataset",
     "write_dataset",
     "write_store",
 ]

@@ -19,7 +19,7 @@ from rsfstudy.formatting import format_list
 from rsfstudy.status import STATUS_LABELS, Status
 from rsfstudy.storage.journal import find_differences
 from rsfstudy.storage.rebuild import find_primary_output
-from rsfstudy.storage.schema import read_provenance
+from rsfstudy.storage.schema import is_single_scene, read_provenance
 from rsfstudy.vocabulary import TIMING_VARIABLES
 
 _AGREEMENT_COLUMNS = ["variable", "values", "identical", "largest_difference", "beyond_errors"]
@@ -43,6 +43,8 @@ def compare_same_lattice(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
         ``attrs["differs"]`` what decides a number and differs between them. Measured times, which
         no two runs share, are left out.
     """
+    if is_single_scene(theirs):
+        return _compare_motions(theirs, ours)
     both = _finished_cells(theirs) & _finished_cells(ours)
     rows = []
     for name, values in theirs.data_vars.items():
@@ -58,7 +60,7 @@ def compare_same_lattice(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     )
 
 
-def compare_motions(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
+def _compare_motions(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
     """Compare two motions of one scene (see ``compare_same_lattice`` for studies)."""
     rows = [
         _variable_agreement(n, theirs, ours)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Mapping
 from typing import Any
@@ -220,21 +219,3 @@ def root_attributes(study: Study, known: int, provenance: Mapping[str, Any]) -> 
     # a command, or the environment, may hold bytes that are no text
     plain = {name: text.encode(errors="backslashreplace").decode() for name, text in texts.items()}
     return {**plain, "layout": LAYOUT_VERSION}
-
-
-def thin_dimensions(sizes: Mapping[str, int], most: int) -> dict[str, np.ndarray]:
-    """Points of each dimension, both ends and some between, that make so many cells at most.
-
-    Parameters
-    ----------
-    sizes : mapping of str to int
-    most : int
-        The longest dimensions are thinned first.
-    """
-    kept = {dimension: min(size, most) for dimension, size in sizes.items()}
-    while math.prod(kept.values()) > most:
-        kept[max(kept, key=kept.__getitem__)] -= 1
-    return {
-        dimension: np.unique(np.linspace(0, size - 1, kept[dimension]).round().astype(int))
-        for dimension, size in sizes.items()
-    }

@@ -32,7 +32,7 @@ from rsfstudy.storage.schema import (
     build_dataclass,
     invalid_part_error,
 )
-from rsfstudy.study import Study, figure_name, load_study, study_names
+from rsfstudy.study import Study, load_study, study_names
 from rsfstudy.vocabulary import coverage_content_type
 
 _STUDY_FILE_REMEDY = "Name the file that declares it: --study FILE (study=)."
@@ -71,35 +71,28 @@ def rebuild_study(results: xr.Dataset, file: str | Path | None = None) -> Study:
     return study
 
 
+def study_of_dataset(results: xr.Dataset) -> Study:
+    """The study that made a dataset, all of it, whatever is selected.
+
+    Raises
+    ------
+    InvalidValue
+        Where the study has code of a user's own.
+    """
+    declared, about = schema.read_declaration(results), schema.read_provenance(results)
+    if has_user_code(results):
+        rule = "has code of a user's own, and code is never taken from a dataset"
+        remedy = f"Import the study from the file that declares it. {about['declared_in']}"
+        raise InvalidValue("study", declared.name, rule, remedy=remedy.strip())
+    return study_from_declaration(declared, loadings.read_loadings(results))
+
+
 def has_user_code(results: xr.Dataset) -> bool:
     """True where code of the user decided a dataset; loadings, which it holds, are data."""
     if schema.read_provenance(results)["fingerprint"]["own_code"] == "none":
         return False
     held = loadings.read_loadings(results)
     return not held or schema.find_user_part(schema.read_declaration(results), held) is not None
-
-
-def load_user_figure(results: xr.Dataset, file: str | Path | None = None) -> Any:
-    """The figure that a user wrote for a dataset, from the file that declares the study. The file
-    that the dataset names is not run unasked, because the results may come from a stranger.
-
-    Raises
-    ------
-    InvalidValue
-        Where no file is given, or it has no such figure.
-    """
-    name, named_in = (
-        schema.read_declaration(results).plot,
-        schema.read_provenance(results)["declared_in"],
-    )
-    if file is None:
-        remedy = f"Name the file that declares it: --study {named_in or 'FILE'}."
-        raise InvalidValue("plot", name, "is no figure of rsfstudy", remedy=remedy)
-    study = load_study(str(file))
-    if study.name != results.attrs["id"] or figure_name(study.plot, study.name) != name:
-        rule = f"does not draw {name!r} of {results.attrs['id']!r}"
-        raise InvalidValue("study", str(file), rule)
-    return None if isinstance(study.plot, str) else study.plot
 
 
 def _check_axes(study: Study, results: xr.Dataset) -> None:

@@ -166,19 +166,6 @@ def _check_file_digest(path: Path) -> bool:
     return True
 
 
-def read_results(path: Path) -> xr.Dataset:
-    """Load the results of a study, as `read_dataset` does.
-
-    Raises
-    ------
-    DataError
-        If it is missing, unreadable, not written by rsfstudy, damaged, or of one scene.
-    """
-    dataset = read_dataset(path)
-    schema.check_is_study(dataset, shorten(path))
-    return dataset
-
-
 def read_dataset(path: Path) -> xr.Dataset:
     """Load a results file, or that of one scene, into memory and close it; a Zarr store is opened,
     not loaded.

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rsfstudy.study.rig_studies import with_rig
     from rsfstudy.study.study import Study
     from rsfstudy.study.study_index import STUDIES_PACKAGE, study_names, study_titles
+    from rsfstudy.study.user_parts import find_named_user_parts
     from rsfstudy.study.verdict_table import format_claim_row
 else:
     __getattr__, __dir__ = lazy_exports(
@@ -33,6 +34,7 @@ else:
             "study.rig_studies": ("with_rig",),
             "study.study": ("Study",),
             "study.study_index": ("STUDIES_PACKAGE", "study_names", "study_titles"),
+            "study.user_parts": ("find_named_user_parts",),
             "study.verdict_table": ("format_claim_row",),
         },
     )
@@ -50,6 +52,7 @@ __all__ = [
     "VERDICTS",
     "build_verdict_table",
     "figure_name",
+    "find_named_user_parts",
     "format_claim_row",
     "is_failed",
     "load_study",

@@ -39,10 +39,8 @@ from rsfstudy.slider import (
     Scene,
     UserPart,
     find_inapplicable_fields,
-    find_named_user_parts,
     names_to_parts,
     scene_fields,
-    user_field_quantities,
 )
 from rsfstudy.study import checks
 from rsfstudy.study.cell import Cell, CellChanges
@@ -51,6 +49,7 @@ from rsfstudy.study.figure_declarations import check_figure, figure_name
 from rsfstudy.study.html import study_html
 from rsfstudy.study.overrides import replace_values, select_points, to_plain_values
 from rsfstudy.study.reductions.application import Reduction
+from rsfstudy.study.user_parts import find_named_user_parts, user_field_quantities
 
 #: Most bytes of the name of a study: a file name has at most 255, and endings follow.
 _MAX_NAME_BYTES = 200

@@ -10,6 +10,7 @@ import math
 from scipy.integrate import DOP853
 
 from rsfstudy.motion.array_calls import evaluate, offset_by
+from rsfstudy.motion.longest_step import LONGEST_STEP
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper
 from rsfstudy.motion.steppers.unrolled_step import (
     DENSE_ROW_COUNT,
@@ -21,7 +22,6 @@ from rsfstudy.motion.steppers.unrolled_step import (
     TOTAL_STAGE_COUNT,
 )
 from rsfstudy.motion.workspace import count_evaluations, step_rates
-from rsfstudy.slider import LONGEST_STEP
 
 #: Weights of the stages of dense output, and of all stages in its rows.
 _EXTRA_WEIGHTS, _DENSE_WEIGHTS = (tuple(x.ravel().tolist()) for x in (DOP853.A_EXTRA, DOP853.D))

@@ -19,9 +19,10 @@ from scipy.integrate import (
 )
 
 from rsfstudy.motion.layout import SLOW_REGIME
+from rsfstudy.motion.longest_step import LONGEST_STEP
 from rsfstudy.motion.meter import MotionStopped
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper, order_eight
-from rsfstudy.slider import LONGEST_STEP, Equations, Numbers
+from rsfstudy.slider import Equations, Numbers
 from rsfstudy.status import Status
 
 #: SciPy's integrators, by name.

@@ -15,8 +15,22 @@ from rsfstudy.slider import (
     normalise_field_value,
     protocol,
 )
-from rsfstudy.storage import build_coordinates, build_scene, invalid_part_error, read_scene_fields
+from rsfstudy.storage.lattice import build_coordinates
+from rsfstudy.storage.schema import build_scene, invalid_part_error, read_scene_fields
 from rsfstudy.study import Study
+
+
+def scene_of_dataset(dataset: xr.Dataset, study: Study | None) -> Scene:
+    """The scene that a dataset is of: of results of a study that of the one cell that is selected.
+
+    Raises
+    ------
+    InvalidValue
+        Where no single cell is selected, or a part is a user's own and not known here.
+    """
+    if study is not None:
+        return study.scene(selected_cell_number(dataset, study))
+    return described_scene(dataset)
 
 
 def selected_cell_number(dataset: xr.Dataset, study: Study) -> int:

@@ -1,0 +1,101 @@
+"""Parameters of fits of records: samples of them, and the scene and the rig of a fit."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.execution import provenance_attributes
+from rsfstudy.fitting import LOGARITHMIC_PARAMETERS, fitted_fields
+from rsfstudy.netcdf import with_cf_encoding
+from rsfstudy.reporting import split_fits
+from rsfstudy.rig import Rig
+from rsfstudy.slider import Scene
+from rsfstudy.status import STATUS_LABELS
+from rsfstudy.storage import build_scene
+
+
+def _single_fit(dataset: xr.Dataset) -> xr.Dataset:
+    """The one fit that a dataset holds."""
+    found = split_fits(dataset)
+    if len(found) != 1:
+        remedy = "Select one first, as in dataset.sel(law='slip')."
+        raise InvalidValue("dataset", len(found), "holds several fits", remedy=remedy)
+    return found[0]
+
+
+def sample_parameters(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
+    """Samples of the parameters of one fit, as `Accessor.sample_parameters` says."""
+    one = _single_fit(dataset)
+    if not isinstance(n, int) or n < 1:
+        raise InvalidValue("n", n, "must be a whole number, 1 or more")
+    has = one["covariance"].notnull().any("other_parameter").values  # of other laws: NaN
+    names = [str(name) for name in one["parameter"].values[has]]
+    at = np.array([one[name].item() for name in names])
+    covariance = one["covariance"].values[np.ix_(has, has)]
+    if not (has.any() and np.isfinite(covariance).all()):
+        raise InvalidValue(
+            "dataset", STATUS_LABELS[int(one["status"])], "has no covariance to draw from"
+        )
+    logs = np.array([name in LOGARITHMIC_PARAMETERS for name in names])
+    scales = np.where(logs, at, 1.0)
+    rng = np.random.default_rng(seed)
+    degrees = one["degrees_of_freedom"].item()
+    spread = rng.multivariate_normal(np.zeros(len(at)), covariance / np.outer(scales, scales), n)
+    spread /= np.sqrt(rng.chisquare(degrees, n) / degrees)[:, None]
+    drawn = np.where(logs, at * np.exp(np.where(logs, spread, 0.0)), at + spread)
+    data = {
+        name: (
+            "draw",
+            drawn[:, place],
+            {key: one[name].attrs[key] for key in ("long_name", "units") if key in one[name].attrs},
+        )
+        for place, name in enumerate(names)
+    }
+    number = {"long_name": "number of the sample", "units": "1"}
+    about = {
+        "title": "Samples of the parameters of a fit",
+        "Conventions": "CF-1.11",
+        **provenance_attributes("dataset.rsf.draw"),
+    }
+    return with_cf_encoding(xr.Dataset(data, {"draw": ("draw", np.arange(n), number)}, about))
+
+
+def fitted_scene(dataset: xr.Dataset) -> Scene:
+    """The scene of one fit, with the parameters that it found and the velocity step that it is of,
+    in units of its slip distance and of the velocity before the step.
+    """
+    one = _single_fit(dataset)
+    plain = json.loads(dataset.attrs["declaration"])
+    first = build_scene(plain["base"], {})
+    if "law" in one.coords:
+        first = first.with_(law=str(one["law"].item()))
+    distances = (
+        float(plain["measure"][f"{n}_guess"]) for n in ("slip_distance", "slip_distance_2")
+    )
+    found = {n: one[n].item() for n in map(str, one["parameter"].values)}
+    stiffness = one["window_stiffness"].item() if "window_stiffness" in one else None
+    before, after = one["velocity_before"].item(), one["velocity_after"].item()
+    fields = fitted_fields(first, distances, found, stiffness, before)
+    return first.with_(**fields, load_velocity_ratio=after / before)
+
+
+def fitted_rig(dataset: xr.Dataset) -> Rig:
+    """The rig of one fit, as `Accessor.rig` says."""
+    one, slider = _single_fit(dataset), fitted_scene(dataset)
+    stress = one["normal_stress_before"].item() if "normal_stress_before" in one else math.nan
+    if not stress > 0.0:
+        remedy = "Read the record with normal_stress=, or make a rsfstudy.Rig that states it."
+        raise InvalidValue("normal_stress", None, "is not in the record", remedy=remedy)
+    velocity = one["velocity_before"].item() * 1e-6
+    distance = velocity / slider.reference_rate
+    return Rig(
+        normal_stress=stress,
+        slip_distance=distance,
+        reference_velocity=velocity,
+        stiffness=slider.stiffness * stress / distance,
+    )

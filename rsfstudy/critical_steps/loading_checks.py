@@ -1,0 +1,96 @@
+"""Checks of the loading and of the instability norm before a critical step is computed."""
+
+from __future__ import annotations
+
+import math
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measure_base import Outcome, check_steady_loading
+from rsfstudy.slider import Scene, SliderParameters
+from rsfstudy.status import Status
+
+#: Slip rate over that of the load point from which on a norm is that of an instability.
+_MIN_NORM_TO_LOAD_RATIO = 1e3
+#: How a text begins that tells of a slower one.
+SLOW_NORM_PREFIX = "the instability norm "
+
+
+def check_single_step(scene: Scene) -> None:
+    """Check that the loading is a single step.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the loading has several segments, or changes stress continuously.
+    """
+    check_steady_loading(scene)
+    loading = scene.parts.loading
+    if len(loading.segments) > 1:
+        rule = "is no single step, after which a motion decides"
+        remedy = "Read its peaks by step_response, or by simulate."
+        raise InvalidValue("loading", loading.name, rule, remedy=remedy)
+
+
+def norm_below_loading_outcome(scene: Scene, load_velocity: float = 0.0) -> Outcome:
+    """Return the outcome if the loading itself reaches the instability norm.
+
+    Steady sliding before the step, or the load point after the step, may already be faster than the
+    instability norm.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the instability norm.
+    load_velocity : float, default: 0.0
+        Load point velocity after the step, in units of V_*.
+
+    Returns
+    -------
+    Outcome
+        Outcome with the status ``norm_below_loading_rate`` and a remedy.
+    """
+    norm, least = scene.instability_norm, scene.inertial_time * max(1.0, abs(load_velocity))
+    return Outcome(
+        Status.NORM_BELOW_LOADING_RATE,
+        message=f"norm {norm:g} is reached by the loading alone, whose norm is {least:.3g}: give "
+        f"instability_norm= well above that, or period= (here {scene.period:g} s) well below "
+        f"{scene.period * norm / least:.3g} s",
+    )
+
+
+def slow_norm_warning(scene: Scene, load_velocity: float) -> str:
+    """Return a warning if the instability norm is a slow slip rate.
+
+    The norm is slow if it is less than a thousand times the load point velocity, because a slip
+    rate may then reach the norm without an instability. There is no warning for scenes with the
+    default reference rate, because they represent published studies and not a rig.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the instability norm.
+    load_velocity : float
+        Load point velocity after the step, in units of V_*.
+
+    Returns
+    -------
+    str
+        The warning, or an empty string.
+    """
+    rate, load = math.exp(scene.log_instability_rate), max(1.0, abs(load_velocity))
+    if (
+        rate >= _MIN_NORM_TO_LOAD_RATIO * load
+        or scene.reference_rate == SliderParameters.reference_rate
+    ):
+        return ""
+    return (
+        f"{SLOW_NORM_PREFIX}{scene.instability_norm:g} is a slip rate of {rate:.3g} V_*, only "
+        f"{rate / load:.3g} times that of the load point: what reaches it may be no instability. "
+        f"Give one above {_MIN_NORM_TO_LOAD_RATIO * load:.3g} V_*, of a rig as a slip rate, as in "
+        "rig.scene(instability_norm='10 mm/s')"
+    )

@@ -1,0 +1,32 @@
+"""Preparation of a run: what workers are sent, and the run that takes in what they compute."""
+
+from __future__ import annotations
+
+from rsfstudy.execution.cells import Task, compute_serially, serialize_task
+from rsfstudy.execution.provenance import code_fingerprint
+from rsfstudy.execution.runner import OutputOptions, StudyRun
+from rsfstudy.execution.workers import Workers
+from rsfstudy.motion import user_stepper
+from rsfstudy.study import Study
+
+
+def prepare_study_run(study: Study, options: OutputOptions, workers: Workers) -> StudyRun:
+    """Prepare the run of a study on workers.
+
+    Raises
+    ------
+    InvalidValue
+        For anything wrong with the study, and for code that cannot be sent to the workers.
+    """
+    task = Task(
+        study.base,
+        study.measure,
+        study.accuracy,
+        workers.time_limit,
+        user_parts=tuple(study.user_parts.values()),
+        steppers=user_stepper(study.accuracy.engine),
+        code_fingerprint=code_fingerprint(study.accuracy.engine, study.user_classes),
+    )
+    if workers.cell_mapper() is not compute_serially:
+        serialize_task(task)  # raises before any work if it cannot be sent
+    return StudyRun(study, options, task, workers.count_concurrent_cells())
