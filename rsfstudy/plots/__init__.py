@@ -1,4 +1,4 @@
-"""Figures of results datasets, motions and fits.
+"""Figures of study results, motions and fits.
 
 Most functions take a dataset and return a figure, or draw on given axes. The package also exports
 helper functions for user-defined figures. The package never computes results, and never calls

@@ -110,10 +110,10 @@ def measured_variables(dataset: xr.Dataset) -> list[str]:
     Returns
     -------
     list of str
-        Names of the numeric variables with the dimensions of the lattice and at least one finite
-        value, in the order of the dataset. The primary output is the first variable. Error
-        estimates, computational costs and variables with the suffix ``_stable`` or ``_unstable``
-        are excluded.
+        Names of the numeric variables that have the dimensions of the lattice and at least one
+        finite value. The order is the order of the dataset. The primary output is the first
+        variable. Error estimates, computational costs and variables with the suffix ``_stable`` or
+        ``_unstable`` are excluded.
     """
     cells = set(dataset["status"].dims)
     values = {str(name): dataset[name] for name in dataset.data_vars}
@@ -300,8 +300,8 @@ def label_points(axis: Axis, names: list[str], width: int, most: int = _MAX_NAME
     width : int
         Maximum number of characters per line of a label.
     most : int, default: 45
-        Maximum number of labels. If there are more names, only every second name, every third name,
-        and so on, is written.
+        Maximum number of labels. If there are more names, some names are omitted at regular
+        intervals.
     """
     some = slice(None, None, -(-len(names) // most))
     texts = [wrap_text(to_mathtext(name), width) for name in names[some]]
@@ -363,7 +363,7 @@ def point_colours(dataset: xr.Dataset, dimension: str) -> np.ndarray:
 def add_colour_bar(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
     """Add a colour bar for the points of a numeric dimension.
 
-    The colours are the colours that ``point_colours`` returns.
+    The colour bar has the same colour scale as ``point_colours``.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Figures of the results of studies.
+"""Figures of study results, and files of figures.
 
 The function ``draw_figure`` draws the figure that a study declares, a generic figure of any
-lattice, or a user-defined figure. The function ``save_figure`` writes this figure to a file. The
-style sheet ``rsfstudy.mplstyle`` defines the appearance of all figures.
+lattice, or a user-defined figure. The function ``save_figure`` writes the figure of a study to a
+file. The style sheet ``rsfstudy.mplstyle`` defines the appearance of all figures.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class NotebookFigure(Figure):
 def draw_figure(
     dataset: xr.Dataset, own: Any = None, *, variable: str | None = None, style: Any = None
 ) -> Figure:
-    """Draw the figure of the results of a study.
+    """Draw the figure of a study.
 
     Parameters
     ----------
@@ -119,8 +119,8 @@ def draw_figure(
         or an ``rsfstudy.Figure``. A string selects a generic figure of maps or lines. The default
         is the figure that the study declares.
     variable : str, optional
-        Name of a variable. If given, the variable is drawn as maps over two numeric axes, or as
-        lines if there are no two numeric axes.
+        Name of a variable to draw instead of the declared figure. The variable is drawn as maps if
+        the lattice has two numeric axes, and as lines otherwise.
     style : path, str, dict or list, optional
         Styles that override the style of rsfstudy: style sheets with the suffix ``.mplstyle``,
         names of matplotlib styles, or dictionaries of matplotlib settings.
@@ -128,8 +128,8 @@ def draw_figure(
     Returns
     -------
     matplotlib.figure.Figure
-        Figure with all its panels. The panels are the first axes of the figure, and colour bars are
-        further axes.
+        Figure with all its panels. The attribute ``axes`` of the figure contains the panels,
+        followed by the colour bars.
 
     Raises
     ------
@@ -262,8 +262,8 @@ def _choose_figure(
 def _expand_panels(drawing: Declared, dataset: xr.Dataset, further: Sequence[str]) -> list[Panel]:
     """Create the panels of a figure for all facets and additional axes.
 
-    Additional axes are axes that the figure does not name. The panels are repeated for each of
-    their points, and the titles describe the points.
+    Additional axes are axes that the figure does not name. The panels are repeated for each point
+    of the additional axes, and the titles describe the points.
     """
     found: list[Panel] = []
     for at in np.ndindex(*(dataset.sizes[dimension] for dimension in further)):
@@ -280,7 +280,7 @@ def _expand_panels(drawing: Declared, dataset: xr.Dataset, further: Sequence[str
 
 
 def _restore_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
-    """Restore the axes of a study from which a single point was selected."""
+    """Restore the dimensions of axes that were reduced to a single point."""
     gone = [d for d in study.dimensions if d not in dataset.dims and d in dataset.coords]
     if not gone:
         return dataset
@@ -327,7 +327,7 @@ def save_figure(
     variable: str | None = None,
     style: Any = None,
 ) -> None:
-    """Write the figure of the results of a study to a file.
+    """Write the figure of a study to a file.
 
     If an error occurs, an existing file is not changed.
 
@@ -420,7 +420,7 @@ def render_figure(drawn: Figure, form: str) -> bytes:
 
 
 def write_image(image: bytes, path: Path) -> None:
-    """Write an image to a file without leaving an incomplete file.
+    """Write an image to a file atomically.
 
     The image is written to a temporary file in the same directory. The temporary file then replaces
     the existing file. Missing parent directories are created.

@@ -41,8 +41,8 @@ PANEL_HEIGHT = 48.0
 LN10 = math.log(10.0)
 #: Names of the variables that may be drawn along x.
 ABSCISSAE = ("load_point_displacement", "slip", "time")
-#: Relative change below which the load point displacement or the slip rate is constant, because
-#: rounding errors cause changes of this size.
+#: Relative change below which the load point displacement or the slip rate is considered constant.
+#: Smaller changes are due to rounding errors.
 _RELATIVE_ROUNDING_ERROR = 1e-6
 _FRICTION_LABEL = r"Friction coefficient, $\mu$"
 

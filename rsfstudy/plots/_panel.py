@@ -43,8 +43,8 @@ from rsfstudy.vocabulary import find_quantity
 
 #: Line styles and marker fill styles for the points of the second axis of ``hue``.
 _SECOND_HUE_STYLES = (("-", "full"), ("--", "none"), (":", "none"), ("-.", "full"))
-#: Number of points of a numeric axis above which the curves are coloured by a colour scale, and
-#: number of points of a curve above which markers are omitted.
+#: Number of points of a numeric axis above which a colour bar replaces legend entries, and number of
+#: points of a curve above which markers are omitted.
 _MIN_POINTS_FOR_COLOUR_SCALE, _MAX_POINTS_WITH_MARKERS = 7, 60
 #: Maximum number of decimal places of a slope.
 _SLOPE_DIGITS = 6
@@ -359,7 +359,7 @@ def _axis_label(what: Any, said: Any, part: xr.Dataset, width: int) -> str:
 
 
 def _resolve_text(said: Any, part: xr.Dataset, otherwise: str) -> str:
-    """Return the text of a panel, or a default text if it is None.
+    """Return the text of a panel, or a default text if the text is None.
 
     If the text of the panel is a function, the function is called with the dataset.
     """

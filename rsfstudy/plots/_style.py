@@ -93,9 +93,9 @@ def style_context(over: Any = None) -> Iterator[None]:
 def _to_matplotlib_style(over: Any) -> str | dict[str, Any]:
     """Convert a style to an argument of ``matplotlib.style.use``.
 
-    The result is the name of a style or a dictionary of checked settings. Other arguments are not
-    passed on to matplotlib. Matplotlib would import a package for a dotted name, download a style
-    sheet from a URL, or parse any text file with one warning per line.
+    The result is the name of a style or a dictionary of checked settings. Other arguments are
+    rejected, because matplotlib would import a package for a dotted name, download a style sheet
+    from a URL, or parse any text file with one warning per line.
     """
     if isinstance(over, Mapping):
         return _validate_settings(over)
@@ -339,7 +339,7 @@ def _tick_label_lines(axes: Axes) -> float:
 
 
 def _legend_entries(axes: Axes) -> dict[str, Any]:
-    """Return the visible artists of the axes by their labels."""
+    """Return a dictionary of the visible artists with their labels as keys."""
     named: dict[str, Any] = {}
     for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
         if _is_visible(handle):
@@ -421,9 +421,9 @@ def _is_visible(handle: Any) -> bool:
 def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
     """Replace the legends of similar panels by one legend of the figure.
 
-    Panels are similar if their legend entries are also entries of the most complete legend among
-    them. The common legend is placed below the panels. The legends are only replaced if more than
-    half of the panels, and at least two panels, are similar.
+    Panels are similar if one of their legends contains all entries of the other legends. The common
+    legend is placed below the panels. The legends are only replaced if more than half of the
+    panels, and at least two panels, are similar.
 
     Parameters
     ----------
@@ -455,7 +455,7 @@ def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
 def enlarge_for_legends(figure: Figure, rows: Sequence[Sequence[Axes]]) -> None:
     """Increase the figure height by the height of legends and tick labels.
 
-    With the larger figure, the legends and the long tick labels do not reduce the data area.
+    As a result, legends and long tick labels do not reduce the height of the panels.
 
     Parameters
     ----------

@@ -22,8 +22,8 @@ from rsfstudy.plots._axes import describe_point
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_style
 from rsfstudy.study import Panel
 
-#: Maximum lag of the autocorrelation, number of rows to which a long record is thinned, and maximum
-#: number of records with a panel.
+#: Maximum lag of the autocorrelation, minimum number of rows that remain when a long record is
+#: thinned, and maximum number of records with a panel.
 _MAX_LAGS, _MAX_ROWS, _MAX_RECORDS = 40, 20_000, 4
 #: Margin on both sides of the windows as a fraction of their extent, and width of the moving
 #: average of residuals as a fraction of a window.
@@ -117,7 +117,7 @@ def _iterate_fits(
 def _thinned_columns(one: xr.Dataset, names: Sequence[str]) -> list[np.ndarray]:
     """Return the columns of a fit without missing values.
 
-    Columns with many rows are thinned.
+    Long columns are thinned by omitting rows.
     """
     columns = np.array([one[name].values for name in names])
     columns = columns[:, np.isfinite(columns).all(axis=0)]
@@ -125,9 +125,10 @@ def _thinned_columns(one: xr.Dataset, names: Sequence[str]) -> list[np.ndarray]:
 
 
 def _window_columns(one: xr.Dataset, names: Sequence[str]) -> Iterator[list[np.ndarray]]:
-    """Iterate over the windows of a fit and return their columns.
+    """Iterate over the windows of a fit.
 
-    A window consists of consecutive rows with values, in order of increasing time.
+    Each item is a list of columns. A window consists of consecutive rows with values, in order of
+    increasing time.
     """
     rows = np.flatnonzero(one[names[-1]].notnull().values)
     late = np.diff(one["record_time"].values[rows]) > 0.0

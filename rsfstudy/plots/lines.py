@@ -49,7 +49,7 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
         Results of a study, with the variable ``status`` and the attribute ``declaration``.
     variable : str, optional
         Name of a variable. By default, the figure shows the primary output and the first measured
-        variables that vary. If there are no such variables, the figure shows the status.
+        variables that vary. If the measure has no numeric variables, the figure shows the status.
 
     Returns
     -------
@@ -138,8 +138,8 @@ def _choose_x_dimension(dataset: xr.Dataset, values: xr.DataArray) -> str:
 def _choose_colour_dimension(dataset: xr.Dataset, values: xr.DataArray, along: str) -> str | None:
     """Choose the dimension that a colour scale represents.
 
-    The result is the longest numeric dimension that is not along x, or None if all such dimensions
-    are short.
+    The result is the longest numeric dimension apart from the dimension along x. The result is None
+    if no numeric dimension has more than six points.
     """
     numeric = [str(d) for d in values.dims if d != along and has_numeric_points(dataset, str(d))]
     long = [name for name in numeric if values.sizes[name] > _MAX_CYCLED_COLOURS]
@@ -171,7 +171,8 @@ def _common_places(same: Sequence[xr.DataArray], dimensions: Sequence[str]) -> t
     """Describe the points of a group of identical curves.
 
     The description contains the coordinates that all curves share. If the curves share no
-    coordinate, all points are listed. In a large group, only the first point is listed.
+    coordinate, the description lists all points. For a large group, the description contains only
+    the first point and the number of the other points.
     """
     places = [list(dict.fromkeys(describe_point(group, d) for group in same)) for d in dimensions]
     if not places or any(len(names) == 1 for names in places):

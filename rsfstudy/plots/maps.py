@@ -93,7 +93,7 @@ def _map_axes(dataset: xr.Dataset, values: xr.DataArray) -> tuple[str, str] | No
     """Return the names of the y axis and the x axis of a map.
 
     The axes are the last two numeric dimensions with at least three points. The result is None if
-    there is only one such dimension.
+    the variable has fewer than two numeric dimensions.
     """
     numeric = [
         str(dimension)
@@ -239,7 +239,7 @@ def _hatch_statuses(
 ) -> None:
     """Hatch the cells without a value, with a different hatch for each status.
 
-    The label of each hatch is the name of the status, for use in the legend.
+    The name of the status becomes the label of the hatch in the legend.
 
     Parameters
     ----------

@@ -95,7 +95,7 @@ def _sampled_fields(dataset: xr.Dataset) -> dict[str, list[str]]:
 def _build_panel(dataset: xr.Dataset, along: str, x: str, y: str) -> Panel:
     """Build the panel of a pair of quantities.
 
-    The panel is a histogram if both quantities are the same, and a scatter plot otherwise.
+    The panel is a histogram if both quantities are identical, and a scatter plot otherwise.
     """
     by = dict.fromkeys(str(d) for name in (x, y) for d in dataset[name].dims if d != along)
     few_ticks = partial(_limit_ticks, _MAX_TICKS - x.endswith("_error"))
@@ -137,7 +137,7 @@ def _limit_ticks(along_x: int, _dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def draw_histogram(name: str, by: Sequence[str], dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw histograms of a variable, one for each point of other axes.
+    """Draw one histogram of a variable for each point of other axes.
 
     Parameters
     ----------

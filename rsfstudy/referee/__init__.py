@@ -2,7 +2,7 @@
 
 The package reads problem files and the answers of other codes, and counts the correct digits of an
 answer. For a user-defined problem, the package computes the known answer with two tolerances. The
-package never imports another code.
+package never imports the other code.
 """
 
 from __future__ import annotations

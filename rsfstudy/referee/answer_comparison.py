@@ -26,9 +26,9 @@ DEFAULT_REQUIRED_DIGITS = 6
 #: Minimum number of digits that must agree if an explanation is correct, and minimum increase of
 #: the number of digits.
 _MIN_EXPLAINED_DIGITS, _MIN_DIGITS_GAINED = 3.0, 1.5
-#: Maximum difference of rounded values in units of the last decimal place. The sum consists of one
-#: unit for rounding in the code, half a unit for rounding in the file, and a small margin for
-#: rounding of the known answer.
+#: Maximum difference of rounded values in units of the last decimal place. The code may contribute
+#: one unit, the rounding in the file half a unit, and the rounding of the known answer a small
+#: margin.
 _MAX_LAST_PLACE_DIFFERENCE = 1.51
 #: Quantities with differences relative to the largest value of the column, because they start at
 #: zero.
@@ -192,7 +192,7 @@ def compare_answers(
     reported: Mapping[str, ReportedQuantity],
     required_digits: float,
 ) -> AnswerComparison:
-    """Compare an answer of another code with the known answer.
+    r"""Compare an answer of another code with the known answer.
 
     If the answer does not pass, the function searches for a convention that explains the
     difference.
@@ -212,6 +212,19 @@ def compare_answers(
     -------
     AnswerComparison
         Agreement of each quantity, and an explanation of the difference if there is one.
+
+    Notes
+    -----
+    The relative difference of a reported value :math:`x` from the known value :math:`y` is
+
+    .. math::
+
+        \Delta = \frac{\max(|x - y| - r, 0)}{s}.
+
+    The rounding error :math:`r` is half a unit in the last digit of :math:`y`. The scale :math:`s`
+    is :math:`|y|` for most quantities. For slip and pore pressure, which start at zero, the scale
+    is the largest value of :math:`|y|` in the column. The number of digits is :math:`-\log_{10}
+    \max \Delta`, limited to the digits of the known answer.
     """
     values = {name: column.values for name, column in reported.items()}
     places = {name: column.resolution for name, column in reported.items()}
@@ -346,9 +359,9 @@ def _reinterpret_answer(
 
 
 def _usual_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
-    """Return the common conversion factor that matches a factor.
+    """Return the common conversion factor that equals a given factor.
 
-    The relative difference of the two factors must be smaller than the tolerance.
+    The relative difference of the two factors must not exceed the tolerance.
 
     Returns
     -------
@@ -365,7 +378,7 @@ def _usual_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
 
 
 def _format_factor(factor: float) -> str:
-    """Format a factor so that the text differs from 1."""
+    """Format a factor so that a factor close to 1 is not displayed as 1."""
     text, beyond = f"{factor:.6g}", factor - 1.0
     return text if text != "1" else f"(1 {'-' if beyond < 0.0 else '+'} {abs(beyond):.2g})"
 

@@ -1,4 +1,8 @@
-"""Answers of other codes, read from tables with any headings and units."""
+"""Tables with the answers of other codes.
+
+The headings and units of a table may differ from the headings and units of the problem. The
+function ``read_answer`` converts the columns to SI units.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,7 @@ from rsfstudy.rig import Column, convert_to_si, read_table
 #: Quantities that a file may contain instead of a requested quantity, and their units.
 _SUBSTITUTES = {"slip_rate": ("log10_slip_rate", "1"), "friction": ("shear_stress", "Pa")}
 _SUBSTITUTE_UNITS = dict(_SUBSTITUTES.values())
-#: Tolerance of the times of an answer, relative to the last time. Files contain rounded times.
+#: Tolerance of times, relative to the last time. The times in files are rounded to some decimals.
 _TIME_RTOL = 1e-9
 #: Largest allowed value in SI units. Larger values would cause an overflow in ratios.
 _MAX_VALUE = 1e100
@@ -106,10 +110,10 @@ def read_answer(
 def _derive_quantity(
     name: str, problem: BenchmarkProblem, found: Mapping[str, ReportedQuantity]
 ) -> np.ndarray:
-    """Compute a requested quantity from its substitute.
+    r"""Compute a requested quantity from its substitute.
 
-    Friction is the shear stress of the spring divided by the normal stress, after the stress due to
-    radiation damping is subtracted.
+    The slip rate is computed from its decimal logarithm. The friction coefficient is computed from
+    the shear stress :math:`\tau` of the spring as :math:`\mu = (\tau - \eta V)/\sigma`.
     """
     if name == "slip_rate":
         return np.asarray(10.0 ** found["log10_slip_rate"].values)

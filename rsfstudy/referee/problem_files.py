@@ -1,4 +1,4 @@
-"""Benchmark problems, and the files of problems, answers and templates.
+"""Benchmark problems and their files.
 
 A ``BenchmarkProblem`` defines a spring-slider, its initial state, its loading, and the quantities
 that a code must report. The function ``read_problem`` reads a problem file, and ``write_problems``

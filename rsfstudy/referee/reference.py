@@ -79,7 +79,12 @@ def compute_normal_stress(problem: BenchmarkProblem) -> np.ndarray:
 
 
 def _answer_series(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
-    """Compute the values of a series at the times of the problem."""
+    r"""Compute the values of a series at the times of the problem.
+
+    The motion provides the state variables :math:`\Theta`, which are converted to :math:`\theta =
+    \theta_* e^{\Theta/b}`. The effect of stress on the state is subtracted first and is distributed
+    over several states in proportion to :math:`|b|`.
+    """
     scene, rig = problem.scene, problem.rig
     at = np.array(problem.times) * rig.dimensionless("1 s")
     recording, meter = (
