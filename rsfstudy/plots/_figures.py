@@ -1,4 +1,4 @@
-"""Figures of study results, and files of figures.
+"""Drawing and saving of the figures of study results.
 
 The function ``draw_figure`` draws the figure that a study declares, a generic figure of any
 lattice, or a user-defined figure. The function ``save_figure`` writes the figure of a study to a
@@ -228,8 +228,8 @@ def _choose_figure(
 ) -> tuple[Declared, xr.Dataset]:
     """Choose the figure of a dataset and create all its panels.
 
-    The dataset is returned with the axes that the figure expects. If the dataset has more axes than
-    the declared figure can display, a generic figure of maps or lines is chosen.
+    The function also returns the dataset with the axes that the figure expects. If the dataset has
+    more axes than the declared figure can display, a generic figure of maps or lines is chosen.
     """
     name, sizes = read_declaration(dataset).plot, dataset["status"].sizes
     study = load_study(name) if name in study_names() else None

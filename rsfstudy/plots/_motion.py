@@ -171,7 +171,7 @@ def _choose_abscissa(motion: xr.Dataset) -> str:
 
 
 def _motion_title(motion: xr.Dataset) -> str:
-    """Return the title, with the status of a motion that ended early."""
+    """Return the title of a motion, with its status if it ended early."""
     status = motion.attrs.get("status", "ok")
     ending = "" if status == "ok" else f" [{status}: {motion.attrs.get('message', '')}]"
     title = motion.attrs.get("title", "Limit cycle of a spring-slider")

@@ -43,8 +43,8 @@ from rsfstudy.vocabulary import find_quantity
 
 #: Line styles and marker fill styles for the points of the second axis of ``hue``.
 _SECOND_HUE_STYLES = (("-", "full"), ("--", "none"), (":", "none"), ("-.", "full"))
-#: Number of points of a numeric axis above which a colour bar replaces legend entries, and number of
-#: points of a curve above which markers are omitted.
+#: Number of points of a numeric axis above which a colour bar replaces legend entries, and number
+#: of points of a curve above which markers are omitted.
 _MIN_POINTS_FOR_COLOUR_SCALE, _MAX_POINTS_WITH_MARKERS = 7, 60
 #: Maximum number of decimal places of a slope.
 _SLOPE_DIGITS = 6

@@ -1,4 +1,4 @@
-"""Text of figures: labels, symbols, units and numbers in mathtext."""
+"""Formatting of labels, symbols, units and numbers for figures."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def _is_valid_mathtext(text: str) -> bool:
 def wrap_text(text: str, width: int) -> str:
     """Wrap a text without breaking formulas.
 
-    Existing line breaks are kept. Assignments such as ``x = 2 y`` are not broken either.
+    Existing line breaks are kept. Assignments such as ``x = 2 y`` are kept on one line.
 
     Parameters
     ----------

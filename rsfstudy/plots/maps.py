@@ -119,8 +119,8 @@ def draw_map(
     plane : tuple of (str, str)
         Names of the y axis and the x axis.
     scale : tuple of (matplotlib.colors.Normalize, sequence of float), or None
-        Colour scale and contour levels. For a variable with flags, the flags replace the levels. If
-        the value is None, the scale is computed from the values of the map.
+        Colour scale and contour levels. For a variable with flags, the flag values replace the
+        contour levels. If the value is None, the scale is computed from the values of the map.
     dataset : xarray.Dataset
         Part of the results with the variable along the dimensions of the map. The dataset must also
         contain the variable ``status``.
@@ -155,8 +155,8 @@ def draw_map(
 def _colour_scale(data: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
     """Return the colour scale and the contour levels of a variable.
 
-    For a variable with flags, the flags replace the levels. The result is None if the variable has
-    no finite value.
+    For a variable with flags, the flag values replace the contour levels. The result is None if the
+    variable has no finite value.
     """
     values = data.values.astype(float)
     if not np.isfinite(values).any():

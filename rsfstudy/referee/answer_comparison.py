@@ -84,7 +84,7 @@ class Agreement:
 
 @dataclass(frozen=True)
 class AnswerComparison:
-    """Agreement of an answer with the known answer, for all quantities.
+    """Agreement of all quantities of an answer with the known answer.
 
     Parameters
     ----------
@@ -295,8 +295,8 @@ def _relative_differences(
     """Compute the relative differences of a quantity from its reference.
 
     The rounding error of the reference, which is half a unit in its last digit, is subtracted from
-    each difference. The result is divided by the reference. For quantities that start at zero, the
-    result is divided by the largest value of the reference.
+    each difference. The remaining difference is divided by the reference value. For quantities that
+    start at zero, the remaining difference is divided by the largest reference value.
     """
     size = np.abs(reference)
     rounded = 0.5 * 10.0 ** (np.floor(np.log10(np.maximum(size, 1e-300))) + 1.0 - digits)

@@ -190,7 +190,7 @@ class BenchmarkProblem:
 
     @property
     def index_values(self) -> np.ndarray:
-        """Values of the index column: times in s, or the numbers of the peaks.
+        """Times of a series in s, or numbers of the peaks.
 
         For an answer with a single row, the array contains the value 1.
         """
@@ -263,7 +263,7 @@ class BenchmarkProblem:
     def theta_star(self) -> tuple[float, ...]:
         r"""Values of theta in steady sliding at the reference velocity.
 
-        The tuple contains one value :math:`\theta_*` in s per state variable.
+        The tuple contains one value of :math:`\theta_*` in s per state variable.
 
         Notes
         -----
@@ -291,7 +291,7 @@ class BenchmarkProblem:
 
     @cached_property
     def log_slip_rate(self) -> float:
-        r"""Initial slip rate as the log rate :math:`\ln(V/V_*)`."""
+        r"""Logarithm of the initial slip rate, :math:`\ln(V/V_*)`."""
         rate = _positive_in_si("slip_rate", self.initial["slip_rate"], "m/s")
         return math.log(rate / self.rig.reference_velocity)
 

@@ -82,8 +82,8 @@ def _answer_series(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable
     r"""Compute the values of a series at the times of the problem.
 
     The motion provides the state variables :math:`\Theta`, which are converted to :math:`\theta =
-    \theta_* e^{\Theta/b}`. The effect of stress on the state is subtracted first and is distributed
-    over several states in proportion to :math:`|b|`.
+    \theta_* e^{\Theta/b}`. The effect of stress on the state is first subtracted from the state
+    variables in proportion to :math:`|b|`.
     """
     scene, rig = problem.scene, problem.rig
     at = np.array(problem.times) * rig.dimensionless("1 s")
