@@ -1,7 +1,7 @@
-"""Figures of results datasets, motions and fits.
+"""Figures of study results, motions and fits.
 
-Functions take a dataset and return a figure, or draw into given axes. User-defined figure functions
-can use the helper functions that this package exports. It never computes results, and never calls
+Most functions take a dataset and return a figure, or draw on given axes. The package also exports
+helper functions for user-defined figures. The package never computes results, and never calls
 ``show()``.
 """
 

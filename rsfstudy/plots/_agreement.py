@@ -1,4 +1,4 @@
-"""The figure of how far answers of another code agree with those that are known."""
+"""Figure of the agreement between another code and known answers."""
 
 from __future__ import annotations
 
@@ -20,8 +20,29 @@ Points = Sequence[tuple[float, float]]
 
 
 def draw_agreement(digits: Mapping[str, Points], label: str, enough: float) -> Figure:
-    """Digits that agree, of each quantity, against what stands on the abscissa; and how many make a
-    pass.
+    """Draw the number of digits that agree for each quantity.
+
+    Parameters
+    ----------
+    digits : mapping of str to sequence of (float, float)
+        For each quantity, pairs of an x value and the number of digits that agree.
+    label : str
+        Label of the x axis. The first letter is capitalised.
+    enough : float
+        Number of digits that is required to pass. The figure shows this number as a dashed line.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure with one panel.
+
+    Examples
+    --------
+    >>> from rsfstudy.plots import draw_agreement
+    >>> digits = {"friction": [(0.0, 9.1), (10.0, 8.4)], "slip_rate": [(0.0, 8.0), (10.0, 7.2)]}
+    >>> figure = draw_agreement(digits, "time (s)", 6.0)
+    >>> figure.axes[0].get_xlabel()
+    'Time (s)'
     """
     figure = NotebookFigure(figsize=figure_size(2, 1), layout="constrained")
     axes = figure.subplots()

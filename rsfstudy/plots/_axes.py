@@ -1,5 +1,7 @@
-"""Axes of a lattice as axes of a figure: which are numbers, which of those want a log scale, and
-what their points are called.
+"""Scales, ticks and colours for the axes of a lattice.
+
+The functions decide whether the points of an axis are numbers, whether the numbers need a log
+scale, and how the points are labelled.
 """
 
 from __future__ import annotations
@@ -30,37 +32,89 @@ from rsfstudy.plots._text import (
 from rsfstudy.study import read_quantities
 from rsfstudy.vocabulary import coverage_content_type, find_quantity
 
-#: Values that span more than this are drawn on a log axis.
+#: Ratio of the largest value to the smallest value above which an axis has a log scale.
 _LOG_SCALE_RATIO = 100.0
-#: Log axes that span less than this have numbers between decades too.
+#: Ratio of the axis limits below which a log axis has additional labels between decades.
 _MAX_RATIO_FOR_MINOR_LABELS = 50.0
-#: Most names along y, and along x.
+#: Maximum number of names along y, and maximum number of names along x.
 _MAX_NAMES_ALONG_Y, _MAX_NAMES_ALONG_X = 45, 30
-#: Most names along x that lie side by side; more stand upright.
+#: Maximum number of horizontal names along x. If there are more names, the names are vertical.
 _MAX_HORIZONTAL_NAMES = 12
-#: What the points of some axes are said to be.
+#: Phrases that describe the points of some axes.
 _POINT_PHRASES = {"law": "{} law", "normal_stress": "{} normal stress", "load": "load point {}"}
 
 
 def has_numeric_points(dataset: xr.Dataset, dimension: str) -> bool:
-    """True if the points of a dimension are numbers, not names or flags."""
+    """Return True if the points of a dimension are numbers.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset with the dimension.
+    dimension : str
+        Name of the dimension.
+
+    Returns
+    -------
+    bool
+        True if the coordinate of the dimension is numeric. Names, flags and Boolean values are not
+        numbers.
+    """
     return is_numeric_variable(dataset[dimension]) and dataset[dimension].dtype.kind != "b"
 
 
 def is_numeric_variable(values: xr.DataArray) -> bool:
-    """True if a variable holds numbers to be drawn."""
+    """Return True if a variable contains numbers that can be plotted.
+
+    Parameters
+    ----------
+    values : xarray.DataArray
+        Variable of a dataset.
+
+    Returns
+    -------
+    bool
+        True for numbers and Boolean values. Variables with flags are not numeric.
+    """
     return values.dtype.kind in "fiub" and "flag_values" not in values.attrs
 
 
 def flag_meanings(values: xr.DataArray) -> dict[float, str]:
-    """What the flags mean that a variable holds, in words; empty for one of numbers."""
+    """Return the meanings of the flags of a variable.
+
+    Parameters
+    ----------
+    values : xarray.DataArray
+        Variable of a dataset. The flags are described by the CF attributes ``flag_values`` and
+        ``flag_meanings``.
+
+    Returns
+    -------
+    dict of float to str
+        Meaning of each flag. The dictionary is empty if the variable has no flags.
+    """
     return {
         value: word.replace("_", " ") for value, word in read_flag_meanings(values.attrs).items()
     }
 
 
 def measured_variables(dataset: xr.Dataset) -> list[str]:
-    """Variables measured in each cell: no error estimates nor costs, the headline first."""
+    """Return the names of the variables that the measure computed.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study. The dimensions of the variable ``status`` are the dimensions of the
+        lattice.
+
+    Returns
+    -------
+    list of str
+        Names of the numeric variables that have the dimensions of the lattice and at least one
+        finite value. The order is the order of the dataset. The primary output is the first
+        variable. Error estimates, computational costs and variables with the suffix ``_stable`` or
+        ``_unstable`` are excluded.
+    """
     cells = set(dataset["status"].dims)
     values = {str(name): dataset[name] for name in dataset.data_vars}
     beside = tuple(f"{name}_{end}" for name in values for end in ("stable", "unstable"))
@@ -76,13 +130,37 @@ def measured_variables(dataset: xr.Dataset) -> list[str]:
 
 
 def varying_variables(dataset: xr.Dataset) -> list[str]:
-    """Of what was measured, the headline and all that is not the same everywhere."""
+    """Return the primary output and all measured variables that vary.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study, with the variable ``status``.
+
+    Returns
+    -------
+    list of str
+        Name of the first measured variable, followed by the names of the other measured variables
+        that have at least two different values.
+    """
     names = measured_variables(dataset)
     return names[:1] + [n for n in names[1:] if float(dataset[n].max()) > float(dataset[n].min())]
 
 
 def is_log_spaced(points: np.ndarray) -> bool:
-    """True if points are spaced by factors rather than by differences."""
+    """Return True if points are spaced logarithmically.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n,)
+        Points of an axis in any order.
+
+    Returns
+    -------
+    bool
+        True if there are at least three points, if the points are positive and span at least one
+        decade, and if the ratios of neighbouring points vary less than the differences.
+    """
     at = np.sort(points.astype(float))
     if at.size < 3 or at[0] <= 0.0 or at[-1] < 10.0 * at[0]:
         return False
@@ -91,13 +169,49 @@ def is_log_spaced(points: np.ndarray) -> bool:
 
 
 def spans_decades(values: np.ndarray) -> bool:
-    """True if values are positive and span decades."""
+    """Return True if all values are positive and span two decades.
+
+    Parameters
+    ----------
+    values : ndarray
+        Values of any shape. NaN and infinite values are ignored.
+
+    Returns
+    -------
+    bool
+        True if the smallest value is positive and the largest value is more than 100 times larger.
+    """
     known = values[np.isfinite(values)]
     return bool(known.size and known.min() > 0.0 and known.max() > _LOG_SCALE_RATIO * known.min())
 
 
 def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
-    """Place of a cell on one dimension, in a few words."""
+    """Describe the position of a cell along a dimension.
+
+    Parameters
+    ----------
+    cell : xarray.Dataset or xarray.DataArray
+        One cell of a lattice, with a scalar coordinate for the dimension. If the coordinate has the
+        attributes ``long_name``, ``symbol`` and ``units``, these attributes override the vocabulary
+        of rsfstudy.
+    dimension : str
+        Name of the dimension.
+
+    Returns
+    -------
+    str
+        Description for a legend or a title, with formulas in mathtext.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.plots import describe_point
+    >>> cell = xr.Dataset(coords={"law": "slip", "b_over_a": 2.0})
+    >>> describe_point(cell, "law")
+    'slip law'
+    >>> describe_point(cell, "b_over_a")
+    '$b/a$ = 2'
+    """
     value = cell[dimension].item()
     about = find_quantity(dimension, read_quantities(cell.coords.to_dataset()))
     if isinstance(value, str):
@@ -111,7 +225,25 @@ def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
 
 
 def set_up_x_axis(axes: Axes, dataset: xr.Dataset, dimension: str) -> np.ndarray:
-    """Places of the points of a dimension along x; those that are no numbers are named there."""
+    """Set up the x axis for the points of a dimension.
+
+    If the points are names, the names are written along the axis.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Axes to set up.
+    dataset : xarray.Dataset
+        Dataset with a coordinate for the dimension.
+    dimension : str
+        Name of the dimension along x.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Position of each point along x. The position of a number is its value, and the positions of
+        names are 0, 1, and so on.
+    """
     points = dataset[dimension].values
     if has_numeric_points(dataset, dimension):
         return np.asarray(points, dtype=float)
@@ -130,12 +262,16 @@ def set_up_x_axis(axes: Axes, dataset: xr.Dataset, dimension: str) -> np.ndarray
 
 
 def set_log_scale(axes: Axes, which: str) -> None:
-    """Have a log axis, with numbers that do not touch each other; call it where limits are known.
+    """Set a log scale with tick labels that do not overlap.
+
+    Call this function after the limits of the axis are set, because the ticks depend on the limits.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
+        Axes to change.
     which : {"x", "y"}
+        Axis that gets the log scale.
     """
     axes.set(**{f"{which}scale": "log"})
     axis: Axis = getattr(axes, f"{which}axis")
@@ -153,35 +289,98 @@ def set_log_scale(axes: Axes, which: str) -> None:
 
 
 def label_points(axis: Axis, names: list[str], width: int, most: int = _MAX_NAMES_ALONG_Y) -> None:
-    """Ticks at 0, 1, ... with names: of all points, or of some where there are many."""
+    """Label the positions 0, 1, 2, ... of an axis with names.
+
+    Parameters
+    ----------
+    axis : matplotlib.axis.Axis
+        Axis to label.
+    names : list of str
+        Names of the points.
+    width : int
+        Maximum number of characters per line of a label.
+    most : int, default: 45
+        Maximum number of labels. If there are more names, some names are omitted at regular
+        intervals.
+    """
     some = slice(None, None, -(-len(names) // most))
     texts = [wrap_text(to_mathtext(name), width) for name in names[some]]
     axis.set_ticks(range(len(names))[some], texts)
 
 
 def label_rows(axes: Axes, names: list[str], width: int = 60) -> None:
-    """Rows with names, from the top down, and half a row beyond either end."""
+    """Label the rows of a figure with names, from top to bottom.
+
+    The y axis is inverted, and its limits leave a margin of half a row at both ends.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Axes whose rows are at y = 0, 1, 2, and so on.
+    names : list of str
+        Names of the rows.
+    width : int, default: 60
+        Maximum number of characters per line of a label.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> from rsfstudy.plots import label_rows
+    >>> axes = Figure().add_subplot()
+    >>> label_rows(axes, ["slip law", "ageing law"])
+    >>> [label.get_text() for label in axes.get_yticklabels()]
+    ['slip law', 'ageing law']
+    >>> [float(limit) for limit in axes.get_ylim()]
+    [1.5, -0.5]
+    """
     label_points(axes.yaxis, names, width)
     axes.set_ylim(len(names) - 0.5, -0.5)
 
 
-# ---- scales of colours --------------------------------------------------------------------------
+# ---- colour scales ------------------------------------------------------------------------------
 
 
 def point_colours(dataset: xr.Dataset, dimension: str) -> np.ndarray:
-    """Colours for the points of an axis of numbers."""
+    """Return the colours of the points of a numeric dimension.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset with a numeric coordinate for the dimension.
+    dimension : str
+        Name of the dimension.
+
+    Returns
+    -------
+    ndarray, shape (n, 4)
+        RGBA colour of each point. The colour scale is logarithmic if the points are spaced
+        logarithmically.
+    """
     points = dataset[dimension].values.astype(float)
     return np.asarray(_colour_scale(dataset, dimension).to_rgba(points))
 
 
 def add_colour_bar(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
-    """Say beside a panel what `point_colours` stand for."""
+    """Add a colour bar for the points of a numeric dimension.
+
+    The colour bar has the same colour scale as ``point_colours``.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset with a numeric coordinate for the dimension.
+    axes : matplotlib.axes.Axes
+        Axes of the panel. The colour bar is placed on the right.
+    dimension : str
+        Name of the dimension.
+    """
     scale = _colour_scale(dataset, dimension)
     bar = cast(Figure, axes.figure).colorbar(scale, ax=axes, pad=0.02)
     bar.set_label(axis_label(find_quantity(dimension, read_quantities(dataset)), 34))
 
 
 def _colour_scale(dataset: xr.Dataset, dimension: str) -> ScalarMappable:
+    """Return the colour scale of a numeric dimension."""
     points = dataset[dimension].values.astype(float)
     kind = LogNorm if is_log_spaced(points) else Normalize
     return ScalarMappable(kind(points.min(), points.max()), colormaps["viridis"])

@@ -1,6 +1,8 @@
-"""Figures of results: the `Figure` that a study declares, lines or maps of any lattice, or a
-function ``draw(dataset, axes)`` of the user's own, or a module with one. How figures look is in
-``rsfstudy.mplstyle``.
+"""Drawing and saving of the figures of study results.
+
+The function ``draw_figure`` draws the figure that a study declares, a generic figure of any
+lattice, or a user-defined figure. The function ``save_figure`` writes the figure of a study to a
+file. The style sheet ``rsfstudy.mplstyle`` defines the appearance of all figures.
 """
 
 from __future__ import annotations
@@ -48,35 +50,54 @@ from rsfstudy.study import Panel, Study, load_study, read_quantities, study_name
 from rsfstudy.study import is_failed as is_failed
 from rsfstudy.vocabulary import DERIVED_COORDINATES, find_quantity
 
-#: What draws any lattice.
+#: Names of the figures that can display any lattice.
 _GENERIC_NAMES = ("lines", "maps")
-#: What draws fits of records.
+#: Name of the figure of fits of records.
 _FITS_NAME = "fits"
-#: Names of figures: those, and those of the named studies.
+#: Names of all figures, including the figures of the named studies.
 FIGURE_NAMES = (*_GENERIC_NAMES, _FITS_NAME, *study_names())
 
-#: Points an inch of what a notebook shows.
+#: Resolution of figures in notebooks, in dots per inch.
 _SCREEN_DPI = 150
-#: What would make two files of one figure differ.
+#: Metadata that remove the date from a file, so that two files of the same figure are identical.
 _METADATA_WITHOUT_DATES: dict[str, dict[str, Any]] = {
     "pdf": {"CreationDate": None},
     "svg": {"Date": None},
 }
-#: Most points of axes that a figure does not know for which its panels are repeated, and panels
-#: that there may be then.
+#: Maximum number of points of additional axes for which the panels of a figure are repeated, and
+#: maximum number of repeated panels.
 _MAX_REPEATS, _MAX_REPEATED_PANELS = 4, 12
-#: Height in mm of a panel of a scatter matrix.
+#: Height of a panel of a scatter matrix in mm.
 _SCATTER_PANEL_HEIGHT = 44.0
 
 
 class NotebookFigure(Figure):
-    """A figure that a notebook shows, without pyplot."""
+    """Figure that notebooks display without pyplot.
+
+    Parameters
+    ----------
+    *args : object
+        Positional arguments of ``matplotlib.figure.Figure``.
+    **options : object
+        Keyword arguments of ``matplotlib.figure.Figure``.
+
+    Examples
+    --------
+    >>> from rsfstudy.plots import NotebookFigure
+    >>> figure = NotebookFigure(figsize=(3.0, 2.0))
+    >>> axes = figure.add_subplot()
+    >>> len(figure.axes)
+    1
+    """
 
     def __init__(self, *args: Any, **options: Any) -> None:
+        """Create the figure with a canvas that can render images."""
         super().__init__(*args, **options)
-        FigureCanvasAgg(self)  # keeps its renderer, and with it how large texts are
+        # The canvas keeps its renderer, which is used to measure the size of texts.
+        FigureCanvasAgg(self)
 
     def _repr_png_(self) -> bytes:
+        """Return the figure as a PNG image for notebooks."""
         image = io.BytesIO()
         self.savefig(image, format="png", dpi=_SCREEN_DPI)
         return image.getvalue()
@@ -85,24 +106,64 @@ class NotebookFigure(Figure):
 def draw_figure(
     dataset: xr.Dataset, own: Any = None, *, variable: str | None = None, style: Any = None
 ) -> Figure:
-    """The figure of a results dataset, as its study declares it, with all its panels.
+    """Draw the figure of a study.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-    own : function or module, optional
-        What draws it where that is no module of `rsfstudy.plots`.
+        Results of a study. The dataset needs the variable ``status`` along the dimensions of the
+        lattice, the variables that the figure displays, and the attributes that ``rsfstudy.run``
+        adds.
+    own : callable, module, Figure or str, optional
+        User-defined figure: a function ``draw(dataset, axes)``, a module with a function ``draw``,
+        or an ``rsfstudy.Figure``. A string selects a generic figure of maps or lines. The default
+        is the figure that the study declares.
     variable : str, optional
-        Draw this variable instead: as maps over two numeric axes, else as lines.
-    style : path, str, dict or list of those, optional
-        Style sheets (files that end in ``.mplstyle``), names of styles of matplotlib, or settings,
-        applied on top of the style of rsfstudy.
+        Name of a variable to draw instead of the declared figure. The variable is drawn as maps if
+        the lattice has two numeric axes, and as lines otherwise.
+    style : path, str, dict or list, optional
+        Styles that override the style of rsfstudy: style sheets with the suffix ``.mplstyle``,
+        names of matplotlib styles, or dictionaries of matplotlib settings.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure with all its panels. The attribute ``axes`` of the figure contains the panels,
+        followed by the colour bars.
 
     Raises
     ------
     InvalidValue
-        Where the declaration names no module of `rsfstudy.plots`; nothing else is ever imported.
-        Where there is no such variable or style.
+        If the declaration of the study contains an unknown figure, if ``own`` cannot draw, if the
+        variable is missing or not numeric, or if a style is invalid.
+    DataError
+        If the dataset has no declaration, or if x and y of a curve have different sizes.
+
+    Notes
+    -----
+    Only the figures of rsfstudy can be selected by name. The function never imports another module
+    because of the contents of a file.
+
+    If the results have more axes than the declared figure can display, the figure is replaced by a
+    generic figure of maps or lines.
+
+    Examples
+    --------
+    >>> import rsfstudy
+    >>> from rsfstudy.measures import LinearStability
+    >>> from rsfstudy.plots import draw_figure
+    >>> axis = rsfstudy.Axis("b_over_a", [1.5, 2.0, 3.0])
+    >>> study = rsfstudy.Study(
+    ...     name="example",
+    ...     title="Critical stiffness",
+    ...     base=rsfstudy.Scene(),
+    ...     axes=[axis],
+    ...     measure=LinearStability(),
+    ... )
+    >>> results = rsfstudy.run(study, workers=0, output=None, progress=False)
+    >>> figure = draw_figure(results, variable="critical_stiffness")
+    >>> figure.axes[0].get_title()
+    'Critical stiffness'
     """
     draws = own is None or isinstance(own, str | Declared) or callable(getattr(own, "draw", own))
     if not draws:
@@ -137,7 +198,10 @@ def draw_figure(
 
 
 def _missing_cells_note(dataset: xr.Dataset) -> str:
-    """The cells that a figure cannot show, in brackets; nothing where it shows all."""
+    """Return a note in brackets about missing and failed cells.
+
+    The note is empty if the results are complete.
+    """
     completeness = dataset.attrs.get("completeness", "complete")
     failed = int((is_failed(dataset["status"]) & (dataset["status"] != Status.PENDING)).sum())
     parts = [completeness] * (completeness != "complete")
@@ -146,6 +210,7 @@ def _missing_cells_note(dataset: xr.Dataset) -> str:
 
 
 def _overrides_note(dataset: xr.Dataset, columns: int) -> str:
+    """Return a note about the values that differ from the declaration."""
     own = read_quantities(dataset)
     names = {n: quantity_symbol(find_quantity(n, own)) for n in read_declaration(dataset).overrides}
     values = {names[name]: value for name, value in read_declaration(dataset).overrides.items()}
@@ -155,14 +220,16 @@ def _overrides_note(dataset: xr.Dataset, columns: int) -> str:
     return wrap_text(f"not as declared: {text}", 55 if columns == 1 else 120)
 
 
-# ---- what draws ---------------------------------------------------------------------------------
+# ---- choice of the figure -----------------------------------------------------------------------
 
 
 def _choose_figure(
     dataset: xr.Dataset, own: Any = None, variable: str | None = None
 ) -> tuple[Declared, xr.Dataset]:
-    """Figure of a dataset with all its panels, and the dataset with the axes that it expects: the
-    one that the study declares, or plain lines or maps if there are more axes than that can show.
+    """Choose the figure of a dataset and create all its panels.
+
+    The function also returns the dataset with the axes that the figure expects. If the dataset has
+    more axes than the declared figure can display, a generic figure of maps or lines is chosen.
     """
     name, sizes = read_declaration(dataset).plot, dataset["status"].sizes
     study = load_study(name) if name in study_names() else None
@@ -193,8 +260,10 @@ def _choose_figure(
 
 
 def _expand_panels(drawing: Declared, dataset: xr.Dataset, further: Sequence[str]) -> list[Panel]:
-    """The panels of a figure, each of one point of the axes that have a panel for each; and of each
-    point of axes that it does not know, which titles say.
+    """Create the panels of a figure for all facets and additional axes.
+
+    Additional axes are axes that the figure does not name. The panels are repeated for each point
+    of the additional axes, and the titles describe the points.
     """
     found: list[Panel] = []
     for at in np.ndindex(*(dataset.sizes[dimension] for dimension in further)):
@@ -211,7 +280,7 @@ def _expand_panels(drawing: Declared, dataset: xr.Dataset, further: Sequence[str
 
 
 def _restore_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
-    """The dataset with the axes of its study of which one point was selected."""
+    """Restore the dimensions of axes that were reduced to a single point."""
     gone = [d for d in study.dimensions if d not in dataset.dims and d in dataset.coords]
     if not gone:
         return dataset
@@ -227,8 +296,10 @@ def _restore_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
 
 
 def _generic_figure(dataset: xr.Dataset, variable: str | None = None) -> Declared:
-    """Figure of any lattice: histograms and scatters of samples, maps where it has two numeric
-    axes, else lines.
+    """Return a figure that can display any lattice.
+
+    The figure is a scatter matrix for samples, a set of maps if there are two numeric axes, and a
+    line plot otherwise.
     """
     from rsfstudy.plots import _axes, lines, maps, samples
 
@@ -256,29 +327,61 @@ def save_figure(
     variable: str | None = None,
     style: Any = None,
 ) -> None:
-    """Write the figure of a results dataset, as PNG, PDF or SVG by the ending of the path: the old
-    file stays, or the whole new one.
+    """Write the figure of a study to a file.
+
+    If an error occurs, an existing file is not changed.
 
     Parameters
     ----------
     dataset : xarray.Dataset
+        Results of a study, with the variables and attributes that ``draw_figure`` needs.
     path : Path
-    own, variable, style : optional
-        As in `figure`.
+        Path of the file. The suffix ``.png``, ``.pdf`` or ``.svg`` determines the format.
+    own : callable, module, Figure or str, optional
+        User-defined figure, as for ``draw_figure``.
+    variable : str, optional
+        Name of a variable to draw instead of the declared figure, as for ``draw_figure``.
+    style : path, str, dict or list, optional
+        Styles that override the style of rsfstudy, as for ``draw_figure``.
 
     Raises
     ------
     InvalidValue
-        Where the figure the study declares does not fit its results.
+        If the suffix of the file is unknown, or if the figure does not fit the results.
+    DataError
+        If the dataset has no declaration.
     OSError
-        Where it cannot be written.
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import rsfstudy
+    >>> from rsfstudy.measures import LinearStability
+    >>> from rsfstudy.plots import save_figure
+    >>> axis = rsfstudy.Axis("b_over_a", [1.5, 2.0, 3.0])
+    >>> study = rsfstudy.Study(
+    ...     name="example",
+    ...     title="Critical stiffness",
+    ...     base=rsfstudy.Scene(),
+    ...     axes=[axis],
+    ...     measure=LinearStability(),
+    ... )
+    >>> results = rsfstudy.run(study, workers=0, output=None, progress=False)
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     path = Path(directory, "figure.png")
+    ...     save_figure(results, path, variable="critical_stiffness")
+    ...     path.exists()
+    True
     """
     form = path.suffix[1:].lower()
     if form not in FIGURE_FORMATS:
         raise InvalidValue("figure", path.name, "needs an ending we write", choices=FIGURE_FORMATS)
     try:
         drawn = draw_figure(dataset, own, variable=variable, style=style)
-        drawn.set_layout_engine(None)  # everything has its place
+        # The layout is final and must not be computed again when the figure is saved.
+        drawn.set_layout_engine(None)
         with style_context(style):
             image = render_figure(drawn, form)
     except RsfStudyError:
@@ -290,18 +393,67 @@ def save_figure(
 
 
 def render_figure(drawn: Figure, form: str) -> bytes:
-    """A figure as PNG, PDF or SVG."""
+    r"""Render a figure as an image.
+
+    Parameters
+    ----------
+    drawn : matplotlib.figure.Figure
+        Figure to render.
+    form : {"png", "pdf", "svg"}
+        Format of the image.
+
+    Returns
+    -------
+    bytes
+        Contents of an image file without a creation date.
+
+    Examples
+    --------
+    >>> from rsfstudy.plots import NotebookFigure, render_figure
+    >>> image = render_figure(NotebookFigure(figsize=(1.0, 1.0)), "png")
+    >>> image[:4]
+    b'\x89PNG'
+    """
     image = io.BytesIO()
     drawn.savefig(image, format=form, metadata=_METADATA_WITHOUT_DATES.get(form))
     return image.getvalue()
 
 
 def write_image(image: bytes, path: Path) -> None:
-    """Write an image, so that the old file stays, or the whole new one."""
+    """Write an image to a file atomically.
+
+    The image is written to a temporary file in the same directory. The temporary file then replaces
+    the existing file. Missing parent directories are created.
+
+    Parameters
+    ----------
+    image : bytes
+        Contents of the file.
+    path : Path
+        Path of the file.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from rsfstudy.plots import NotebookFigure, render_figure, write_image
+    >>> image = render_figure(NotebookFigure(figsize=(1.0, 1.0)), "svg")
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     path = Path(directory, "figures", "empty.svg")
+    ...     write_image(image, path)
+    ...     path.read_bytes() == image
+    True
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f".{path.name}.new")
     try:
-        beside.unlink(missing_ok=True)  # were it a link or a pipe, writing would go elsewhere
+        # If the temporary file were a link or a pipe, the image would be written to another place.
+        beside.unlink(missing_ok=True)
         beside.write_bytes(image)
         os.replace(beside, path)
     finally:

@@ -1,5 +1,7 @@
-"""The picture of one motion or limit cycle: friction and slip rate along it, and its path on the
-phase plane.
+"""Figure of a single motion or limit cycle.
+
+The function ``plot_motion`` draws friction and slip rate along the motion, and the path of the
+motion in the phase plane.
 """
 
 from __future__ import annotations
@@ -34,12 +36,13 @@ from rsfstudy.rig import DISPLAY_BASE_UNITS, Rig
 from rsfstudy.slider import Scene, steady_friction_excess
 from rsfstudy.storage import read_scene_fields
 
-#: Of a panel, in mm.
+#: Height of a panel in mm.
 PANEL_HEIGHT = 48.0
 LN10 = math.log(10.0)
-#: What a motion may be drawn against.
+#: Names of the variables that may be drawn along x.
 ABSCISSAE = ("load_point_displacement", "slip", "time")
-#: Change of load point displacement, over slip, below which the load point is held.
+#: Relative change below which the load point displacement or the slip rate is considered constant.
+#: Smaller changes are due to rounding errors.
 _RELATIVE_ROUNDING_ERROR = 1e-6
 _FRICTION_LABEL = r"Friction coefficient, $\mu$"
 
@@ -49,31 +52,45 @@ _FRICTION_LABEL = r"Friction coefficient, $\mu$"
 def plot_motion(
     motion: xr.Dataset, rig: Rig | None = None, *, against: str | None = None
 ) -> Figure:
-    """Draw one motion, or a limit cycle.
+    """Draw a motion or a limit cycle.
 
     Parameters
     ----------
     motion : xarray.Dataset
-        As `rsfstudy.simulate` or `rsfstudy.limit_cycle` gives it.
+        Motion from ``rsfstudy.simulate``, or limit cycle from ``rsfstudy.limit_cycle``. The
+        required variables are ``slip``, ``log10_slip_rate``, ``frictional_stress``, the variable
+        along x, and ``normal_stress_ratio`` or ``effective_normal_stress``. In addition, a motion
+        needs ``friction_coefficient``, and a limit cycle needs ``shear_stress``. All variables have
+        the dimensions of ``slip``. The attribute ``scene`` is also required.
     rig : Rig, optional
-        The rig, in whose units the axes are then.
+        Rig whose scales convert the axes to MPa, um and s. By default, the axes are in the units of
+        the dataset.
     against : {"load_point_displacement", "slip", "time"}, optional
-        What friction and slip rate are drawn against: by default load point displacement, or slip
-        where the load point is held throughout; time along a limit cycle, of which load point
-        displacement is not known.
+        Variable along x. The default is the load point displacement. If the load point is
+        stationary, the default is the slip. For a limit cycle, the default is the time, because the
+        load point displacement is unknown.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Friction (of a limit cycle shear stress), slip rate, and the path on the plane of both with
-        the line of steady sliding.
+        Figure with three panels. The panels show the friction coefficient, the slip rate, and the
+        path in the phase plane with the line of steady sliding. For a limit cycle, the first panel
+        shows the shear stress.
 
     Raises
     ------
     DataError
-        Where the dataset is no motion and no limit cycle, or there is none.
+        If the dataset is not a motion or a limit cycle, or if the motion contains no values.
     InvalidValue
-        For another abscissa.
+        If ``against`` is unknown, or if the dataset cannot be converted to the units of the rig.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene, plot_motion, simulate
+    >>> scene = Scene(b_over_a=2.0, stiffness_ratio=1.2, load_velocity_ratio=2.0)
+    >>> figure = plot_motion(simulate(scene, duration=5.0))
+    >>> len(figure.axes)
+    3
     """
     if against not in (None, *ABSCISSAE):
         raise InvalidValue("against", against, "is unknown", choices=ABSCISSAE)
@@ -115,7 +132,8 @@ def _check_motion(motion: xr.Dataset, against: str | None) -> None:
     Raises
     ------
     DataError
-        If a variable is missing, is not numeric, or has the wrong dimensions.
+        If a variable is missing, is not numeric or has the wrong dimensions, or if a slip rate
+        exceeds the range of floating-point numbers.
     """
     stress = () if "friction_coefficient" in motion else ("shear_stress",)
     needed = ("slip", against or "time", "frictional_stress", "log10_slip_rate", *stress)
@@ -139,8 +157,11 @@ def _normal_stress_name(motion: xr.Dataset) -> str:
 
 
 def _choose_abscissa(motion: xr.Dataset) -> str:
-    """Load point displacement, or slip where that does not change but for rounding; time where it
-    is not known.
+    """Choose the variable along x.
+
+    The result is the load point displacement, or the slip if the load point displacement is
+    constant apart from rounding errors. If the load point displacement is missing, the result is
+    the time.
     """
     if "load_point_displacement" not in motion:
         return "time"
@@ -150,7 +171,7 @@ def _choose_abscissa(motion: xr.Dataset) -> str:
 
 
 def _motion_title(motion: xr.Dataset) -> str:
-    """Title of a motion, and how it ended if not as it should."""
+    """Return the title of a motion, with its status if it ended early."""
     status = motion.attrs.get("status", "ok")
     ending = "" if status == "ok" else f" [{status}: {motion.attrs.get('message', '')}]"
     title = motion.attrs.get("title", "Limit cycle of a spring-slider")
@@ -158,12 +179,11 @@ def _motion_title(motion: xr.Dataset) -> str:
 
 
 def _draw_slip_rate(shown: xr.Dataset, axes: Axes, against: str) -> None:
-    """Slip rate in the units of the rig, or its logarithm over V_*."""
+    """Draw the slip rate, or its logarithm if the dataset has no slip rate."""
     if "slip_rate" in shown:
         axes.plot(shown[against], shown["slip_rate"])
-        if (
-            np.ptp(ends := axes.dataLim.intervaly) < _RELATIVE_ROUNDING_ERROR * ends[1]
-        ):  # it slides steadily
+        # A constant slip rate needs explicit limits, because rounding errors would fill the panel.
+        if np.ptp(ends := axes.dataLim.intervaly) < _RELATIVE_ROUNDING_ERROR * ends[1]:
             axes.set_ylim(0.5 * ends[0], 2.0 * ends[1])
         set_log_scale(axes, "y")
         axes.set_ylabel(
@@ -175,11 +195,11 @@ def _draw_slip_rate(shown: xr.Dataset, axes: Axes, against: str) -> None:
 
 
 def _draw_phase_plane(motion: xr.Dataset, shown: xr.Dataset, axes: Axes) -> None:
-    """Friction against slip rate, with the line of steady sliding."""
+    """Draw friction against slip rate, with the line of steady sliding."""
     logs = motion["log10_slip_rate"]
     rates = shown.get("slip_rate", (10.0**logs).assign_attrs(units="$V_*$"))
     scale = float(rates[0]) / 10.0 ** float(logs[0])
-    # in ruptures the spring carries what accelerates the mass, too
+    # During ruptures, the spring stress also includes the stress that accelerates the mass.
     friction = motion["frictional_stress"] / motion[_normal_stress_name(motion)]
     axes.plot(scale * 10.0**logs, friction, **cycle_style(0), label="motion")
     axes.plot(
@@ -196,8 +216,10 @@ def _draw_phase_plane(motion: xr.Dataset, shown: xr.Dataset, axes: Axes) -> None
 
 
 def _steady_friction(values: dict[str, Any], log10_rates: np.ndarray) -> np.ndarray | None:
-    """Friction coefficient of steady sliding; None of a scene with a part that is not known here,
-    but for its loading, which does not matter.
+    """Compute the friction coefficient of steady sliding.
+
+    The loading of the scene is ignored, because steady sliding does not depend on the loading. The
+    result is None if another part of the scene is unknown.
     """
     try:
         scene = Scene(
@@ -211,6 +233,7 @@ def _steady_friction(values: dict[str, Any], log10_rates: np.ndarray) -> np.ndar
 
 
 def _axis_label(values: xr.DataArray) -> str:
+    """Return the label of an axis from the attributes of a variable."""
     name = str(values.attrs.get("long_name", values.name))
     name = name.removesuffix(" since the step") if "phase" in values.dims else name
     name = f"{name[:1].upper()}{name[1:]}"
@@ -220,5 +243,5 @@ def _axis_label(values: xr.DataArray) -> str:
 
 
 def _format_units(units: str) -> str:
-    """Units as an axis names them."""
+    """Format units for the label of an axis."""
     return units.replace(" s-1", "/s").replace("um", r"$\mu$m")

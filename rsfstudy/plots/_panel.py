@@ -1,4 +1,9 @@
-"""Draws a `Panel`: its curves, its scales, and what its axes, curves and places are called."""
+"""Drawing of the panels of a figure.
+
+The function ``expand_facets`` creates one panel per facet, and ``draw_panel`` draws the curves,
+labels and title of a panel. After all panels are drawn, ``finalize_panels`` applies common scales
+and adds legends.
+"""
 
 from __future__ import annotations
 
@@ -36,20 +41,34 @@ from rsfstudy.status import Status
 from rsfstudy.study import Panel, read_quantities
 from rsfstudy.vocabulary import find_quantity
 
-#: Of the second axis of `hue`: dashes, and how markers are filled.
+#: Line styles and marker fill styles for the points of the second axis of ``hue``.
 _SECOND_HUE_STYLES = (("-", "full"), ("--", "none"), (":", "none"), ("-.", "full"))
-#: Points of an axis of numbers from which on a scale of colours tells curves apart, and points of
-#: curves from which on they have no markers.
+#: Number of points of a numeric axis above which a colour bar replaces legend entries, and number
+#: of points of a curve above which markers are omitted.
 _MIN_POINTS_FOR_COLOUR_SCALE, _MAX_POINTS_WITH_MARKERS = 7, 60
-#: Digits of a slope.
+#: Maximum number of decimal places of a slope.
 _SLOPE_DIGITS = 6
-#: Characters left of a title for the letter of a panel, and for numbers along y.
+#: Width of the panel letter and of the y tick labels, in characters.
 _LETTER_WIDTH = 10
 _MISSING = xr.DataArray(np.nan)
 
 
 def expand_facets(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
-    """The panel at each point of the axes of its `facet`; none where there is nothing to draw."""
+    """Create one panel for each point of the facet axes.
+
+    Parameters
+    ----------
+    panel : Panel
+        Panel with the axes ``facet``.
+    dataset : xarray.Dataset
+        Results of a study, with the variables of the panel and the variable ``status``.
+
+    Returns
+    -------
+    list of Panel
+        Panels without facets. Panels without data are omitted. The list is empty if the condition
+        of the panel is not met.
+    """
     if isinstance(panel.y, str) and panel.y and not dataset.get(panel.y, _MISSING).notnull().any():
         return []
     if panel.condition and not panel.condition(dataset):
@@ -63,7 +82,7 @@ def expand_facets(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
 
 
 def _has_data(panel: Panel, dataset: xr.Dataset) -> bool:
-    """True if there is anything to draw in a panel."""
+    """Return True if a panel has data to display."""
     part = _select_part(panel, dataset)
     if isinstance(panel.y, str):
         return bool(part[panel.y].notnull().any() or (part["status"] == Status.OK).any())
@@ -72,24 +91,54 @@ def _has_data(panel: Panel, dataset: xr.Dataset) -> bool:
 
 
 def _select_part(panel: Panel, dataset: xr.Dataset) -> xr.Dataset:
-    """The part of a dataset that a panel shows."""
+    """Select the part of a dataset that a panel displays."""
     at = {d: place for d, place in panel.isel.items() if d in dataset.dims}
     return dataset.isel({d: _point_indices(dataset[d], place) for d, place in at.items()})
 
 
 def at_extra_dims(panel: Panel, where: Mapping[str, int], said: str) -> Panel:
-    """The panel at a place on further axes, which its title says too."""
+    """Restrict a panel to one point of additional dimensions.
 
+    Parameters
+    ----------
+    panel : Panel
+        Panel without facets.
+    where : mapping of str to int
+        Index of the point along each additional dimension.
+    said : str
+        Description of the point, which is appended to the title.
+
+    Returns
+    -------
+    Panel
+        Copy of the panel without a condition.
+    """
     own = {dimension: at for dimension, at in panel.isel.items() if dimension not in where}
 
     def title(part: xr.Dataset) -> str:
+        """Return the title of the panel with the description of the point."""
         return _join_phrases(_resolve_text(panel.title, part, _describe_places(part, own)), said)
 
     return replace(panel, isel={**own, **where}, title=title, condition=None)
 
 
 def draw_panel(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw all of a panel that does not depend on others."""
+    """Draw the curves, scales, labels and title of a panel.
+
+    Parameters
+    ----------
+    panel : Panel
+        Panel without facets.
+    dataset : xarray.Dataset
+        Results of a study, with the variables that the panel displays.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+
+    Raises
+    ------
+    DataError
+        If x and y of a curve are not one-dimensional arrays of the same size.
+    """
     part = _select_part(panel, dataset)
     places = "" if panel.is_custom else _describe_places(part, panel.isel)
     if panel.x and (panel.y in part if isinstance(panel.y, str) else panel.y):
@@ -104,7 +153,8 @@ def draw_panel(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
         if any(end is not None for end in limits):
             getattr(axes, f"set_{which}lim")(*limits)
         if which == "y" and limits[1] is None is not limits[0]:
-            top = float(axes.dataLim.ymax)  # what lies highest is seen whole
+            # A margin above the highest point keeps the marker of this point inside the panel.
+            top = float(axes.dataLim.ymax)
             axes.set_ylim(top=max(axes.get_ylim()[1], top + 0.05 * (top - limits[0])))
     across, up = text_capacity(axes)
     if label := _axis_label(panel.x, panel.x_label, part, across - _LETTER_WIDTH):
@@ -116,8 +166,17 @@ def draw_panel(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def finalize_panels(panels: Sequence[Panel], axes_of: Sequence[Axes]) -> None:
-    """Have panels that are to be alike the same scales along y and of colours, and then numbers and
-    legends.
+    """Apply common scales to the panels and add legends.
+
+    Panels with the same ``y_scale_group`` get the same y limits and the same colour limits. Custom
+    panels are not changed.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+        All panels of the figure.
+    axes_of : sequence of matplotlib.axes.Axes
+        Axes of the panels, in the same order.
     """
     pairs = [(p, axes) for p, axes in zip(panels, axes_of, strict=True) if not p.is_custom]
     for name in {panel.y_scale_group for panel, _axes in pairs if panel.y_scale_group}:
@@ -136,7 +195,22 @@ def finalize_panels(panels: Sequence[Panel], axes_of: Sequence[Axes]) -> None:
 
 
 def iterate_curves(panel: Panel, part: xr.Dataset) -> Iterator[tuple[xr.Dataset, dict[str, Any]]]:
-    """Each curve of a panel, and how it is drawn."""
+    """Iterate over the curves of a panel.
+
+    Parameters
+    ----------
+    panel : Panel
+        Panel with the axes ``hue``.
+    part : xarray.Dataset
+        Part of the dataset that the panel displays.
+
+    Yields
+    ------
+    row : xarray.Dataset
+        Part of the dataset that the curve displays.
+    style : dict of str to object
+        Properties of the curve, as for ``matplotlib.axes.Axes.plot``.
+    """
     several = [d for d in panel.hue if part.sizes[d] > 1]
     shades = None if callable(panel.style) or not panel.hue else _curve_colours(part, panel.hue[0])
     named = [d for d in panel.hue if shades is None or d != panel.hue[0]]
@@ -154,13 +228,17 @@ def iterate_curves(panel: Panel, part: xr.Dataset) -> Iterator[tuple[xr.Dataset,
 
 
 def _second_hue_style(number: int) -> dict[str, str]:
-    """Dashes and markers of a point of the second axis of `hue`."""
+    """Return the line style and marker fill style for the second hue axis."""
     line, fill = _SECOND_HUE_STYLES[number % len(_SECOND_HUE_STYLES)]
     return {"linestyle": line, "fillstyle": fill}
 
 
 def _add_second_hue_legend(panel: Panel, part: xr.Dataset, axes: Axes) -> None:
-    """Say what dashes and open markers stand for, where colours stand for something else."""
+    """Add the line styles of the second hue axis to the legend.
+
+    The entries are grey. No entries are added if only one hue axis varies, if the first hue axis
+    has a colour scale, or if the panel defines its own curve labels.
+    """
     if panel.curve_label is None and len([d for d in panel.hue if part.sizes[d] > 1]) > 1:
         second = panel.hue[1]
         shades = not callable(panel.style) and _curve_colours(part, panel.hue[0]) is not None
@@ -172,7 +250,10 @@ def _add_second_hue_legend(panel: Panel, part: xr.Dataset, axes: Axes) -> None:
 
 
 def _curve_colours(part: xr.Dataset, dimension: str) -> np.ndarray | None:
-    """Colours of a scale for the points of a long axis of numbers."""
+    """Return the colours of a long numeric axis.
+
+    The result is None if the axis is short or not numeric.
+    """
     long = part.sizes[dimension] > _MIN_POINTS_FOR_COLOUR_SCALE and has_numeric_points(
         part, dimension
     )
@@ -180,6 +261,7 @@ def _curve_colours(part: xr.Dataset, dimension: str) -> np.ndarray | None:
 
 
 def _curve_name(panel: Panel, row: xr.Dataset, by: Sequence[str]) -> str | None:
+    """Return the legend label of a curve, with its slope if there is one."""
     name = (
         to_mathtext(panel.curve_label(row))
         if panel.curve_label
@@ -189,11 +271,12 @@ def _curve_name(panel: Panel, row: xr.Dataset, by: Sequence[str]) -> str | None:
         return name
     symbol = find_quantity(panel.annotation, read_quantities(row)).symbol
     slope = f"{symbol} = {format_slope(row, panel.annotation, _SLOPE_DIGITS)}".removeprefix(" = ")
-    return f"{name}: {slope.replace('$ = $', ' = ')}"  # a formula is never broken
+    # A single formula cannot be broken at the equals sign when the label is wrapped.
+    return f"{name}: {slope.replace('$ = $', ' = ')}"
 
 
 def _draw_curve(panel: Panel, row: xr.Dataset, axes: Axes, style: dict[str, Any]) -> np.ndarray:
-    """Draw one curve, and return its y values.
+    """Draw one curve and return its y values.
 
     Raises
     ------
@@ -216,11 +299,12 @@ def _draw_curve(panel: Panel, row: xr.Dataset, axes: Axes, style: dict[str, Any]
     if y.size > _MAX_POINTS_WITH_MARKERS and not panel.markers_only:
         style = style | {"marker": ""}
     if np.isfinite(y).sum() == 1 and not style["marker"]:
-        style = style | {"marker": "o"}  # a line of one point is not seen
+        # A line with a single point is invisible without a marker.
+        style = style | {"marker": "o"}
     points = {"linestyle": "none"} if panel.markers_only or panel.fit_line else {}
     axes.plot(x, y, **style | points)
     if panel.fit_line and np.isfinite(line := np.broadcast_arrays(*panel.fit_line(row))).any():
-        # its legend has the marker, too
+        # The line has no markers, but its legend entry shows the marker of the points.
         axes.plot(*line, **style | {"linewidth": 0.9, "markevery": []})
     if panel.error_bars:
         bars = {"fmt": "none", "ecolor": style["color"], "elinewidth": 0.8, "capsize": 3}
@@ -229,11 +313,16 @@ def _draw_curve(panel: Panel, row: xr.Dataset, axes: Axes, style: dict[str, Any]
 
 
 def _evaluate(what: Any, row: xr.Dataset) -> np.ndarray:
+    """Return the values of a variable or of a function of the dataset."""
     return np.atleast_1d(np.asarray(what(row) if callable(what) else row[what]))
 
 
 def _point_indices(points: xr.DataArray, at: Any) -> Any:
-    """Numbers of points: of the lowest, for `min`; each once."""
+    """Convert a selection of points to indices without duplicates.
+
+    If the selection is a function, such as ``min``, the function receives a list of all coordinate
+    values, and returns one value or a list of values.
+    """
     if callable(at):
         values, wanted = points.values.tolist(), at(points.values.tolist())
         at = [values.index(v) for v in wanted] if isinstance(wanted, list) else values.index(wanted)
@@ -241,6 +330,7 @@ def _point_indices(points: xr.DataArray, at: Any) -> Any:
 
 
 def _set_scales(panel: Panel, part: xr.Dataset, axes: Axes, values: np.ndarray) -> None:
+    """Set the scales of a panel, label named points and add a colour bar."""
     named = isinstance(panel.x, str) and part[panel.x].dtype.kind not in "fiu"
     if named:
         set_up_x_axis(axes, part, str(panel.x))
@@ -258,6 +348,7 @@ def _set_scales(panel: Panel, part: xr.Dataset, axes: Axes, values: np.ndarray) 
 
 
 def _axis_label(what: Any, said: Any, part: xr.Dataset, width: int) -> str:
+    """Return the label of an axis, wrapped to a given width."""
     if said is not None:
         return wrap_text(_resolve_text(said, part, ""), width)
     return (
@@ -268,20 +359,26 @@ def _axis_label(what: Any, said: Any, part: xr.Dataset, width: int) -> str:
 
 
 def _resolve_text(said: Any, part: xr.Dataset, otherwise: str) -> str:
-    """Text that a panel states, or else another."""
+    """Return the text of a panel, or a default text if the text is None.
+
+    If the text of the panel is a function, the function is called with the dataset.
+    """
     if said is None:
         return otherwise
     return str(said(part) if callable(said) else said)
 
 
 def _describe_places(part: xr.Dataset, at: Mapping[str, Any]) -> str:
-    """Place of a panel on the axes that it shows one point of, as a title."""
+    """Describe the selected points of a panel for its title."""
     return _join_phrases(
         *(describe_point(part, dimension) for dimension in at if part[dimension].ndim == 0)
     )
 
 
 def _join_phrases(*parts: str) -> str:
-    """Parts one after the other, with a capital letter; empty ones are left out."""
+    """Join phrases with commas and capitalise the first letter.
+
+    Empty phrases are omitted.
+    """
     text = ", ".join(filter(None, parts))
     return f"{text[:1].upper()}{text[1:]}"

@@ -1,5 +1,8 @@
-"""Looks of figures: the style sheet, widths of journal columns, letters of panels, and legends
-that lie beside the data.
+"""Style sheet, legends and layout of figures.
+
+The context manager ``style_context`` applies the style sheet of rsfstudy. The other functions
+compute the size of a figure, cycle through colours and markers, place legends outside the data
+area, and finish the layout after all panels are drawn.
 """
 
 from __future__ import annotations
@@ -27,15 +30,15 @@ from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue, RsfStudyError, shorten
 from rsfstudy.plots._text import visible_length, wrap_text
 
-#: The style sheet that ships.
+#: Default style sheet of rsfstudy.
 STYLE_SHEET = Path(__file__).with_name("rsfstudy.mplstyle")
-#: Ending of style sheets.
+#: File name suffix of style sheets.
 _STYLE_SHEET_SUFFIX = ".mplstyle"
 INCHES_PER_MM = 1.0 / 25.4
-#: Between the two columns of a journal, in inches.
+#: Gap between the two columns of a journal page, in inches.
 _COLUMN_GAP = 6.0 * INCHES_PER_MM
 _MARKERS = "os^Dv<>P*X"
-#: Part of the width of a panel that a scale of colours takes, with its label.
+#: Fraction of the panel width that a colour bar and its label occupy.
 _COLOUR_BAR_SHARE = 0.24
 
 
@@ -45,10 +48,16 @@ def style_context(over: Any = None) -> Iterator[None]:
 
     Parameters
     ----------
-    over : path, str, dict or list of those, optional
+    over : path, str, dict or list, optional
         A style sheet (a file with the suffix ``.mplstyle``), the name of a style in
-        ``matplotlib.style.available``, or a dictionary of matplotlib settings. Later styles
-        override earlier styles.
+        ``matplotlib.style.available``, a dictionary of matplotlib settings, or a list of such
+        styles. Later styles override earlier styles. By default, only the style sheet of rsfstudy
+        is applied.
+
+    Yields
+    ------
+    None
+        The styles are active inside the ``with`` block.
 
     Raises
     ------
@@ -56,6 +65,14 @@ def style_context(over: Any = None) -> Iterator[None]:
         If an argument is not a valid style, if a style contains an unknown setting, or if a figure
         cannot be drawn in this style, for example because the style needs LaTeX and LaTeX is not
         installed.
+
+    Examples
+    --------
+    >>> from matplotlib import rcParams
+    >>> from rsfstudy.plots import style_context
+    >>> with style_context({"font.size": 9}):
+    ...     print(rcParams["font.size"], rcParams["axes.titlesize"])
+    9.0 8.0
     """
     others = over if isinstance(over, list | tuple) else [over]
     settings = [_to_matplotlib_style(other) for other in others if other is not None]
@@ -64,7 +81,8 @@ def style_context(over: Any = None) -> Iterator[None]:
             yield
         except (RsfStudyError, OSError):
             raise
-        except Exception as error:  # settings that are valid alone may not be together
+        # Settings that are valid separately may be invalid in combination.
+        except Exception as error:
             if not settings:
                 raise
             rule = f"a figure cannot be drawn in it: {shorten(error).rstrip('.')}"
@@ -75,9 +93,9 @@ def style_context(over: Any = None) -> Iterator[None]:
 def _to_matplotlib_style(over: Any) -> str | dict[str, Any]:
     """Convert a style to an argument of ``matplotlib.style.use``.
 
-    The result is the name of a style or a dictionary of checked settings. Other arguments are not
-    passed on to matplotlib. Matplotlib would import a package for a dotted name, download a style
-    sheet from a URL, or parse any text file with one warning per line.
+    The result is the name of a style or a dictionary of checked settings. Other arguments are
+    rejected, because matplotlib would import a package for a dotted name, download a style sheet
+    from a URL, or parse any text file with one warning per line.
     """
     if isinstance(over, Mapping):
         return _validate_settings(over)
@@ -90,6 +108,7 @@ def _to_matplotlib_style(over: Any) -> str | dict[str, Any]:
 
 
 def _printable_style(over: Any) -> Any:
+    """Return a style in a form that is readable in an error message."""
     return str(over) if isinstance(over, Path) else over
 
 
@@ -108,7 +127,8 @@ def _validate_settings(settings: Mapping[Any, Any]) -> dict[str, Any]:
             raise InvalidValue("style", name, rule, choices=rcParams)
         try:
             checked[name] = value
-        except Exception as error:  # validators of matplotlib raise anything
+        # The validators of matplotlib raise exceptions of any type.
+        except Exception as error:
             reason = shorten(error).removeprefix(f"Key {name}: ").rstrip(".")
             rule = f"is not a valid value of {name}: {reason}"
             raise InvalidValue("style", value, rule) from error
@@ -151,18 +171,29 @@ def _strip_comment(line: str) -> str:
 
 
 def _strip_quotes(value: str) -> str:
+    """Remove the double quotes around a value."""
     return value[1:-1] if len(value) > 1 and value[0] == value[-1] == '"' else value
 
 
 def figure_size(columns: int, rows: int, height: float | None = None) -> tuple[float, float]:
-    """Inches of a figure of panels: one journal column wide, or two.
+    """Compute the size of a figure in inches.
 
     Parameters
     ----------
-    columns, rows : int
-        How many panels it has beside, and above each other.
+    columns : int
+        Number of columns of panels. A figure with one column of panels is as wide as one column of
+        a journal page, and any other figure is as wide as the page.
+    rows : int
+        Number of rows of panels.
     height : float, optional
-        Of a panel, in mm; that of the style by default.
+        Height of a panel in mm. The default is the figure height of the current style.
+
+    Returns
+    -------
+    width : float
+        Width of the figure in inches.
+    height : float
+        Height of the figure in inches.
     """
     width, usual = rcParams["figure.figsize"]
     each = usual if height is None else height * INCHES_PER_MM
@@ -170,24 +201,85 @@ def figure_size(columns: int, rows: int, height: float | None = None) -> tuple[f
 
 
 def cycle_style(number: int) -> dict[str, Any]:
-    """Colour and line style of the `number`-th of several, from the cycle of the style."""
+    """Return the colour and line style of a curve.
+
+    Parameters
+    ----------
+    number : int
+        Index of the curve, starting at 0. The styles repeat after the last style of the cycle.
+
+    Returns
+    -------
+    dict of str to object
+        Properties of the curve from ``axes.prop_cycle`` of the current style. The style of rsfstudy
+        defines the properties ``color`` and ``linestyle``.
+
+    Examples
+    --------
+    >>> from rsfstudy.plots import cycle_style, style_context
+    >>> with style_context():
+    ...     style = cycle_style(1)
+    >>> style["linestyle"]
+    '--'
+    """
     return dict(next(itertools.islice(itertools.cycle(rcParams["axes.prop_cycle"]), number, None)))
 
 
 def cycle_marker(number: int) -> str:
-    """Marker of the `number`-th of several."""
+    """Return the marker of a curve.
+
+    Parameters
+    ----------
+    number : int
+        Index of the curve, starting at 0. The markers repeat after the tenth curve.
+
+    Returns
+    -------
+    str
+        Marker in the notation of matplotlib.
+
+    Examples
+    --------
+    >>> from rsfstudy.plots import cycle_marker
+    >>> [cycle_marker(number) for number in range(3)]
+    ['o', 's', '^']
+    """
     return _MARKERS[number % len(_MARKERS)]
 
 
 def add_panel_letters(panels: Sequence[Axes]) -> None:
-    """Write (a), (b), ... left of the titles of panels, where there are several."""
+    """Label the panels of a figure with (a), (b), and so on.
+
+    The letters are placed to the left of the titles. If the figure has only one panel, no letter is
+    added.
+
+    Parameters
+    ----------
+    panels : sequence of matplotlib.axes.Axes
+        Panels in the order of their letters.
+    """
     for panel, text in zip(panels, itertools.cycle(string.ascii_lowercase), strict=False):
         if len(panels) > 1:
             panel.set_title(f"({text}) ", loc="left", fontweight="bold", ha="right")
 
 
 def text_capacity(axes: Axes) -> tuple[int, int]:
-    """Characters that a line of text along x, and along y, may have."""
+    """Estimate how many characters fit along the axes of a panel.
+
+    The estimate uses the average width of a letter in the current font size.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Axes of the panel.
+
+    Returns
+    -------
+    across : int
+        Number of characters along x, at least 12.
+    up : int
+        Number of characters along y, at least 12.
+    """
     figure, (left, right) = cast(Figure, axes.figure), _horizontal_extent(axes)
     place = axes.get_subplotspec()
     rows = 1 if place is None else place.get_gridspec().nrows
@@ -201,14 +293,20 @@ def text_capacity(axes: Axes) -> tuple[int, int]:
 
 
 def add_legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
-    """Name what is drawn below the axes, where it covers nothing; call it after the label of x.
+    """Add a legend below the axes, outside the data area.
+
+    Call this function after the x label is set, because the position of the legend depends on the
+    height of the label. If the axes have no labelled and visible data, no legend is added.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-    columns : int
-        Most entries beside each other; fewer where they would be wider than the panel.
+        Axes that the legend describes.
+    columns : int, default: 2
+        Maximum number of columns of the legend. Fewer columns are used if the legend would be wider
+        than the panel.
     title : str, optional
+        Title of the legend.
     """
     shown = _legend_entries(axes)
     if not shown:
@@ -216,7 +314,8 @@ def add_legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
     lines = axes.get_xlabel().count("\n") + _tick_label_lines(axes)
     drop = rcParams["font.size"] * (2.9 + 1.3 * lines)
     figure, (left, right) = cast(Figure, axes.figure), _horizontal_extent(axes)
-    if getattr(axes, "_colorbars", ()):  # else the layout leaves the panel what is beside both
+    # A legend that extends below the colour bar would make the layout engine narrow the panel.
+    if getattr(axes, "_colorbars", ()):
         right -= _COLOUR_BAR_SHARE * (right - left)
     below = offset_copy(axes.transAxes, figure, 0.0, -drop, "points")
     made = partial(
@@ -230,7 +329,7 @@ def add_legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
 
 
 def _tick_label_lines(axes: Axes) -> float:
-    """Lines of text that the names of ticks along x are high."""
+    """Estimate the height of the x tick labels, in lines of text."""
 
     def lines(tick: Text) -> float:
         parts = tick.get_text().split("\n")
@@ -240,7 +339,7 @@ def _tick_label_lines(axes: Axes) -> float:
 
 
 def _legend_entries(axes: Axes) -> dict[str, Any]:
-    """What is drawn on the axes, by its name."""
+    """Return a dictionary of the visible artists with their labels as keys."""
     named: dict[str, Any] = {}
     for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
         if _is_visible(handle):
@@ -251,8 +350,10 @@ def _legend_entries(axes: Axes) -> dict[str, Any]:
 def _fit_legend(
     made: Callable[..., Legend], named: Mapping[str, Any], columns: int, width: float
 ) -> None:
-    """Make a legend of so many columns, or of fewer, until it is no wider than that. It is read
-    line by line: matplotlib fills columns.
+    """Create a legend with as many columns as fit into a given width.
+
+    The width is in pixels. Matplotlib fills the columns of a legend one after another, so the
+    entries are reordered to be read line by line.
     """
     for beside in range(min(columns, len(named)), 0, -1):
         texts = [text for column in range(beside) for text in list(named)[column::beside]]
@@ -262,13 +363,42 @@ def _fit_legend(
 
 
 def add_grey_legend_entry(axes: Axes, name: str, style: Mapping[str, Any]) -> None:
-    """Name in the legend what is drawn in several colours; the line is out of sight."""
+    """Add an entry in grey to the legend of the axes.
+
+    The entry explains a line style or a marker that is drawn in several colours. Call this function
+    before the legend is created.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Axes to which the entry belongs.
+    name : str
+        Label of the entry.
+    style : mapping of str to object
+        Properties of the line, as for ``matplotlib.lines.Line2D``. The default colour is grey.
+
+    Notes
+    -----
+    The entry belongs to a line outside the visible area of the axes.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> from rsfstudy.plots import add_grey_legend_entry
+    >>> axes = Figure().add_subplot()
+    >>> add_grey_legend_entry(axes, "theory", {"linestyle": "--"})
+    >>> axes.get_legend_handles_labels()[1]
+    ['theory']
+    """
     line = {"color": "0.3", **style}
     axes.add_artist(Line2D([-1.0], [-1.0], transform=axes.transAxes, label=name, **line))
 
 
 def _horizontal_extent(axes: Axes) -> tuple[float, float]:
-    """From where to where a panel may reach from side to side, as fractions of the figure."""
+    """Return the left and right limits of the space for a panel.
+
+    The limits are fractions of the figure width.
+    """
     place = axes.get_subplotspec()
     if place is None:
         return 0.0, 1.0
@@ -277,7 +407,7 @@ def _horizontal_extent(axes: Axes) -> tuple[float, float]:
 
 
 def _is_visible(handle: Any) -> bool:
-    """True if there is anything of it to be seen."""
+    """Return True if the artist of a legend entry has visible data."""
     if isinstance(handle, ErrorbarContainer):
         handle = handle.lines[0]
     if isinstance(handle, Line2D):
@@ -289,7 +419,19 @@ def _is_visible(handle: Any) -> bool:
 
 
 def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
-    """Name what most panels name, or some of it, once and below them all."""
+    """Replace the legends of similar panels by one legend of the figure.
+
+    Panels are similar if one of their legends contains all entries of the other legends. The common
+    legend is placed below the panels. The legends are only replaced if more than half of the
+    panels, and at least two panels, are similar.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        Figure that contains the panels.
+    panels : sequence of matplotlib.axes.Axes
+        Panels of the figure.
+    """
     named = {panel: _legend_entries(panel) for panel in panels if panel.get_legend()}
     alike: list[Axes] = []
     for fullest in named:
@@ -311,8 +453,16 @@ def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
 
 
 def enlarge_for_legends(figure: Figure, rows: Sequence[Sequence[Axes]]) -> None:
-    """Make a figure as much taller as its legends and names of ticks are, so that they take nothing
-    from the data.
+    """Increase the figure height by the height of legends and tick labels.
+
+    As a result, legends and long tick labels do not reduce the height of the panels.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        Figure that contains the panels.
+    rows : sequence of sequence of matplotlib.axes.Axes
+        Panels in each row of the figure.
     """
     beside = [[legend for panel in row if (legend := panel.get_legend())] for row in rows]
     heights = [
@@ -324,24 +474,45 @@ def enlarge_for_legends(figure: Figure, rows: Sequence[Sequence[Axes]]) -> None:
 
 
 def _legend_height(legend: Legend) -> float:
-    """Inches, with a line and a half between it and what it belongs to."""
+    """Return the height of a legend in inches.
+
+    The height includes a margin of 1.5 times the font size.
+    """
     figure = cast(Figure, legend.figure)
     height = float(legend.get_window_extent().height)
     return height / figure.dpi + 1.5 * float(rcParams["font.size"]) / 72.0
 
 
 def freeze_ticks(axes: Axes) -> None:
-    """Have ticks that come when the style is no longer in force look as those that come now."""
+    """Set the size of the tick labels to the size in the current style.
+
+    Matplotlib may create ticks after the style context has ended. The explicit size ensures that
+    later tick labels have the same size.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Axes whose ticks are changed.
+    """
     axes.tick_params(axis="x", labelsize=rcParams["xtick.labelsize"])
     axes.tick_params(axis="y", labelsize=rcParams["ytick.labelsize"])
 
 
 def finalize_layout(figure: Figure) -> None:
-    """Give everything its place: ticks take their style when they are made, and how much room they
-    need is known only then.
+    """Compute the final layout of a figure.
+
+    The layout engine is executed twice. The first execution creates the ticks and thereby moves the
+    panels. Long titles are then wrapped, and the second execution adjusts the layout to the wrapped
+    titles.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        Figure with all its panels and legends.
     """
     layout = figure.get_layout_engine()
-    if layout is None:  # a figure of the user's own may have taken it away
+    # A user-defined figure function may have removed the layout engine.
+    if layout is None:
         figure.draw_without_rendering()
         return
     layout.execute(figure)
@@ -351,8 +522,11 @@ def finalize_layout(figure: Figure) -> None:
 
 
 def _wrap_title(axes: Axes) -> None:
-    """Break a title that would be cut where the figure ends, or touch the letter of its panel: long
-    names along y move the panel, and a scale of colours makes it narrow.
+    """Wrap the title of a panel if the title is too long for one line.
+
+    A title must not extend beyond the figure or overlap the letter of the panel. The available
+    width depends on the other parts of the figure, because long y tick labels move the panel and a
+    colour bar makes the panel narrower.
     """
     title, edges, panel = axes.title, cast(Figure, axes.figure).bbox, axes.get_window_extent()
     extent, middle = title.get_window_extent(), 0.5 * sum(panel.intervalx)

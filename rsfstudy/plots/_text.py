@@ -1,4 +1,4 @@
-"""Words, symbols and numbers as figures write them."""
+"""Formatting of labels, symbols, units and numbers for figures."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _MATH_PARSER = MathTextParser("path")
 _MATH_PATTERN = re.compile(r"((?<!\\)\$(?:[^$\\]|\\.)*\$)")
 _NUMBER_PATTERN = re.compile(r"-?[\d.,]*\d")
 _WORD_PATTERN = re.compile(rf"(?:{_MATH_PATTERN.pattern[1:-1]}|\\\$|[^\s$])+")
-#: A space at which no line ends.
+#: Space at which a line is never broken.
 _UNBREAKABLE_SPACE = r"$\ $"
 
-#: What results call things, and how figures write it.
+#: Patterns of symbols in results, and their replacements in mathtext.
 _SYMBOL_REPLACEMENTS: tuple[tuple[str, str], ...] = (
     (r"\bk_cr\(V_\*\)", r"$k_{cr}(V_*)$"),
     (r"\ba/\(b-a\)", r"$a/(b-a)$"),
@@ -36,7 +36,7 @@ _SYMBOL_REPLACEMENTS: tuple[tuple[str, str], ...] = (
 )
 
 
-#: Names that are enough on an axis, where files say more.
+#: Names for the labels of axes, which are shorter than the names in files.
 _SHORT_NAMES = {
     "a_over_b_minus_a": "",
     "critical_displacement": "critical displacement",
@@ -65,8 +65,20 @@ _SHORT_NAMES = {
 
 
 def to_mathtext(text: Any) -> str:
-    """A name or label with symbols for what stands for them, and no underscore; formulas stay as
-    they are, and what only looks like one is taken literally.
+    """Convert the symbols in a text to mathtext.
+
+    Underscores outside formulas are replaced by spaces. Formulas between dollar signs are not
+    changed. If the text is not valid mathtext, the dollar signs are displayed literally.
+
+    Parameters
+    ----------
+    text : str or object
+        Name or label. Other objects are converted to a string first.
+
+    Returns
+    -------
+    str
+        Text for a matplotlib label.
     """
     parts = (
         _MATH_PATTERN.split(str(text))
@@ -79,6 +91,7 @@ def to_mathtext(text: Any) -> str:
 
 
 def _replace_symbols(text: str) -> str:
+    """Replace symbols and underscores outside formulas."""
     for found, written in _SYMBOL_REPLACEMENTS:
         pieces = _MATH_PATTERN.split(text)
         text = "".join(
@@ -89,6 +102,7 @@ def _replace_symbols(text: str) -> str:
 
 
 def _is_valid_mathtext(text: str) -> bool:
+    """Return True if matplotlib can display the text."""
     if text.count("$") % 2:
         return False
     try:
@@ -99,8 +113,21 @@ def _is_valid_mathtext(text: str) -> bool:
 
 
 def wrap_text(text: str, width: int) -> str:
-    """Text in lines of `width` characters at most, never broken within a formula, nor within
-    ``x = 2 y``; its own lines stay apart.
+    """Wrap a text without breaking formulas.
+
+    Existing line breaks are kept. Assignments such as ``x = 2 y`` are kept on one line.
+
+    Parameters
+    ----------
+    text : str
+        Text, which may contain mathtext.
+    width : int
+        Maximum number of visible characters per line. A longer word or formula has its own line.
+
+    Returns
+    -------
+    str
+        Text with line breaks.
     """
     if "\n" in text:
         return "\n".join(wrap_text(line, width) for line in text.split("\n"))
@@ -121,12 +148,37 @@ def wrap_text(text: str, width: int) -> str:
 
 
 def visible_length(text: str) -> int:
-    """Characters to be seen, about."""
+    """Estimate the number of visible characters of a text.
+
+    Parameters
+    ----------
+    text : str
+        Text, which may contain mathtext.
+
+    Returns
+    -------
+    int
+        Number of characters. Each mathtext command is counted as one character.
+    """
     return len(re.sub(r"[${}^_]", "", re.sub(r"\\[a-zA-Z]+", "x", text)))
 
 
 def axis_label(about: Quantity, width: int = 45) -> str:
-    """Label of an axis: name of a quantity, its symbol and its units."""
+    """Return the label of an axis with name, symbol and units of a quantity.
+
+    Parameters
+    ----------
+    about : Quantity
+        Quantity along the axis.
+    width : int, default: 45
+        Maximum number of visible characters per line.
+
+    Returns
+    -------
+    str
+        Label in mathtext. If a quantity has neither units nor a symbol, its scale is used as the
+        unit.
+    """
     words = _SHORT_NAMES.get(about.name, about.long_name.split(":")[0])
     text = ", ".join(filter(None, (f"{words[:1].upper()}{words[1:]}", about.symbol)))
     units = about.units if about.units not in ("", "1") else about.scale * (not about.symbol)
@@ -139,18 +191,61 @@ def axis_label(about: Quantity, width: int = 45) -> str:
 
 
 def format_units(units: str) -> str:
-    """Units as figures write them."""
+    """Format units in mathtext.
+
+    Parameters
+    ----------
+    units : str
+        UDUNITS string, for example ``"um s-1"``.
+
+    Returns
+    -------
+    str
+        Units with powers as superscripts.
+    """
     powers = re.sub(r"(\b[a-zA-Z]+|\))(-?\d)\b", r"\1$^{\2}$", units)
     return to_mathtext(re.sub(r"\bum\b", r"$\\mu$m", powers))
 
 
 def quantity_symbol(about: Quantity) -> str:
-    """Its symbol, or else its name in words."""
+    """Return the symbol of a quantity, or its name if there is no symbol.
+
+    Parameters
+    ----------
+    about : Quantity
+        Quantity of a dataset.
+
+    Returns
+    -------
+    str
+        Symbol or name in mathtext.
+    """
     return to_mathtext(about.symbol or about.name)
 
 
 def format_number(value: float, digits: int = 3) -> str:
-    """A number of so many digits; with a power of ten where it is far from 1."""
+    """Format a number with a given number of significant digits.
+
+    Parameters
+    ----------
+    value : float
+        Number to format.
+    digits : int, default: 3
+        Number of significant digits.
+
+    Returns
+    -------
+    str
+        Number in mathtext. A power of ten is used for numbers that are far from 1.
+
+    Examples
+    --------
+    >>> from rsfstudy.plots import format_number
+    >>> format_number(0.66421)
+    '0.664'
+    >>> format_number(1e-8)
+    '$10^{-8}$'
+    """
     text = f"{value:.{digits}g}"
     if "e" in text and 1.0 <= abs(float(text)) < 1e5:
         text = f"{float(text):,.0f}"
@@ -158,8 +253,25 @@ def format_number(value: float, digits: int = 3) -> str:
 
 
 def format_with_error(value: float, error: float, most: int | None = None) -> str:
-    """A value and its error, to the first digit of the error; the value alone where the
-    error is too small to show in at most so many digits behind the point.
+    r"""Format a value and its error, rounded to the first digit of the error.
+
+    At least one decimal place is written.
+
+    Parameters
+    ----------
+    value : float
+        Value to format.
+    error : float
+        Error of the value, for example its standard error.
+    most : int, optional
+        Maximum number of decimal places. If the error is too small for these decimal places, the
+        error is omitted. By default the error is always included.
+
+    Returns
+    -------
+    str
+        Formula such as ``$0.66 \pm 0.02$``. The result is "unknown" if the value or the error is
+        not finite.
     """
     if not math.isfinite(value) or not math.isfinite(error):
         return "unknown"
@@ -170,13 +282,50 @@ def format_with_error(value: float, error: float, most: int | None = None) -> st
 
 
 def format_slope(row: xr.Dataset, name: str, most: int | None = None) -> str:
-    """A slope, as `format_with_error` writes it: its standard error, which tells of misfit, and the
-    numerical one.
+    r"""Format a slope and its error.
+
+    The error is the sum of the standard error, which measures the misfit of the fitted line, and
+    the numerical error.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        Results for one line. The scalar variables ``name`` and ``<name>_stderr`` are required, and
+        the variable ``<name>_error`` is optional.
+    name : str
+        Name of the slope.
+    most : int, optional
+        Maximum number of decimal places. If the error is too small for these decimal places, the
+        error is omitted. By default the error is always included.
+
+    Returns
+    -------
+    str
+        Formula in mathtext. The result is "unknown" if the slope or its error is not finite.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.plots import format_slope
+    >>> row = xr.Dataset({"zeta": 0.6642, "zeta_stderr": 0.002, "zeta_error": 1e-7})
+    >>> print(format_slope(row, "zeta"))
+    $0.664 \pm 0.002$
     """
     numerical = float(row[f"{name}_error"]) if f"{name}_error" in row else 0.0
     return format_with_error(float(row[name]), float(row[f"{name}_stderr"]) + numerical, most)
 
 
 def format_stiffness_ratio(ratio: float) -> str:
-    """A stiffness in units of the critical one at V_*."""
+    """Format a stiffness relative to the critical stiffness.
+
+    Parameters
+    ----------
+    ratio : float
+        Stiffness divided by the critical stiffness at :math:`V_*`.
+
+    Returns
+    -------
+    str
+        Equation in mathtext.
+    """
     return "$k = k_{cr}$" if ratio == 1.0 else rf"$k = {ratio:g}\,k_{{cr}}$"

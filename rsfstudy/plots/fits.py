@@ -1,4 +1,8 @@
-"""Fits of records: each record with its curves, what they leave, and how parameters go together."""
+"""Figure of fits of laboratory records.
+
+The first panels show the records with the fitted curves. For the first record, further panels show
+the residuals, the autocorrelation of the residuals, and the correlations of the parameters.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +22,13 @@ from rsfstudy.plots._axes import describe_point
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_style
 from rsfstudy.study import Panel
 
-#: Lags of the autocorrelation, most rows of a record that are drawn, and most records with a panel.
+#: Maximum lag of the autocorrelation, minimum number of rows that remain when a long record is
+#: thinned, and maximum number of records with a panel.
 _MAX_LAGS, _MAX_ROWS, _MAX_RECORDS = 40, 20_000, 4
-#: Part of the windows that is drawn beside them, and of a window that residuals are averaged over.
+#: Margin on both sides of the windows as a fraction of their extent, and width of the moving
+#: average of residuals as a fraction of a window.
 _MARGIN_SHARE, _AVERAGING_SHARE = 0.15, 0.02
-#: Standard errors that the band is wide to each side.
+#: Half width of the confidence band in standard errors.
 _BAND_STDERRS = 2.0
 _ROW_STYLE: dict[str, Any] = {
     "color": "0.7",
@@ -35,7 +41,23 @@ _DISPLACEMENT_LABEL = r"Load point displacement ($\mu$m)"
 
 
 def panels(dataset: xr.Dataset) -> Sequence[Panel]:
-    """Each record with its fits; and of the first one, what is left, and correlations."""
+    """Build the panels of the figure of a fit.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of ``rsfstudy.fit``. The required variables are ``record_displacement``,
+        ``record_friction``, ``record_time``, ``fitted_friction``, ``fitted_friction_stderr``,
+        ``residual`` and ``innovation`` along ``row``, and ``correlation`` with the coordinate
+        ``parameter``. The dimension ``law`` is required, and the dimensions ``record``, ``step``
+        and ``part`` are optional.
+
+    Returns
+    -------
+    tuple of Panel
+        One panel per record, for at most four records, followed by three panels for the first
+        record.
+    """
     records = dataset.sizes.get("record", 1)
     part, record = ([d] if d in dataset.dims else [] for d in ("part", "record"))
     named = Panel(title=partial(_record_title, records), x_label=_DISPLACEMENT_LABEL)
@@ -64,20 +86,25 @@ def panels(dataset: xr.Dataset) -> Sequence[Panel]:
 
 
 def _record_title(records: int, dataset: xr.Dataset) -> str:
-    """The record, where there are several."""
+    """Return the name of the record if there are several records."""
     if records == 1:
         return ""
     return f"{dataset['record'].item()}{f' (of {records})' * (records > _MAX_RECORDS)}"
 
 
 def _step_title(dataset: xr.Dataset) -> str:
+    """Return the title of the first step if there are several steps."""
     return f"Step {dataset['step'].values[0]:g}" if "step" in dataset.dims else ""
 
 
 def _iterate_fits(
     dataset: xr.Dataset, *, first: bool = False
 ) -> Iterator[tuple[xr.Dataset, str, int]]:
-    """Each fit, its law, and the number of that; those of the first step, or of all."""
+    """Iterate over the fits of a record.
+
+    Each item contains the results of a fit, the description of the law, and the index of the law.
+    If ``first`` is True, only the fits of the first step are included.
+    """
     steps = range(1 if first else dataset.sizes.get("step", 1))
     for number in range(dataset.sizes["law"]):
         for step in steps:
@@ -88,14 +115,21 @@ def _iterate_fits(
 
 
 def _thinned_columns(one: xr.Dataset, names: Sequence[str]) -> list[np.ndarray]:
-    """Columns of the rows that hold numbers, thinned."""
+    """Return the columns of a fit without missing values.
+
+    Long columns are thinned by omitting rows.
+    """
     columns = np.array([one[name].values for name in names])
     columns = columns[:, np.isfinite(columns).all(axis=0)]
     return list(columns[:, :: max(1, columns.shape[1] // _MAX_ROWS)])
 
 
 def _window_columns(one: xr.Dataset, names: Sequence[str]) -> Iterator[list[np.ndarray]]:
-    """Columns of each window: a run of rows of one record that hold numbers."""
+    """Iterate over the windows of a fit.
+
+    Each item is a list of columns. A window consists of consecutive rows with values, in order of
+    increasing time.
+    """
     rows = np.flatnonzero(one[names[-1]].notnull().values)
     late = np.diff(one["record_time"].values[rows]) > 0.0
     for part in np.split(rows, np.flatnonzero((np.diff(rows) > 1) | ~late) + 1):
@@ -104,6 +138,7 @@ def _window_columns(one: xr.Dataset, names: Sequence[str]) -> Iterator[list[np.n
 
 
 def _draw_record(dataset: xr.Dataset, axes: Axes) -> None:
+    """Draw a record with the fitted curves and their confidence bands."""
     windows = []
     for number, (one, name, law) in enumerate(_iterate_fits(dataset)):
         if not number:
@@ -127,6 +162,7 @@ def _draw_record(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
+    """Draw the residuals of the fits and their moving averages."""
     axes.axhline(0.0, color="0.5", lw=0.8, zorder=2)
     for one, name, law in _iterate_fits(dataset):
         style = cycle_style(law) | {"label": name, "marker": "", "linewidth": 1.0, "zorder": 3}
@@ -139,6 +175,7 @@ def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def _draw_autocorrelation(dataset: xr.Dataset, axes: Axes) -> None:
+    """Draw the autocorrelation of residuals and of whitened residuals."""
     axes.axhline(0.0, color="0.5", lw=0.8)
     for one, name, law in _iterate_fits(dataset, first=True):
         left, freed = _thinned_columns(one, ("residual", "innovation"))
@@ -154,12 +191,14 @@ def _draw_autocorrelation(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def _compute_autocorrelation(values: np.ndarray) -> np.ndarray:
+    """Compute the autocorrelation at all lags up to the maximum lag."""
     seen = values - values.mean()
     size = float(seen @ seen) or 1.0
     return np.array([1.0, *(seen[lag:] @ seen[:-lag] / size for lag in range(1, _MAX_LAGS + 1))])
 
 
 def _correlation_title(dataset: xr.Dataset) -> str:
+    """Return the title of the correlation panel with the names of the laws."""
     laws = [str(law) for law in dataset["law"].values]
     if len(laws) == 1:
         return f"Correlation: {describe_point(dataset.isel(law=0), 'law')}"
@@ -167,14 +206,18 @@ def _correlation_title(dataset: xr.Dataset) -> str:
 
 
 def _parameter_symbol(name: str) -> str:
-    """That of a parameter, with the number of its window, where several are fitted together."""
+    """Return the symbol of a parameter, with its window number if any."""
     plain, number = split_window_number(name)
     symbol = PARAMETERS[plain].symbol
     return f"{symbol[:-1]}^{{({number})}}$" if number else symbol
 
 
 def _draw_correlation(dataset: xr.Dataset, axes: Axes) -> None:
-    """Correlations of parameters: by the first law below the diagonal, by the second above."""
+    """Draw the correlation matrix of the parameters.
+
+    The lower triangle shows the fit of the first law, and the upper triangle shows the fit of the
+    second law.
+    """
     fits = [one for one, _name, _law in _iterate_fits(dataset, first=True)][:2]
     lower, upper = fits[0]["correlation"].values, fits[-1]["correlation"].values
     values = np.tril(lower) + np.triu(upper, 1)

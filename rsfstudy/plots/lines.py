@@ -1,4 +1,8 @@
-"""Any lattice: what was measured against an axis, one line for each point of the others."""
+"""Line plots of the variables of any lattice.
+
+The function ``panels`` builds one panel per variable. Each panel shows the variable along one axis,
+with one line for each point of the other axes.
+"""
 
 from __future__ import annotations
 
@@ -27,18 +31,31 @@ from rsfstudy.storage import read_declaration
 from rsfstudy.study import Panel, read_quantities
 from rsfstudy.vocabulary import find_quantity
 
-#: Most panels, and most lines that a legend names; lines along a longer axis of numbers are told
-#: apart by a scale of colours.
+#: Maximum number of panels, maximum number of lines with a legend entry, and maximum number of
+#: points of a numeric axis without a colour scale.
 _MAX_PANELS, _MAX_LEGEND_LINES, _MAX_CYCLED_COLOURS = 4, 12, 6
-#: Most curves that lie on each other and are all named.
+#: Maximum number of identical curves that are all named in the legend.
 _MAX_NAMED_DUPLICATES = 3
-#: Most points of a line with markers.
+#: Maximum number of points of a line with markers.
 _MAX_POINTS_WITH_MARKERS = 60
 
 
 def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
-    """One panel for each variable that was measured, or one for that which is named; none where
-    that is no number.
+    """Build the line plots of one or several variables.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study, with the variable ``status`` and the attribute ``declaration``.
+    variable : str, optional
+        Name of a variable. By default, the figure shows the primary output and the first measured
+        variables that vary. If the measure has no numeric variables, the figure shows the status.
+
+    Returns
+    -------
+    list of Panel
+        One panel per variable, and at most four panels. The list is empty if the dataset does not
+        contain the given variable or if the variable is neither numeric nor a flag.
     """
     if variable is None:
         names = varying_variables(dataset)[:_MAX_PANELS] or ["status"]
@@ -56,7 +73,7 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
 
 
 def _build_panel(dataset: xr.Dataset, name: str, title: str) -> Panel:
-    """All values of a variable."""
+    """Build the panel of one variable."""
     along = _choose_x_dimension(dataset, dataset[name]) if dataset[name].ndim else ""
     return Panel(
         x=along,
@@ -67,6 +84,7 @@ def _build_panel(dataset: xr.Dataset, name: str, title: str) -> Panel:
 
 
 def _draw_lines(name: str, along: str, dataset: xr.Dataset, axes: Axes) -> None:
+    """Draw the lines of a variable along a dimension."""
     values = dataset[name]
     if told := flag_meanings(values):
         flags, places = np.unique(values.values, return_inverse=True)
@@ -106,7 +124,10 @@ def _draw_lines(name: str, along: str, dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def _choose_x_dimension(dataset: xr.Dataset, values: xr.DataArray) -> str:
-    """The axis of x: the longest of numbers, or the last."""
+    """Choose the dimension along x.
+
+    The result is the longest numeric dimension, or the last dimension if no dimension is numeric.
+    """
     names = [str(dimension) for dimension in values.dims]
     numeric = [
         name for name in names if name in dataset.coords and has_numeric_points(dataset, name)
@@ -115,14 +136,18 @@ def _choose_x_dimension(dataset: xr.Dataset, values: xr.DataArray) -> str:
 
 
 def _choose_colour_dimension(dataset: xr.Dataset, values: xr.DataArray, along: str) -> str | None:
-    """The axis whose points a scale of colours tells apart: one of many numbers."""
+    """Choose the dimension that a colour scale represents.
+
+    The result is the longest numeric dimension apart from the dimension along x. The result is None
+    if no numeric dimension has more than six points.
+    """
     numeric = [str(d) for d in values.dims if d != along and has_numeric_points(dataset, str(d))]
     long = [name for name in numeric if values.sizes[name] > _MAX_CYCLED_COLOURS]
     return max(long, key=lambda name: values.sizes[name]) if long else None
 
 
 def _iterate_points(values: xr.DataArray, dimensions: Sequence[str]) -> Iterator[xr.DataArray]:
-    """The values at each point of some dimensions."""
+    """Iterate over the values at each point of some dimensions."""
     for places in np.ndindex(*(values.sizes[d] for d in dimensions)):
         yield values.isel(dict(zip(dimensions, places, strict=True)))
 
@@ -130,7 +155,10 @@ def _iterate_points(values: xr.DataArray, dimensions: Sequence[str]) -> Iterator
 def _distinct_curves(
     groups: Sequence[xr.DataArray], dimensions: Sequence[str]
 ) -> list[tuple[xr.DataArray, str]]:
-    """Curves that differ, each with what all of its places have in common, in words."""
+    """Group identical curves and describe the points of each group.
+
+    Curves without a finite value are omitted.
+    """
     alike: dict[bytes, list[xr.DataArray]] = {}
     for group in groups:
         if bool(np.isfinite(group).any()):
@@ -140,8 +168,11 @@ def _distinct_curves(
 
 
 def _common_places(same: Sequence[xr.DataArray], dimensions: Sequence[str]) -> tuple[str, ...]:
-    """Places of curves that lie on each other: what they have in common, or else all of the two or
-    three that there are, or the first.
+    """Describe the points of a group of identical curves.
+
+    The description contains the coordinates that all curves share. If the curves share no
+    coordinate, the description lists all points. For a large group, the description contains only
+    the first point and the number of the other points.
     """
     places = [list(dict.fromkeys(describe_point(group, d) for group in same)) for d in dimensions]
     if not places or any(len(names) == 1 for names in places):

@@ -1,5 +1,7 @@
-"""Any lattice with two axes of numbers: a map of a variable for each point of the other axes, in
-colours with contours; cells that end without a number are hatched, and named.
+"""Maps of a variable over two numeric axes.
+
+The function ``panels`` builds one map for each point of the other axes. A map shows the values as
+colours with labelled contours. Cells without a value are hatched according to their status.
 """
 
 from __future__ import annotations
@@ -33,22 +35,36 @@ from rsfstudy.status import Status
 from rsfstudy.study import Panel, read_quantities
 from rsfstudy.vocabulary import find_quantity
 
-#: Fewest points of an axis of a map, and most maps.
+#: Minimum number of points of each axis of a map, and maximum number of maps.
 _MIN_POINTS, _MAX_MAPS = 3, 12
-#: Hatches of cells without a number, by the order in which their statuses are met.
+#: Hatches of cells without a value, in the order of their status codes.
 _HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "||||", "----", "++++", "oooo")
-#: Part of a panel that a label needs around it.
+#: Minimum distance of a contour label from the frame and from other contours, as a fraction of the
+#: panel size.
 _LABEL_CLEARANCE = 0.06
-#: Part of a panel that a line has to go through for one.
+#: Minimum extent of a contour with a label, as a fraction of the panel size.
 _MIN_LABELLED_LENGTH = 0.2
-#: Fewest points of an axis along which lines of equal value are drawn.
+#: Minimum number of points of each axis for contours.
 _MIN_POINTS_FOR_CONTOURS = 6
 _STATUS_NAMES = {int(status): status.label for status in Status}
 
 
 def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
-    """A map of what is named, or of the headline, for each point of the axes that it has beside
-    the two; none where there are no two.
+    """Build the maps of a variable.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study, with the variable ``status`` along all dimensions of the lattice. A map
+        requires a variable with at least two numeric dimensions of three or more points.
+    variable : str, optional
+        Name of a variable of the lattice. The default is the primary output.
+
+    Returns
+    -------
+    list of Panel
+        One map per point of the other axes, and at most 12 maps. The list is empty if the dataset
+        does not contain the variable or if the variable does not have two numeric dimensions.
     """
     names = measured_variables(dataset)[:1] if variable is None else [variable]
     if not names or names[0] not in dataset:
@@ -74,7 +90,11 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
 
 
 def _map_axes(dataset: xr.Dataset, values: xr.DataArray) -> tuple[str, str] | None:
-    """The axes of y and x: the last two of numbers."""
+    """Return the names of the y axis and the x axis of a map.
+
+    The axes are the last two numeric dimensions with at least three points. The result is None if
+    the variable has fewer than two numeric dimensions.
+    """
     numeric = [
         str(dimension)
         for dimension in values.dims
@@ -90,7 +110,23 @@ def draw_map(
     dataset: xr.Dataset,
     axes: Axes,
 ) -> None:
-    """A mark: one map over the axes of y and x, by a scale of colours and contours or its own."""
+    """Draw a map of a variable with contours and hatched cells.
+
+    Parameters
+    ----------
+    name : str
+        Name of the variable.
+    plane : tuple of (str, str)
+        Names of the y axis and the x axis.
+    scale : tuple of (matplotlib.colors.Normalize, sequence of float), or None
+        Colour scale and contour levels. For a variable with flags, the flag values replace the
+        contour levels. If the value is None, the scale is computed from the values of the map.
+    dataset : xarray.Dataset
+        Part of the results with the variable along the dimensions of the map. The dataset must also
+        contain the variable ``status``.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     dataset = dataset.sortby(list(plane))
     values = dataset[name].astype(float).transpose(*plane)
     y, x = (values[dimension].values.astype(float) for dimension in plane)
@@ -117,8 +153,10 @@ def draw_map(
 
 
 def _colour_scale(data: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
-    """A scale of colours, and where contours are on it, or the flags that there are; none where
-    nothing is known.
+    """Return the colour scale and the contour levels of a variable.
+
+    For a variable with flags, the flag values replace the contour levels. The result is None if the
+    variable has no finite value.
     """
     values = data.values.astype(float)
     if not np.isfinite(values).any():
@@ -133,11 +171,14 @@ def _colour_scale(data: xr.DataArray) -> tuple[Normalize, Sequence[float]] | Non
     return Normalize(low, high), MaxNLocator(8).tick_values(low, high)
 
 
-# ---- what is on a map ---------------------------------------------------------------------------
+# ---- contents of a map --------------------------------------------------------------------------
 
 
 def _cell_edges(points: np.ndarray, log: bool = False) -> np.ndarray:
-    """Edges of cells whose centres are these: halfway, on the scale they are drawn on."""
+    """Compute the edges of cells from their centres.
+
+    The edges are the midpoints between neighbouring centres, on a linear or logarithmic scale.
+    """
     if points.size < 2:
         return np.asarray(
             [0.9 * points[0], 1.1 * points[0]] if log else [points[0] - 0.5, points[0] + 0.5]
@@ -149,8 +190,18 @@ def _cell_edges(points: np.ndarray, log: bool = False) -> np.ndarray:
 
 
 def draw_contours(axes: Axes, values: xr.DataArray, levels: Sequence[float]) -> None:
-    """Lines of equal value, labelled, where there are points enough on both axes; x and y are the
-    coordinates of the last and the first dimension.
+    """Draw labelled contours of a variable.
+
+    Contours are drawn only if both axes have at least six points.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    values : xarray.DataArray, shape (ny, nx)
+        Values of the variable, with coordinates for both dimensions.
+    levels : sequence of float
+        Values of the variable at the contours.
     """
     y, x = (values[dimension].values for dimension in values.dims)
     if min(values.shape) < _MIN_POINTS_FOR_CONTOURS or not len(levels):
@@ -163,8 +214,11 @@ def draw_contours(axes: Axes, values: xr.DataArray, levels: Sequence[float]) -> 
 
 
 def _label_positions(axes: Axes, found: QuadContourSet) -> list[tuple[float, float]]:
-    """Places where the longest line of each level is farthest from those of other levels and from
-    the frame; none where that is too close for a label, or the line too short.
+    """Choose the positions of the contour labels.
+
+    The label of a level is placed on its longest contour, at the point with the largest distance
+    from other levels and from the frame. A level has no label if the distance is too small or if
+    the contour is too short.
     """
     panel = axes.transData + axes.transAxes.inverted()
     levels = [[panel.transform(part) for part in parts if len(part)] for parts in found.allsegs]
@@ -183,17 +237,20 @@ def _label_positions(axes: Axes, found: QuadContourSet) -> list[tuple[float, flo
 def _hatch_statuses(
     axes: Axes, at: tuple[np.ndarray, np.ndarray], status: np.ndarray, unknown: np.ndarray
 ) -> None:
-    """Hatch the cells without a number, each status in its own way, and name it for the legend.
+    """Hatch the cells without a value, with a different hatch for each status.
+
+    The name of the status becomes the label of the hatch in the legend.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-    at : tuple of array
+        Axes to draw on.
+    at : tuple of (ndarray, ndarray)
         Edges of the cells along x and along y.
-    status : array
-        Along y, then x.
-    unknown : array of bool
-        The cells to hatch.
+    status : ndarray, shape (ny, nx)
+        Status codes of the cells.
+    unknown : ndarray of bool, shape (ny, nx)
+        True for the cells to be hatched.
     """
     for hatch, code in zip(_HATCHES, np.unique(status[unknown]), strict=False):
         rows = [_run_outline(at, *run) for run in _horizontal_runs(unknown & (status == code))]
@@ -203,7 +260,10 @@ def _hatch_statuses(
 
 
 def _horizontal_runs(here: np.ndarray) -> list[tuple[int, int, int]]:
-    """Cells side by side: their row, and the first and the one after the last of their columns."""
+    """Find runs of neighbouring True values in the rows of an array.
+
+    Each run is a tuple of the row, the first column, and the column after the last column.
+    """
     change = np.diff(np.pad(here.astype(int), ((0, 0), (1, 1))), axis=1)
     first, last = np.argwhere(change == 1), np.argwhere(change == -1)
     return [(int(r), int(a), int(b)) for (r, a), (_r, b) in zip(first, last, strict=True)]
@@ -212,5 +272,6 @@ def _horizontal_runs(here: np.ndarray) -> list[tuple[int, int, int]]:
 def _run_outline(
     at: tuple[np.ndarray, np.ndarray], row: int, a: int, b: int
 ) -> list[tuple[Any, Any]]:
+    """Return the corners of a run of cells."""
     (left, right), (low, high) = at[0][[a, b]], at[1][row : row + 2]
     return [(left, low), (right, low), (right, high), (left, high)]

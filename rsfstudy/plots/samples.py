@@ -1,5 +1,8 @@
-"""Samples or cases: histograms and a scatter matrix of what was measured and of the fields that
-vary, a colour for each point of the other axes.
+"""Histograms and scatter plots of samples and cases.
+
+The function ``panels`` builds a scatter matrix of the primary output and of the sampled fields. The
+diagonal of the matrix shows histograms. Points of the other axes of the study have different
+colours.
 """
 
 from __future__ import annotations
@@ -25,16 +28,34 @@ from rsfstudy.storage import build_axis, read_declaration
 from rsfstudy.study import DrawFunction, Panel, read_quantities
 from rsfstudy.vocabulary import find_quantity
 
-#: Most quantities that are shown, the headline among them, and most ticks of each.
+#: Maximum number of quantities in the scatter matrix, including the measured variable, and maximum
+#: number of ticks per axis.
 _MAX_QUANTITIES, _MAX_TICKS = 4, 3
-#: Points of a scatter; in a file of lines they are one image, since there may be 10^5 of them.
+#: Style of the scatter points. The points are rasterised in vector graphics, because there may be
+#: 10^5 points.
 _POINT_STYLE = {"marker": ".", "markersize": 2.0, "markeredgewidth": 0.0, "rasterized": True}
-#: Bins of a histogram, at most, and characters of a line of a label.
+#: Maximum number of bins of a histogram, and maximum number of characters per line of a label.
 _MAX_BINS, _LABEL_WIDTH = 30, 17
 
 
 def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
-    """A square of panels; none where no axis is numbered, or what is named lies along another."""
+    """Build the panels of a scatter matrix.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study, with the variable ``status`` and the attribute ``declaration``. The
+        fields of a sampled axis are coordinates of the dataset.
+    variable : str, optional
+        Name of a measured variable. The default is the primary output.
+
+    Returns
+    -------
+    list of Panel
+        Panels of the matrix, row by row. The list is empty if the study has no axis with numbered
+        points, such as samples or cases. The list is also empty if the variable is not numeric or
+        does not vary along such an axis.
+    """
     fields = _sampled_fields(dataset)
     along = next((d for d in fields if variable is None or d in dataset[variable].dims), None)
     if along is None or (variable is not None and not is_numeric_variable(dataset[variable])):
@@ -47,12 +68,23 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
 
 
 def square_side(panels: Sequence[Panel]) -> int:
-    """Panels beside each other."""
+    """Return the number of rows and columns of a scatter matrix.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+        All panels of the matrix.
+
+    Returns
+    -------
+    int
+        Number of panels in each row, which equals the number of rows.
+    """
     return math.isqrt(len(panels))
 
 
 def _sampled_fields(dataset: xr.Dataset) -> dict[str, list[str]]:
-    """Fields along each axis whose points are numbered, by its dimension."""
+    """Return the fields of each axis with numbered points, by dimension."""
     found: dict[str, list[str]] = {}
     for axis in map(build_axis, read_declaration(dataset).axes):
         if axis.has_numbered_points and dataset.sizes.get(axis.dimension, 1) > 1:
@@ -61,6 +93,10 @@ def _sampled_fields(dataset: xr.Dataset) -> dict[str, list[str]]:
 
 
 def _build_panel(dataset: xr.Dataset, along: str, x: str, y: str) -> Panel:
+    """Build the panel of a pair of quantities.
+
+    The panel is a histogram if both quantities are identical, and a scatter plot otherwise.
+    """
     by = dict.fromkeys(str(d) for name in (x, y) for d in dataset[name].dims if d != along)
     few_ticks = partial(_limit_ticks, _MAX_TICKS - x.endswith("_error"))
     if x == y:
@@ -80,8 +116,10 @@ def _build_panel(dataset: xr.Dataset, along: str, x: str, y: str) -> Panel:
 
 
 def _short_label(dataset: xr.Dataset, name: str) -> str:
-    """Symbol and units, in short lines: panels are small, and the power of ten of the numbers along
-    an axis stands beside the first line.
+    """Return an axis label with symbol and units in short lines.
+
+    The lines are short because the panels are small. In addition, the power of ten of the tick
+    labels is written next to the first line of the label.
     """
     about = find_quantity(name.removesuffix("_error"), read_quantities(dataset))
     units = "" if about.units in ("", "1") or about.scale else f" ({format_units(about.units)})"
@@ -90,13 +128,28 @@ def _short_label(dataset: xr.Dataset, name: str) -> str:
 
 
 def _limit_ticks(along_x: int, _dataset: xr.Dataset, axes: Axes) -> None:
-    """A mark: ticks that do not touch each other; errors have long numbers."""
+    """Limit the number of ticks, so that the tick labels do not overlap.
+
+    The tick labels of error estimates are long, so fewer ticks are used along x.
+    """
     axes.xaxis.set_major_locator(MaxNLocator(along_x))
     axes.yaxis.set_major_locator(MaxNLocator(_MAX_TICKS))
 
 
 def draw_histogram(name: str, by: Sequence[str], dataset: xr.Dataset, axes: Axes) -> None:
-    """A mark: how often a value is met, at each point of other axes."""
+    """Draw one histogram of a variable for each point of other axes.
+
+    Parameters
+    ----------
+    name : str
+        Name of the variable.
+    by : sequence of str
+        Dimensions whose points have separate histograms.
+    dataset : xarray.Dataset
+        Dataset with the variable and with coordinates for the dimensions ``by``.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
+    """
     values = dataset[name]
     known = values.values[np.isfinite(values.values)]
     edges = np.histogram_bin_edges(known, min(_MAX_BINS, max(5, round(known.size**0.5))))

@@ -1,7 +1,8 @@
 """Benchmark problems with known answers, and checks of other codes.
 
-The package reads problem files and tables of answers, computes reference answers at two tolerances,
-and counts the correct digits of the answers of another code. It never imports that code.
+The package reads problem files and the answers of other codes, and counts the correct digits of an
+answer. For a user-defined problem, the package computes the known answer with two tolerances. The
+package never imports the other code.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""Agreement of two answers: to how many digits, from where on they part, what would explain it."""
+"""Comparison of an answer with the known answer to a problem.
+
+The function ``compare_answers`` counts the digits that agree. If the answer does not pass, the
+function also tests whether another convention explains the difference.
+"""
 
 from __future__ import annotations
 
@@ -17,22 +21,25 @@ from rsfstudy.referee.problem_files import BenchmarkProblem
 from rsfstudy.referee.reference import AnswerTable
 from rsfstudy.rig import read_table
 
-#: Digits that make a problem passed, unless others are asked for.
+#: Default number of digits that is required to pass.
 DEFAULT_REQUIRED_DIGITS = 6
-#: A candidate explains a difference if it leaves so many digits, and so many more than there were.
+#: Minimum number of digits that must agree if an explanation is correct, and minimum increase of
+#: the number of digits.
 _MIN_EXPLAINED_DIGITS, _MIN_DIGITS_GAINED = 3.0, 1.5
-#: Units in the last place by which what is written in decimals may differ: one of rounding in the
-#: code, and half of rounding in the file, a little more for ours.
+#: Maximum difference of rounded values in units of the last decimal place. The code may contribute
+#: one unit, the rounding in the file half a unit, and the rounding of the known answer a small
+#: margin.
 _MAX_LAST_PLACE_DIFFERENCE = 1.51
-#: Of these, differences are told over the largest of the column: they begin at zero.
+#: Quantities with differences relative to the largest value of the column, because they start at
+#: zero.
 _QUANTITIES_FROM_ZERO = ("slip", "pore_pressure")
-#: Conventions of radiation damping, and factors of eta.
+#: Conventions of radiation damping, and the corresponding factors of eta.
 _DAMPING_FACTORS = {
     "twice as much (G/c_s for G/(2 c_s))": 2.0,
     "half as much": 0.5,
     "left out": 0.0,
 }
-#: Factors between usual conventions: units, decades, angles, and kinds of logarithms.
+#: Common conversion factors of units, powers of ten, angles and logarithms.
 _USUAL_FACTORS = {
     "2": 2.0, "0.5": 0.5, "pi": math.pi, "1/pi": 1.0 / math.pi, "2 pi": 2.0 * math.pi,
     "1/(2 pi)": 0.5 / math.pi, "ln 10": math.log(10.0), "1/ln 10": 1.0 / math.log(10.0),
@@ -40,29 +47,31 @@ _USUAL_FACTORS = {
     **{f"1/{unit:g}": 1.0 / unit for unit in (60.0, 3600.0, 86400.0)},
     **{f"{10.0**power:g}": 10.0**power for power in range(-15, 16) if power},
 }  # fmt: skip
-#: Relative difference below which a factor is a usual one: of many values, and of a single value.
+#: Relative tolerances for common conversion factors, for several values and for a single value.
 _FACTOR_RTOL, _SINGLE_VALUE_FACTOR_RTOL = 1e-6, 1e-3
-#: Accuracies of ours where a problem has no answer yet; what candidates need.
+#: Relative tolerances of the two answers to a user-defined problem, and relative tolerance of
+#: answers with other conventions.
 _REFERENCE_RTOLS, _EXPLANATION_RTOL = (1e-9, 1e-11), 1e-8
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """Agreement of a quantity.
+    """Agreement of one quantity with the known answer.
 
-    Attributes
+    Parameters
     ----------
     quantity : str
+        Name of the quantity.
     digits : float
-        To which all of it agrees, no more than are known.
+        Number of digits to which all rows agree, limited to the digits of the known answer.
     worst_row : int
-        Where it agrees least.
+        Index of the row with the largest difference.
     first_failing_row : int or None
-        The first row that has fewer digits than make a pass.
+        Index of the first row with fewer digits than required, or None if there is no such row.
     agrees_as_written : bool
-        Whether it agrees as far as it is written.
-    relative_differences : ndarray
-        Relative differences.
+        True if all rows agree within the rounding error of the written values.
+    relative_differences : ndarray, shape (n,)
+        Relative difference of each row.
     """
 
     quantity: str
@@ -75,16 +84,19 @@ class Agreement:
 
 @dataclass(frozen=True)
 class AnswerComparison:
-    """Agreement of an answer, and what would explain that it fails.
+    """Agreement of all quantities of an answer with the known answer.
 
-    Attributes
+    Parameters
     ----------
     problem : BenchmarkProblem
+        Problem that the answers belong to.
     agreements : tuple of Agreement
+        Agreement of each quantity.
     required_digits : float
-        Digits that make a pass.
-    explanation : str
-        What would explain that it does not pass, or nothing.
+        Number of digits that is required to pass.
+    explanation : str, default: ""
+        Convention that explains the difference. The string is empty if the answer passes or if no
+        explanation was found.
     """
 
     problem: BenchmarkProblem
@@ -94,16 +106,27 @@ class AnswerComparison:
 
     @property
     def digits(self) -> float:
-        """Digits to which all of it agrees."""
+        """Number of digits to which all quantities agree."""
         return min(agreement.digits for agreement in self.agreements)
 
     @property
     def passes(self) -> bool:
-        """True if every quantity has digits enough, or all that are known."""
+        """True if all quantities have the required number of digits.
+
+        If the known answer has fewer digits than required, agreement of all known digits is
+        sufficient.
+        """
         return self.digits >= min(self.required_digits, self.problem.digits)
 
     def describe_agreements(self) -> list[str]:
-        """How far each quantity agrees, in one line for each."""
+        """Describe the agreement of each quantity.
+
+        Returns
+        -------
+        list of str
+            One line per quantity. The line contains the number of digits, the row with the largest
+            difference, and the first row with fewer digits than required.
+        """
         problem, lines = self.problem, []
         for agreement in self.agreements:
             text = f"  {agreement.quantity:20s} {round_digits_down(agreement.digits):4.1f} digits"
@@ -120,6 +143,7 @@ class AnswerComparison:
 
 
 def _format_row(problem: BenchmarkProblem, row: int) -> str:
+    """Format the index value of a row with its units."""
     units = {"time": " s"}.get(problem.index_column, "")
     return f"{problem.index_column} = {problem.index_values[row]:g}{units}"
 
@@ -127,13 +151,28 @@ def _format_row(problem: BenchmarkProblem, row: int) -> str:
 def known_answer(
     problem: BenchmarkProblem, path: Path | None
 ) -> tuple[BenchmarkProblem, AnswerTable]:
-    """A problem and its answer: the one that is shipped; or ours, with the digits to which two
-    motions of different accuracy agree.
+    """Return a problem and its known answer.
+
+    Parameters
+    ----------
+    problem : BenchmarkProblem
+        Problem to be answered.
+    path : Path or None
+        File of the known answer. If the value is None, rsfstudy computes the answer with two
+        tolerances.
+
+    Returns
+    -------
+    problem : BenchmarkProblem
+        Problem whose field ``digits`` is the number of known digits. For a computed answer, this is
+        the number of digits to which the results with both tolerances agree.
+    answer : dict of str to ndarray
+        Columns of the answer in SI units.
 
     Raises
     ------
     RsfStudyError
-        Where rsfstudy finds none.
+        If rsfstudy cannot compute the answer.
     """
     if path is not None:
         table = read_table(path)
@@ -153,7 +192,40 @@ def compare_answers(
     reported: Mapping[str, ReportedQuantity],
     required_digits: float,
 ) -> AnswerComparison:
-    """Agreement of what another code told with an answer, and what would explain a difference."""
+    r"""Compare an answer of another code with the known answer.
+
+    If the answer does not pass, the function searches for a convention that explains the
+    difference.
+
+    Parameters
+    ----------
+    problem : BenchmarkProblem
+        Problem that the answers belong to.
+    answer : mapping of str to ndarray
+        Columns of the known answer in SI units.
+    reported : mapping of str to ReportedQuantity
+        Quantities that the other code reports.
+    required_digits : float
+        Number of digits that is required to pass.
+
+    Returns
+    -------
+    AnswerComparison
+        Agreement of each quantity, and an explanation of the difference if there is one.
+
+    Notes
+    -----
+    The relative difference of a reported value :math:`x` from the known value :math:`y` is
+
+    .. math::
+
+        \Delta = \frac{\max(|x - y| - r, 0)}{s}.
+
+    The rounding error :math:`r` is half a unit in the last digit of :math:`y`. The scale :math:`s`
+    is :math:`|y|` for most quantities. For slip and pore pressure, which start at zero, the scale
+    is the largest value of :math:`|y|` in the column. The number of digits is :math:`-\log_{10}
+    \max \Delta`, limited to the digits of the known answer.
+    """
     values = {name: column.values for name, column in reported.items()}
     places = {name: column.resolution for name, column in reported.items()}
     found = AnswerComparison(
@@ -173,6 +245,16 @@ def round_digits_down(digits: float) -> float:
     """Round a number of digits down to one decimal place.
 
     Rounding down ensures that a failed problem never displays enough digits to pass.
+
+    Parameters
+    ----------
+    digits : float
+        Number of digits.
+
+    Returns
+    -------
+    float
+        Rounded number of digits.
     """
     return math.floor(10.0 * digits) / 10.0
 
@@ -184,6 +266,7 @@ def _compute_agreements(
     required_digits: float,
     resolutions: Mapping[str, float] | None = None,
 ) -> tuple[Agreement, ...]:
+    """Compute the agreement of each quantity of a problem."""
     found = []
     for name in problem.quantities:
         apart = _relative_differences(name, reported[name], answer[name], problem.digits)
@@ -209,8 +292,11 @@ def _compute_agreements(
 def _relative_differences(
     name: str, reported: np.ndarray, reference: np.ndarray, digits: int
 ) -> np.ndarray:
-    """Differences of a quantity beyond what ours are rounded by, to so many digits, relative to
-    each number.
+    """Compute the relative differences of a quantity from its reference.
+
+    The rounding error of the reference, which is half a unit in its last digit, is subtracted from
+    each difference. The remaining difference is divided by the reference value. For quantities that
+    start at zero, the remaining difference is divided by the largest reference value.
     """
     size = np.abs(reference)
     rounded = 0.5 * 10.0 ** (np.floor(np.log10(np.maximum(size, 1e-300))) + 1.0 - digits)
@@ -221,7 +307,10 @@ def _relative_differences(
 def _iterate_explanations(
     problem: BenchmarkProblem, reported: AnswerTable, answer: AnswerTable
 ) -> Iterator[tuple[float, str]]:
-    """Digits to which what is told agrees with other conventions, and these."""
+    """Iterate over conventions that may explain a difference.
+
+    Each item contains the number of digits that agree under the convention, and a description.
+    """
     for words, table in _reinterpret_answer(problem, reported, answer):
         yield min(a.digits for a in _compute_agreements(problem, table, answer, 0.0)), words
     for words, other in _reformulate_problem(problem):
@@ -237,7 +326,10 @@ def _iterate_explanations(
 def _reinterpret_answer(
     problem: BenchmarkProblem, reported: AnswerTable, answer: AnswerTable
 ) -> Iterator[tuple[str, AnswerTable]]:
-    """Tables of what is told, read by other conventions, each with words for it."""
+    """Iterate over answers that are converted from other conventions.
+
+    Each item contains a description of the convention, and the converted columns.
+    """
     shift, stress = sum(problem.b) * math.log(2.0), problem.rig.normal_stress
     if "friction" in reported:
         for sign, place in ((1.0, "left out of"), (-1.0, "left in")):
@@ -252,7 +344,7 @@ def _reinterpret_answer(
             yield words, reported | {"friction": at_fault}
     for name in problem.quantities:
         factor = float(np.median(reported[name] / np.where(answer[name], answer[name], np.nan)))
-        # any factor and any shift would explain a quantity of one value
+        # An arbitrary factor or an arbitrary shift would explain any single value.
         several = len(answer[name]) > 1
         usual = _usual_factor(factor, _FACTOR_RTOL if several else _SINGLE_VALUE_FACTOR_RTOL)
         if usual is not None:
@@ -267,7 +359,9 @@ def _reinterpret_answer(
 
 
 def _usual_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
-    """Return a common conversion factor that equals a factor within a tolerance.
+    """Return the common conversion factor that equals a given factor.
+
+    The relative difference of the two factors must not exceed the tolerance.
 
     Returns
     -------
@@ -284,15 +378,19 @@ def _usual_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
 
 
 def _format_factor(factor: float) -> str:
-    """Format a factor so that the text differs from 1."""
+    """Format a factor so that a factor close to 1 is not displayed as 1."""
     text, beyond = f"{factor:.6g}", factor - 1.0
     return text if text != "1" else f"(1 {'-' if beyond < 0.0 else '+'} {abs(beyond):.2g})"
 
 
 def _reformulate_problem(problem: BenchmarkProblem) -> Iterator[tuple[str, BenchmarkProblem]]:
-    """Problems with other conventions, each with words for it."""
+    """Iterate over problems with other conventions.
+
+    Each item contains a description of the convention, and the changed problem.
+    """
 
     def changed(**parameters: object) -> BenchmarkProblem:
+        """Return the problem with some parameters replaced."""
         return replace(problem, parameters={**problem.parameters, **parameters})
 
     if problem.radiation_damping:

@@ -1,4 +1,8 @@
-"""Answers of other codes: tables of any names and units, read as a problem asks for it."""
+"""Tables with the answers of other codes.
+
+The headings and units of a table may differ from the headings and units of the problem. The
+function ``read_answer`` converts the columns to SI units.
+"""
 
 from __future__ import annotations
 
@@ -15,17 +19,26 @@ from rsfstudy.referee import reference
 from rsfstudy.referee.problem_files import BenchmarkProblem
 from rsfstudy.rig import Column, convert_to_si, read_table
 
-#: What a code may tell instead of a quantity, and in which units.
+#: Quantities that a file may contain instead of a requested quantity, and their units.
 _SUBSTITUTES = {"slip_rate": ("log10_slip_rate", "1"), "friction": ("shear_stress", "Pa")}
 _SUBSTITUTE_UNITS = dict(_SUBSTITUTES.values())
-#: Times may differ by so much, over the last: they are written in decimals.
+#: Tolerance of times, relative to the last time. The times in files are rounded to some decimals.
 _TIME_RTOL = 1e-9
-#: In SI units; beyond it are overflows, whose ratios overflow too.
+#: Largest allowed value in SI units. Larger values would cause an overflow in ratios.
 _MAX_VALUE = 1e100
 
 
 class ReportedQuantity(NamedTuple):
-    """A quantity of another code in SI units, and one in the last place that is written."""
+    """Quantity that another code reports.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Values in SI units.
+    resolution : float
+        One unit in the last decimal place of the values, in SI units. The resolution is 0 if all
+        values are zero, or if the quantity was computed from another quantity.
+    """
 
     values: np.ndarray
     resolution: float
@@ -34,15 +47,34 @@ class ReportedQuantity(NamedTuple):
 def read_answer(
     path: Path, problem: BenchmarkProblem, columns: Mapping[str, str] | None = None
 ) -> dict[str, ReportedQuantity]:
-    """The columns that a problem asks for, in SI units.
+    """Read the columns that a problem requests, in SI units.
+
+    Parameters
+    ----------
+    path : Path
+        Path of the table.
+    problem : BenchmarkProblem
+        Problem that the table answers.
+    columns : mapping of str to str, optional
+        Heading and units of the columns in the file, as for ``rsfstudy.read_table``. By default,
+        the first line of the file must contain the names of the columns.
+
+    Returns
+    -------
+    dict of str to ReportedQuantity
+        Requested quantities by name.
 
     Raises
     ------
     InvalidValue
-        For a column that is missing, units of another kind, a gap, other times or another length.
+        If a column is missing, if units have the wrong dimension, if a value is missing, or if the
+        number of rows or the times differ from the problem.
+    DataError
+        If the file cannot be read.
     """
     table = read_table(path, columns)
-    # first, because columns are converted at the times of the problem
+    # The number of rows is checked first, because the conversion of columns uses the times of the
+    # problem.
     rows, count = (
         problem.index_values,
         max((len(column.values) for column in table.values()), default=0),
@@ -61,7 +93,7 @@ def read_answer(
         key: _convert_column(key, column, problem) for key, column in table.items() if key in asked
     }
     for name, (other, _units) in _SUBSTITUTES.items():
-        # what waves carry away takes a slip rate
+        # With radiation damping, the slip rate is required to convert shear stress to friction.
         waits = name == "friction" and problem.radiation_damping and "slip_rate" not in found
         if name in problem.units and name not in found and other in found and not waits:
             found[name] = ReportedQuantity(_derive_quantity(name, problem, found), 0.0)
@@ -78,8 +110,10 @@ def read_answer(
 def _derive_quantity(
     name: str, problem: BenchmarkProblem, found: Mapping[str, ReportedQuantity]
 ) -> np.ndarray:
-    """A quantity by what is told instead: friction by the shear stress of the spring, over normal
-    stress at the times of the problem.
+    r"""Compute a requested quantity from its substitute.
+
+    The slip rate is computed from its decimal logarithm. The friction coefficient is computed from
+    the shear stress :math:`\tau` of the spring as :math:`\mu = (\tau - \eta V)/\sigma`.
     """
     if name == "slip_rate":
         return np.asarray(10.0 ** found["log10_slip_rate"].values)
@@ -92,7 +126,7 @@ def _derive_quantity(
 
 
 def _convert_column(key: str, column: Column, problem: BenchmarkProblem) -> ReportedQuantity:
-    """A column in SI units."""
+    """Convert a column to SI units."""
     units = problem.units.get(key) or _SUBSTITUTE_UNITS[key]
     one = "1" if column.units in ("", "1") else f"1 {column.units}"
     if units != "1" and one == "1":
@@ -112,7 +146,10 @@ def _convert_column(key: str, column: Column, problem: BenchmarkProblem) -> Repo
 
 
 def _find_resolution(values: np.ndarray) -> float:
-    """One in the last place of the numbers; 0 where none has one, and 1 of whole numbers."""
+    """Return one unit in the last decimal place of the numbers.
+
+    The resolution of whole numbers is 1. If all numbers are zero, the result is 0.
+    """
     exponents = [Decimal(repr(x)).normalize().as_tuple().exponent for x in values.tolist() if x]
     return float(10.0 ** min(0, *map(int, exponents))) if exponents else 0.0
 
@@ -120,6 +157,13 @@ def _find_resolution(values: np.ndarray) -> float:
 def _check_rows(
     column: Column, values: np.ndarray, expected: np.ndarray, problem: BenchmarkProblem
 ) -> None:
+    """Check that the index column has the values of the problem.
+
+    Raises
+    ------
+    InvalidValue
+        If a value differs, for example because the file contains other times.
+    """
     wrong = np.abs(values - expected) > _TIME_RTOL * np.abs(expected).max()
     wanted = f"{expected[np.argmax(wrong)]:g} {problem.units[problem.index_column]}"
     column._replace(values=values).check_values(

@@ -1,5 +1,8 @@
-"""Problems: what a slider is, how it begins, what loads it, and what is to be told of it; and the
-files of problems, answers and templates that are written for other codes.
+"""Benchmark problems and their files.
+
+A ``BenchmarkProblem`` defines a spring-slider, its initial state, its loading, and the quantities
+that a code must report. The function ``read_problem`` reads a problem file, and ``write_problems``
+writes the shipped problems for use with other codes.
 """
 
 from __future__ import annotations
@@ -28,9 +31,9 @@ from rsfstudy.paths import check_path
 from rsfstudy.rig import Rig, convert_to_si
 from rsfstudy.slider import Scene, compute_steady_states, field_defaults, friction_relation
 
-#: Where the problems stand, each beside its answer.
+#: Folder of the shipped problems and their answers.
 PROBLEM_FOLDER = Path(__file__).with_name("problems")
-#: What may be asked for: SI units, by what is reported.
+#: SI units of the quantities that a problem can request, for each type of report.
 SERIES_UNITS = {
     "time": "s", "friction": "1", "slip_rate": "m/s", "theta": "s", "theta_1": "s", "theta_2": "s",
     "slip": "m", "normal_stress": "Pa", "pore_pressure": "Pa",
@@ -43,67 +46,79 @@ NUMBER_UNITS = {
     "slowest_slip_rate": "m/s",
 }  # fmt: skip
 REPORT_UNITS = {"series": SERIES_UNITS, "peaks": PEAK_UNITS, "numbers": NUMBER_UNITS}
-#: What must be stated, and what a rig calls that, or what else it may be told.
+#: Fields of the rig by the names of the problem parameters. The first dictionary contains only the
+#: required parameters.
 _REQUIRED_RIG_FIELDS = {
     "normal_stress": "normal_stress",
     "D_c": "slip_distance",
     "V_star": "reference_velocity",
 }
 _RIG_FIELDS = {**_REQUIRED_RIG_FIELDS, "stiffness": "stiffness", "period": "period", "mass": "mass"}
-#: Units of parameters that no field of a scene holds.
+#: SI units of the parameters that are converted to dimensionless fields of the scene.
 _PARAMETER_UNITS = {
     "b": "1", "b_2": "1", "D_c_2": "m", "radiation_damping": "Pa s/m", "V_c": "m/s",
     "V_unstable": "m/s",
 }  # fmt: skip
-#: Laws whose theta goes as exp(Theta/b).
+#: Laws with the state variable b ln(theta/theta_*), so that theta follows from the state variable.
 _LAWS_WITH_THETA = (
     "slip", "slowness", "family", "perrin_rice_zheng", "composite", "two_slip_states",
     "two_slowness_states",
 )  # fmt: skip
 
 
-#: How msgspec names a mismatch, and its kinds of values in words.
+#: Pattern of the type errors of msgspec, and descriptions of the types for error messages.
 _TYPE_ERROR_PATTERN = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$(.*)`)?")
 _TYPE_DESCRIPTIONS = {
     "array": "a list", "object": "a table", "str": "a text", "int": "a whole number",
     "float": "a number", "bool": "true or false", "null": "nothing", "date": "a date",
 }  # fmt: skip
-#: Largest number of digits of an answer, and of peaks.
+#: Maximum number of digits of an answer, and maximum number of peaks.
 _MAX_DIGITS, _MAX_PEAKS = 15, 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
 class BenchmarkProblem:
-    """A problem, as its file states it.
+    """Benchmark problem for codes that simulate a spring-slider.
 
-    Attributes
+    Parameters
     ----------
     title : str
+        Title of the problem.
     law : str
-        State evolution law.
-    equations, conventions : str
-        The equations, and what codes do not agree upon.
-    report : {"series", "peaks", "numbers"}
-        What to tell: values at times; times and heights of maxima of slip rate; or numbers.
+        Name of the state evolution law.
+    equations : str, optional
+        Equations of the problem, as text for readers.
+    conventions : str, optional
+        Conventions that differ between codes, as text for readers.
+    report : {"series", "peaks", "numbers"}, optional
+        Type of the answer. A series contains values at given times, and peaks are the times and
+        values of the maxima of slip rate. The default is a series.
     quantities : list of str
-        Columns of the answer.
-    parameters : mapping
-        Numbers, and texts with units: ``a``, ``b``, ``D_c``, ``V_star``, ``mu_star``,
-        ``normal_stress``, and ``b_2``, ``D_c_2``, ``radiation_damping``, ``V_c``, ``V_unstable``;
-        others are fields of a scene, or of a rig.
-    initial : mapping
-        ``slip_rate`` and ``theta`` at the beginning (a list for two states); without it, steady
-        sliding at V_star.
-    loading : list of mapping
-        Segments, as `Rig.protocol` takes them.
-    times : list of float
-        In s, of a series.
-    count : int
-        Peaks to tell.
-    digits : int
-        Digits of the answer that two ways agree upon.
-    number : int
-        Of the problem; 0 for one of the user's own.
+        Names of the requested quantities, which are columns of the answer.
+    parameters : mapping of str to object
+        Values of the parameters, as numbers in SI units or as strings with units. The parameters
+        ``a``, ``b``, ``D_c``, ``V_star`` and ``normal_stress`` are required. A law with two states
+        also needs ``b_2`` and ``D_c_2``. Optional parameters are ``mu_star``, ``stiffness``,
+        ``period``, ``mass``, ``radiation_damping``, ``V_c``, ``V_unstable``, and other fields of a
+        scene.
+    initial : mapping of str to object, optional
+        Initial values ``slip_rate`` and ``theta``. For a law with two states, ``theta`` is a list.
+        By default, the motion starts from steady sliding at ``V_star``.
+    loading : list of mapping, optional
+        Segments of the loading history, as for ``Rig.protocol``.
+    times : list of float, optional
+        Times of a series in s, in increasing order.
+    count : int, default: 0
+        Number of peaks to report.
+    digits : int, default: 12
+        Number of significant digits of the known answer, from 1 to 15.
+    number : int, default: 0
+        Number of the problem. The number of a user-defined problem is 0.
+
+    Raises
+    ------
+    InvalidValue
+        If a field has an invalid value, or if a required parameter is missing.
     """
 
     title: str
@@ -121,6 +136,7 @@ class BenchmarkProblem:
     number: int = 0
 
     def __post_init__(self) -> None:
+        """Validate the fields of the problem."""
         if self.report not in REPORT_UNITS:
             raise InvalidValue("report", self.report, "is unknown", choices=REPORT_UNITS)
         if not self.quantities:
@@ -154,40 +170,46 @@ class BenchmarkProblem:
 
     @property
     def units(self) -> Mapping[str, str]:
-        """SI units of what may be asked for."""
+        """SI units of the quantities that can be requested, by name."""
         return REPORT_UNITS[self.report]
 
     @property
     def index_column(self) -> str:
-        """The column that says which row is which."""
+        """Name of the column that identifies the rows of the answer.
+
+        The name is empty if the answer consists of a single row.
+        """
         return {"series": "time", "peaks": "event", "numbers": ""}[self.report]
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of the columns of an answer."""
+        """Names of the columns of the answer."""
         return (
             (self.index_column, *self.quantities) if self.index_column else tuple(self.quantities)
         )
 
     @property
     def index_values(self) -> np.ndarray:
-        """Numbers of that column: times in s, or numbers of peaks."""
+        """Times of a series in s, or numbers of the peaks.
+
+        For an answer with a single row, the array contains the value 1.
+        """
         rows = self.times if self.report == "series" else range(1, max(self.count, 1) + 1)
         return np.array(rows, dtype=float)
 
     @property
     def header(self) -> list[str]:
-        """Columns of an answer with their units."""
+        """Headings of the columns of the answer, with units."""
         return [f"{name} ({self.units[name]})" for name in self.columns]
 
     @cached_property
     def rig(self) -> Rig:
-        """The scales of the problem, and its spring and mass."""
+        """Rig with the scales, stiffness and inertia of the problem."""
         return Rig(**{_RIG_FIELDS[n]: v for n, v in self.parameters.items() if n in _RIG_FIELDS})
 
     @cached_property
     def si_parameters(self) -> Mapping[str, float]:
-        """Parameters that no field of a scene holds, in SI units."""
+        """SI values of parameters that are dimensionless in the scene."""
         stated = self.parameters
         return {
             n: convert_to_si(n, stated[n], units)
@@ -197,19 +219,22 @@ class BenchmarkProblem:
 
     @property
     def b(self) -> tuple[float, ...]:
-        """Evolution effect of each state."""
+        """Evolution effects, one value per state variable."""
         return tuple(
             self.si_parameters[name] for name in ("b", "b_2") if name in self.si_parameters
         )
 
     @property
     def radiation_damping(self) -> float:
-        """Radiation damping in Pa s/m."""
+        r"""Radiation damping :math:`\eta` in Pa s/m.
+
+        The value is zero if the problem has no radiation damping.
+        """
         return self.si_parameters.get("radiation_damping", 0.0)
 
     @cached_property
     def scene(self) -> Scene:
-        """The scene that the problem states, but for how it begins."""
+        """Scene of the problem, without the initial state."""
         rig, si, a = self.rig, self.si_parameters, _positive_in_si("a", self.parameters["a"], "1")
         fields = {
             n: v for n, v in self.parameters.items() if n not in {*_RIG_FIELDS, *_PARAMETER_UNITS}
@@ -236,7 +261,27 @@ class BenchmarkProblem:
 
     @property
     def theta_star(self) -> tuple[float, ...]:
-        """theta in steady sliding at V_star, of each state, in s."""
+        r"""Values of theta in steady sliding at the reference velocity.
+
+        The tuple contains one value of :math:`\theta_*` in s per state variable.
+
+        Notes
+        -----
+        For most laws, :math:`\theta_* = D_c/V_*`. For the law of Perrin, Rice and Zheng [1]_,
+        :math:`\theta_* = 2 D_c/V_*`. For the composite law of Kato and Tullis [2]_,
+
+        .. math::
+
+            \theta_* = \frac{D_c}{V_*} e^u, \quad u e^u = e^{-V_*/V_c}.
+
+        The solution :math:`u` is the Lambert W function of :math:`e^{-V_*/V_c}`.
+
+        References
+        ----------
+        .. [1] Perrin, Rice and Zheng (1995), J. Mech. Phys. Solids 43, 1461-1495.
+
+        .. [2] Kato and Tullis (2001), Geophys. Res. Lett. 28, 1103-1106.
+        """
         velocity = self.rig.reference_velocity
         scale = 2.0 if self.law == "perrin_rice_zheng" else 1.0
         if self.law == "composite":
@@ -246,14 +291,16 @@ class BenchmarkProblem:
 
     @cached_property
     def log_slip_rate(self) -> float:
-        """ln(V/V_star) at the beginning."""
+        r"""Logarithm of the initial slip rate, :math:`\ln(V/V_*)`."""
         rate = _positive_in_si("slip_rate", self.initial["slip_rate"], "m/s")
         return math.log(rate / self.rig.reference_velocity)
 
     @property
     def initial_event(self) -> Event | None:
-        """The beginning of the motion, where that is stated: a stress of the spring with which slip
-        rate is the one stated, before any step.
+        """Start of the motion with the initial slip rate and state.
+
+        The stress of the spring is chosen so that the slip rate equals the initial slip rate before
+        any step of the loading. The value is None if the problem has no initial values.
         """
         if not self.initial:
             return None
@@ -275,7 +322,11 @@ class BenchmarkProblem:
         return Event(EventKind.START, None, 0.0, 0.0, point, "", 0, 0.0)
 
     def _initial_states(self) -> tuple[float, ...]:
-        """State variables at the beginning, 0 in steady sliding at V_star."""
+        r"""Compute the initial values of the state variables.
+
+        The state variable is :math:`b \ln(\theta/\theta_*)`, which is zero in steady sliding at
+        :math:`V_*`.
+        """
         stated = self.initial["theta"]
         thetas = stated if isinstance(stated, list) else [stated]
         if len(thetas) != len(self.b):
@@ -286,6 +337,7 @@ class BenchmarkProblem:
 
 
 def _positive_in_si(name: str, value: Any, units: str) -> float:
+    """Convert a value to SI units and check that the value is positive."""
     found = convert_to_si(name, value, units)
     if not found > 0.0:
         raise InvalidValue(name, value, "must be positive")
@@ -293,21 +345,32 @@ def _positive_in_si(name: str, value: Any, units: str) -> float:
 
 
 def read_problem(path: Path) -> BenchmarkProblem:
-    """The problem of a TOML file.
+    """Read a benchmark problem from a TOML file.
+
+    Parameters
+    ----------
+    path : Path
+        Path of the file.
+
+    Returns
+    -------
+    BenchmarkProblem
+        Validated problem. The scene and the initial state have been computed once without an error.
 
     Raises
     ------
     DataError
-        Where there is no such file of TOML.
+        If the file does not exist or is not a valid TOML file.
     InvalidValue
-        For what the file does not say, or says wrongly.
+        If a required key is missing, if a key is unknown, or if a value is invalid.
     """
     check_regular_file("problem", path)
     try:
         stated = tomllib.loads(path.read_text(encoding="utf-8"))
     except RecursionError as error:
         raise DataError(f"{path}: cannot be read as TOML (it is nested too deeply)") from error
-    except (OSError, ValueError) as error:  # of the text, its encoding or the digits of a number
+    # ValueError is raised for wrong syntax, wrong encoding and numbers with too many digits.
+    except (OSError, ValueError) as error:
         raise DataError(f"{path}: cannot be read as TOML ({shorten(error)})") from error
     known = {
         name: kind for name, kind in get_type_hints(BenchmarkProblem).items() if name != "number"
@@ -340,7 +403,13 @@ def read_problem(path: Path) -> BenchmarkProblem:
 
 
 def _check_type(name: str, value: Any, kind: Any) -> None:
-    """Raise ``InvalidValue`` if a value of a problem does not have the declared type."""
+    """Check that a value of a problem has the declared type.
+
+    Raises
+    ------
+    InvalidValue
+        If the value has another type.
+    """
     try:
         msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
@@ -353,13 +422,26 @@ def _check_type(name: str, value: Any, kind: Any) -> None:
 
 
 def shipped_problems() -> dict[int, Path]:
-    """The files of the problems, by number."""
+    """Return the files of the shipped problems by number.
+
+    Returns
+    -------
+    dict of int to Path
+        Path of each problem file.
+    """
     return {int(path.name[:2]): path for path in sorted(PROBLEM_FOLDER.glob("*.toml"))}
 
 
 def write_problems(directory: Path) -> int:
-    """Write all problems into ``problems``, their answers into ``answers``, a table to be filled
-    for each into ``templates``, and ``example.py``.
+    """Write the shipped problems, their answers and templates to a directory.
+
+    The directory then contains the folders ``problems``, ``answers`` and ``templates``, and the
+    script ``example.py``. A template is a table with the headings of an answer and without values.
+
+    Parameters
+    ----------
+    directory : Path
+        New or empty directory.
 
     Returns
     -------
@@ -369,9 +451,9 @@ def write_problems(directory: Path) -> int:
     Raises
     ------
     InvalidValue
-        Where the directory is not empty.
+        If the directory is not empty.
     DataError
-        Where it cannot be written.
+        If the files cannot be written.
     """
     check_path("DIR", directory)
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
@@ -394,7 +476,7 @@ def write_problems(directory: Path) -> int:
 
 
 def _write_template(problem: BenchmarkProblem, path: Path) -> None:
-    """The header of an answer, and which row is which."""
+    """Write an empty answer with the headings and the index column."""
     empty = [""] * len(problem.quantities)
     rows = [f"{row:.12g}" for row in problem.index_values] if problem.index_column else []
     with path.open("w", newline="", encoding="utf-8") as file:

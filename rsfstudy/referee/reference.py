@@ -1,4 +1,4 @@
-"""Answers of rsfstudy to problems."""
+"""Answers to benchmark problems, computed with rsfstudy."""
 
 from __future__ import annotations
 
@@ -26,18 +26,30 @@ from rsfstudy.slider import critical_stiffness, growth_rates
 from rsfstudy.status import Status
 
 AnswerTable = dict[str, np.ndarray]
-#: What answers may cost.
+#: Maximum number of evaluations of the right-hand side per answer.
 WORK_BUDGET = 5_000_000
 
 
 def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
-    """Columns of the answer in SI units, by name.
+    """Compute the answer to a benchmark problem.
+
+    Parameters
+    ----------
+    problem : BenchmarkProblem
+        Problem to solve.
+    accuracy : Accuracy
+        Tolerance, work budget and engine of the integration.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Columns of the answer in SI units.
 
     Raises
     ------
     RsfStudyError
-        Where the motion ends before all is told, or a number that is asked for does not exist, or
-        is not found.
+        If the motion ends before the answer is complete, or if a requested number does not exist or
+        cannot be computed.
     """
     found = {"series": _answer_series, "peaks": _answer_peaks, "numbers": _answer_numbers}[
         problem.report
@@ -50,12 +62,29 @@ def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable
 
 
 def compute_normal_stress(problem: BenchmarkProblem) -> np.ndarray:
-    """Effective normal stress in Pa at the times of a series, to which friction refers."""
+    """Compute the effective normal stress at the times of a series.
+
+    Parameters
+    ----------
+    problem : BenchmarkProblem
+        Problem whose answer is a series.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Effective normal stress in Pa.
+    """
     asked = replace(problem, quantities=["normal_stress"])
     return compute_answer(asked, Accuracy(1e-11, WORK_BUDGET))["normal_stress"]
 
 
 def _answer_series(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+    r"""Compute the values of a series at the times of the problem.
+
+    The motion provides the state variables :math:`\Theta`, which are converted to :math:`\theta =
+    \theta_* e^{\Theta/b}`. The effect of stress on the state is first subtracted from the state
+    variables in proportion to :math:`|b|`.
+    """
     scene, rig = problem.scene, problem.rig
     at = np.array(problem.times) * rig.dimensionless("1 s")
     recording, meter = (
@@ -93,6 +122,7 @@ def _answer_series(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable
 
 
 def _answer_peaks(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+    """Compute the times and values of the maxima of slip rate."""
     rig, meter = problem.rig, WorkMeter(accuracy.budget, engine=accuracy.engine)
     watched = integrate_events(
         problem.scene,
@@ -111,6 +141,7 @@ def _answer_peaks(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
 
 
 def _answer_numbers(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+    """Compute the requested numbers."""
     told: dict[str, float] = {}
     for names, find in _NUMBER_FUNCTIONS.items():
         if {*names} & {*problem.quantities}:
@@ -121,6 +152,13 @@ def _answer_numbers(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTabl
 def _run_measure(
     problem: BenchmarkProblem, accuracy: Accuracy, measure: Measure
 ) -> Mapping[str, float]:
+    """Apply a measure to the scene of a problem.
+
+    Raises
+    ------
+    RsfStudyError
+        If the status of the measurement is not ok.
+    """
     found = measure(problem.scene, accuracy)
     if found.status is not Status.OK:
         raise RsfStudyError(f"{measure.name}: {found.status.label} ({found.message})")
@@ -128,6 +166,7 @@ def _run_measure(
 
 
 def _linear_stability(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float, ...]:
+    """Compute the critical stiffness, the growth rate and the frequency."""
     scene, rig = problem.scene, problem.rig
     growth = growth_rates(scene, scene.log_load_velocity)[0] * scene.load_velocity
     stiffness = critical_stiffness(scene, scene.log_load_velocity)
@@ -136,16 +175,19 @@ def _linear_stability(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[fl
 
 
 def _critical_velocity(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float]:
+    """Compute the critical load point velocity in m/s."""
     found = _run_measure(problem, accuracy, CriticalStep())
     return (problem.rig.reference_velocity * found["critical_velocity_ratio"],)
 
 
 def _critical_displacement(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float]:
+    """Compute the critical displacement step in m."""
     found = _run_measure(problem, accuracy, CriticalStep(of="displacement_step"))
     return (problem.rig.slip_distance * found["critical_displacement"],)
 
 
 def _limit_cycle(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float, ...]:
+    """Compute the recurrence interval, stress drops and slip rates."""
     rig, found = problem.rig, _run_measure(problem, accuracy, LimitCycle(phases=2))
     drops = (rig.normal_stress * found[f"{name}_stress_drop"] for name in ("static", "dynamic"))
     rates = (rig.reference_velocity * 10.0 ** found[f"{m}_log10_slip_rate"] for m in ("max", "min"))

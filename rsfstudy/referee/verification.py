@@ -1,4 +1,4 @@
-"""Comparison of a file of another code with the answer to its problem, and a summary of several."""
+"""Comparison of files of other codes with known answers."""
 
 from __future__ import annotations
 
@@ -15,24 +15,32 @@ from rsfstudy.referee.problem_files import read_problem, shipped_problems
 def compare_file(
     file: Path, stated_problem: str, columns: Mapping[str, str] | None, required_digits: float
 ) -> AnswerComparison:
-    """Compare a file of another code with the answer to its problem.
+    """Compare a file of another code with the known answer to its problem.
 
     Parameters
     ----------
     file : Path
-        Table with the columns that the problem asks for.
+        Table with the columns that the problem requests.
     stated_problem : str
-        Number of a shipped problem, or path of a problem file. If empty, the file name begins with
-        the number.
-    columns : mapping of str to str, optional
-        Columns of the file by name, as in ``read_table``.
+        Number of a shipped problem, or path of a problem file. If the string is empty, the first
+        two characters of the file name are the number of the problem.
+    columns : mapping of str to str, or None
+        Heading and units of the columns in the file, as for ``rsfstudy.read_table``. If the value
+        is None, the first line of the file must contain the names of the columns.
     required_digits : float
-        Digits that make a pass.
+        Number of digits that is required to pass.
+
+    Returns
+    -------
+    AnswerComparison
+        Agreement of each quantity with the known answer.
 
     Raises
     ------
     InvalidValue
-        If there is no such problem, or if the file does not contain its columns.
+        If the problem does not exist, or if the file does not contain the requested columns.
+    DataError
+        If a file cannot be read.
     """
     number, there, path = stated_problem or file.name[:2], shipped_problems(), None
     if stated_problem and not number.isdecimal():
@@ -48,7 +56,18 @@ def compare_file(
 
 
 def summarise_comparisons(found: Sequence[AnswerComparison]) -> str:
-    """One line to quote."""
+    """Summarise the comparisons of several files in one line.
+
+    Parameters
+    ----------
+    found : sequence of AnswerComparison
+        Comparisons of the files.
+
+    Returns
+    -------
+    str
+        Text such as "9 problems of 24, 9 to 10 digits". Only the problems that passed are counted.
+    """
     passed = {one.problem.title: math.floor(one.digits) for one in found if one.passes}
     own = all(one.problem.number == 0 for one in found)
     of = "one's own" if own else f"{len(shipped_problems())}"
