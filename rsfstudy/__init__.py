@@ -77,27 +77,29 @@ _LAZY_EXPORTS = {
     "api.single_scene": ("critical_step", "limit_cycle", "to_si"),
     "api.event_catalogue": ("events",),
 }
-_MODULE_OF = {name: module for module, names in _LAZY_EXPORTS.items() for name in names}
+_MODULE_BY_EXPORTED_NAME = {
+    name: module for module, names in _LAZY_EXPORTS.items() for name in names
+}
 
 #: Documented modules, besides the names of this one.
-_NAMESPACES = ("fitting", "measures", "parts", "plots", "reductions", "reduce")
+_DOCUMENTED_NAMESPACES = ("fitting", "measures", "parts", "plots", "reductions", "reduce")
 
-__all__ = sorted(_MODULE_OF)
+__all__ = sorted(_MODULE_BY_EXPORTED_NAME)
 
 
 def __getattr__(name: str) -> Any:
-    if name in _NAMESPACES:
+    if name in _DOCUMENTED_NAMESPACES:
         return importlib.import_module(f"{__name__}.{name}")
     if name in RENAMED[__name__]:
         warn_renamed(name, new := RENAMED[__name__][name], __name__)
         name = new
-    if name not in _MODULE_OF:
+    if name not in _MODULE_BY_EXPORTED_NAME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+    return getattr(importlib.import_module(f"{__name__}.{_MODULE_BY_EXPORTED_NAME[name]}"), name)
 
 
 def __dir__() -> list[str]:
     return __all__
 
 
-_former_modules.install()
+_former_modules.install_former_module_finder()

@@ -170,6 +170,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "stress_left": "relaxation",
         "seepage": "auxiliary_rates",
         "seeped": "auxiliary_steady_states",
+        "numbers": "parameter_values",
     },
     "rsfstudy.slider.laws": {
         "LawOfStates": "LawBase",
@@ -193,6 +194,8 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "radiated": "radiated_stress",
         "damping": "radiated_stress_slope",
         "norm": "slip_rate_norm",
+        "slip_rate": "build_slip_rate_functions",
+        "rupture_rate": "build_rupture_rate_function",
     },
     "rsfstudy.slider.loading:Loading": {
         "begins": "initial_unknowns",
@@ -225,8 +228,10 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "begins_elsewhere": "starts_unsteady",
         "numbers_of_friction": "friction_numbers",
         "shown": "quantities_with_values",
+        "functions": "equation_functions",
+        "numbers": "parameter_values",
     },
-    "rsfstudy.slider.point:Point": {
+    "rsfstudy.slider.point:MotionPoint": {
         "growth": "log_slip_rate_derivative",
         "friction": "frictional_stress",
         "imbalance": "steady_state_offset",
@@ -244,14 +249,14 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "imposed": "load_point_stress",
         "imposed_change": "load_point_stress_change",
         "states": "state_count",
-        "counted": "distance_indices",
+        "counted": "indices_of_states_in_distance",
     },
     "rsfstudy.slider.equations:Equations": {
         "rate": "rate_function",
         "point": "point_function",
         "p": "parameters",
         "states": "state_count",
-        "balance": "balance_function",
+        "balance": "force_balance_function",
         "rates": "evaluate_rates",
         "at": "evaluate_point",
     },
@@ -269,7 +274,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
     "rsfstudy.motion.meter:WorkMeter": {
         "spent": "evaluations",
         "check": "check_budget",
-        "settle": "charge_difference",
+        "settle": "charge_new_work",
         "by_regime": "evaluations_by_regime",
     },
     "rsfstudy.motion.events": {
@@ -309,7 +314,8 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
     },
     "rsfstudy.motion.events:Event": {
         "watch": "specification",
-        "work": "evaluations",
+        "work": "evaluation_count",
+        "evaluations": "evaluation_count",
     },
     "rsfstudy.motion.driver:PythonMotionState": {
         "lasts": "end_time",
@@ -339,20 +345,25 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
     },
     "rsfstudy.motion.workspace:Workspace": {
         "new": "y_end",
-        "step": "step_block",
-        "dense": "dense_rows",
+        "step": "order_eight_step_block",
+        "dense": "dense_output_rows",
         "within": "y_within",
         "slopes": "dense_slopes",
         "before": "point_at_begin",
         "after": "point_at_end",
         "between": "point_within",
         "when": "event_clocks",
-        "specified": "spec_count",
+        "specified": "event_spec_count",
         "p": "parameters",
         "p_before": "parameters_before",
+        "unknowns": "unknown_count",
     },
     "rsfstudy.motion.steppers:Stepper": {
         "reach": "step_to_segment_end",
+        "begin": "begin_regime",
+        "attempt": "attempt_step",
+        "unknowns_at": "interpolate_unknowns",
+        "retake": "retake_step",
     },
     "rsfstudy.fitting.record:Record": {
         "stated": "specified_steps",
@@ -368,7 +379,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
     },
     "rsfstudy.measure_base._recorded_motion": {
         "Recorded": "RecordingMeasure",
-        "recorded": "phase_outputs",
+        "recorded": "outputs_along_phase",
     },
     "rsfstudy.measure_base.measure:Measure": {
         "find": "compute",
@@ -383,6 +394,34 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "optional": "optional_outputs",
         "estimated": "outputs_with_error",
     },
+    "rsfstudy.api.study_runs:plot()": {
+        "own": "user_figure",
+    },
+    "rsfstudy.plots._figures:draw_figure()": {
+        "own": "user_figure",
+    },
+    "rsfstudy.plots._figures:save_figure()": {
+        "own": "user_figure",
+    },
+    "rsfstudy.plots._figures:render_figure()": {
+        "drawn": "figure",
+        "form": "image_format",
+    },
+    "rsfstudy.plots._style:style_context()": {
+        "over": "user_styles",
+    },
+    "rsfstudy.plots._agreement:draw_agreement()": {
+        "enough": "required_digits",
+    },
+    "rsfstudy.plots._text:format_slope()": {
+        "most": "max_decimals",
+    },
+    "rsfstudy.storage.comparison:Comparison": {
+        "points": "differing_axis_points",
+        "cells": "finished_cell_counts",
+        "numbers": "agreement_table",
+        "left_out": "uncompared_variables",
+    },
 }
 
 
@@ -394,83 +433,86 @@ def user_stacklevel() -> int:
     return level
 
 
-def warn_renamed(former: str, new: str, where: str) -> None:
+def warn_renamed(former_name: str, new_name: str, owner_name: str) -> None:
     """Emit the deprecation warning for the former name of a member, keyword or module object."""
-    text = f"{former!r} of {where} is now called {new!r}. The old name will be removed in 1.0.0."
+    text = f"{former_name!r} of {owner_name} is now called {new_name!r}. The old name will be removed in 1.0.0."
     warnings.warn(text, DeprecationWarning, stacklevel=user_stacklevel())
 
 
-def renamed_names(module: str) -> Callable[[str], Any]:
+def renamed_names(module_name: str) -> Callable[[str], Any]:
     """Return a module ``__getattr__`` that looks up the former names of the module."""
 
     def __getattr__(name: str) -> Any:  # noqa: N807
-        if (new := RENAMED[module].get(name)) is None:
-            raise AttributeError(f"module {module!r} has no attribute {name!r}")
-        warn_renamed(name, new, module)
-        return getattr(importlib.import_module(module), new)
+        if (new := RENAMED[module_name].get(name)) is None:
+            raise AttributeError(f"module {module_name!r} has no attribute {name!r}")
+        warn_renamed(name, new, module_name)
+        return getattr(importlib.import_module(module_name), new)
 
     return __getattr__
 
 
-def renamed_members(kind: C, *, writable: bool = False) -> C:
+def renamed_members(owner_class: C, *, writable: bool = False) -> C:
     """Add the former names of members to a class."""
-    for former, new in RENAMED[_key(kind)].items():
-        setattr(kind, former, (_FormerField if writable else _FormerMember)(former, new))
-    return kind
+    for former, new in RENAMED[_key_of_class_or_function(owner_class)].items():
+        setattr(owner_class, former, (_FormerField if writable else _FormerMember)(former, new))
+    return owner_class
 
 
-def renamed_value(kind: type, name: str) -> str:
+def renamed_value(owner_class: type, member_name: str) -> str:
     """Return the new name of a class member, and any name that is not a former name unchanged."""
-    new = RENAMED[_key(kind)].get(name, name)
-    if new != name:
-        warn_renamed(name, new, kind.__name__)
+    new = RENAMED[_key_of_class_or_function(owner_class)].get(member_name, member_name)
+    if new != member_name:
+        warn_renamed(member_name, new, owner_class.__name__)
     return new
 
 
-def adopt_former_members(kind: type) -> None:
+def adopt_former_members(subclass: type) -> None:
     """Make members that a subclass defines under a former name available under the new name.
 
     If the subclass also defines the new name, the former name is ignored. A dataclass field becomes
     a property if its new name is a property of the base class. Other dataclass fields keep their
     name and their meaning.
     """
-    for base in kind.__mro__[1:]:
-        for former, new in RENAMED.get(_key(base), {}).items():
-            own, annotation = vars(kind), vars(kind).get("__annotations__", {}).get(former, "")
+    for base in subclass.__mro__[1:]:
+        for former, new in RENAMED.get(_key_of_class_or_function(base), {}).items():
+            own, annotation = (
+                vars(subclass),
+                vars(subclass).get("__annotations__", {}).get(former, ""),
+            )
             is_field = annotation != "" and "ClassVar" not in str(annotation)
             if new in own or not (former in own or is_field):
                 continue
             if is_field and not isinstance(getattr(base, new, None), property):
                 continue
-            warn_renamed(former, new, kind.__name__)
-            setattr(kind, new, _field_property(former) if is_field else own[former])
+            warn_renamed(former, new, subclass.__name__)
+            setattr(subclass, new, _field_property(former) if is_field else own[former])
 
 
-def renamed_keywords(target: F) -> F:
+def renamed_keywords(function_or_class: F) -> F:
     """Accept the former names of keyword arguments of a function or of a constructor."""
-    table = RENAMED[f"{_key(target)}()"]
-    owner: Any = target
-    wrapped = owner.__init__ if isinstance(target, type) else target
+    table = RENAMED[f"{_key_of_class_or_function(function_or_class)}()"]
+    owner: Any = function_or_class
+    wrapped = owner.__init__ if isinstance(function_or_class, type) else function_or_class
 
     @functools.wraps(wrapped)
     def wrapper(*args: Any, **keywords: Any) -> Any:
         # dataclasses.replace also passes the present values, under the new names
         for former in table.keys() & keywords.keys():
-            warn_renamed(former, table[former], f"{target.__name__}()")
+            warn_renamed(former, table[former], f"{function_or_class.__name__}()")
             keywords[table[former]] = keywords.pop(former)
         return wrapped(*args, **keywords)
 
-    if not isinstance(target, type):
+    if not isinstance(function_or_class, type):
         return wrapper  # type: ignore[return-value]
     owner.__init__ = wrapper
-    return target
+    return function_or_class
 
 
 class _FormerMember:
     """Descriptor that looks up a member by its new name."""
 
-    def __init__(self, former: str, new: str) -> None:
-        self.former, self.new = former, new
+    def __init__(self, former_name: str, new_name: str) -> None:
+        self.former, self.new = former_name, new_name
 
     def __get__(self, instance: Any, owner: type) -> Any:
         annotated = any(self.former in vars(c).get("__annotations__", {}) for c in owner.__mro__)
@@ -491,11 +533,11 @@ class _FormerField(_FormerMember):
         setattr(instance, self.new, value)
 
 
-def _field_property(name: str) -> property:
+def _field_property(field_name: str) -> property:
     """Return a property with the value of a field."""
-    return property(lambda self: getattr(self, name))
+    return property(lambda self: getattr(self, field_name))
 
 
-def _key(target: Any) -> str:
+def _key_of_class_or_function(class_or_function: Any) -> str:
     """Return the key of a class or function in ``RENAMED``."""
-    return f"{target.__module__}:{target.__qualname__}"
+    return f"{class_or_function.__module__}:{class_or_function.__qualname__}"

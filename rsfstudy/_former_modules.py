@@ -83,7 +83,7 @@ class _FormerModule(ModuleType):
         return dir(importlib.import_module(f"rsfstudy.{present}")) if present else []
 
 
-def install() -> None:
+def install_former_module_finder() -> None:
     """Add the import hook, before the finders of files."""
     if not any(isinstance(finder, FormerModules) for finder in sys.meta_path):
         sys.meta_path.insert(0, FormerModules())

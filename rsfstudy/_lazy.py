@@ -11,7 +11,7 @@ from rsfstudy._deprecation import RENAMED, warn_renamed
 
 
 def lazy_exports(
-    package: str, modules: Mapping[str, Iterable[str]]
+    package_name: str, names_by_module: Mapping[str, Iterable[str]]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Create the ``__getattr__`` and ``__dir__`` functions of a package.
 
@@ -29,20 +29,20 @@ def lazy_exports(
         Functions to assign in the ``__init__`` module of the package.
     """
     sources: dict[str, tuple[str, str]] = {}
-    for module, names in modules.items():
+    for module, names in names_by_module.items():
         for name, _, other in (entry.partition(" as ") for entry in names):
             sources[other or name] = f"rsfstudy.{module}", name
-    renamed = RENAMED.get(package, {})
+    renamed = RENAMED.get(package_name, {})
 
     def get(name: str) -> Any:
         if name in renamed:
-            warn_renamed(name, renamed[name], package)
-            return getattr(sys.modules[package], renamed[name])
+            warn_renamed(name, renamed[name], package_name)
+            return getattr(sys.modules[package_name], renamed[name])
         if name not in sources:
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+            raise AttributeError(f"module {package_name!r} has no attribute {name!r}")
         module, original = sources[name]
         value = getattr(importlib.import_module(module), original)
-        setattr(sys.modules[package], name, value)
+        setattr(sys.modules[package_name], name, value)
         return value
 
     return get, lambda: sorted(sources)

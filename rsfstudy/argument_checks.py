@@ -19,17 +19,19 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, ForwardRef, Literal, TypeVar, Union
 
-from rsfstudy.errors import InvalidValue, shorten
+from rsfstudy.errors import InvalidValue, shorten_text
 
 #: Largest number of items of a list that is passed as an argument. A `range` and an array that
 #: repeats one value can be longer than anything that fits in memory.
 MAX_ITEMS = 2**20
 #: Number of items of an argument, and of levels of nesting, that the checks look at.
-_MAX_CHECKED_ITEMS, _MAX_NESTING = 1000, 4
+_MAX_CHECKED_ITEMS, _MAX_CHECKED_NESTING_LEVELS = 1000, 4
 #: Modules that annotations name by an alias.
 _MODULE_ALIASES = {"xr": "xarray", "pd": "pandas", "np": "numpy"}
 #: Messages of xarray about a dimension that an array does not have.
-_LACKING = re.compile(r"'(.+?)' (?:not found in array dimensions|is not a valid dimension)")
+_MISSING_DIMENSION_MESSAGE_PATTERN = re.compile(
+    r"'(.+?)' (?:not found in array dimensions|is not a valid dimension)"
+)
 #: Names of plain types in messages.
 _TYPE_DESCRIPTIONS: Mapping[Any, str] = {
     str: "a text",
@@ -54,8 +56,8 @@ def check_argument_lengths(arguments: Mapping[str, Any]) -> None:
         If an argument is too long. The error names the argument.
     """
     for name, value in arguments.items():
-        for part in _nested_values(value, _MAX_NESTING):
-            if _is_too_long(part):
+        for part in _iterate_nested_values(value, _MAX_CHECKED_NESTING_LEVELS):
+            if _is_too_long_lazy_sequence(part):
                 rule = f"has more than {MAX_ITEMS:,} items"
                 raise InvalidValue(name, part, rule, remedy="Pass a shorter list.")
 
@@ -74,7 +76,10 @@ def string_instead_of_list_error(
         if not isinstance(value, str) or (isinstance(blamed, str) and blamed == value):
             continue
         if _allows_list_of_strings(annotation) and not matches_annotation(value, annotation):
-            rule, remedy = f"must be {describe_type(annotation)}", f"Write [{shorten(value)!r}]."
+            rule, remedy = (
+                f"must be {describe_type(annotation)}",
+                f"Write [{shorten_text(value)!r}].",
+            )
             return InvalidValue(name, value, rule, remedy=remedy)
     return None
 
@@ -115,15 +120,15 @@ def unusable_value_error(
     None if no argument explains the exception.
     """
     for name, value in arguments.items():
-        for part in _nested_values(value, _MAX_NESTING):
+        for part in _iterate_nested_values(value, _MAX_CHECKED_NESTING_LEVELS):
             if isinstance(part, float) and not math.isfinite(part):
                 return InvalidValue(name, value, "must be finite", remedy=remedy)
             if isinstance(part, int) and abs(part) >= 2**63:
                 return InvalidValue(name, value, "is too large a number", remedy=remedy)
             if isinstance(part, str) and not _is_encodable(part):
                 return InvalidValue(name, value, "must be a text that UTF-8 can hold")
-        if (dimension := _lacking_dimension(value, error)) is not None:
-            rule, dims = f"has no dimension {shorten(dimension)!r}", map(str, value.dims)
+        if (dimension := _find_missing_dimension(value, error)) is not None:
+            rule, dims = f"has no dimension {shorten_text(dimension)!r}", map(str, value.dims)
             return InvalidValue(name, value, rule, choices=dims, remedy=remedy)
         if isinstance(error, OSError) and _is_part_of_path(value, error.filename):
             rule = f"cannot be the name of a file: {error.strerror}"
@@ -134,14 +139,18 @@ def unusable_value_error(
         if isinstance(value, str) and value == _missing_name(error):
             return InvalidValue(name, value, "is unknown", remedy=remedy)
         if name != "self" and callable(value) and _was_raised_by(value, error):
-            rule = f"fails when it is called ({type(error).__name__}: {shorten(error)})"
+            rule = f"fails when it is called ({type(error).__name__}: {shorten_text(error)})"
             return InvalidValue(name, value, rule, remedy=remedy)
     return None
 
 
-def _lacking_dimension(value: Any, error: Exception) -> str | None:
+def _find_missing_dimension(value: Any, error: Exception) -> str | None:
     """Return the dimension that an exception of xarray reports as missing in an array."""
-    found = _LACKING.search(str(error)) if hasattr(type(value), "to_dataset") else None
+    found = (
+        _MISSING_DIMENSION_MESSAGE_PATTERN.search(str(error))
+        if hasattr(type(value), "to_dataset")
+        else None
+    )
     return found[1] if found and found[1] not in value.dims else None
 
 
@@ -174,14 +183,16 @@ def _was_raised_by(function: Callable[..., Any], error: Exception) -> bool:
     return isinstance(error, TypeError)
 
 
-def python_number(value: Any) -> Any:
+def convert_numpy_number(value: Any) -> Any:
     """Return a NumPy number or Boolean as a Python object, and any other value unchanged."""
     kind = type(value)
     is_scalar = kind.__module__ == "numpy" and hasattr(kind, "item") and kind.__name__ != "ndarray"
     return value.item() if is_scalar and value.dtype.kind in "biuf" else value
 
 
-def matches_annotation(value: object, annotation: Any, max_nesting: int = _MAX_NESTING) -> bool:
+def matches_annotation(
+    value: object, annotation: Any, max_nesting: int = _MAX_CHECKED_NESTING_LEVELS
+) -> bool:
     """Return True if a value has the annotated type or behaves like this type.
 
     Lists, tuples and arrays are interchangeable, and so are Python and NumPy numbers. A Boolean is
@@ -233,56 +244,60 @@ def describe_type(annotation: Any) -> str:
     return f"an {name}" if name[0] in "aeioux" else f"a {name}"
 
 
-def _is_number_of_type(value: object, kind: type) -> bool:
+def _is_number_of_type(value: object, number_type: type) -> bool:
     name = type(value).__name__
     is_flag = name in ("bool", "bool_")  # of Python or NumPy
-    if kind is bool or is_flag:
-        return kind is bool and is_flag
+    if number_type is bool or is_flag:
+        return number_type is bool and is_flag
     if not isinstance(value, Real) or name == "timedelta64":  # an integer according to NumPy
         return False
-    return kind is float or isinstance(value, Integral)
+    return number_type is float or isinstance(value, Integral)
 
 
 def _is_matching_container(
-    value: object, origin: Any, arguments: tuple[Any, ...], levels: int
+    value: object, container_type: Any, item_annotations: tuple[Any, ...], nesting_levels: int
 ) -> bool:
     """Return True if a value is a container of type ``origin`` with matching items."""
-    if not isinstance(origin, type) or issubclass(origin, type):
+    if not isinstance(container_type, type) or issubclass(container_type, type):
         return isinstance(value, type)
-    if origin in (Callable, typing.get_origin(Callable[..., Any])):
+    if container_type in (Callable, typing.get_origin(Callable[..., Any])):
         return callable(value)
-    if issubclass(origin, Mapping):
+    if issubclass(container_type, Mapping):
         # a dataset is a mapping, but not one that a caller means
         if not isinstance(value, Mapping) or hasattr(type(value), "data_vars"):
             return False
         pairs = itertools.islice(value.items(), _MAX_CHECKED_ITEMS)
-        return not arguments or all(
-            matches_annotation(key, arguments[0], levels)
-            and matches_annotation(item, arguments[1], levels)
+        return not item_annotations or all(
+            matches_annotation(key, item_annotations[0], nesting_levels)
+            and matches_annotation(item, item_annotations[1], nesting_levels)
             for key, item in pairs
         )
-    if not issubclass(origin, Iterable):
-        return isinstance(value, origin)
-    if not _is_sequence_like(value, origin):
+    if not issubclass(container_type, Iterable):
+        return isinstance(value, container_type)
+    if not _is_sequence_like(value, container_type):
         return False
     items = list(itertools.islice(typing.cast(Iterable[Any], value), _MAX_CHECKED_ITEMS))
-    if origin is tuple and arguments and Ellipsis not in arguments:
-        return len(items) == len(arguments) and all(
-            matches_annotation(item, each, levels)
-            for item, each in zip(items, arguments, strict=True)
+    if container_type is tuple and item_annotations and Ellipsis not in item_annotations:
+        return len(items) == len(item_annotations) and all(
+            matches_annotation(item, each, nesting_levels)
+            for item, each in zip(items, item_annotations, strict=True)
         )
-    return all(matches_annotation(item, arguments[0], levels) for item in items if arguments)
+    return all(
+        matches_annotation(item, item_annotations[0], nesting_levels)
+        for item in items
+        if item_annotations
+    )
 
 
-def _is_sequence_like(value: object, origin: type) -> bool:
+def _is_sequence_like(value: object, container_type: type) -> bool:
     if isinstance(value, str | bytes):
         return False
     dimensions = getattr(value, "ndim", None)
     if isinstance(dimensions, int):  # an array or a series; the module numpy has a function
         return dimensions > 0
-    if issubclass(origin, Sequence | tuple):
+    if issubclass(container_type, Sequence | tuple):
         return isinstance(value, Sequence)
-    return isinstance(value, Collection if issubclass(origin, Collection) else Iterable)
+    return isinstance(value, Collection if issubclass(container_type, Collection) else Iterable)
 
 
 def _allows_list_of_strings(annotation: Any) -> bool:
@@ -345,19 +360,19 @@ def _resolve_annotation(function: Callable[..., Any], annotation: Any) -> Any:
         return Any
 
 
-def _nested_values(value: object, levels: int) -> Iterator[Any]:
+def _iterate_nested_values(value: object, nesting_levels: int) -> Iterator[Any]:
     """Yield a value and, recursively, the first items of each list or mapping."""
     yield value
-    if not levels or isinstance(value, range):
+    if not nesting_levels or isinstance(value, range):
         return
     if isinstance(value, Mapping):
         value = list(itertools.islice(value.values(), _MAX_CHECKED_ITEMS))
     if isinstance(value, list | tuple | set | frozenset):
         for item in itertools.islice(value, _MAX_CHECKED_ITEMS):
-            yield from _nested_values(item, levels - 1)
+            yield from _iterate_nested_values(item, nesting_levels - 1)
 
 
-def _is_too_long(value: Any) -> bool:
+def _is_too_long_lazy_sequence(value: Any) -> bool:
     """Return True if a lazy or repeated-value sequence exceeds ``MAX_ITEMS`` items.
 
     Such sequences are a ``range`` and an array with a stride of zero. Their memory does not grow

@@ -19,30 +19,30 @@ from typing import Any, ParamSpec, Self, TypeVar
 from rsfstudy._deprecation import user_stacklevel as user_stacklevel
 from rsfstudy.argument_checks import (
     check_argument_lengths,
-    python_number,
+    convert_numpy_number,
     string_instead_of_list_error,
     type_mismatch_error,
     unusable_value_error,
 )
-from rsfstudy.errors import CallError, DataError, InvalidValue, RsfStudyError, shorten
+from rsfstudy.errors import CallError, DataError, InvalidValue, RsfStudyError, shorten_text
 
 P = ParamSpec("P")
 T = TypeVar("T")
 C = TypeVar("C", bound=type)
 
 #: Exceptions that leave the boundary as they are.
-_UNCONVERTED_EXCEPTIONS = (RsfStudyError, Warning, bdb.BdbQuit)
+_EXCEPTIONS_PASSED_UNCHANGED = (RsfStudyError, Warning, bdb.BdbQuit)
 #: Special methods that users call, in addition to methods without a leading underscore.
 _GUARDED_SPECIAL_METHODS = ("__init__", "__new__", "__call__", "__getitem__")
 #: Modules that call a function on behalf of their own caller.
-_TRANSPARENT_MODULES = ("dataclasses", "functools", "rsfstudy._deprecation")
+_MODULES_CALLING_FOR_THEIR_CALLER = ("dataclasses", "functools", "rsfstudy._deprecation")
 
 
 def error_boundary(
     function: Callable[P, T],
     *,
-    is_inner: bool = False,
-    passed: tuple[type[Exception], ...] = _UNCONVERTED_EXCEPTIONS,
+    is_called_internally: bool = False,
+    unchanged_exceptions: tuple[type[Exception], ...] = _EXCEPTIONS_PASSED_UNCHANGED,
 ) -> Callable[P, T]:
     """Wrap a function so that it raises only errors of rsfstudy.
 
@@ -64,27 +64,33 @@ def error_boundary(
         ``InvalidValue``, or to a ``DataError`` if a dataset caused the exception. The original
         exception is the cause of the new exception.
     """
-    return _wrap(function, is_inner=is_inner, passed=passed)
+    return _wrap_in_error_boundary(
+        function,
+        is_called_internally=is_called_internally,
+        unchanged_exceptions=unchanged_exceptions,
+    )
 
 
-def guard_methods(kind: C) -> C:
+def guard_methods(guarded_class: C) -> C:
     """Apply the error boundary to the constructor and public methods of a class.
 
     The constructor also rejects arguments that do not match their annotations. Most dataclasses
     store any argument, so a wrong argument would cause an error much later. Static methods are not
     wrapped, because the engines compile the static methods of parts.
     """
-    for name, member in list(vars(kind).items()):
+    for name, member in list(vars(guarded_class).items()):
         if name.startswith("_") and name not in _GUARDED_SPECIAL_METHODS:
             continue
         is_constructor = name in ("__init__", "__new__")
         is_static = isinstance(member, staticmethod)
         if isinstance(member, classmethod) or (is_static and is_constructor):
-            guarded = _wrap(member.__func__, is_strict=is_constructor)
-            setattr(kind, name, type(member)(guarded))
+            guarded = _wrap_in_error_boundary(member.__func__, is_constructor=is_constructor)
+            setattr(guarded_class, name, type(member)(guarded))
         elif inspect.isfunction(member):
-            setattr(kind, name, _wrap(member, is_strict=is_constructor))
-    return kind
+            setattr(
+                guarded_class, name, _wrap_in_error_boundary(member, is_constructor=is_constructor)
+            )
+    return guarded_class
 
 
 class CheckedKeywords:
@@ -120,12 +126,12 @@ def _constructor_parameters(cls: type) -> tuple[str, ...]:
     return () if takes_any else tuple(parameters)[1:]
 
 
-def _wrap(
+def _wrap_in_error_boundary(
     function: Callable[P, T],
     *,
-    is_inner: bool = False,
-    is_strict: bool = False,
-    passed: tuple[type[Exception], ...] = _UNCONVERTED_EXCEPTIONS,
+    is_called_internally: bool = False,
+    is_constructor: bool = False,
+    unchanged_exceptions: tuple[type[Exception], ...] = _EXCEPTIONS_PASSED_UNCHANGED,
 ) -> Callable[P, T]:
     """Wrap a function in the error boundary.
 
@@ -145,15 +151,15 @@ def _wrap(
             unknown = [keyword for keyword in options if keyword not in names]
             if unknown:
                 raise _unknown_keyword_error(name, unknown[0], names) from None
-            text = f"{name}() {shorten(error)}. It takes {', '.join(names) or 'nothing'}."
+            text = f"{name}() {shorten_text(error)}. It takes {', '.join(names) or 'nothing'}."
             raise CallError(text) from None
 
     @functools.wraps(function)
     def wrapper(*args: P.args, **options: P.kwargs) -> T:
-        if is_strict:
-            args = tuple(map(python_number, args))  # type: ignore[assignment]
-            options = {key: python_number(value) for key, value in options.items()}  # type: ignore[assignment]
-        if not is_inner and _is_internal_call():
+        if is_constructor:
+            args = tuple(map(convert_numpy_number, args))  # type: ignore[assignment]
+            options = {key: convert_numpy_number(value) for key, value in options.items()}  # type: ignore[assignment]
+        if not is_called_internally and _is_called_from_rsfstudy():
             try:
                 return function(*args, **options)
             except TypeError:
@@ -167,13 +173,13 @@ def _wrap(
             if wrong := string_instead_of_list_error(function, arguments, error):
                 raise wrong from error
             raise
-        except passed:
+        except unchanged_exceptions:
             raise
         except Exception as error:
             wrong = type_mismatch_error(function, arguments, remedy)
             wrong = wrong or unusable_value_error(arguments, error, remedy)
             raise wrong or _failed_call_error(name, arguments, error) from error
-        if is_strict:
+        if is_constructor:
             # the constructor may have converted arguments to other types
             made = getattr(arguments.get("self"), "__dict__", {})
             stored = {name: made.get(name, value) for name, value in arguments.items()}
@@ -184,25 +190,31 @@ def _wrap(
     return wrapper
 
 
-def _unknown_keyword_error(name: str, keyword: str, valid: Iterable[str]) -> CallError:
+def _unknown_keyword_error(
+    callable_name: str, keyword: str, valid_keywords: Iterable[str]
+) -> CallError:
     """Return the error for an unknown keyword of a function or class."""
-    names = list(valid)
-    close = difflib.get_close_matches(shorten(keyword), names, n=1)
+    names = list(valid_keywords)
+    close = difflib.get_close_matches(shorten_text(keyword), names, n=1)
     hint = "".join(f" Did you mean {each!r}?" for each in close)
     takes = ", ".join(names) or "nothing"
-    return CallError(f"{name}() has no parameter {shorten(keyword)!r}.{hint} It takes {takes}.")
+    return CallError(
+        f"{callable_name}() has no parameter {shorten_text(keyword)!r}.{hint} It takes {takes}."
+    )
 
 
-def _is_internal_call() -> bool:
+def _is_called_from_rsfstudy() -> bool:
     """Return True if the caller is a module of rsfstudy other than the command line."""
     frame = sys._getframe(2)
-    while frame.f_back and frame.f_globals.get("__name__") in _TRANSPARENT_MODULES:
+    while frame.f_back and frame.f_globals.get("__name__") in _MODULES_CALLING_FOR_THEIR_CALLER:
         frame = frame.f_back
     module = str(frame.f_globals.get("__name__"))
     return module.startswith("rsfstudy.") and not module.startswith("rsfstudy.cli.")
 
 
-def _failed_call_error(name: str, arguments: dict[str, Any], error: Exception) -> RsfStudyError:
+def _failed_call_error(
+    callable_name: str, arguments: dict[str, Any], error: Exception
+) -> RsfStudyError:
     """Return the error for a failed call whose arguments have the correct types."""
     reason = format_exception(error)
     if any(map(_is_dataset_or_accessor, arguments.values())):
@@ -211,14 +223,16 @@ def _failed_call_error(name: str, arguments: dict[str, Any], error: Exception) -
             # xarray lists all variables after the first sentence
             missing = str(error.args[0]).partition(". ")[0].removeprefix("No variable named ")
             if str(error.args[0]).startswith("No variable") or missing.isidentifier():
-                rule = f"has no {shorten(missing)}, which datasets of rsfstudy have"
+                rule = f"has no {shorten_text(missing)}, which datasets of rsfstudy have"
         remedy = "Pass the dataset as it was opened, or run the study again."
-        return DataError(f"{name}: the dataset {rule}. {remedy}")
+        return DataError(f"{callable_name}: the dataset {rule}. {remedy}")
     if isinstance(error, MemoryError):
-        return InvalidValue(name, "...", f"needs more memory than there is ({shorten(error)})")
+        return InvalidValue(
+            callable_name, "...", f"needs more memory than there is ({shorten_text(error)})"
+        )
     given = {key: value for key, value in arguments.items() if value is not None}
-    remedy = f"See the documentation of {name}."
-    return InvalidValue(name, given, f"cannot be answered ({reason})", remedy=remedy)
+    remedy = f"See the documentation of {callable_name}."
+    return InvalidValue(callable_name, given, f"cannot be answered ({reason})", remedy=remedy)
 
 
 def _is_dataset_or_accessor(value: object) -> bool:
@@ -232,12 +246,12 @@ def format_exception(error: BaseException) -> str:
     If the message cannot be formatted, only the type is returned.
     """
     try:
-        return f"{type(error).__name__}: {shorten(error)}"
+        return f"{type(error).__name__}: {shorten_text(error)}"
     except Exception:  # its text may raise as well
         return type(error).__name__
 
 
-def check_regular_file(name: str, path: str | Path) -> None:
+def check_regular_file(argument_name: str, path: str | Path) -> None:
     """Raise ``InvalidValue`` if a path exists but is not a regular file.
 
     Reading from a pipe or a device might never return.
@@ -246,7 +260,11 @@ def check_regular_file(name: str, path: str | Path) -> None:
         is_other = Path(path).exists() and not Path(path).is_file()
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise InvalidValue(name, str(path), f"cannot be the path of a file: {reason}") from error
+        raise InvalidValue(
+            argument_name, str(path), f"cannot be the path of a file: {reason}"
+        ) from error
     if is_other:
         remedy = "Name a file."
-        raise InvalidValue(name, str(path), "is a directory, a pipe or a device", remedy=remedy)
+        raise InvalidValue(
+            argument_name, str(path), "is a directory, a pipe or a device", remedy=remedy
+        )

@@ -15,14 +15,14 @@ __getattr__ = renamed_names(__name__)
 
 #: Most characters of a text, and most choices, that a message has room for; and the most that are
 #: listed beside those that look like what was given.
-_MAX_CHARACTERS, _MAX_CHOICES, _MAX_CHOICES_WITH_SUGGESTIONS = 200, 60, 20
+_MAX_CHARACTERS_OF_VALUE, _MAX_CHOICES, _MAX_CHOICES_WITH_SUGGESTIONS = 200, 60, 20
 #: Most characters of a message.
 _MAX_MESSAGE_LENGTH = 5000
 #: Number and length of the choices that are compared with a value, which bounds the time.
-_MAX_COMPARED_CHOICES, _MAX_COMPARED_LENGTH = 1000, 100
+_MAX_COMPARED_CHOICES, _MAX_CHOICE_LENGTH_FOR_SUGGESTION = 1000, 100
 
 
-class _ValueRepr(reprlib.Repr):
+class _ShortValueRepr(reprlib.Repr):
     """Texts of values, of bounded length; numbers of NumPy are shown as numbers."""
 
     def repr1(self, x: object, level: int) -> str:
@@ -30,9 +30,11 @@ class _ValueRepr(reprlib.Repr):
         return super().repr1(x.item() if number and hasattr(x, "item") else x, level)
 
 
-_value_repr = _ValueRepr()
-_value_repr.maxstring = _value_repr.maxother = _value_repr.maxlong = 100
-_value_repr.maxlist = _value_repr.maxtuple = _value_repr.maxdict = _value_repr.maxset = 20
+_short_value_repr = _ShortValueRepr()
+_short_value_repr.maxstring = _short_value_repr.maxother = _short_value_repr.maxlong = 100
+_short_value_repr.maxlist = _short_value_repr.maxtuple = _short_value_repr.maxdict = (
+    _short_value_repr.maxset
+) = 20
 
 
 class RsfStudyError(Exception):
@@ -41,7 +43,9 @@ class RsfStudyError(Exception):
     """
 
     def __str__(self) -> str:
-        return escape_control(shorten(super().__str__().replace("\n", " "), _MAX_MESSAGE_LENGTH))
+        return escape_control_characters(
+            shorten_text(super().__str__().replace("\n", " "), _MAX_MESSAGE_LENGTH)
+        )
 
 
 @renamed_members
@@ -73,9 +77,13 @@ class InvalidValue(RsfStudyError, ValueError):
         remedy: str = "",
     ) -> None:
         choices = list(choices)
-        shown = _value_repr.repr(value)
-        text = f"{shorten(name)} = {shown}: {rule}."
-        compared = [c for c in choices[:_MAX_COMPARED_CHOICES] if len(c) <= _MAX_COMPARED_LENGTH]
+        shown = _short_value_repr.repr(value)
+        text = f"{shorten_text(name)} = {shown}: {rule}."
+        compared = [
+            c
+            for c in choices[:_MAX_COMPARED_CHOICES]
+            if len(c) <= _MAX_CHOICE_LENGTH_FOR_SUGGESTION
+        ]
         close = difflib.get_close_matches(shown.strip("'\""), compared, n=3, cutoff=0.5)
         if close:
             text += f" Did you mean {' or '.join(map(repr, close))}?"
@@ -83,7 +91,7 @@ class InvalidValue(RsfStudyError, ValueError):
             close and (len(choices) > _MAX_CHOICES_WITH_SUGGESTIONS or len(choices) == len(close))
         ):
             more = len(choices) - _MAX_CHOICES
-            text += f" Choices: {', '.join(map(shorten, choices[:_MAX_CHOICES]))}"
+            text += f" Choices: {', '.join(map(shorten_text, choices[:_MAX_CHOICES]))}"
             text += f" and {more:,} more." if more > 0 else "."
         if remedy:
             text += f" {remedy}"
@@ -94,7 +102,7 @@ class InvalidValue(RsfStudyError, ValueError):
     def with_location(self, place: str) -> InvalidValue:
         """This error, with the place where it arose."""
         placed = InvalidValue.__new__(InvalidValue)
-        Exception.__init__(placed, f"{shorten(place)}: {self}")
+        Exception.__init__(placed, f"{shorten_text(place)}: {self}")
         placed.name, placed.value = self.name, self.value
         return placed
 
@@ -136,7 +144,7 @@ class RsfStudyWarning(UserWarning):
     """
 
     def __str__(self) -> str:
-        return escape_control(shorten(super().__str__(), _MAX_MESSAGE_LENGTH))
+        return escape_control_characters(shorten_text(super().__str__(), _MAX_MESSAGE_LENGTH))
 
 
 class NoResultWarning(RsfStudyWarning):
@@ -149,13 +157,13 @@ class IncompleteWarning(RsfStudyWarning):
     """A motion that ended early, or cells of a run that failed."""
 
 
-def shorten(text: object, max_length: int = _MAX_CHARACTERS) -> str:
+def shorten_text(text: object, max_length: int = _MAX_CHARACTERS_OF_VALUE) -> str:
     """A text without its middle where it is too long for a message."""
     whole, half = str(text), max_length // 2
     return whole if len(whole) <= max_length else f"{whole[:half]}...{whole[-half:]}"
 
 
-def escape_control(text: str) -> str:
+def escape_control_characters(text: str) -> str:
     """Text with its control characters spelt out."""
     characters = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
     return "".join(c if isinstance(c, str) else c.decode() for c in characters)

@@ -11,7 +11,7 @@ import numpy as np
 #: Most values of a list that are shown.
 _MAX_LISTED_VALUES = 8
 #: Numbers of more digits than a reader wants.
-_LONG_DECIMAL = re.compile(r"(?<![\w.])\d+\.\d{6,}(?:e[+-]?\d+)?")
+_LONG_DECIMAL_NUMBER_PATTERN = re.compile(r"(?<![\w.])\d+\.\d{6,}(?:e[+-]?\d+)?")
 
 
 def read_flag_meanings(attributes: Mapping[str, Any]) -> dict[float, str]:
@@ -23,7 +23,7 @@ def read_flag_meanings(attributes: Mapping[str, Any]) -> dict[float, str]:
     return dict(zip(np.ravel(attributes.get("flag_values", [])).tolist(), words, strict=False))
 
 
-def is_list_like(value: Any) -> bool:
+def is_sequence_of_axis_values(value: Any) -> bool:
     """True of several values, which an axis lays out."""
     if isinstance(value, np.ndarray):
         return value.ndim == 1
@@ -36,7 +36,7 @@ def format_overrides(overrides: Mapping[str, Any]) -> str:
         name: value if isinstance(value, list) else [value] for name, value in overrides.items()
     }
     told = ", ".join(f"{name}={format_list(values)}" for name, values in texts.items())
-    return _LONG_DECIMAL.sub(lambda found: format_value(float(found[0])), told)
+    return _LONG_DECIMAL_NUMBER_PATTERN.sub(lambda found: format_value(float(found[0])), told)
 
 
 def format_list(values: Sequence[Any], separator: str = ",") -> str:
@@ -57,7 +57,7 @@ def format_value(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
 
 
-def format_fields(fields: Mapping[str, Any]) -> str:
+def format_nonempty_fields(fields: Mapping[str, Any]) -> str:
     """Fields that have a value, with it."""
     return ", ".join(
         f"{n} = {format_value(value)}" for n, value in fields.items() if value is not None

@@ -8,7 +8,7 @@ from typing import Any
 import xarray as xr
 
 
-def fill_value_encoding(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
+def encoding_without_fill_values(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
     """Return an encoding without fill values for coordinates, flags and counts.
 
     xarray writes ``_FillValue = NaN`` for every floating-point variable. The CF conventions do not
@@ -22,13 +22,13 @@ def fill_value_encoding(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
     }
 
 
-def with_cf_encoding(dataset: xr.Dataset) -> xr.Dataset:
+def copy_with_cf_encoding(dataset: xr.Dataset) -> xr.Dataset:
     """Return a copy of a dataset whose encoding omits unwanted fill values.
 
     ``to_netcdf`` then writes no fill values for coordinates, flags and counts. The encoding belongs
     to the variables, so selections and renamed copies of the dataset keep the encoding.
     """
     encoded = dataset.copy()
-    for name, encoding in fill_value_encoding(encoded).items():
+    for name, encoding in encoding_without_fill_values(encoded).items():
         encoded[name].encoding.update(encoding)
     return encoded

@@ -15,12 +15,12 @@ from typing import Any
 
 from rsfstudy._deprecation import renamed_members, renamed_names
 from rsfstudy.error_boundary import guard_methods
-from rsfstudy.errors import InvalidValue, escape_control
+from rsfstudy.errors import InvalidValue, escape_control_characters
 
 __getattr__ = renamed_names(__name__)
 
 #: A heading of a table.
-_HEADING_WITH_UNITS = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
+_HEADING_WITH_UNITS_PATTERN = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
 
 
 @guard_methods
@@ -109,20 +109,20 @@ def is_variable_name(name: object) -> bool:
     return isinstance(name, str) and name.isidentifier() and unicodedata.is_normalized("NFC", name)
 
 
-def format_unit_quotient(units: Sequence[str]) -> str:
+def format_unit_quotient(units_or_scales: Sequence[str]) -> str:
     """Units, or scales, of a first quantity over others, as in ``s (um s-1)-1``;
     `split_unit_quotient` gives the single ones again.
     """
-    first, *others = units
+    first, *others = units_or_scales
     return first + "".join(f" ({each})-1" for each in others if each != "1")
 
 
-def split_unit_quotient(units: str) -> list[str]:
+def split_unit_quotient(unit_quotient: str) -> list[str]:
     """Units, or scales, of which something is in the first over the others."""
-    return [each.removesuffix(")-1") for each in units.split(" (")]
+    return [each.removesuffix(")-1") for each in unit_quotient.split(" (")]
 
 
-def units_or_scale(attributes: Mapping[Any, Any]) -> str:
+def units_or_scale_of_variable(attributes: Mapping[Any, Any]) -> str:
     """What the numbers of a variable are in: units, or what those without units are measured in."""
     units, scale = str(attributes.get("units", "")), str(attributes.get("scale", ""))
     return format_unit_quotient([scale, *split_unit_quotient(units)[1:]]) if scale else units
@@ -130,7 +130,7 @@ def units_or_scale(attributes: Mapping[Any, Any]) -> str:
 
 def parse_heading(text: str) -> tuple[str, str] | None:
     """Name and units that a heading such as ``velocity (um/s)`` states; None of another text."""
-    match = _HEADING_WITH_UNITS.fullmatch(text.strip())
+    match = _HEADING_WITH_UNITS_PATTERN.fullmatch(text.strip())
     return (match[1], match[2].strip()) if match else None
 
 
@@ -138,14 +138,14 @@ def parse_heading(text: str) -> tuple[str, str] | None:
 
 #: Of a table of quantities.
 _QUANTITY_TABLE_HEADINGS = ("field", "symbol", "value", "unit", "meaning")
-_FUNCTION_NAMES = ("ln", "log", "exp")
-_SCRIPT_TAGS = {"_": "sub", "^": "sup"}
+_FUNCTION_NAMES_IN_FORMULAS = ("ln", "log", "exp")
+_HTML_TAGS_OF_SUB_AND_SUPERSCRIPTS = {"_": "sub", "^": "sup"}
 _CELL_STYLE = 'style="text-align: left; vertical-align: top"'
 
 
 def escape_html(text: object) -> str:
     """Escape a string for HTML, and make control characters visible."""
-    return escape(escape_control(str(text)))
+    return escape(escape_control_characters(str(text)))
 
 
 class HtmlMarkup(str):
@@ -167,10 +167,11 @@ def html_table(
     caption : str
         What stands above it.
     """
-    above = f"<p><b>{_format_cell(caption)}</b></p>" if caption else ""
-    head = "".join(f"<th {_CELL_STYLE}>{_format_cell(text)}</th>" for text in headings)
+    above = f"<p><b>{_format_html_table_cell(caption)}</b></p>" if caption else ""
+    head = "".join(f"<th {_CELL_STYLE}>{_format_html_table_cell(text)}</th>" for text in headings)
     lines = (
-        "".join(f"<td {_CELL_STYLE}>{_format_cell(value)}</td>" for value in row) for row in rows
+        "".join(f"<td {_CELL_STYLE}>{_format_html_table_cell(value)}</td>" for value in row)
+        for row in rows
     )
     body = "".join(f"<tr>{line}</tr>" for line in lines)
     return HtmlMarkup(f"{above}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
@@ -210,31 +211,35 @@ def html_symbol(formula: str) -> HtmlMarkup:
     if "$" not in formula:
         return HtmlMarkup(escape_html(formula))
     text = escape_html(formula.strip("$"))
-    text = re.sub(r"\\([A-Za-z]+)", lambda found: _html_character(found[1]), text)
-    text = re.sub(r"([_^])(?:\{([^{}]*)\}|(&\w+;|.))", _script_html, text)
+    text = re.sub(r"\\([A-Za-z]+)", lambda found: _html_character_entity(found[1]), text)
+    text = re.sub(r"([_^])(?:\{([^{}]*)\}|(&\w+;|.))", _format_html_script, text)
     bare = re.sub(r"[{}]|\\.", "", text)
     return HtmlMarkup(f"<i>{bare}</i>")
 
 
-def html_unit(about: Quantity) -> HtmlMarkup:
+def html_unit(quantity: Quantity) -> HtmlMarkup:
     """Unit of a quantity, or its scale where it is dimensionless; empty for 1."""
-    if about.scale:
-        scale = about.scale.replace("sigma", r"\sigma")
+    if quantity.scale:
+        scale = quantity.scale.replace("sigma", r"\sigma")
         return html_symbol(f"${scale}$")
-    return HtmlMarkup(escape_html(about.units if about.units != "1" else ""))
+    return HtmlMarkup(escape_html(quantity.units if quantity.units != "1" else ""))
 
 
-def _html_character(name: str) -> str:
+def _html_character_entity(character_name: str) -> str:
     """Letters and signs have the same names in HTML."""
-    return name if name in _FUNCTION_NAMES else html5.get(f"{name};", "")
+    return (
+        character_name
+        if character_name in _FUNCTION_NAMES_IN_FORMULAS
+        else html5.get(f"{character_name};", "")
+    )
 
 
-def _script_html(found: re.Match[str]) -> str:
-    tag = _SCRIPT_TAGS[found[1]]
-    return f"<{tag}>{found[2] if found[2] is not None else found[3]}</{tag}>"
+def _format_html_script(match: re.Match[str]) -> str:
+    tag = _HTML_TAGS_OF_SUB_AND_SUPERSCRIPTS[match[1]]
+    return f"<{tag}>{match[2] if match[2] is not None else match[3]}</{tag}>"
 
 
-def _format_cell(value: Any) -> str:
+def _format_html_table_cell(value: Any) -> str:
     if isinstance(value, HtmlMarkup):
         return value
     if isinstance(value, bool):

@@ -26,7 +26,9 @@ def _read_vocabulary() -> Iterator[Quantity]:
         yield from (Quantity(**row) for row in rows)
 
 
-QUANTITIES: dict[str, Quantity] = {about.name: about for about in (*SCENE, *_read_vocabulary())}
+QUANTITY_BY_NAME: dict[str, Quantity] = {
+    about.name: about for about in (*SCENE, *_read_vocabulary())
+}
 
 _SUFFIX_DESCRIPTIONS = {
     "error": "numerical error estimate of",
@@ -39,7 +41,7 @@ _SUFFIX_DESCRIPTIONS = {
     "closed_form": "published closed form beside",
 }
 
-_COUNT_SUFFIXES = ("points", "crossings")
+_SUFFIXES_OF_COUNT_VARIABLES = ("points", "crossings")
 
 #: Times that were measured: no two runs share them.
 TIMING_VARIABLES = (
@@ -54,7 +56,7 @@ TIMING_VARIABLES = (
 )
 
 #: Coordinates that follow from an axis: name -> (axis, formula).
-DERIVED_COORDINATES: dict[str, tuple[str, Callable[[float], float]]] = {
+FORMULAS_OF_DERIVED_COORDINATES: dict[str, tuple[str, Callable[[float], float]]] = {
     "log_load_velocity_ratio": (
         "load_velocity_ratio",
         lambda ratio: -math.inf if ratio == 0.0 else math.log(ratio),
@@ -66,17 +68,19 @@ DERIVED_COORDINATES: dict[str, tuple[str, Callable[[float], float]]] = {
 }
 
 
-def coverage_content_type(name: str) -> str:
+def coverage_content_type(variable_name: str) -> str:
     """Kind of content of a variable, in the words of ISO 19115-1."""
-    if name in ("rhs_evaluations", *TIMING_VARIABLES):
+    if variable_name in ("rhs_evaluations", *TIMING_VARIABLES):
         return "auxiliaryInformation"
-    if name in ("status", "message") or re.search("_(error|stderr|misfit|points)$", name):
+    if variable_name in ("status", "message") or re.search(
+        "_(error|stderr|misfit|points)$", variable_name
+    ):
         return "qualityInformation"
     return "modelResult"
 
 
 def find_quantity(
-    name: str, extra_quantities: Mapping[str, Quantity] = MappingProxyType({})
+    variable_name: str, extra_quantities: Mapping[str, Quantity] = MappingProxyType({})
 ) -> Quantity:
     """Look a quantity up, deriving ``<name>_error`` and its like from ``<name>``.
 
@@ -88,16 +92,20 @@ def find_quantity(
     extra_quantities : mapping of str to Quantity
         What a study says of its own numbers.
     """
-    if name in extra_quantities:
-        return extra_quantities[name]
-    if name in QUANTITIES:
-        return QUANTITIES[name]
-    match = re.fullmatch(rf"(\w+)_({'|'.join(_SUFFIX_DESCRIPTIONS)})", name)
+    if variable_name in extra_quantities:
+        return extra_quantities[variable_name]
+    if variable_name in QUANTITY_BY_NAME:
+        return QUANTITY_BY_NAME[variable_name]
+    match = re.fullmatch(rf"(\w+)_({'|'.join(_SUFFIX_DESCRIPTIONS)})", variable_name)
     if match:
         of = find_quantity(match[1], extra_quantities)
-        units = "1" if match[2] in _COUNT_SUFFIXES else of.units
-        scale = "" if match[2] in _COUNT_SUFFIXES else of.scale
+        units = "1" if match[2] in _SUFFIXES_OF_COUNT_VARIABLES else of.units
+        scale = "" if match[2] in _SUFFIXES_OF_COUNT_VARIABLES else of.scale
         return Quantity(
-            name, of.symbol, units, f"{_SUFFIX_DESCRIPTIONS[match[2]]} {of.long_name}", scale
+            variable_name,
+            of.symbol,
+            units,
+            f"{_SUFFIX_DESCRIPTIONS[match[2]]} {of.long_name}",
+            scale,
         )
-    return Quantity(name, "", "1", name.replace("_", " "))
+    return Quantity(variable_name, "", "1", variable_name.replace("_", " "))

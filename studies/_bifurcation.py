@@ -14,19 +14,24 @@ import numpy as np
 
 from rsfstudy import Accuracy, Scene, Segment
 from rsfstudy.errors import InvalidValue
-from rsfstudy.limit_cycles.cycle_search import EventSequence, follow_to_orbit
+from rsfstudy.limit_cycles.cycle_search import StickSlipSequence, follow_to_periodic_orbit
 from rsfstudy.limit_cycles.cycles import LN10, Cycle, more_events_remedy
 from rsfstudy.limit_cycles.limit_cycle import (
-    PEAK_INDEX,
-    PERIOD_OUTPUT,
-    PERTURBATION_DISPLACEMENT,
+    EVENTS_PER_PERIOD_OUTPUT,
+    INDEX_OF_PEAK_OUTPUT,
+    INITIAL_PERTURBATION_DISPLACEMENT,
     STEADY_SLIDING_OUTCOME,
-    aperiodic_outcome,
-    check_errors,
-    estimate_cycle_errors,
+    estimate_primary_output_errors,
+    outcome_of_aperiodic_motion,
+    status_from_output_errors,
 )
-from rsfstudy.limit_cycles.return_map import DIFFERENCE_STEP, Orbit, ReturnMap, section_at
-from rsfstudy.measure_base import check_steady_loading
+from rsfstudy.limit_cycles.return_map import (
+    DIFFERENCE_STEP_OVER_LOG_RATE_RANGE,
+    PeriodicOrbit,
+    ReturnMap,
+    section_vector_at,
+)
+from rsfstudy.measure_base import check_loading_lets_motion_settle
 from rsfstudy.measures import Measure, Outcome, Output, Quantity, Status
 from rsfstudy.motion import WorkMeter, estimate_error
 
@@ -41,7 +46,7 @@ _ALIGNMENT_EVENTS = 16
 _MAX_CYCLE_GUESSES, _MAX_GUESS_DISTANCE = 3, 0.3
 
 _OUTPUTS = (
-    replace(PERIOD_OUTPUT, error=True),
+    replace(EVENTS_PER_PERIOD_OUTPUT, error=True),
     Output(
         "floquet_multiplier",
         r"$\mathrm{Re}\,\Lambda_1$",
@@ -170,13 +175,13 @@ class Bifurcation(Measure):
         Outcome
             Outcome with the status ``not_periodic`` if the motion does not approach a cycle.
         """
-        check_steady_loading(scene)
+        check_loading_lets_motion_settle(scene)
         if scene.log_load_velocity == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
         if not scene.is_perturbed:
-            scene = scene.with_segment(Segment(1.0, PERTURBATION_DISPLACEMENT))
-        motion = follow_to_orbit(
-            scene, accuracy, meter, self.transient + self.events, follow_all=True
+            scene = scene.with_segment(Segment(1.0, INITIAL_PERTURBATION_DISPLACEMENT))
+        motion = follow_to_periodic_orbit(
+            scene, accuracy, meter, self.transient + self.events, follow_all_cycles=True
         )
         if motion is None:
             return STEADY_SLIDING_OUTCOME
@@ -187,7 +192,7 @@ class Bifurcation(Measure):
             growth = _mean_growth(ReturnMap(scene, accuracy, meter), motion.cycles, self.events)
             values |= zip(("lyapunov_exponent", "lyapunov_exponent_stderr"), growth, strict=True)
             remedy = more_events_remedy(max(self.transient, self.events), "transient")
-            ended = aperiodic_outcome(scene, motion, remedy)
+            ended = outcome_of_aperiodic_motion(scene, motion, remedy)
             if status is Status.OK:
                 status, why = ended.status, ended.message
             return Outcome(status, values, why)
@@ -209,7 +214,7 @@ class Bifurcation(Measure):
 
 
 def _one_event_cycle_outputs(
-    scene: Scene, accuracy: Accuracy, motion: EventSequence, meter: WorkMeter
+    scene: Scene, accuracy: Accuracy, motion: StickSlipSequence, meter: WorkMeter
 ) -> tuple[Status, str, dict[str, float | np.ndarray]]:
     """Compute the results of the period-one cycle.
 
@@ -236,23 +241,25 @@ def _one_event_cycle_outputs(
     one = _find_one_event_cycle(ReturnMap(scene, accuracy, meter), motion.cycles)
     if one is None:
         return Status.OK, "", {}
-    again = ReturnMap(scene, accuracy.refined(), meter).find_orbit(
+    again = ReturnMap(scene, accuracy.refined(), meter).find_periodic_orbit(
         one.start_section, 1, one.cycles[0].log_slip_rate_range
     )
     if again is None:
         return Status.OK, "", {}
-    (first, *_), (same, *_) = one.multipliers, again.multipliers
+    (first, *_), (same, *_) = one.floquet_multipliers, again.floquet_multipliers
     chance = _COINCIDENCE_FLOOR * accuracy.rtol
-    errors = estimate_cycle_errors(accuracy, one, again)
+    errors = estimate_primary_output_errors(accuracy, one, again)
     values: dict[str, float | np.ndarray] = {
         "floquet_multiplier": float(first.real),
         "floquet_multiplier_error": estimate_error(first.real, same.real, chance),
         "floquet_multiplier_imaginary": float(abs(first.imag)),
         "floquet_multiplier_size": float(abs(first)),
-        "one_event_log10_peak": float(one.primary_outputs[PEAK_INDEX]),
-        "one_event_log10_peak_error": float(errors[PEAK_INDEX]),
+        "one_event_log10_peak": float(one.corrected_primary_outputs[INDEX_OF_PEAK_OUTPUT]),
+        "one_event_log10_peak_error": float(errors[INDEX_OF_PEAK_OUTPUT]),
     }
-    return *check_errors(accuracy, one, errors, slice(PEAK_INDEX, PEAK_INDEX + 1)), values
+    return *status_from_output_errors(
+        accuracy, one, errors, slice(INDEX_OF_PEAK_OUTPUT, INDEX_OF_PEAK_OUTPUT + 1)
+    ), values
 
 
 def _mean_growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float, float]:
@@ -279,11 +286,18 @@ def _mean_growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float
         cycle.
     """
     seen = seen[-(kept + _ALIGNMENT_EVENTS) :]
-    step = DIFFERENCE_STEP * by.scene.a * max(cycle.log_slip_rate_range for cycle in seen)
-    departure, grown = np.ones(len(section_at(seen[0].start_point))), []
+    step = (
+        DIFFERENCE_STEP_OVER_LOG_RATE_RANGE
+        * by.scene.a
+        * max(cycle.log_slip_rate_range for cycle in seen)
+    )
+    departure, grown = np.ones(len(section_vector_at(seen[0].start_point))), []
     for cycle in seen:
-        start, offset = section_at(cycle.start_point), step * departure / np.linalg.norm(departure)
-        ahead, behind = by.compute_image(start + offset), by.compute_image(start - offset)
+        start, offset = (
+            section_vector_at(cycle.start_point),
+            step * departure / np.linalg.norm(departure),
+        )
+        ahead, behind = by.follow_one_cycle(start + offset), by.follow_one_cycle(start - offset)
         if ahead is None or behind is None:
             return math.nan, math.nan
         departure = (ahead - behind)[: len(start)] / (2.0 * step)
@@ -294,7 +308,7 @@ def _mean_growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float
     return float(np.mean(grown)), float(np.std(means, ddof=1) / math.sqrt(len(means)))
 
 
-def _find_one_event_cycle(by: ReturnMap, seen: Sequence[Cycle]) -> Orbit | None:
+def _find_one_event_cycle(by: ReturnMap, seen: Sequence[Cycle]) -> PeriodicOrbit | None:
     """Find the period-one cycle near the motion.
 
     Parameters
@@ -311,8 +325,8 @@ def _find_one_event_cycle(by: ReturnMap, seen: Sequence[Cycle]) -> Orbit | None:
     """
     for near in _closest_returns(seen):
         # After a period doubling, successive events alternate between the two sides of the cycle.
-        midpoint = 0.5 * (section_at(near.start_point) + section_at(near.end_point))
-        orbit = by.find_orbit(
+        midpoint = 0.5 * (section_vector_at(near.start_point) + section_vector_at(near.end_point))
+        orbit = by.find_periodic_orbit(
             midpoint, 1, near.log_slip_rate_range, max_distance=_MAX_GUESS_DISTANCE
         )
         if orbit is not None:
@@ -336,7 +350,7 @@ def _closest_returns(seen: Sequence[Cycle]) -> list[Cycle]:
     return sorted(seen[len(seen) // 2 :], key=off)[:_MAX_CYCLE_GUESSES]
 
 
-def _lyapunov_exponent(orbit: Orbit) -> float:
+def _lyapunov_exponent(orbit: PeriodicOrbit) -> float:
     """Return the Lyapunov exponent of a periodic orbit."""
-    size = float(abs(orbit.multipliers[0]))
+    size = float(abs(orbit.floquet_multipliers[0]))
     return math.log(size) / orbit.period if size else -math.inf

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 from rsfstudy import Accuracy, Scene, Segment
 from rsfstudy.errors import InvalidValue
-from rsfstudy.limit_cycles.cycle_search import CycleSearch
+from rsfstudy.limit_cycles.cycle_search import LimitCycleSearch
 from rsfstudy.limit_cycles.return_map import ReturnMap
 from rsfstudy.measures import Measure, Outcome, Output, Status
 from rsfstudy.motion import (
@@ -28,7 +28,7 @@ from rsfstudy.motion import (
     integrate_events,
     rise,
 )
-from rsfstudy.slider import Point
+from rsfstudy.slider import MotionPoint
 from rsfstudy.slider.loading.oscillation import NormalStressOscillation
 
 #: Displacement step in D_c that starts the stick-slip motion without waves, and maximum number of
@@ -219,13 +219,13 @@ class _NextEvent(NamedTuple):
     recurrence_interval: float
     clock_advance: float
     remaining_time: float
-    cycle_start: Point
+    cycle_start: MotionPoint
     train_start: float
 
 
 def _find_free_cycle(
     free: Scene, accuracy: Accuracy, meter: WorkMeter
-) -> tuple[Point, tuple[float, float]] | None:
+) -> tuple[MotionPoint, tuple[float, float]] | None:
     """Find the limit cycle without waves.
 
     Parameters
@@ -244,10 +244,10 @@ def _find_free_cycle(
         motion settles to steady sliding.
     """
     nudged = free.with_segment(Segment(free.load_velocity, START_DISPLACEMENT_STEP))
-    approach = CycleSearch(nudged, accuracy, meter)
-    if not approach.run(MAX_EVENTS):
+    approach = LimitCycleSearch(nudged, accuracy, meter)
+    if not approach.follow_until_converged(MAX_EVENTS):
         return None
-    start = ReturnMap(free, accuracy, meter).point_at(approach.orbit.start_section)
+    start = ReturnMap(free, accuracy, meter).point_at_section(approach.orbit.start_section)
     motion = integrate_events(
         free, accuracy, meter, _event_specifications(free), start=start, with_time=True
     )

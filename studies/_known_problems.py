@@ -199,7 +199,9 @@ class ProblemMeasure(Measure):
         if "problems" not in described:
             return {}
         known = [json.loads(json.dumps(problem.describe())) for problem in REGISTERED_PROBLEMS]
-        listed = schema.convert_plain(described.pop("problems"), Sequence[dict[str, Any]], path)
+        listed = schema.convert_plain_data_to_type(
+            described.pop("problems"), Sequence[dict[str, Any]], path
+        )
         for number, each in enumerate(listed):
             if each not in known:
                 raise schema.invalid_part_error(

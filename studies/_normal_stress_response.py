@@ -16,14 +16,14 @@ import numpy as np
 
 from rsfstudy import Accuracy, Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base import RecordingMeasure, phase_outputs
+from rsfstudy.measure_base import RecordingMeasure, outputs_along_phase
 from rsfstudy.measure_base._recorded_motion import PHASE_VARIABLES
 from rsfstudy.measures import Outcome, Output, Status
 from rsfstudy.motion import Event, WorkMeter, integrate_events
-from rsfstudy.responses import estimate_instant_errors
-from rsfstudy.slider import Point, growth_rates, steady_sliding
+from rsfstudy.responses import estimate_errors_at_instants
+from rsfstudy.slider import MotionPoint, linear_growth_rates, steady_sliding
 from rsfstudy.slider.loading.oscillation import NormalStressOscillation
-from rsfstudy.slider.stability import response_to_normal_stress
+from rsfstudy.slider.stability import spring_response_to_normal_stress
 
 #: Remaining transient at the beginning of the record, relative to the requested accuracy. The
 #: remaining transient is computed from the slowest decay rate of small perturbations.
@@ -86,7 +86,7 @@ _OUTPUTS = (
         "number of periods of forcing after which the response repeats itself",
     ),
     Output("settled", "", "1", "whether one period of the response is as another later on"),
-    *phase_outputs(*PHASE_VARIABLES),
+    *outputs_along_phase(*PHASE_VARIABLES),
 )
 
 
@@ -257,7 +257,7 @@ class NormalStressResponse(RecordingMeasure):
             raise InvalidValue("samples", self.samples, rule)
 
     @property
-    def point_count(self) -> int:
+    def recorded_point_count(self) -> int:
         """Number of points of the record along ``phase``."""
         return self.samples + 1
 
@@ -322,12 +322,14 @@ class NormalStressResponse(RecordingMeasure):
         if not scene.load_velocity or steady_sliding(scene, scene.log_load_velocity) is None:
             why = "the load point is held, or steady sliding is not possible at its velocity"
             return Outcome(Status.NO_STEADY_STATE, message=why)
-        decay = -scene.load_velocity * growth_rates(scene, scene.log_load_velocity)[0].real
+        decay = -scene.load_velocity * linear_growth_rates(scene, scene.log_load_velocity)[0].real
         if not decay > 0.0:
             why = "steady sliding is unstable: no transient decays"
             return Outcome(Status.NOT_APPLICABLE, message=why)
         period = loading.oscillation_period
-        linear = response_to_normal_stress(scene, scene.log_load_velocity, 2.0 * math.pi / period)
+        linear = spring_response_to_normal_stress(
+            scene, scene.log_load_velocity, 2.0 * math.pi / period
+        )
         by_theory = {"linear_gain": abs(linear), "linear_phase_lead": _phase_in_degrees(linear)}
         fold = 1.0 / decay / period
         # The transient must be too weak to be mistaken for the response when the comparison of
@@ -358,7 +360,7 @@ class NormalStressResponse(RecordingMeasure):
 
     def _find_repetition(
         self, scene: Scene, waits: int, accuracy: Accuracy, meter: WorkMeter
-    ) -> tuple[Point, int]:
+    ) -> tuple[MotionPoint, int]:
         """Find the number of forcing periods after which the response repeats.
 
         The motion is first integrated over a number of forcing periods, the argument ``waits``. The
@@ -405,7 +407,12 @@ class NormalStressResponse(RecordingMeasure):
         return point, 0
 
     def _resolve(
-        self, scene: Scene, start: Point, way: _ResponsePeriod, accuracy: Accuracy, meter: WorkMeter
+        self,
+        scene: Scene,
+        start: MotionPoint,
+        way: _ResponsePeriod,
+        accuracy: Accuracy,
+        meter: WorkMeter,
     ) -> tuple[_ResponseRecord, _ResponseRecord]:
         """Record the response with enough samples for the requested accuracy.
 
@@ -441,7 +448,7 @@ class NormalStressResponse(RecordingMeasure):
     def _record_twice(
         self,
         scene: Scene,
-        start: Point,
+        start: MotionPoint,
         way: _ResponsePeriod,
         instants: int,
         accuracy: Accuracy,
@@ -486,7 +493,7 @@ class NormalStressResponse(RecordingMeasure):
     def _record_period(
         self,
         scene: Scene,
-        start: Point,
+        start: MotionPoint,
         way: _ResponsePeriod,
         instants: int,
         accuracy: Accuracy,
@@ -607,7 +614,7 @@ def _estimate_errors(
         "distortion": over_spring,
         "departure_from_linear": left * over_imposed / abs(linear),
     }
-    errors = estimate_instant_errors(values, _read_outputs(again, linear), by_friction, *asked)
+    errors = estimate_errors_at_instants(values, _read_outputs(again, linear), by_friction, *asked)
     return {name: error + hidden[name.removesuffix("_error")] for name, error in errors.items()}
 
 

@@ -14,21 +14,25 @@ import numpy as np
 
 from rsfstudy import Accuracy, Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base import RecordingMeasure, check_steady_loading, phase_outputs
+from rsfstudy.measure_base import (
+    RecordingMeasure,
+    check_loading_lets_motion_settle,
+    outputs_along_phase,
+)
 from rsfstudy.measure_base._recorded_motion import PHASE_VARIABLES
 from rsfstudy.measures import Outcome, Output, Status
 from rsfstudy.motion import (
     MOTION_VARIABLES,
     RECORDED_VARIABLES,
-    ROUNDING_ERROR,
+    RELATIVE_ROUNDING_ERROR,
     Event,
     Recording,
     WorkMeter,
-    friction_coefficient,
     integrate_events,
-    sample_along_path,
+    recorded_friction_coefficient,
+    resample_motion_along_path,
 )
-from rsfstudy.responses import estimate_instant_errors, settled_flag
+from rsfstudy.responses import estimate_errors_at_instants, flag_of_settled_friction
 
 #: Final fraction of the record over which friction must be constant, and the tolerance of this
 #: condition relative to the remaining transient at ``fit_from``.
@@ -40,7 +44,7 @@ _SPRING_RESPONSE_LOG_RATE = math.log(2.0)
 #: that is used in these iterations.
 _MAX_EXTENSIONS, _MIN_LOG_SLIP_RATE = 3, -600.0
 #: Largest direct change of friction relative to mu_* that is attributed to rounding.
-_NEGLIGIBLE_DIRECT_CHANGE = 10.0 * ROUNDING_ERROR
+_NEGLIGIBLE_DIRECT_CHANGE = 10.0 * RELATIVE_ROUNDING_ERROR
 
 _OUTPUTS = (
     Output(
@@ -78,7 +82,7 @@ _OUTPUTS = (
         "1",
         "largest departure of friction, where it is read, from that of a stiff slider",
     ),
-    *phase_outputs(*PHASE_VARIABLES),
+    *outputs_along_phase(*PHASE_VARIABLES),
 )
 
 
@@ -103,7 +107,7 @@ class _TransientRecord(NamedTuple):
     @property
     def final_friction(self) -> float:
         """Friction at the end of the record."""
-        return float(friction_coefficient(self.rows[-1:])[0])
+        return float(recorded_friction_coefficient(self.rows[-1:])[0])
 
     def remaining_transient(self, slip: float) -> float:
         """Return the remaining transient of friction at a slip.
@@ -202,7 +206,7 @@ class NormalStressTransient(RecordingMeasure):
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
         distance = values["apparent_slip_distance"]
         size = abs(values["apparent_alpha"] * math.log(ratio)) * math.exp(-self.fit_to / distance)
-        part = 1.0 + scene.a / max(size, ROUNDING_ERROR * scene.a)
+        part = 1.0 + scene.a / max(size, RELATIVE_ROUNDING_ERROR * scene.a)
         names = ("apparent_alpha", "apparent_slip_distance", "evolution_left")
         return {name: part * abs(values[name]) for name in names}
 
@@ -225,7 +229,7 @@ class NormalStressTransient(RecordingMeasure):
         Outcome
             Outcome of the measure.
         """
-        check_steady_loading(scene)
+        check_loading_lets_motion_settle(scene)
         step = scene.parts.loading.segments[0]
         if not step.normal_stress:
             return Outcome(Status.NO_STEP, message="normal stress does not change at once")
@@ -243,7 +247,7 @@ class NormalStressTransient(RecordingMeasure):
             span = f"{self.fit_from:g} to {self.fit_to:g} D_c of slip"
             why = f"from {span} friction does not decay, or is still that of loading or unloading"
             return Outcome(Status.NOT_APPLICABLE, shown, why)
-        errors = estimate_instant_errors(
+        errors = estimate_errors_at_instants(
             values, refined, self._sensitivities_to_friction(scene, record, values), scene, accuracy
         )
         direct = _direct_change(scene, record)
@@ -251,7 +255,7 @@ class NormalStressTransient(RecordingMeasure):
             why = "friction does not change at once, so that no part of that can be left"
             del values["evolution_left"], errors["evolution_left_error"]
             return Outcome(Status.NOT_APPLICABLE, {**values, **errors, **shown}, why)
-        rounded = ROUNDING_ERROR * scene.mu_star / abs(direct)
+        rounded = RELATIVE_ROUNDING_ERROR * scene.mu_star / abs(direct)
         errors["evolution_left_error"] += rounded * abs(values["evolution_left"])
         return Outcome(Status.OK, {**values, **errors, **shown})
 
@@ -289,7 +293,7 @@ class NormalStressTransient(RecordingMeasure):
         begin, *_others = integrate_events(
             scene, accuracy, meter, with_time=True, recording=recording, until=self.record
         )
-        rows = recording.table(scene)
+        rows = recording.as_table(scene)
         slip = rows[:, MOTION_VARIABLES.index("slip")]
         if slip.max() < max(self.fit_to, 1.0):
             return None
@@ -388,16 +392,16 @@ class NormalStressTransient(RecordingMeasure):
         self, scene: Scene, record: _TransientRecord
     ) -> dict[str, float | np.ndarray]:
         """Return the record, and the results that need no exponential fit."""
-        rows, friction = record.rows, friction_coefficient(record.rows)
+        rows, friction = record.rows, recorded_friction_coefficient(record.rows)
         late = rows[:, 0] >= (1.0 - _FINAL_SHARE) * self.record
         is_flat = bool(
             np.ptp(friction[late])
             < _FINAL_FRICTION_RTOL * abs(record.remaining_transient(self.fit_from))
         )
-        path = sample_along_path(rows, self.phases, RECORDED_VARIABLES)
+        path = resample_motion_along_path(rows, self.phases, RECORDED_VARIABLES)
         return {
             "direct_change": _direct_change(scene, record),
-            "settled": settled_flag(scene.segment_scene(-1), is_flat=is_flat),
+            "settled": flag_of_settled_friction(scene.segment_scene(-1), is_flat=is_flat),
             "closed_form_departure": self._departure_from_rigid(scene, record),
             "time": path["time"],
             "load_point_displacement": path["time"],
@@ -435,7 +439,7 @@ class NormalStressTransient(RecordingMeasure):
         # If b is zero, alpha is zero too, and friction does not evolve.
         away = -coupling[1] / scene.b * math.log(ratio) if scene.b else 0.0
         left = np.array([law.relaxation(away, at) for at in slip[read].tolist()])
-        seen = friction_coefficient(record.rows[read]) - scene.mu_star
+        seen = recorded_friction_coefficient(record.rows[read]) - scene.mu_star
         return float(np.abs(seen - scene.b * left).max())
 
 

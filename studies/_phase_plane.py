@@ -12,10 +12,10 @@ import xarray as xr
 
 from rsfstudy import Scene
 from rsfstudy.slider import (
-    field_types,
     find_inapplicable_fields,
-    steady_friction_excess,
-    stress_for_friction,
+    frictional_stress_for_friction,
+    scene_field_types,
+    steady_friction_minus_reference,
 )
 from rsfstudy.study import find_named_user_parts
 from rsfstudy.study.figure_declarations import Axes
@@ -40,7 +40,7 @@ def steady_line_key(cell: xr.Dataset) -> tuple[str, float, float]:
         mu_*.
     """
     scene = scene_from_coordinates(cell)
-    return scene.normal_stress, scene.phi or 0.0, steady_friction_excess(scene, LN10)
+    return scene.normal_stress, scene.phi or 0.0, steady_friction_minus_reference(scene, LN10)
 
 
 def scene_from_coordinates(cell: xr.Dataset) -> Scene:
@@ -58,7 +58,7 @@ def scene_from_coordinates(cell: xr.Dataset) -> Scene:
     """
     here = {str(name): cell[name].item() for name in cell.coords if cell[name].ndim == 0}
     parts = find_named_user_parts(here, [here])
-    kinds = field_types(parts.values())
+    kinds = scene_field_types(parts.values())
     # Coordinates that do not apply to the cell are NaN or an empty string.
     values = {n: v for n, v in here.items() if n in kinds and v == v and v != ""}
     flags = [name for name in values if kinds[name] in (bool, bool | None)]
@@ -84,7 +84,9 @@ def steady_line(cell: xr.Dataset, log10_rates: np.ndarray) -> np.ndarray:
         Shear stress in sigma_*. NaN if there is no steady sliding at a slip rate.
     """
     scene = scene_from_coordinates(cell)
-    excesses = [steady_friction_excess(scene, rate * LN10) for rate in log10_rates.tolist()]
+    excesses = [
+        steady_friction_minus_reference(scene, rate * LN10) for rate in log10_rates.tolist()
+    ]
     return _stresses_from_friction(scene, np.array(excesses))
 
 
@@ -111,7 +113,7 @@ def constant_state_line(cell: xr.Dataset, state: float, log10_rates: np.ndarray)
 
 def _stresses_from_friction(scene: Scene, excesses: np.ndarray) -> np.ndarray:
     """Compute the shear stress at friction coefficients relative to mu_*."""
-    stresses = (stress_for_friction(scene, excess) for excess in excesses.tolist())
+    stresses = (frictional_stress_for_friction(scene, excess) for excess in excesses.tolist())
     return np.array([math.nan if g is None else scene.mu_star + g for g in stresses])
 
 

@@ -26,11 +26,11 @@ from rsfstudy.fitting import (
 )
 from rsfstudy.fitting.fit_problem import FitProblem
 from rsfstudy.fitting.fit_solution import FitSolution
-from rsfstudy.fitting.intervals import LikelihoodProfile, stderr_multiplier
-from rsfstudy.fitting.joint_model import JointModel, number_parameters
+from rsfstudy.fitting.intervals import LikelihoodProfile, student_t_multiplier
+from rsfstudy.fitting.joint_model import JointModel, add_window_numbers
 from rsfstudy.fitting.noise import check_noise_name
 from rsfstudy.fitting.validity import find_validity_problems
-from rsfstudy.fitting.window_model import Values, WindowModel, check_positive
+from rsfstudy.fitting.window_model import ParameterValues, WindowModel, check_fields_positive
 from rsfstudy.measures import Measure, Outcome, Output, OutputValue, Quantity, Status
 from rsfstudy.motion import WorkMeter
 
@@ -167,7 +167,7 @@ class SyntheticFit(Measure):
         check_free_parameters(self.free)
         if self.process not in _PROCESSES:
             raise InvalidValue("process", self.process, "is unknown", choices=_PROCESSES)
-        check_positive(self, "slip_distance", "noise_size")
+        check_fields_positive(self, "slip_distance", "noise_size")
         if self.rows < 10 * len(windows[0]):
             raise InvalidValue("rows", self.rows, "must be ten for each piece at least")
         if self.seed < 0:
@@ -196,7 +196,7 @@ class SyntheticFit(Measure):
     @property
     def _free_parameters(self) -> tuple[str, ...]:
         """Names of the free parameters, with a number for each window."""
-        return number_parameters(self.free, len(self._window_segments()))
+        return add_window_numbers(self.free, len(self._window_segments()))
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Draw a record and fit it.
@@ -279,36 +279,45 @@ class SyntheticFit(Measure):
         self,
         search: FitProblem,
         found: FitSolution,
-        true: Values,
+        true: ParameterValues,
         promised: np.ndarray,
         reasons: Sequence[str],
     ) -> dict[str, OutputValue]:
         """Compare the result of a fit with the exact parameters."""
         naive = found
         if self.noise != "white":
-            naive = FitProblem(search.model, found.values, self._free_parameters, "white").solve()
-        exact = search.coordinates(true)
+            naive = FitProblem(
+                search.model, found.parameter_values, self._free_parameters, "white"
+            ).solve()
+        exact = search.values_to_coordinates(true)
         profiles = [LikelihoodProfile(search, found, name) for name in self._free_parameters]
         # Noise of the load point displacement widens the intervals in proportion.
         wider = np.array(
-            [found.coordinate_stderr[one.index] / one.noise_stderr for one in profiles]
+            [
+                found.coordinate_stderr[one.parameter_index] / one.stderr_from_noise
+                for one in profiles
+            ]
         )
         nearer = profiles[0].best_coordinates + (exact - profiles[0].best_coordinates) / wider
         each = zip(profiles, nearer.tolist(), strict=True)
-        squared = [one.squared_distance(x) for one, x in each]
-        naively = np.square((search.coordinates(naive.values) - exact) / naive.coordinate_stderr)
+        squared = [one.scaled_likelihood_decrease(x) for one, x in each]
+        naively = np.square(
+            (search.values_to_coordinates(naive.parameter_values) - exact) / naive.coordinate_stderr
+        )
         by_parameter = {
-            "estimate": search.coordinates(found.values),
-            "deviation": search.coordinates(found.values) - exact,
+            "estimate": search.values_to_coordinates(found.parameter_values),
+            "deviation": search.values_to_coordinates(found.parameter_values) - exact,
             "deviation_error": np.array([found.numerical_errors[n] for n in self._free_parameters])
             / found.coordinate_derivatives,
             "spread": found.coordinate_stderr,
             "promised_spread": promised,
-            "told": np.array([float(n not in found.unidentified) for n in self._free_parameters]),
+            "told": np.array(
+                [float(n not in found.unidentified_parameters) for n in self._free_parameters]
+            ),
         }
         for words, share in (("one", SHARE_WITHIN_ONE_STDERR), ("two", SHARE_WITHIN_TWO_STDERRS)):
             for prefix, of, far in (("", found, squared), ("naive_", naive, naively)):
-                inside = np.array(far) <= stderr_multiplier(of, share) ** 2
+                inside = np.array(far) <= student_t_multiplier(of, share) ** 2
                 by_parameter[f"{prefix}inside_{words}"] = inside.astype(float)
         # If a parameter has a separate value in each window, the first window is reported.
         shown = [
@@ -316,7 +325,7 @@ class SyntheticFit(Measure):
             for n in self.free
         ]
         values: dict[str, OutputValue] = {name: each[shown] for name, each in by_parameter.items()}
-        values |= {"criterion": found.aic, "noise_order": found.noise.order}
+        values |= {"criterion": found.aic, "noise_order": found.noise_model.order}
         return values | {"flagged": float(bool(reasons))}
 
     def _window_segments(self) -> list[list[_ProtocolSegment]]:
@@ -328,10 +337,10 @@ class SyntheticFit(Measure):
         longer = self.slip_distance * (scene.as_dict().get("length_ratio") or 1.0)
         plainly = scene_to_parameters(scene, self.slip_distance, longer)
         plainly |= {name: 0.0 for name in self.free if name not in plainly}
-        names = number_parameters(tuple(plainly), len(self._window_segments()))
+        names = add_window_numbers(tuple(plainly), len(self._window_segments()))
         return {name: plainly[strip_window_number(name)] for name in names}
 
-    def _initial_parameters(self, scene: Scene, true: Values) -> dict[str, float]:
+    def _initial_parameters(self, scene: Scene, true: ParameterValues) -> dict[str, float]:
         """Return initial parameters that differ slightly from the exact values."""
         first = {
             n: v
@@ -361,7 +370,7 @@ class SyntheticFit(Measure):
             parts.append(WindowModel(scene, time, moved, seen, loading, smooth, meter))
         return JointModel(tuple(parts))
 
-    def _expected_stderrs(self, truth: JointModel, true: Values) -> np.ndarray:
+    def _expected_stderrs(self, truth: JointModel, true: ParameterValues) -> np.ndarray:
         """Compute standard errors from the Fisher information of the known noise."""
         correlations = _correlations(self.process, self.rows)
         jacobian = truth.jacobian(true, self._free_parameters)

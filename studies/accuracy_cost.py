@@ -29,8 +29,8 @@ from rsfstudy.measures import (
     Status,
     StepResponse,
 )
-from rsfstudy.motion import COMPILED, MAX_RTOL, MIN_RTOL, SCIPY, WorkMeter, is_installed
-from rsfstudy.motion.steppers.scipy import METHODS
+from rsfstudy.motion import COMPILED, MAX_RTOL, MIN_RTOL, SCIPY, WorkMeter, is_engine_installed
+from rsfstudy.motion.steppers.scipy import SCIPY_SOLVER_BY_METHOD_NAME
 from rsfstudy.reductions import LinearFit
 from rsfstudy.study.figure_declarations import Axes, horizontal_line, reference_line
 
@@ -90,7 +90,8 @@ RegimeMethods = tuple[tuple[str, str], ...]
 
 #: Methods that use the same integrator in all regimes.
 _SINGLE_INTEGRATORS: Mapping[str, RegimeMethods] = {
-    name: tuple((regime, name) for regime in (*_SLOW_REGIMES, "inertial")) for name in METHODS
+    name: tuple((regime, name) for regime in (*_SLOW_REGIMES, "inertial"))
+    for name in SCIPY_SOLVER_BY_METHOD_NAME
 }
 #: Methods that use a different integrator during ruptures, for scenes with inertia.
 _INTEGRATOR_PAIRS: Mapping[str, RegimeMethods] = {
@@ -107,7 +108,9 @@ _METHODS_BY_INTEGRATOR: Mapping[str, RegimeMethods] = {
 
 #: Names of the installed integrators and of their combinations.
 INTEGRATORS = tuple(
-    name for name in _METHODS_BY_INTEGRATOR if name != _COMPILED_NAME or is_installed(COMPILED)
+    name
+    for name in _METHODS_BY_INTEGRATOR
+    if name != _COMPILED_NAME or is_engine_installed(COMPILED)
 )
 
 

@@ -20,7 +20,7 @@ from scipy.interpolate import CubicSpline
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import Quantity, StepResponse
 from rsfstudy.reductions import Difference, Reduction
-from rsfstudy.study import is_failed
+from rsfstudy.study import failed_cell_mask
 from rsfstudy.study.figure_declarations import Axes
 
 from ._paper import PAPER, REFERENCE
@@ -90,7 +90,7 @@ class PathSeparation(Reduction):
         if dataset.sizes.get(self.along, 0) != 2:
             return xr.Dataset()
         dataset = dataset.sortby(self.along)  # The path without the effect comes first.
-        bad = is_failed(dataset["status"]).any(self.along)
+        bad = failed_cell_mask(dataset["status"]).any(self.along)
         core = [self.along, "phase"]
         parting, merging, offset = xr.apply_ufunc(
             self._compare,

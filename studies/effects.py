@@ -142,7 +142,7 @@ def _measure_costs(scene: Scene) -> dict[str, float]:
     dict
         Results by name, for the equations between ruptures and, with inertia, during ruptures.
     """
-    slow = equations_between_ruptures(scene, clock=False)
+    slow = equations_between_ruptures(scene, with_time=False)
     forms: dict[str, tuple[Equations, tuple[float, ...]]] = {"": (slow, _SLOW_UNKNOWNS)}
     if scene.inertia:
         forms["_in_rupture"] = equations_in_rupture(scene), _RUPTURE_UNKNOWNS
@@ -150,7 +150,7 @@ def _measure_costs(scene: Scene) -> dict[str, float]:
         normal_stress="constant", fluid="drained", inertia=False, radiation_damping=0.0
     )
     timed = {
-        "plainest": (equations_between_ruptures(plainest, clock=False), _SLOW_UNKNOWNS),
+        "plainest": (equations_between_ruptures(plainest, with_time=False), _SLOW_UNKNOWNS),
         **forms,
     }
     turns = [
@@ -160,7 +160,7 @@ def _measure_costs(scene: Scene) -> dict[str, float]:
     costs = {}
     for where, (form, _state) in forms.items():
         ratios = [seconds[where] / seconds["plainest"] for seconds in turns]
-        costs[f"unknowns{where}"] = float(len(form.unknowns))
+        costs[f"unknowns{where}"] = float(len(form.unknown_names))
         costs[f"evaluation_cost{where}"] = statistics.median(ratios)
         costs[f"time_per_evaluation{where}"] = statistics.median(s[where] for s in turns)
     return costs
@@ -169,7 +169,7 @@ def _measure_costs(scene: Scene) -> dict[str, float]:
 def _time_right_hand_side(equations: Equations, state: tuple[float, ...]) -> float:
     """Return the processor time of one right-hand-side evaluation in s."""
     rate, p = equations.rate_function, equations.parameters
-    state += (0.0,) * (len(equations.unknowns) - len(state))
+    state += (0.0,) * (len(equations.unknown_names) - len(state))
     began = time.thread_time()
     for _ in range(_EVALUATIONS_PER_TIMING):
         rate(state, p)

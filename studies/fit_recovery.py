@@ -23,7 +23,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import LOGARITHMIC_PARAMETERS, PARAMETERS, scene_to_parameters
 from rsfstudy.fitting.fit_problem import FitProblem
 from rsfstudy.fitting.joint_model import JointModel
-from rsfstudy.fitting.window_model import Values, WindowModel
+from rsfstudy.fitting.window_model import ParameterValues, WindowModel
 from rsfstudy.measures import Measure, Outcome, Output, OutputValue, Quantity, Status
 from rsfstudy.motion import WorkMeter
 from rsfstudy.study.figure_declarations import Axes
@@ -170,7 +170,7 @@ class RecoveryError(Measure):
         }
         found = FitProblem(JointModel((model,)), first, free, "white").solve()
         sizes = {name: _parameter_scale(name, true) for name in free}
-        off = {name: (found.values[name] - true[name]) / sizes[name] for name in free}
+        off = {name: (found.parameter_values[name] - true[name]) / sizes[name] for name in free}
         values: dict[str, OutputValue] = {
             "largest_deviation": max(map(abs, off.values())),
             "largest_deviation_error": max(
@@ -196,7 +196,7 @@ class RecoveryError(Measure):
         return WindowModel(scene, time, at - step, np.zeros(ROWS), loading, accuracy, meter)
 
 
-def _friction_by_scipy(model: WindowModel, true: Values) -> np.ndarray:
+def _friction_by_scipy(model: WindowModel, true: ParameterValues) -> np.ndarray:
     r"""Compute the friction of a record with an independent implementation.
 
     The unknowns are the product of normal stress :math:`\sigma` and friction :math:`\mu`, and the
@@ -249,8 +249,8 @@ def _friction_by_scipy(model: WindowModel, true: Values) -> np.ndarray:
         return [k * (piece[1] - first * speed), first * speed / distance * change(psi + w, speed)]
 
     time, y = model.time - true.get("step_time", 0.0), np.array([true["mu_star"], 0.0])
-    found, ends = np.empty(len(time)), [*model.loading[1:, 0], time[-1]]
-    for piece, end in zip(model.loading, ends, strict=True):
+    found, ends = np.empty(len(time)), [*model.loading_segments[1:, 0], time[-1]]
+    for piece, end in zip(model.loading_segments, ends, strict=True):
         rows = (time >= piece[0]) & (time <= end)
         at = np.unique([*time[rows], end])
         solved = solve_ivp(
@@ -261,7 +261,7 @@ def _friction_by_scipy(model: WindowModel, true: Values) -> np.ndarray:
     return found
 
 
-def _parameter_scale(name: str, true: Values) -> float:
+def _parameter_scale(name: str, true: ParameterValues) -> float:
     """Return the scale of the deviations of a parameter.
 
     The scale of a parameter that is fitted as a logarithm is its exact value. The scale of ``a``

@@ -217,7 +217,7 @@ class _Departures(NamedTuple):
                 beside, accuracy, meter, recording=recording, until=float(time[-1])
             ):
                 pass
-            tables.append(recording.table(beside))
+            tables.append(recording.as_table(beside))
         motion, other = (math.log(10.0) * table[:, LOG_SLIP_RATE_COLUMN] for table in tables)
         size = np.log(np.abs(other - motion))
         # The local maxima are refined with a parabola through three samples.

@@ -17,7 +17,7 @@ import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.reductions import Inverse
-from rsfstudy.slider.stability import response_to_normal_stress
+from rsfstudy.slider.stability import spring_response_to_normal_stress
 from rsfstudy.study.figure_declarations import Axes, horizontal_line
 
 from ._normal_stress_response import NormalStressResponse
@@ -239,7 +239,9 @@ def linear_theory_line(
     scene, known = scene_from_coordinates(row.isel(oscillation_period=0)), row["oscillation_period"]
     periods = np.geomspace(0.5 * float(known.min()), 2.0 * float(known.max()), 300)
     frequencies = 2.0 * math.pi / periods
-    found = [response_to_normal_stress(scene, scene.log_load_velocity, f) for f in frequencies]
+    found = [
+        spring_response_to_normal_stress(scene, scene.log_load_velocity, f) for f in frequencies
+    ]
     return periods, np.asarray(part(np.array(found)))
 
 

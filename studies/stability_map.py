@@ -27,9 +27,9 @@ from rsfstudy.limit_cycles import SLIP_MODES
 from rsfstudy.measures import LimitCycle, Quantity, Status
 from rsfstudy.reductions import Boundary, Reduction
 from rsfstudy.slider import critical_stiffness
-from rsfstudy.study import is_failed
+from rsfstudy.study import failed_cell_mask
 from rsfstudy.study.figure_declarations import Axes
-from rsfstudy.study.reductions.base import dimension_of_coordinate, is_refused
+from rsfstudy.study.reductions.base import dimension_of_coordinate, refused_result_mask
 
 from ._paper import GU_ET_AL, PAPER, REFERENCE
 from ._phase_plane import scene_from_coordinates
@@ -110,7 +110,7 @@ class CycleRegionEdge(Reduction):
         """
         dimension = dimension_of_coordinate(dataset, _STIFFNESS)
         cycles, settles = dataset[self.of].notnull(), dataset["status"] == Status.NO_LIMIT_CYCLE
-        lost = is_refused(dataset, self.of, dimension)
+        lost = refused_result_mask(dataset, self.of, dimension)
         answers = cycles.astype(float).where((cycles | settles) & ~lost)
         linear = _linear_boundary(answers.isel({dimension: 0}, drop=True), dataset)
         if linear is None:
@@ -138,7 +138,7 @@ class CycleRegionEdge(Reduction):
             "_misplaced": misplaced.sum([dimension, *along]).where(whole),
         }
         note = f"between cells with a number and without one in {self.of}, along {_STIFFNESS}"
-        if bool(is_failed(dataset["status"]).any()):
+        if bool(failed_cell_mask(dataset["status"]).any()):
             note += "; cells along it failed or are missing"
         return self.results(note, made)
 

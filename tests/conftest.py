@@ -122,18 +122,20 @@ def cot_phi(scene: Scene) -> float:
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
     """However long workers take to start, no test gives them up."""
-    monkeypatch.setattr(workers, "WARN_AFTER", math.inf)
-    monkeypatch.setattr(workers, "GIVE_UP_AFTER", math.inf)
+    monkeypatch.setattr(workers, "WARN_AFTER_SECONDS_WITHOUT_WORKER", math.inf)
+    monkeypatch.setattr(workers, "GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER", math.inf)
 
 
 @pytest.fixture(autouse=True, scope="session")
 def the_checkout_stays():
     """Each of hundreds of runs would ask Git three times for the state of the same checkout."""
-    asked, checkout = provenance.git_state, provenance._PACKAGE_DIRECTORY.parent
+    asked, checkout = provenance.read_git_commit_and_state, provenance._PACKAGE_DIRECTORY.parent
     known = functools.cache(asked)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            provenance, "git_state", lambda root: (known if root == checkout else asked)(root)
+            provenance,
+            "read_git_commit_and_state",
+            lambda root: (known if root == checkout else asked)(root),
         )
         yield
 

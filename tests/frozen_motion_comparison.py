@@ -20,12 +20,12 @@ from rsfstudy import Scene
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.events import EventKind
 from rsfstudy.motion.meter import MotionStopped
-from rsfstudy.slider.point import Point
+from rsfstudy.slider.point import MotionPoint
 
 FROZEN_EVENTS_FILE = Path(__file__).with_name("frozen_events.json")
 
 #: Numbers of a point that are no states.
-POINT_FIELDS = tuple(name for name in Point._fields if name != "psis")
+POINT_FIELDS = tuple(name for name in MotionPoint._fields if name != "psis")
 
 
 class EventColumns(NamedTuple):

@@ -24,10 +24,10 @@ from rsfstudy.motion.events import (
     minimum,
     rise,
 )
-from rsfstudy.motion.integrate import events_along, integrate_events
+from rsfstudy.motion.integrate import integrate_events, iterate_events_of_equations
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.recording import MOTION_VARIABLES, Recording
-from rsfstudy.slider.equations import equations_between_ruptures, equations_of_rigid_slider
+from rsfstudy.slider.equations import equations_at_imposed_slip_rate, equations_between_ruptures
 
 #: Rows of a motion that are kept, and what those without end may cost.
 ROWS, BUDGET = 12, 40_000
@@ -114,13 +114,13 @@ class Track(NamedTuple):
     def events(self, scene: Scene, engine: str) -> Iterator[Any]:
         """What is told, one event after the other."""
         if self.log_slip_rate is None:
-            equations = equations_between_ruptures(scene, clock=False)
+            equations = equations_between_ruptures(scene, with_time=False)
         else:
-            equations = equations_of_rigid_slider(scene, self.log_slip_rate)
+            equations = equations_at_imposed_slip_rate(scene, self.log_slip_rate)
         meter, how = WorkMeter(self.budget, engine=engine), {"backward": self.backward}
         asked = (equations, self.state, 0.07 * self.rtol, meter, self.watches)
         if not self.samples:
-            return events_along(*asked, **how)
+            return iterate_events_of_equations(*asked, **how)
         return self._recorded_events(scene, *asked, **how)
 
     def _recorded_events(self, scene: Scene, *asked: Any, **how: Any) -> Iterator[Any]:
@@ -128,12 +128,13 @@ class Track(NamedTuple):
         all told with the last of them.
         """
         recording, events = Recording(sample_times=np.array(self.samples)), []
-        for event in events_along(*asked, **how, recording=recording):
+        for event in iterate_events_of_equations(*asked, **how, recording=recording):
             if event.kind is EventKind.SAMPLED:
                 break
             events.append(event)
         friction = (
-            recording.table(scene)[:, MOTION_VARIABLES.index("frictional_stress")] - scene.mu_star
+            recording.as_table(scene)[:, MOTION_VARIABLES.index("frictional_stress")]
+            - scene.mu_star
         )
         events += [
             event._replace(slip=slip, point=asked[0].evaluate_point((stress,)))

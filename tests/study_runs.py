@@ -32,7 +32,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.slider.point import Point
+from rsfstudy.slider.point import MotionPoint
 from rsfstudy.study import catalogue
 from rsfstudy.study.cell import Cell
 from rsfstudy.study.claims import Claim
@@ -100,7 +100,7 @@ def example_claim(**fields) -> Claim:
 
 def cell_key(scene, measure) -> bytes:
     """Name of a cell that is planned alone."""
-    return plan.cell_key(scene, measure)
+    return plan.compute_cell_key(scene, measure)
 
 
 def run_with_failures(*words, **options) -> xr.Dataset:
@@ -290,7 +290,7 @@ def run_command(words: Sequence[str]) -> tuple[int, str]:
     return int(done.returncode or 0), " ".join(f"{done.stdout}{done.stderr}".split())
 
 
-def start_point(scene: Scene) -> Point:
+def start_point(scene: Scene) -> MotionPoint:
     """Point at which the motion of a scene begins."""
     return next(integrate_events(scene, Accuracy(), WorkMeter(1_000_000))).point
 

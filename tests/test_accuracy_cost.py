@@ -18,10 +18,10 @@ from rsfstudy import Scene
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.integrate import events_along
+from rsfstudy.motion.integrate import iterate_events_of_equations
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.recording import Recording
-from rsfstudy.motion.steppers.scipy import METHODS
+from rsfstudy.motion.steppers.scipy import SCIPY_SOLVER_BY_METHOD_NAME
 from rsfstudy.reductions import apply_reductions
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider.equations import equations_between_ruptures
@@ -40,23 +40,25 @@ PROBLEM = Problem(
 CYCLE = Scene(normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
 
 
-@pytest.mark.parametrize("method", sorted(METHODS))
+@pytest.mark.parametrize("method", sorted(SCIPY_SOLVER_BY_METHOD_NAME))
 def test_every_right_hand_side_is_counted(method, monkeypatch):
     """By the meter as by the equations themselves: Jacobians and interpolants included."""
-    system, calls = equations_between_ruptures(SCENE, clock=False), []
+    system, calls = equations_between_ruptures(SCENE, with_time=False), []
     counted = system._replace(
         rate_function=lambda state, p: (calls.append(state), system.rate_function(state, p))[1]
     )
     meter = WorkMeter(10**6, {"quasi_static": method})
     # within each step it is recorded, which asks for interpolants
-    path = events_along(counted, (0.0, 0.0), 1e-6, meter, [STEP_END_EVENT], recording=Recording())
+    path = iterate_events_of_equations(
+        counted, (0.0, 0.0), 1e-6, meter, [STEP_END_EVENT], recording=Recording()
+    )
     told = list(itertools.islice(path, 22))
-    assert meter.evaluations == told[-1].evaluations == len(calls)
+    assert meter.evaluations == told[-1].evaluation_count == len(calls)
     assert meter.steps == 21
     assert (meter.jacobians > 0) == (method in ("Radau", "BDF"))
 
 
-@pytest.mark.parametrize("method", sorted(METHODS))
+@pytest.mark.parametrize("method", sorted(SCIPY_SOLVER_BY_METHOD_NAME))
 def test_every_integrator_solves_a_cycle(method):
     """Right to a hundred times a loose tolerance: multistep methods keep less of it."""
     regimes = ("slow_manifold", "inertial")

@@ -16,7 +16,7 @@ from study_runs import FAULTY_STUDY_FILE, example_claim, run, run_command
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.cli.console import console
+from rsfstudy.cli.console import stdout_console
 from rsfstudy.errors import DataError, InvalidValue, RunError
 from rsfstudy.reductions import LinearFit
 from rsfstudy.responses.linear_stability import LinearStability
@@ -277,4 +277,4 @@ def test_a_full_disk_where_the_output_goes_is_told(monkeypatch):
     with contextlib.suppress(OSError), open("/dev/full", "w") as full:  # raised by closing it too
         monkeypatch.setattr(sys, "stdout", full)
         with pytest.raises(RunError, match="cannot print: No space left on device"):
-            console.print("anything")
+            stdout_console.print("anything")

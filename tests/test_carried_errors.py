@@ -22,7 +22,7 @@ from rsfstudy.reductions import (
     apply_reductions,
 )
 from rsfstudy.status import Status
-from rsfstudy.study.reductions.base import ERROR_COMMENT
+from rsfstudy.study.reductions.base import PROPAGATED_ERROR_COMMENT
 
 X = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
 OF, ON = "critical_velocity_ratio", "a_over_b_minus_a"
@@ -83,7 +83,7 @@ def test_the_error_is_what_cells_moved_by_theirs_change_in_all(reduction):
     # 1e-6 of a number is the second order; and the last bits of it
     expected = moved_one_by_one(reduction, dataset).transpose(*error.dims)
     np.testing.assert_allclose(error, expected, rtol=1e-5, atol=2e-15)
-    assert error.attrs["comment"] == ERROR_COMMENT
+    assert error.attrs["comment"] == PROPAGATED_ERROR_COMMENT
     assert error.attrs["long_name"].startswith("numerical error estimate of")
 
 

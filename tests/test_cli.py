@@ -134,7 +134,7 @@ def test_list_and_show():
     ],
 )
 def test_settings(text, values):
-    assert assignments.parse_setting(text, ())[1] == values
+    assert assignments.parse_axis_assignment(text, ())[1] == values
 
 
 def test_a_label_may_hold_commas_and_colons(tmp_path):
@@ -144,7 +144,9 @@ def test_a_label_may_hold_commas_and_colons(tmp_path):
     )
     assert ran.returncode == 0, ran.stderr
     assert rsfstudy.open("hard_cases", tmp_path).hard_case.values.tolist() == [label]
-    several = assignments.parse_setting(f"hard_case={label},other , {label}", (label, "rigid"))
+    several = assignments.parse_axis_assignment(
+        f"hard_case={label},other , {label}", (label, "rigid")
+    )
     assert several == ("hard_case", [label, "other", label])
 
 
@@ -212,9 +214,9 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
 def without_numba(monkeypatch):
     """As where Numba is not installed."""
     monkeypatch.setitem(sys.modules, "rsfstudy.motion.compiled.machine", None)
-    engine_factory.compiled_engine.cache_clear()
+    engine_factory.import_compiled_engine.cache_clear()
     yield
-    engine_factory.compiled_engine.cache_clear()
+    engine_factory.import_compiled_engine.cache_clear()
 
 
 def compiled(**fields):

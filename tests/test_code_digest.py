@@ -107,11 +107,11 @@ def study_in(place, *, helper=HELPER, measure=MEASURE):
 
 
 def digest(study):
-    return code_digest.digest_classes(type(study.measure))
+    return code_digest.digest_user_classes(type(study.measure))
 
 
 def test_a_measure_of_rsfstudy_has_its_version():
-    assert code_digest.digest_classes(CriticalStep) == "none"
+    assert code_digest.digest_user_classes(CriticalStep) == "none"
 
 
 @pytest.mark.parametrize(
@@ -320,7 +320,7 @@ def test_of_the_physics_its_code_counts_and_no_remark(old, new, same, tmp_path):
         (tmp_path / name / "slider" / "law.py").write_text(text)
     assert old in LAW
     before, after = (
-        code_digest.digest_sources(provenance.read_sources(tmp_path / name))
+        code_digest.digest_sources(provenance.read_physics_sources(tmp_path / name))
         for name in ("before", "after")
     )
     assert (before == after) is same
@@ -328,7 +328,7 @@ def test_of_the_physics_its_code_counts_and_no_remark(old, new, same, tmp_path):
 
 def test_the_digest_of_the_physics_is_that_of_its_files():
     package = Path(rsfstudy.__file__).parent
-    files = provenance.read_sources(package)
+    files = provenance.read_physics_sources(package)
     assert {"slider/friction.py", "motion/loop.py", "measure_base/measure.py"} <= set(files)
     moved = {**files, "slider/moved.py": files["slider/friction.py"]}
     digests = [code_digest.digest_sources(each) for each in (files, moved)]
@@ -339,7 +339,7 @@ def test_the_digest_of_the_physics_is_that_of_its_files():
 def test_cached_properties_of_a_study_do_not_change_its_digest(name):
     """One process may have used the measures and scenes of a study, and another may not."""
     study = catalogue.load_study(name)
-    fresh = code_digest.digest_with_measures("", study.measure.code_classes)
+    fresh = code_digest.digest_physics_and_measures("", study.measure.code_classes)
     values = [
         value
         for kind in study.measure.code_classes
@@ -348,4 +348,4 @@ def test_cached_properties_of_a_study_do_not_change_its_digest(name):
     values += [part for value in values if isinstance(value, dict) for part in value.values()]
     used = [value.variables for value in values if isinstance(value, measures.Measure)]
     assert used
-    assert code_digest.digest_with_measures("", study.measure.code_classes) == fresh
+    assert code_digest.digest_physics_and_measures("", study.measure.code_classes) == fresh

@@ -47,9 +47,14 @@ def row(found, name=NUMBER):
 def test_the_same_agree(two):
     found = rsfstudy.compare(*two)
     assert found.agrees
-    assert found.cells == (8, 0, 0)
-    assert (found.numbers["values"] == found.numbers["identical"]).all()
-    assert (found.declaration, found.origin, found.points, found.left_out) == ({}, {}, {}, {})
+    assert found.finished_cell_counts == (8, 0, 0)
+    assert (found.agreement_table["values"] == found.agreement_table["identical"]).all()
+    assert (
+        found.declaration,
+        found.origin,
+        found.differing_axis_points,
+        found.uncompared_variables,
+    ) == ({}, {}, {}, {})
 
 
 @pytest.mark.parametrize(("part", "beyond"), [(0.9, 0), (1.1, 1)])
@@ -106,10 +111,10 @@ def test_cells_are_matched_by_their_places(two):
     second = second.assign_coords(b_over_a=second.b_over_a * (1.0 + 2e-16))
     first = first.isel(b_over_a=[0, 1, 2])
     found = rsfstudy.compare(first, second)
-    assert found.cells == (2, 4, 1)
+    assert found.finished_cell_counts == (2, 4, 1)
     assert row(found)["identical"] == 2
-    assert found.points["law"] == (["slip"], [])
-    assert found.points["b_over_a"] == ([2.5], pytest.approx([3.0]))
+    assert found.differing_axis_points["law"] == (["slip"], [])
+    assert found.differing_axis_points["b_over_a"] == ([2.5], pytest.approx([3.0]))
     assert found.agrees
 
 
@@ -117,7 +122,7 @@ def test_an_axis_that_the_other_lacks_is_matched_by_its_fixed_value(computed):
     fixed = run(study(law="slowness"))
     for pair in ((computed, fixed), (fixed, computed)):
         found = rsfstudy.compare(*pair)
-        assert sorted(found.cells) == [0, 4, 4]
+        assert sorted(found.finished_cell_counts) == [0, 4, 4]
         assert row(found)["identical"] == 4
     named = study(Axis("case", {"one": {"law": "slip"}, "two": {"law": "slowness"}}))
     with pytest.raises(InvalidValue, match="axis = 'case': is an axis of one of the two"):
@@ -129,8 +134,8 @@ def test_reductions_of_other_cells_are_left_out(computed):
     fit = LinearFit(name="slope", of=NUMBER, on="b_over_a")
     whole = replace(whole, reductions=[fit])
     first, second = run(whole), run(whole.with_(b_over_a=RATIOS[:3]))
-    assert "slope" in rsfstudy.compare(first, second).left_out
-    assert "slope" in set(rsfstudy.compare(first, first).numbers["variable"])
+    assert "slope" in rsfstudy.compare(first, second).uncompared_variables
+    assert "slope" in set(rsfstudy.compare(first, first).agreement_table["variable"])
     fewer = run(whole.with_(law=["slip"]))
     assert row(rsfstudy.compare(first, fewer), "slope")["values"] == 1
 

@@ -17,7 +17,7 @@ from study_runs import COMPILED_ONLY_STUDIES, SMALL_STUDY, reduced_study, run
 
 from rsfstudy import Scene, critical_step, limit_cycle, simulate
 from rsfstudy.errors import DataError, IncompleteWarning, InvalidValue
-from rsfstudy.execution.plan import Plan
+from rsfstudy.execution.plan import CellPlan
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.compiled import compile_cache, machine
@@ -79,7 +79,7 @@ class Tabulated(Law):
 def test_a_part_that_cannot_be_compiled_is_named_with_the_line():
     line = tabulated.__code__.co_firstlineno + 1
     with pytest.raises(InvalidValue, match=rf"the part .*tabulated.*test_compiled.py, line {line}"):
-        machine.compile_scene(Scene(law=Tabulated), with_time=True)
+        machine.compile_equations_of_scene(Scene(law=Tabulated), with_time=True)
     assert (
         simulate(Scene(law=Tabulated, stiffness=0.01, hold_time=1.0), duration=1.0).attrs["status"]
         == "ok"
@@ -144,17 +144,17 @@ def test_a_file_says_which_engine_and_cells_are_not_mixed(tmp_path):
 )
 def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
     """By what their measure says of time."""
-    wanted, addresses = list[tuple[str, ...]](), machine.function_addresses
+    wanted, addresses = list[tuple[str, ...]](), machine.compiled_function_addresses
 
     def asked(equations):
-        wanted.append((equations.regime, *equations.unknowns))
+        wanted.append((equations.regime, *equations.unknown_names))
         return addresses(equations)
 
     study = reduced_study(name)
-    scene = Plan(study).examples[0]
-    monkeypatch.setattr(machine, "function_addresses", asked)
+    scene = CellPlan(study).example_scenes[0]
+    monkeypatch.setattr(machine, "compiled_function_addresses", asked)
     for clock in study.measure.needs_time:
-        machine.compile_scene(scene, with_time=clock)
+        machine.compile_equations_of_scene(scene, with_time=clock)
     prepared = set(wanted)
     wanted.clear()
     study.measure(scene, study.accuracy)
@@ -179,15 +179,15 @@ def tripled(y, rates, p, result):
 @pytest.fixture
 def empty_cache(tmp_path, monkeypatch) -> Path:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    return compile_cache.cache_folder()
+    return compile_cache.compile_cache_folder()
 
 
 def compiled_programs(function=doubled) -> int:
     """How many programs it takes to have a function called by its address."""
-    before = compilation_log.programs
-    (address,) = compile_cache.compile_cfuncs([function])
+    before = compilation_log.compiled_program_count
+    (address,) = compile_cache.compile_cfunc_addresses([function])
     assert address
-    return compilation_log.programs - before
+    return compilation_log.compiled_program_count - before
 
 
 def test_other_processes_find_equations_again(tmp_path):
@@ -195,12 +195,12 @@ def test_other_processes_find_equations_again(tmp_path):
     asks = (
         "from rsfstudy import Scene\n"
         "from rsfstudy.critical_steps.critical_path import CriticalPath\n"
-        "from rsfstudy.motion.compiled.machine import function_addresses\n"
+        "from rsfstudy.motion.compiled.machine import compiled_function_addresses\n"
         "from rsfstudy.motion.engines import compilation_log\n"
         "from rsfstudy.slider.equations import equations_between_ruptures\n"
         "scene = Scene(normal_stress='constant')\n"
-        "function_addresses(equations_between_ruptures(scene, clock=False))\n"
-        "CriticalPath.of_scene(scene, 'compiled')\n"
+        "compiled_function_addresses(equations_between_ruptures(scene, with_time=False))\n"
+        "CriticalPath.from_scene(scene, 'compiled')\n"
         "print(compilation_log.programs)\n"
     )
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
@@ -278,39 +278,39 @@ def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeyp
     function, state = ctypes.CFUNCTYPE(None, *[ctypes.POINTER(ctypes.c_double)] * 4), (0.01, 0.02)
     for law in ("perrin_rice_zheng", "slip", "perrin_rice_zheng", "slip"):
         monkeypatch.setattr(FunctionIdentity, "_unique_ids", itertools.count(10**7))
-        compile_cache._jit_internal.cache_clear()
-        monkeypatch.setattr(machine, "_ADDRESS_CACHE", {})
+        compile_cache._jit_compile_callee_cached.cache_clear()
+        monkeypatch.setattr(machine, "_COMPILED_ADDRESS_CACHE", {})
         equations = equations_between_ruptures(
-            Scene(law=law, normal_stress="constant"), clock=False
+            Scene(law=law, normal_stress="constant"), with_time=False
         )
         y, p = (
             (ctypes.c_double * 2)(*state),
             (ctypes.c_double * len(equations.parameters))(*equations.parameters),
         )
         result = (ctypes.c_double * 2)()
-        function(machine.function_addresses(equations)[0])(y, y, p, result)
+        function(machine.compiled_function_addresses(equations)[0])(y, y, p, result)
         assert list(result) == pytest.approx(list(equations.evaluate_rates(state)), rel=1e-12)
 
 
 def test_a_cache_of_other_code_is_never_used(monkeypatch):
     """Any change of a function, or of a number it reads, makes another digest."""
     scene = Scene(law=SlipLaw)
-    rate = equations_between_ruptures(scene, clock=False).rate_function
-    before = compile_cache.compute_digest(None, rate)
-    assert compile_cache.compute_digest(None, rate) == before
-    cells = scene.functions.friction.strength.__closure__
+    rate = equations_between_ruptures(scene, with_time=False).rate_function
+    before = compile_cache.compute_code_digest(None, rate)
+    assert compile_cache.compute_code_digest(None, rate) == before
+    cells = scene.equation_functions.friction_functions.strength.__closure__
     effect = next(
         c.cell_contents for c in cells if c.cell_contents.__name__ == "linker_dieterich_effect"
     )
     monkeypatch.setitem(effect.__globals__, "NORMAL_STRESS", 3)
-    assert compile_cache.compute_digest(None, rate) != before
-    assert compile_cache.compute_digest(None, doubled) != compile_cache.compute_digest(
+    assert compile_cache.compute_code_digest(None, rate) != before
+    assert compile_cache.compute_code_digest(None, doubled) != compile_cache.compute_code_digest(
         None, tripled
     )
-    before = compile_cache.compute_digest(None, doubled)
-    assert compile_cache.compute_digest(int, doubled) != before
+    before = compile_cache.compute_code_digest(None, doubled)
+    assert compile_cache.compute_code_digest(int, doubled) != before
     monkeypatch.setitem(compile_cache._COMPILER_OPTIONS, "fastmath", {"nsz"})
-    assert compile_cache.compute_digest(None, doubled) != before
+    assert compile_cache.compute_code_digest(None, doubled) != before
 
 
 def by_module(y, rates, p, result):
@@ -319,6 +319,6 @@ def by_module(y, rates, p, result):
 
 def test_a_number_of_another_module_counts_too(monkeypatch):
     monkeypatch.setattr(known, "NUMBER", 2.0)
-    before = compile_cache.compute_digest(by_module)
+    before = compile_cache.compute_code_digest(by_module)
     monkeypatch.setattr(known, "NUMBER", 3.0)
-    assert compile_cache.compute_digest(by_module) != before
+    assert compile_cache.compute_code_digest(by_module) != before

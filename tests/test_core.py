@@ -15,16 +15,16 @@ from rsfstudy import Scene
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import PYTHON, SCIPY
-from rsfstudy.motion.integrate import events_along
+from rsfstudy.motion.integrate import iterate_events_of_equations
 from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.slider.equations import (
     Equations,
+    equations_against_displacement,
     equations_between_ruptures,
-    equations_by_displacement,
 )
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.point import Point
-from rsfstudy.slider.scene_functions import path_metric
+from rsfstudy.slider.point import MotionPoint
+from rsfstudy.slider.scene_functions import displacement_per_path_length
 from rsfstudy.status import Status
 
 
@@ -134,7 +134,7 @@ def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
 def test_growth_on_the_slow_manifold_is_that_of_its_slip_rate(fields):
     """By differences along the motion, at a weight of mass of 1e-3."""
     scene = Scene(load_velocity_ratio=2.0, inertia=True, **fields)
-    equations = equations_between_ruptures(scene, clock=False)
+    equations = equations_between_ruptures(scene, with_time=False)
     weight = math.sqrt(1e-3 * scene.a / scene.stiffness) / scene.inertial_time
     psis = (-scene.a * math.log(weight), *[1e-3] * (scene.state_count - 1))
     state, step = np.array([2e-3, *psis]), 1e-4
@@ -161,8 +161,10 @@ def test_growth_on_the_slow_manifold_is_that_of_its_slip_rate(fields):
 @given(st.floats(-1e12, 1e12))
 def test_the_way_along_a_path_is_that_of_its_two_parts(slant):
     """d(sigma)**2 = ds**2 + (slant ds)**2."""
-    assert path_metric(slant) * math.hypot(1.0, slant) == pytest.approx(1.0, rel=1e-15)
-    assert path_metric(-1e300) == pytest.approx(1e-300, rel=1e-15, abs=0.0)
+    assert displacement_per_path_length(slant) * math.hypot(1.0, slant) == pytest.approx(
+        1.0, rel=1e-15
+    )
+    assert displacement_per_path_length(-1e300) == pytest.approx(1e-300, rel=1e-15, abs=0.0)
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
@@ -173,9 +175,9 @@ def test_rates_along_the_path_are_those_by_displacement_over_its_length(law, log
     """
     scene = Scene(law=law, normal_stress="constant", load_velocity_ratio=3.0)
     state = (0.01, 0.01 - scene.a * log_slip_rate)
-    by = equations_by_displacement(scene)
+    by = equations_against_displacement(scene)
     growth = by.evaluate_point(state).log_slip_rate_derivative
-    along = equations_between_ruptures(scene, clock=False).evaluate_rates(state)
+    along = equations_between_ruptures(scene, with_time=False).evaluate_rates(state)
     for ours, theirs in zip(along, by.evaluate_rates(state), strict=True):
         assert ours * math.sqrt(1.0 + (growth / 6.0) ** 2) == pytest.approx(theirs, rel=1e-12)
 
@@ -229,10 +231,10 @@ def test_equations_that_fail_end_in_a_status_and_not_in_nan(engine):
         return (math.nan if state[0] > 1.0 else 1.0,)
 
     def point(state, _rates, _p):
-        return Point(*[float(state[0])] * len(Point._fields))._replace(psis=state)
+        return MotionPoint(*[float(state[0])] * len(MotionPoint._fields))._replace(psis=state)
 
     system = Equations("broken", ("y",), (1.0,), rate, point, (1.0,) * LAW)
     meter = WorkMeter(10**5, engine=engine)
     with np.errstate(invalid="ignore"), pytest.raises(MotionStopped) as halted:
-        list(events_along(system, (0.0,), 1e-8, meter))
+        list(iterate_events_of_equations(system, (0.0,), 1e-8, meter))
     assert halted.value.status in (Status.INTEGRATION_FAILED, Status.WORK_BUDGET_SPENT)

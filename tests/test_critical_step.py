@@ -16,15 +16,15 @@ from time_domain_reference import TimeDomainMotion
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.critical_steps import critical_step, forward_motion
-from rsfstudy.critical_steps.critical_path import CriticalPath, scalar_function
+from rsfstudy.critical_steps.critical_path import CriticalPath, scalar_function_for_engine
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.slow_manifold import slow_manifold_error
+from rsfstudy.critical_steps.slow_manifold import slow_manifold_relative_error
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.roots import build_root_finder
-from rsfstudy.slider.equations import equations_between_ruptures, log_slip_rate_at
-from rsfstudy.slider.point import Point
+from rsfstudy.slider.equations import equations_between_ruptures, quasi_static_log_slip_rate
+from rsfstudy.slider.point import MotionPoint
 from rsfstudy.status import Status
 
 RATE, DISPLACEMENT, FALL = "load_velocity_ratio", "displacement_step", "normal_stress_step"
@@ -247,7 +247,9 @@ def test_paths_on_the_slow_manifold_agree_with_motions_of_the_full_equations(cas
     values = {}
     for heavy in (False, True):
         for module in (critical_step, forward_motion):
-            monkeypatch.setattr(module, "inertia_matters", lambda *_scene, heavy=heavy: heavy)
+            monkeypatch.setattr(
+                module, "inertia_matters_below_norm", lambda *_scene, heavy=heavy: heavy
+            )
         values[heavy] = found(scene, rtol=1e-8)[:2]
     (path, error), (forward, its_error) = values[False], values[True]
     assert abs(path - forward) <= error + its_error
@@ -256,7 +258,7 @@ def test_paths_on_the_slow_manifold_agree_with_motions_of_the_full_equations(cas
     # the first order of mass is there, and what is left is within the bound of the second
     assert 0.05 * weight < moved < 0.8 * weight
     left = abs(math.log(forward / path) / math.log(path))
-    assert left < slow_manifold_error(scene) + 1e-8
+    assert left < slow_manifold_relative_error(scene) + 1e-8
 
 
 def test_mass_counts_at_a_norm_just_above_the_loading_rate():
@@ -296,7 +298,7 @@ def test_a_displacement_step_may_jump_to_the_norm_at_once():
     """
     scene = Scene(law="slowness", stiffness_ratio=5.0, instability_norm=0.01)
     value, _error, outcome = found(scene, DISPLACEMENT)
-    jump = log_slip_rate_at(scene, scene.stiffness * value, 0.0)
+    jump = quasi_static_log_slip_rate(scene, scene.stiffness * value, 0.0)
     assert jump == pytest.approx(scene.log_instability_rate, rel=1e-8)
     assert "jump" in outcome.message
     with_mass = found(scene.with_(inertia=True), DISPLACEMENT)[0]
@@ -322,14 +324,14 @@ def test_an_orbit_that_grows_slowly_is_known_to_reach_the_norm_in_a_few_leaps():
     """Leaps that had to be shortened each time would take ten times the work."""
     slowly = {"law": "slowness", "b_over_a": 2.46, "phi": 82.8, "alpha": 0.129}
     scene = Scene(**slowly, stiffness_ratio=0.998, load_velocity_ratio=0.16, instability_norm=3e-4)
-    assert forward_motion.reaches_norm(scene, Accuracy(1e-6), WorkMeter(15_000))
+    assert forward_motion.motion_reaches_norm(scene, Accuracy(1e-6), WorkMeter(15_000))
 
 
 def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
     """k = k_cr, constant normal stress: without mass it peaks at 10^87 V_*."""
     scene = Scene(law="slowness", load_velocity_ratio=200.0, instability_norm=10.0, **CONSTANT)
     for inertia in (False, True):
-        reached = forward_motion.reaches_norm(
+        reached = forward_motion.motion_reaches_norm(
             scene.with_(inertia=inertia), Accuracy(1e-6), WorkMeter(500_000)
         )
         assert reached is not inertia
@@ -342,9 +344,9 @@ def test_a_limit_cycle_below_the_norm_is_not_leapt_over():
     for load, peak in ((0.25, 9.57), (0.3, 8.49)):
         scene = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=load)
         assert peak < scene.log_instability_rate
-        assert not forward_motion.reaches_norm(scene, Accuracy(1e-6), WorkMeter(500_000))
+        assert not forward_motion.motion_reaches_norm(scene, Accuracy(1e-6), WorkMeter(500_000))
     low = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=0.15)
-    assert forward_motion.reaches_norm(low, Accuracy(1e-6), WorkMeter(500_000))
+    assert forward_motion.motion_reaches_norm(low, Accuracy(1e-6), WorkMeter(500_000))
 
 
 def test_a_spent_budget_is_a_failure_with_a_name():
@@ -375,9 +377,9 @@ def test_public_call_returns_a_small_dataset():
 def test_the_critical_path_touches_the_norm_at_rest(law, load):
     """At the touching point ln V is at the norm and stationary, by the assembled equations."""
     scene = Scene(law=law, load_velocity_ratio=load)
-    start = CriticalPath.of_scene(scene).tangency_point
+    start = CriticalPath.from_scene(scene).tangency_point
     assert start is not None
-    system = equations_between_ruptures(scene, clock=False)
+    system = equations_between_ruptures(scene, with_time=False)
     point = system.evaluate_point(start)
     assert point.log_slip_rate == pytest.approx(scene.log_instability_rate, rel=1e-12)
     assert point.log_slip_rate_derivative == pytest.approx(0.0, abs=1e-11)
@@ -391,12 +393,15 @@ def test_where_a_path_begins_and_ends_is_the_same_by_all_engines(law, normal_str
     """
     for load in (1e-3, 1.5, 40.0):
         scene = Scene(law=law, normal_stress=normal_stress, load_velocity_ratio=load)
-        paths = [CriticalPath.of_scene(scene, engine) for engine in (SCIPY, COMPILED)]
+        paths = [CriticalPath.from_scene(scene, engine) for engine in (SCIPY, COMPILED)]
         plain, compiled = (path.tangency_point for path in paths)
         assert compiled == pytest.approx(plain, rel=1e-12, abs=1e-14)
         begin = (0.01, -0.02), paths[0].parameters
-        at = [scalar_function(path.evaluate_point, path.engine, *begin)(*begin) for path in paths]
-        assert all(isinstance(point, Point) for point in at)
+        at = [
+            scalar_function_for_engine(path.evaluate_point, path.engine, *begin)(*begin)
+            for path in paths
+        ]
+        assert all(isinstance(point, MotionPoint) for point in at)
         assert np.hstack(at[1]) == pytest.approx(np.hstack(at[0]), rel=1e-11, abs=1e-14)
 
 

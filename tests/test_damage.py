@@ -135,4 +135,4 @@ def test_a_damaged_motion_is_refused(tmp_path):
         store.read_dataset(tmp_path / "motion.nc")
     shutil.copy(tmp_path / "whole.nc", tmp_path / "motion.nc")
     again = store.read_dataset(tmp_path / "motion.nc")
-    xr.testing.assert_identical(again, motion.assign_attrs(layout=schema.LAYOUT_VERSION))
+    xr.testing.assert_identical(again, motion.assign_attrs(layout=schema.FILE_LAYOUT_VERSION))

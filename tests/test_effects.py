@@ -13,11 +13,11 @@ from rsfstudy.named_studies import effects
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.equations import (
+    build_friction_relation,
+    equations_at_imposed_slip_rate,
     equations_between_ruptures,
     equations_in_rupture,
-    equations_of_rigid_slider,
-    friction_relation,
-    log_slip_rate_at,
+    quasi_static_log_slip_rate,
 )
 
 shear = st.floats(-0.5, 0.5)
@@ -29,12 +29,12 @@ def test_strength_is_shear_over_normal_stress(g, phi, mu_star):
     scene = Scene(phi=phi, mu_star=mu_star, alpha=0.0)
     ratio = 1.0 + cot_phi(scene) * g
     exact = (mu_star + g) / ratio - mu_star
-    assert friction_relation(scene)(g)[0] == pytest.approx(exact, abs=4e-15 / ratio)
+    assert build_friction_relation(scene)(g)[0] == pytest.approx(exact, abs=4e-15 / ratio)
 
 
 @given(shear, st.floats(0.0, 1.2), st.floats(50.0, 89.0))
 def test_slopes_are_derivatives(g, alpha, phi):
-    relation, h = friction_relation(Scene(alpha=alpha, phi=phi)), 1e-6
+    relation, h = build_friction_relation(Scene(alpha=alpha, phi=phi)), 1e-6
     ahead, behind, here = relation(g + h), relation(g - h), relation(g)
     for value in (0, 2):
         numeric = (ahead[value] - behind[value]) / (2 * h)
@@ -47,7 +47,7 @@ def test_the_shift_is_the_integral_of_the_linker_dieterich_term(g, alpha, phi):
     """dTheta = -alpha dsigma/sigma over a jump from sigma_* is eq. 2 of the paper."""
     scene = Scene(alpha=alpha, phi=phi)
     cot = cot_phi(scene)
-    _value, _slope, shift, slope = friction_relation(scene)(g)
+    _value, _slope, shift, slope = build_friction_relation(scene)(g)
     assert -shift == pytest.approx(-alpha * math.log(1.0 + cot * g), abs=1e-14)
     assert slope == pytest.approx(alpha * cot / (1.0 + cot * g), rel=1e-14)
 
@@ -64,22 +64,25 @@ def eq_13(scene: Scene, displacement: float) -> float:
 @given(st.floats(-3.0, 5.0), st.floats(0.0, 1.0), st.floats(45.0, 85.0))
 def test_jump_of_slip_rate_is_eq_13(displacement, alpha, phi):
     scene = Scene(alpha=alpha, phi=phi, displacement_step=displacement)
-    ours = math.exp(log_slip_rate_at(scene, scene.spring_stress_step, 0.0))
+    ours = math.exp(quasi_static_log_slip_rate(scene, scene.spring_stress_step, 0.0))
     assert ours == pytest.approx(eq_13(scene, displacement), rel=1e-12)
 
 
 @given(shear)
 def test_alpha_to_zero_is_the_effect_absent(g):
     """Each effect at vanishing strength equals the effect absent."""
-    absent, vanishing = friction_relation(Scene(alpha=0.0)), friction_relation(Scene(alpha=1e-12))
+    absent, vanishing = (
+        build_friction_relation(Scene(alpha=0.0)),
+        build_friction_relation(Scene(alpha=1e-12)),
+    )
     for ours, theirs in zip(vanishing(g), absent(g), strict=True):
         assert ours == pytest.approx(theirs, abs=3e-12)
 
 
 @given(shear)
 def test_phi_to_90_degrees_is_constant_normal_stress(g):
-    absent = friction_relation(Scene(normal_stress="constant"))
-    vanishing = friction_relation(Scene(phi=90.0 - 1e-10))
+    absent = build_friction_relation(Scene(normal_stress="constant"))
+    vanishing = build_friction_relation(Scene(phi=90.0 - 1e-10))
     for ours, theirs in zip(vanishing(g), absent(g), strict=True):
         assert ours == pytest.approx(theirs, abs=1e-11)  # cot(phi) = 1.7e-12
 
@@ -87,26 +90,26 @@ def test_phi_to_90_degrees_is_constant_normal_stress(g):
 @pytest.mark.parametrize(
     ("equations", "unknowns"),
     [
-        (equations_of_rigid_slider(Scene(normal_stress="constant"), 1.0), 1),
-        (equations_of_rigid_slider(Scene(), 1.0), 1),
-        (equations_between_ruptures(Scene(normal_stress="constant"), clock=False), 2),
-        (equations_between_ruptures(Scene(alpha=0.0), clock=False), 2),
-        (equations_between_ruptures(Scene(), clock=False), 2),
-        (equations_between_ruptures(Scene(), clock=True), 3),
-        (equations_between_ruptures(Scene(radiation_damping=0.1), clock=False), 2),
-        (equations_between_ruptures(Scene(inertia=True), clock=False), 2),
+        (equations_at_imposed_slip_rate(Scene(normal_stress="constant"), 1.0), 1),
+        (equations_at_imposed_slip_rate(Scene(), 1.0), 1),
+        (equations_between_ruptures(Scene(normal_stress="constant"), with_time=False), 2),
+        (equations_between_ruptures(Scene(alpha=0.0), with_time=False), 2),
+        (equations_between_ruptures(Scene(), with_time=False), 2),
+        (equations_between_ruptures(Scene(), with_time=True), 3),
+        (equations_between_ruptures(Scene(radiation_damping=0.1), with_time=False), 2),
+        (equations_between_ruptures(Scene(inertia=True), with_time=False), 2),
         (equations_in_rupture(Scene(inertia=True)), 3),
     ],
 )
 def test_number_of_unknowns(equations, unknowns):
-    assert len(equations.unknowns) == len(equations.scales) == unknowns
+    assert len(equations.unknown_names) == len(equations.unknown_scales) == unknowns
     assert len(equations.evaluate_rates([0.01] * unknowns)) == unknowns
 
 
 def test_the_same_functions_serve_all_scenes_of_the_same_parts():
     """None holds a number of a scene: those are arguments."""
     one, other = (
-        equations_between_ruptures(Scene(a=a, phi=phi, load_velocity_ratio=load), clock=False)
+        equations_between_ruptures(Scene(a=a, phi=phi, load_velocity_ratio=load), with_time=False)
         for a, phi, load in ((0.01, 55.0, 2.0), (0.02, 70.0, 3.0))
     )
     assert one.rate_function is other.rate_function
@@ -127,7 +130,7 @@ def test_trial_states_outside_of_the_physics_give_finite_rates():
         massive = scene.with_(inertia=True)
         for wild, psi in itertools.product((-1e6, -2.0, -1.7320508, 3.0, 1e6), (-50.0, 0.0, 50.0)):
             pores = [wild, psi][: scene.state_count - 1]
-            for system in (equations_between_ruptures(s, clock=True) for s in (scene, massive)):
+            for system in (equations_between_ruptures(s, with_time=True) for s in (scene, massive)):
                 assert all(map(math.isfinite, system.evaluate_rates([wild, psi, *pores, 0.0])))
             for x in (-1e4, 0.0, 1e4):
                 assert all(

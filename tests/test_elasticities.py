@@ -15,7 +15,7 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantities import Output
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.rig.quantities import derive_scene_fields
+from rsfstudy.rig.quantities import derive_scene_fields_from_rig
 from rsfstudy.status import Status
 
 #: Where boundaries have closed forms that the norm does not show in.
@@ -236,7 +236,9 @@ def test_the_elasticities_that_uncertain_recurrence_states():
         ends = []
         for by in (-0.01, 0.01):
             rig = known | {name: known[name] * math.exp(by)}
-            cycle = LimitCycle(phases=2)(stated.base.with_(**derive_scene_fields(rig)), COMPILED)
+            cycle = LimitCycle(phases=2)(
+                stated.base.with_(**derive_scene_fields_from_rig(rig)), COMPILED
+            )
             interval = cycle.values["recurrence_interval"] * rig["slip_distance"]
             ends.append(math.log(interval / rig["reference_velocity"]))
         assert (ends[1] - ends[0]) / 0.02 == pytest.approx(value, abs=1e-3)

@@ -10,14 +10,18 @@ from study_runs import start_point
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.critical_steps.forward_motion import reaches_norm
+from rsfstudy.critical_steps.forward_motion import motion_reaches_norm
 from rsfstudy.errors import IncompleteWarning, NoResultWarning
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.events import EventKind, rise
 from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import MotionStopped, WorkMeter
-from rsfstudy.motion.regime_switching import CONTINUES, find_termination, termination_margin
+from rsfstudy.motion.regime_switching import (
+    CONTINUES,
+    find_termination_status,
+    margin_to_termination,
+)
 from rsfstudy.status import Status
 
 ENGINES = (SCIPY, COMPILED)
@@ -28,8 +32,12 @@ def test_a_margin_is_left_where_a_motion_goes_on():
     for load in (0.0, 1.0):
         for x in rates:
             for stress in stresses:
-                goes_on = find_termination(x, stress, load) == CONTINUES
-                assert (termination_margin(x, stress, load) > 1e-12) == goes_on, (x, stress, load)
+                goes_on = find_termination_status(x, stress, load) == CONTINUES
+                assert (margin_to_termination(x, stress, load) > 1e-12) == goes_on, (
+                    x,
+                    stress,
+                    load,
+                )
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -80,7 +88,7 @@ def test_the_norm_is_met_before_normal_stress_is_lost(engine):
         stepped = scene.with_(normal_stress_step=step)
         for rtol in (1e-6, 1e-8):
             asked = Accuracy(rtol, engine=engine), WorkMeter(100_000, engine=engine)
-            assert reaches_norm(stepped, *asked) is reached, (step, rtol)
+            assert motion_reaches_norm(stepped, *asked) is reached, (step, rtol)
 
 
 @pytest.mark.parametrize("rise_by", [0.5, 5.0, 11.0, 30.0, 60.0])

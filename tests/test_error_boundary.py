@@ -133,7 +133,7 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         (lambda r: RIG.in_units("x"), "dataset = 'x': must be an xarray.Dataset"),
         (lambda r: Scene().with_segment(None), "segment = None: must be a rsfstudy.Segment"),
         (
-            lambda r: rsfstudy.protocol([{"velocity": 2.0}]).describe_reversal(9),
+            lambda r: rsfstudy.protocol([{"velocity": 2.0}]).locate_load_point_reversal(9),
             "index = 9: is out of",
         ),
         (lambda r: Figure(panels=int), "panels = <class 'int'>: must be a list"),
@@ -281,12 +281,12 @@ def test_warnings_are_spelt_out():
 
 
 def test_headings_of_the_terminal_are_spelt_out(dataset, tmp_path, capsys):
-    from rsfstudy.cli.table_layout import print_piece
-    from rsfstudy.reporting.tables import Table
+    from rsfstudy.cli.table_layout import print_summary_piece
+    from rsfstudy.reporting.tables import TextTable
 
     rows = [{f"zeta ({ESCAPE})": "1", "why": "x" * 60}]
-    print_piece(Table(rows, caption=ESCAPE, wrappable={"why"}))
-    print_piece({ESCAPE: "1"})
+    print_summary_piece(TextTable(rows, caption=ESCAPE, wrappable_columns={"why"}))
+    print_summary_piece({ESCAPE: "1"})
     wide = {f"{n} {ESCAPE}": "y" * 30 for n in range(5)}
-    print_piece(Table([wide]))  # does not fit, and is printed as a list
+    print_summary_piece(TextTable([wide]))  # does not fit, and is printed as a list
     assert all(c.isprintable() or c == "\n" for c in capsys.readouterr().out)

@@ -23,9 +23,9 @@ from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import laws, stability, steady_state
 from rsfstudy.slider.equations import (
     Equations,
+    equations_against_displacement,
+    equations_against_inertial_time,
     equations_between_ruptures,
-    equations_by_displacement,
-    equations_by_inertial_time,
 )
 from rsfstudy.status import Status
 
@@ -66,7 +66,7 @@ def scene_of(fields: dict, ratio: float, log_slip_rate: float = 0.0) -> Scene:
 def eigenvalues(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
     """Of the assembled equations around a steady state, by central differences."""
     at, columns = np.array(state), []
-    for unit, scale in zip(np.eye(len(at)), equations.scales, strict=True):
+    for unit, scale in zip(np.eye(len(at)), equations.unknown_scales, strict=True):
         step = 1e-5 * scale * unit  # rounding and truncation balance
         ahead, behind = (equations.evaluate_rates(tuple((at + s).tolist())) for s in (step, -step))
         columns.append((np.array(ahead) - np.array(behind)) / (2e-5 * scale))
@@ -79,9 +79,12 @@ def test_growth_rates_are_eigenvalues_of_the_assembled_equations(fields, ratio, 
     """Their clock is slip and load point displacement: twice as fast as slip."""
     scene = scene_of(fields, ratio, log_slip_rate)
     found = steady_state.steady_sliding(scene, log_slip_rate)
-    equations, at = equations_by_displacement(scene), (found.spring_stress, *found.psis)
+    equations, at = equations_against_displacement(scene), (found.spring_stress, *found.states)
     assert np.abs(equations.evaluate_rates(at)).max() < 1e-13
-    ours, theirs = 0.5 * stability.growth_rates(scene, log_slip_rate), eigenvalues(equations, at)
+    ours, theirs = (
+        0.5 * stability.linear_growth_rates(scene, log_slip_rate),
+        eigenvalues(equations, at),
+    )
     assert len(ours) == 1 + scene.state_count
     # pore pressure may drain, and one of two states evolve, many times as fast as others:
     # differences have the digits of the fastest
@@ -94,9 +97,9 @@ def test_growth_rates_with_mass_are_eigenvalues_of_the_full_equations(fields):
     """In inertial time: w times as much."""
     scene = Scene(**{"stiffness_ratio": 0.9, **fields})
     found = steady_state.steady_sliding(scene, 0.0)
-    at = (found.spring_stress, 0.0, found.frictional_stress, *found.psis[1:])
-    ours = scene.inertial_time * stability.growth_rates(scene, 0.0)
-    theirs = eigenvalues(equations_by_inertial_time(scene), at)
+    at = (found.spring_stress, 0.0, found.frictional_stress, *found.states[1:])
+    ours = scene.inertial_time * stability.linear_growth_rates(scene, 0.0)
+    theirs = eigenvalues(equations_against_inertial_time(scene), at)
     np.testing.assert_allclose(np.sort_complex(ours), theirs, rtol=1e-6)
 
 
@@ -104,7 +107,7 @@ def test_growth_rates_with_mass_are_eigenvalues_of_the_full_equations(fields):
 def test_critical_stiffness_is_where_growth_begins(fields):
     """Linearly in what is missing of it; pore pressure that hardly drains makes it slow."""
     for off, grows in ((-1e-6, True), (1e-6, False)):
-        rates = stability.growth_rates(scene_of(fields, 1.0 + off, 0.7), 0.7)
+        rates = stability.linear_growth_rates(scene_of(fields, 1.0 + off, 0.7), 0.7)
         assert bool(rates[0].real > 0.0) is grows
         assert abs(rates[0].real) < 1e-5
 
@@ -158,7 +161,7 @@ def test_the_measure_finds_the_threshold_of_growth(
 def test_slip_rate_grows_as_the_unknowns_change(fields):
     """The growth of ln V that is told is that along the equations, away from steady sliding."""
     scene = Scene(**{"load_velocity_ratio": 3.0, "stiffness": 0.01, **fields})
-    equations = equations_between_ruptures(scene, clock=False)
+    equations = equations_between_ruptures(scene, with_time=False)
     at = scene.a * np.array([0.3, 0.2, 0.1, 0.05, 0.02][: 1 + scene.state_count])
     rates, step = np.array(equations.evaluate_rates(tuple(at))), 1e-5
     ahead, behind = (
@@ -195,7 +198,7 @@ def test_small_oscillations_grow_as_linear_theory_says(fields, ratio):
     # full equations are stiff this slowly: what sets them off must stand out from their errors
     small = 1e-4 if "period" in fields else 1e-5
     scene = Scene(stiffness_ratio=ratio, load_velocity_ratio=1.0, displacement_step=small, **fields)
-    rates = stability.growth_rates(scene, 0.0)
+    rates = stability.linear_growth_rates(scene, 0.0)
     turning = max((rate for rate in rates if rate.imag), key=lambda rate: rate.real)
     peaks = []
     for event in integrate_events(

@@ -36,7 +36,7 @@ from rsfstudy.study import catalogue
 from rsfstudy.study.figure_declarations import Figure, Panel
 
 #: Fields of every scene; others are among its values only if they are stated.
-PLAIN = tuple(name for name in registry.FIELD_NAMES if name not in registry.OMITTED_IF_NONE)
+PLAIN = tuple(name for name in registry.FIELD_NAMES if name not in registry.FIELDS_OMITTED_IF_NONE)
 EXAMPLES = sorted((Path(__file__).parent / "extensions").glob("*.py"))
 #: One cell of each.
 PLACES = {
@@ -398,7 +398,7 @@ def test_a_part_has_as_many_numbers_as_there_are_places():
 
     scene = Scene(normal_stress=made(Unvaried, name="numerous", numbers=numbers), stiffness=0.01)
     with pytest.raises(InvalidValue, match="'numerous': states 3 numbers, .* places for 2"):
-        _asked = scene.numbers
+        _asked = scene.parameter_values
 
 
 def test_a_field_may_be_stated_anew_with_another_default():

@@ -27,7 +27,7 @@ from rsfstudy.cli import assignments, printing
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RunError
 from rsfstudy.execution import clusters, runner, workers
-from rsfstudy.execution.plan import BatchIterator
+from rsfstudy.execution.plan import CellBatchIterator
 from rsfstudy.reductions import LinearFit, apply_reductions
 from rsfstudy.reporting import tables
 from rsfstudy.status import Status
@@ -109,7 +109,7 @@ def lost(*words, **options):
 
 def test_a_cell_that_kills_its_worker(sturdy, monkeypatch):
     """One batch holds the killer and its neighbours: only the killer is recorded."""
-    monkeypatch.setattr(BatchIterator, "next_size", lambda _self: 4)
+    monkeypatch.setattr(CellBatchIterator, "compute_next_batch_size", lambda _self: 4)
     dataset = lost(faulty_study("segfaults", at=(2.5,)), client=sturdy[0])
     only_one_failed(dataset, "worker_lost")
     assert "more memory than a worker may use" in dataset.message.values[1]
@@ -137,7 +137,9 @@ def test_a_cell_that_computes_for_ever(sturdy, monkeypatch):
     alone before it is blamed.
     """
     client, log = sturdy
-    monkeypatch.setattr(workers, "_MAX_WORKER_DEATHS", 1)  # a worker takes seconds to start
+    monkeypatch.setattr(
+        workers, "_MAX_WORKER_DEATHS_PER_CELL", 1
+    )  # a worker takes seconds to start
     dataset = lost(faulty_study("spins in C", at=(2.5,)), client=client, time_limit=0.5)
     only_one_failed(dataset, "time_limit_spent")
     assert "no answer within 0.5 s of CPU time" in dataset.message.values[1]
@@ -181,7 +183,7 @@ def test_if_everything_fails_at_the_start_the_run_stops_and_says_why(fault, tmp_
         run(faulty_study(fault, cells=100), output=tmp_path)
     partial = rsfstudy.open(tmp_path / "faulty.partial.nc")
     tried = partial.status != int(Status.PENDING)
-    assert runner._MAX_FIRST_FAILURES <= int(tried.sum()) < 100
+    assert runner._MAX_FAILURES_WITHOUT_SUCCESS <= int(tried.sum()) < 100
     assert not (tmp_path / "faulty.nc").exists()
 
 
@@ -253,7 +255,9 @@ def test_cells_with_awkward_labels_alone(tmp_path):
     dataset["status"][:, 1] = int(Status.UNVERIFIED)
     for number, label in enumerate(AWKWARD):
         place = {"study": label, "inertia": dataset.inertia.values[1]}
-        words = shlex.split(tables.rerun_command(dataset, str(tmp_path / "awkward.nc"), place))
+        words = shlex.split(
+            tables.format_recompute_command(dataset, str(tmp_path / "awkward.nc"), place)
+        )
         cells = dict(assignments.parse_cell_coordinate(text) for text in words if "=" in text)
         scene, _outcome = rsfstudy.recompute_cell(tmp_path / "awkward.nc", cells)
         assert (scene.b_over_a, scene.inertia) == (2.0 + number, True)
@@ -308,7 +312,11 @@ def test_workers_that_never_come(monkeypatch):
     """A scheduler without workers: the run says so, and ends with the reason."""
     from distributed import Client, LocalCluster
 
-    for name, seconds in {"_POLL_INTERVAL": 0.1, "WARN_AFTER": 0.2, "GIVE_UP_AFTER": 0.4}.items():
+    for name, seconds in {
+        "_POLL_INTERVAL": 0.1,
+        "WARN_AFTER_SECONDS_WITHOUT_WORKER": 0.2,
+        "GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER": 0.4,
+    }.items():
         monkeypatch.setattr(workers, name, seconds)
     with (
         LocalCluster(n_workers=0, **QUIET_CLUSTER_OPTIONS) as cluster,

@@ -448,5 +448,5 @@ def test_a_legend_is_read_line_by_line(count, columns):
 def test_units_stay_with_the_last_word(units):
     about = Quantity("recurrence", "", units, "recurrence interval of stick-slip")
     for width in range(8, 60):
-        last = _text.axis_label(about, width).split("\n")[-1]
+        last = _text.format_quantity_axis_label(about, width).split("\n")[-1]
         assert re.match(r"(?!\().*\(.*\)$", last)

@@ -18,11 +18,11 @@ from study_runs import call_main, cell_key, run
 import rsfstudy
 from rsfstudy import Scene, plots
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.execution.provenance import git_state
+from rsfstudy.execution.provenance import read_git_commit_and_state
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 from rsfstudy.storage import rebuild, schema, store
-from rsfstudy.storage.journal import Journal, OutputPacking
+from rsfstudy.storage.journal import CellJournal, OutputPacking
 from rsfstudy.study import catalogue, study_index
 
 
@@ -80,7 +80,9 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypat
 
 def test_what_reads_back_differently_is_not_put_in_place(tmp_path, monkeypatch):
     path = tmp_path / "trial.nc"
-    monkeypatch.setattr(store, "fill_value_encoding", lambda _d: {"v": {"dtype": "float32"}})
+    monkeypatch.setattr(
+        store, "encoding_without_fill_values", lambda _d: {"v": {"dtype": "float32"}}
+    )
     with pytest.raises(DataError, match="what was read back differs"):
         store.write_dataset(dataset(0.1), path)
     assert os.listdir(tmp_path) == []
@@ -113,21 +115,21 @@ KEYS = np.array([cell_key(Scene(b_over_a=b), Pair()) for b in (2.0, 3.0)], dtype
 
 
 def journal(tmp_path, fingerprint=None, **options):
-    return Journal(
+    return CellJournal(
         tmp_path / "trial.cells.sqlite", fingerprint or {"rtol": 1e-7}, LAYOUT, **options
     )
 
 
 def test_the_journal_returns_what_it_was_given(tmp_path):
     with journal(tmp_path) as kept:
-        kept.add([LAYOUT.pack_cell(KEYS[0].tobytes(), *DONE)])
+        kept.add_cells([LAYOUT.pack_cell(KEYS[0].tobytes(), *DONE)])
     with journal(tmp_path) as kept:
         assert kept.statuses(KEYS).tolist() == [Status.OK, Status.PENDING]
         found = kept.read_cells(KEYS)
-    assert found.status.tolist() == [Status.OK, Status.PENDING]
-    assert (found.work[0], found.seconds[0]) == (42, 0.1)
-    np.testing.assert_array_equal(found.numbers[0], [1.5, 1.0, np.nan])
-    assert np.isnan(found.numbers[1]).all()
+    assert found.statuses.tolist() == [Status.OK, Status.PENDING]
+    assert (found.rhs_evaluations[0], found.wall_times[0]) == (42, 0.1)
+    np.testing.assert_array_equal(found.packed_outputs[0], [1.5, 1.0, np.nan])
+    assert np.isnan(found.packed_outputs[1]).all()
 
 
 def test_a_damaged_journal_is_named(tmp_path):
@@ -139,7 +141,7 @@ def test_a_damaged_journal_is_named(tmp_path):
 
 def test_a_number_changed_in_the_journal_is_noticed(tmp_path):
     with journal(tmp_path) as kept:
-        kept.add([LAYOUT.pack_cell(KEYS[0].tobytes(), *DONE)])
+        kept.add_cells([LAYOUT.pack_cell(KEYS[0].tobytes(), *DONE)])
     path = tmp_path / "trial.cells.sqlite"
     right, wrong = np.array([1.5]).tobytes(), np.array([1.25]).tobytes()
     content = path.read_bytes()
@@ -152,7 +154,7 @@ def test_a_number_changed_in_the_journal_is_noticed(tmp_path):
 def test_a_result_moved_to_another_cell_of_the_journal_is_noticed(tmp_path):
     """It is whole, but for the other."""
     with journal(tmp_path) as kept:
-        kept.add([LAYOUT.pack_cell(KEYS[0].tobytes(), *DONE)])
+        kept.add_cells([LAYOUT.pack_cell(KEYS[0].tobytes(), *DONE)])
     with contextlib.closing(sqlite3.connect(tmp_path / "trial.cells.sqlite")) as db, db:
         db.execute("UPDATE cells SET key = ?", (KEYS[1].tobytes(),))
     with journal(tmp_path) as kept, pytest.raises(DataError, match="is damaged.*--fresh"):
@@ -192,10 +194,10 @@ def test_what_another_program_saved_is_read_and_told(small, tmp_path):
 
 
 def test_a_file_of_a_later_version_is_told_for_what_it_is(small, tmp_path):
-    later = xr.load_dataset(small).assign_attrs(layout=schema.LAYOUT_VERSION + 1)
+    later = xr.load_dataset(small).assign_attrs(layout=schema.FILE_LAYOUT_VERSION + 1)
     store.write_dataset(later, tmp_path / "later.nc")
     with pytest.raises(
-        DataError, match=f"layout is 3, and this version .* reads 1 to {schema.LAYOUT_VERSION}"
+        DataError, match=f"layout is 3, and this version .* reads 1 to {schema.FILE_LAYOUT_VERSION}"
     ):
         rsfstudy.open(tmp_path / "later.nc")
 
@@ -235,7 +237,7 @@ def test_git_tells_the_commit_and_whether_it_was_clean(tmp_path):
         command = ["git", "-C", str(tmp_path), *who, *words]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
-    assert git_state(tmp_path) == "none"
+    assert read_git_commit_and_state(tmp_path) == "none"
     git("init", "-q")
     for place in ("rsfstudy", "studies", "outputs"):
         (tmp_path / place).mkdir()
@@ -244,11 +246,11 @@ def test_git_tells_the_commit_and_whether_it_was_clean(tmp_path):
     git("commit", "-q", "-m", "x")
     commit = git("rev-parse", "HEAD")
     (tmp_path / "outputs" / "file.py").write_text("x = 2\n")
-    assert git_state(tmp_path) == f"{commit} clean"
-    assert git_state(tmp_path / "rsfstudy") == "none"
+    assert read_git_commit_and_state(tmp_path) == f"{commit} clean"
+    assert read_git_commit_and_state(tmp_path / "rsfstudy") == "none"
     for place in ("rsfstudy", "studies"):
         (tmp_path / place / "file.py").write_text("x = 2\n")
-        assert git_state(tmp_path) == f"{commit} with uncommitted changes"
+        assert read_git_commit_and_state(tmp_path) == f"{commit} with uncommitted changes"
         git("checkout", "-q", place)
 
 

@@ -63,9 +63,11 @@ def test_the_correlation_of_averages_is_removed() -> None:
     exact = np.maximum(1.0 - lags, 0.0) + 0.002 * np.eye(60)
     overlap = AveragingCorrelation(time, 1.0)
     root = np.linalg.inv(np.linalg.cholesky(exact))
-    np.testing.assert_allclose(overlap.whiten(np.eye(60)), root, atol=1e-9)
+    np.testing.assert_allclose(overlap.whiten_columns(np.eye(60)), root, atol=1e-9)
     assert overlap.log_determinant == pytest.approx(np.linalg.slogdet(exact)[1])
-    assert overlap.rows_per_independent_row == pytest.approx(5.0, rel=0.1)  # but for the ends
+    assert overlap.row_count_per_independent_sample == pytest.approx(
+        5.0, rel=0.1
+    )  # but for the ends
     line = apply_running_mean(time, time[:, None] ** 2, 1.0)[:, 0]
     # the mean of t^2 over 1 s is t^2 + 1/12; lines between rows add less than 0.2^2/2
     np.testing.assert_allclose(line[3:-3], time[3:-3] ** 2 + 1.0 / 12.0, atol=0.02)

@@ -20,9 +20,9 @@ from synthetic_records import (
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.fitting.load_point_errors import shift_steps
+from rsfstudy.fitting.load_point_errors import shift_steps_by_their_errors
 from rsfstudy.fitting.record import loading_history
-from rsfstudy.fitting.window_model import STEP_SHIFT_FRACTION, WindowModel
+from rsfstudy.fitting.window_model import STEP_SHIFT_IN_STANDARD_DEVIATIONS, WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import WorkMeter
 
@@ -74,7 +74,7 @@ def test_a_ramp_is_loaded_at_steady_acceleration() -> None:
     columns = {"time": times, "displacement": synthetic.load_point_displacement(RAMP, times)}
     columns["friction"] = synthetic.friction_and_sensitivities("slowness", times, RAMP)[0]
     one = rsfstudy.read_record(columns).with_steps([(40.0, 40.4, 1.0, 10.0)])
-    pieces = loading_history(one, 0.0, 50.0, from_rows=False)
+    pieces = loading_history(one, 0.0, 50.0, use_recorded_rows=False)
     ends = np.append(pieces[1:, 0], 50.0)
     moved = np.cumsum(pieces[:, 1] * (ends - pieces[:, 0]))
     lasts = np.clip(ends - 40.0, 0.0, 0.4)
@@ -122,10 +122,13 @@ def test_errors_of_steps_are_those_of_two_straight_lines() -> None:
     """
     one = with_noise(0.1, 0)
     times = np.array(
-        [[step[:4] for step in steps] for steps in shift_steps(one, one.loading_steps)]
+        [
+            [step[:4] for step in steps]
+            for steps in shift_steps_by_their_errors(one, one.loading_steps)
+        ]
     )
     variances = np.square(times - np.array([one.loading_steps[0][:4]])).sum(axis=(0, 1))
-    variances = variances[[0, 2, 3]] / STEP_SHIFT_FRACTION**2
+    variances = variances[[0, 2, 3]] / STEP_SHIFT_IN_STANDARD_DEVIATIONS**2
     (step,) = one.loading_steps
     counts = np.array([(one.time < step.start).sum(), (one.time >= step.start).sum()])
     lasts = np.array([step.start - one.time[0], one.time[-1] - step.start])
@@ -133,8 +136,8 @@ def test_errors_of_steps_are_those_of_two_straight_lines() -> None:
     exact = [of_time, *(12 * 0.01 / (counts * lasts**2))]
     # 400 rows tell s^2 to 7 per cent, and an order above 0 that chance may take to some more
     assert variances == pytest.approx(exact, rel=0.25)
-    assert shift_steps(one.with_steps([step[:4]]), [step]) == []
-    assert shift_steps(synthetic_record(), [step]) == []
+    assert shift_steps_by_their_errors(one.with_steps([step[:4]]), [step]) == []
+    assert shift_steps_by_their_errors(synthetic_record(), [step]) == []
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.9])

@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 
 from rsfstudy.fitting import intervals
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
-from rsfstudy.fitting.window_model import QUICK_DIFFERENCES, DifferenceScheme, Values
+from rsfstudy.fitting.window_model import QUICK_DIFFERENCE_SCHEME, DifferenceScheme, ParameterValues
 
 ROWS, SIZE = 80, 1e-3
 FREE = ("b", "slip_distance", "mu_star")
@@ -26,13 +26,13 @@ class Relaxation:
     def friction_per_window(self) -> list[np.ndarray]:
         return [self.friction]
 
-    def __init__(self, truth: Values, seed: int = 2) -> None:
+    def __init__(self, truth: ParameterValues, seed: int = 2) -> None:
         self.time = self.displacement = np.linspace(0.0, 30.0, ROWS)
         noise = np.random.default_rng(seed).standard_normal(ROWS)
         self.friction = self.model_friction(truth) + SIZE * noise
 
     def model_friction(
-        self, values: Values, *, refined: bool = False, require_stable: bool = False
+        self, values: ParameterValues, *, refined: bool = False, require_stable: bool = False
     ) -> np.ndarray:
         """The relaxation."""
         return np.asarray(
@@ -40,7 +40,7 @@ class Relaxation:
             - values["b"] * -np.expm1(-self.displacement / values["slip_distance"])
         )
 
-    def trend(self, _values: Values) -> np.ndarray:
+    def trend(self, _values: ParameterValues) -> np.ndarray:
         """None."""
         return np.zeros(ROWS)
 
@@ -48,18 +48,18 @@ class Relaxation:
         """Only its level is told without a step."""
         return name == "mu_star"
 
-    def check_parameters(self, values: Values) -> None:
+    def check_parameters(self, values: ParameterValues) -> None:
         """All is right."""
 
-    def loading_sensitivity(self, _values: Values) -> np.ndarray:
+    def loading_sensitivity(self, _values: ParameterValues) -> np.ndarray:
         """Nothing: no load point moves it."""
         return np.zeros((ROWS, 0))
 
     def jacobian(
         self,
-        values: Values,
+        values: ParameterValues,
         free: Sequence[str],
-        difference_scheme: DifferenceScheme = QUICK_DIFFERENCES,
+        difference_scheme: DifferenceScheme = QUICK_DIFFERENCE_SCHEME,
     ) -> np.ndarray:
         """In closed form."""
         over = self.displacement / values["slip_distance"]
@@ -96,8 +96,8 @@ def by_hand(model: Relaxation, b: float) -> float:
 
 def test_intervals_end_where_the_likelihood_has_fallen() -> None:
     model, search, found = fit(25.0)
-    far = intervals.stderr_multiplier(found, intervals.CONFIDENCE_LEVEL)
-    b = found.values["b"]
+    far = intervals.student_t_multiplier(found, intervals.CONFIDENCE_LEVEL)
+    b = found.parameter_values["b"]
     low, high = intervals.confidence_interval(search, found, "b")
     # squared distances are off by a fifth, to first order, where a parabola is nearly one
     for end, slack in ((low, 0.25), (high, 0.06)):
@@ -113,7 +113,7 @@ def test_noise_alone_tells_neither_b_nor_its_slip_distance() -> None:
         for seed in range(20):
             model = Relaxation(first | {"b": size}, seed)
             search = FitProblem(model, first, FREE, "ar")  # type: ignore[arg-type]
-            told[size] += not {"b", "slip_distance"} & set(search.solve().unidentified)
+            told[size] += not {"b", "slip_distance"} & set(search.solve().unidentified_parameters)
     # chance passes a difference of ten of criteria in some of a thousand records
     assert told[0.0] == 0
     assert told[4.0 * SIZE] > 15

@@ -19,7 +19,11 @@ from synthetic_records import (
 )
 
 from rsfstudy import Scene
-from rsfstudy.fitting.window_model import FINE_DIFFERENCES, QUICK_DIFFERENCES, WindowModel
+from rsfstudy.fitting.window_model import (
+    ACCURATE_DIFFERENCE_SCHEME,
+    QUICK_DIFFERENCE_SCHEME,
+    WindowModel,
+)
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import WorkMeter
 
@@ -69,12 +73,16 @@ def test_derivatives_are_those_of_the_augmented_equations(
     assert np.abs(model.model_friction(truth) - friction).max() < 1e-8 * truth["a"]
     largest = np.abs(exact).max(axis=0)
     fine = (
-        np.abs(model.jacobian(truth, SENSITIVITY_PARAMETERS, FINE_DIFFERENCES) - exact).max(axis=0)
+        np.abs(
+            model.jacobian(truth, SENSITIVITY_PARAMETERS, ACCURATE_DIFFERENCE_SCHEME) - exact
+        ).max(axis=0)
         / largest
     )
     assert (fine < 1e-6).all(), fine
     quick = (
-        np.abs(model.jacobian(truth, SENSITIVITY_PARAMETERS, QUICK_DIFFERENCES) - exact).max(axis=0)
+        np.abs(model.jacobian(truth, SENSITIVITY_PARAMETERS, QUICK_DIFFERENCE_SCHEME) - exact).max(
+            axis=0
+        )
         / largest
     )
     assert (quick < 2e-3).all(), quick  # enough to go downhill by
@@ -119,6 +127,6 @@ def test_derivatives_at_the_ends_of_the_family(exponent: float) -> None:
     del synthetic.LAW_FUNCTIONS["any"]
     weights = {1: 0.75, 2: -0.15, 3: 1.0 / 60.0}
     exact = sum(w / 0.02 * (moved[n] - moved[-n]) for n, w in weights.items())
-    found = model.jacobian(truth, ("law_exponent",), FINE_DIFFERENCES)[:, 0]
+    found = model.jacobian(truth, ("law_exponent",), ACCURATE_DIFFERENCE_SCHEME)[:, 0]
     # to one side the third order of the step, .005, is what is left
     assert np.abs(found - exact).max() < 2e-5 * np.abs(exact).max()

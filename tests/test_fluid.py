@@ -16,13 +16,13 @@ from rsfstudy import Scene, simulate
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import EventKind, maximum
-from rsfstudy.motion.integrate import events_along, integrate_events
+from rsfstudy.motion.integrate import integrate_events, iterate_events_of_equations
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLES, Recording
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import (
-    equations_of_rigid_slider,
+    equations_at_imposed_slip_rate,
 )
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.fluid.dilatant import DilatantFluid
@@ -86,10 +86,12 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
     scene = dilatant(0.01, drainage, load_velocity_ratio=rate, **CONSTANT)
     x, c, start = math.log(rate), drainage / rate, scene.a * math.log(rate)
     recording, meter = Recording(sample_times=np.array([0.1, 0.7, 2.0, 5.0])), WorkMeter(100_000)
-    equations = equations_of_rigid_slider(scene, x)
-    path = events_along(equations, (start, 0.0, 0.0), 1e-11, meter, recording=recording)
+    equations = equations_at_imposed_slip_rate(scene, x)
+    path = iterate_events_of_equations(
+        equations, (start, 0.0, 0.0), 1e-11, meter, recording=recording
+    )
     next(event for event in path if event.kind is EventKind.SAMPLED)
-    for row, asked in zip(recording.table(scene), recording.sample_times, strict=True):
+    for row, asked in zip(recording.as_table(scene), recording.sample_times, strict=True):
         slip, friction = (
             row[RECORDED_VARIABLES.index("slip")],
             row[RECORDED_VARIABLES.index("frictional_stress")] - 0.76,
@@ -186,7 +188,7 @@ class Tight(Fluid):
     auxiliary_rates = staticmethod(tight)
     auxiliary_steady_states = staticmethod(filled)
 
-    def numbers(self, scene):
+    def parameter_values(self, scene):
         return (self.opening,)
 
 
@@ -197,7 +199,7 @@ def test_a_fluid_of_your_own(law):
     """
     scene = Scene(law=law, fluid=Tight, opening=0.004, **CONSTANT)
     assert scene.critical_stiffness == pytest.approx(0.0145 - 0.76 * 0.004, rel=1e-11)
-    assert np.abs(stability.growth_rates(scene.with_(stiffness=0.01), 0.0)).min() < 1e-9
+    assert np.abs(stability.linear_growth_rates(scene.with_(stiffness=0.01), 0.0)).min() < 1e-9
     slipped = simulate(scene.with_(stiffness=0.02, load_velocity_ratio=1.5), duration=3.0)
     np.testing.assert_allclose(slipped["porosity"], -slipped["pore_pressure"], atol=1e-12)
 

@@ -22,7 +22,7 @@ import rsfstudy
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.referee import problem_files
 from rsfstudy.storage import store
-from rsfstudy.storage.journal import Journal, read_timings
+from rsfstudy.storage.journal import CellJournal, read_timings
 
 LONG = 130_000
 
@@ -110,15 +110,15 @@ def test_a_journal_with_a_hostile_fingerprint_is_refused_and_not_locked(
     fingerprint: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "trial.cells.sqlite"
-    with Journal(path, {"rtol": 1e-7}, LAYOUT):
+    with CellJournal(path, {"rtol": 1e-7}, LAYOUT):
         pass
     with contextlib.closing(sqlite3.connect(path)) as database, database:
         database.execute("UPDATE fingerprint SET json = ?", (fingerprint,))
     with pytest.raises(DataError, match="its fingerprint is damaged") as refused:
-        Journal(path, {"rtol": 1e-7}, LAYOUT)
+        CellJournal(path, {"rtol": 1e-7}, LAYOUT)
     assert refused.value.__traceback__ is not None  # which keeps its frames alive
     assert read_timings(path) is None
-    with Journal(path, {"rtol": 1e-7}, LAYOUT, fresh=True) as again:
+    with CellJournal(path, {"rtol": 1e-7}, LAYOUT, fresh=True) as again:
         assert again.statuses(np.empty(0, dtype="V16")).size == 0
 
 

@@ -10,7 +10,7 @@ from rsfstudy.named_studies._normal_stress_transient import NormalStressTransien
 
 from rsfstudy import Scene, simulate
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.monotone_approach import single_state_evolution
+from rsfstudy.critical_steps.monotone_approach import build_single_state_evolution_function
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
@@ -20,7 +20,7 @@ from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import laws, steady_state
-from rsfstudy.slider.equations import compute_steady_states, state_evolution
+from rsfstudy.slider.equations import build_state_evolution_function, compute_steady_states
 from rsfstudy.slider.laws.composite import lambert_w
 from rsfstudy.slider.scene_functions import build_scene_functions, velocity_ratios
 from rsfstudy.status import Status
@@ -35,7 +35,7 @@ def test_every_law_rests_where_it_says(law):
     of order ten, times b.
     """
     scene = Scene(law=law)
-    evolutions = state_evolution(scene)
+    evolutions = build_state_evolution_function(scene)
     for log_slip_rate in (-30.0, 0.0, 12.0):
         steady = compute_steady_states(scene, log_slip_rate, 0.0)
         if law not in CUT_OFFS:
@@ -53,7 +53,7 @@ def test_every_law_rests_where_it_says(law):
 @pytest.mark.parametrize("law", CUT_OFFS)
 def test_friction_is_mu_star_at_the_reference_rate(law, cutoff):
     scene = Scene(law=law, cutoff_velocity_ratio=cutoff, stiffness=0.01)
-    assert steady_state.steady_friction_excess(scene, 0.0) == pytest.approx(0.0, abs=1e-16)
+    assert steady_state.steady_friction_minus_reference(scene, 0.0) == pytest.approx(0.0, abs=1e-16)
 
 
 @given(st.floats(-3000.0, 30.0), st.floats(-60.0, 60.0), st.floats(-20.0, 5.0))
@@ -67,9 +67,9 @@ def test_evolution_goes_over_to_that_of_stationary_contact(log_slip_rate, log_th
 
     def evolving(law: str) -> float:
         scene = Scene(law=law, a=0.5 * b, load_velocity_ratio=load)
-        x, _slower, share = velocity_ratios(log_slip_rate, scene.numbers)
-        return build_scene_functions(scene).friction.evolutions(
-            x, (b * log_theta,), 0.0, share, scene.numbers
+        x, _slower, share = velocity_ratios(log_slip_rate, scene.parameter_values)
+        return build_scene_functions(scene).friction_functions.evolutions(
+            x, (b * log_theta,), 0.0, share, scene.parameter_values
         )[0]
 
     # exp(-100) of the slip rate is taken too much where slip is slower than that
@@ -87,9 +87,9 @@ def test_the_ends_of_the_family_are_the_two_laws_of_the_paper(log_slip_rate, sta
     """To the last bit: they are the same arithmetic."""
     for exponent, law in ((0.0, "slip"), (1.0, "slowness")):
         ours, theirs = Scene(law="family", law_exponent=exponent), Scene(law=law)
-        assert single_state_evolution(ours)(log_slip_rate, state) == single_state_evolution(theirs)(
+        assert build_single_state_evolution_function(ours)(
             log_slip_rate, state
-        )
+        ) == build_single_state_evolution_function(theirs)(log_slip_rate, state)
 
 
 @given(st.floats(-30, 30), st.floats(-20, 20))
@@ -99,10 +99,10 @@ def test_cut_offs_beyond_all_slip_leave_plainer_laws(log_slip_rate, log_theta):
     """
     state = 0.029 * log_theta
     for law, cutoff, plain in (("composite", 1e-300, "slip"), ("cut_off", 1e300, "slowness")):
-        ours = single_state_evolution(Scene(law=law, cutoff_velocity_ratio=cutoff))(
+        ours = build_single_state_evolution_function(Scene(law=law, cutoff_velocity_ratio=cutoff))(
             log_slip_rate, state
         )
-        theirs = single_state_evolution(Scene(law=plain))(log_slip_rate, state)
+        theirs = build_single_state_evolution_function(Scene(law=plain))(log_slip_rate, state)
         assert ours == pytest.approx(theirs, rel=1e-13, abs=1e-15)
 
 

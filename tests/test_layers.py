@@ -161,7 +161,7 @@ def test_a_worker_loads_nothing_more_for_a_measure_in_the_file_of_a_study(tmp_pa
     """It is sent what the measure draws on, and not what declares, reduces and draws."""
     for name in study_index.study_names():
         study = catalogue.load_study(name)
-        task = cells.Task(study.base, study.measure, study.accuracy)
+        task = cells.CellTask(study.base, study.measure, study.accuracy)
         (tmp_path / name).write_bytes(cells.serialize_task(task))
     heavy = {"xarray", "pandas", "matplotlib", "netCDF4", "numba"}
     asked = (

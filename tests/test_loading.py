@@ -16,7 +16,7 @@ from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider.loading import Loading, Segment
 from rsfstudy.slider.parts import number
-from rsfstudy.slider.stability import growth_rates
+from rsfstudy.slider.stability import linear_growth_rates
 from rsfstudy.status import Status
 
 
@@ -149,8 +149,8 @@ def test_no_strength_is_the_scene_without_the_effect(idle, still, law):
     plain = Scene(law=law, **still)
     scene = plain.with_(**idle)
     assert scene == plain
-    assert scene.numbers == plain.numbers
-    assert scene.functions is plain.functions
+    assert scene.parameter_values == plain.parameter_values
+    assert scene.equation_functions is plain.equation_functions
     assert scene.state_count == plain.state_count
 
 
@@ -171,8 +171,8 @@ def test_steady_sliding_and_its_stability_are_those_before_normal_stress_changes
     assert scene.stiffness == still.stiffness
     if "normal_stress_step" in change:  # after which sliding is steady at another stress
         return
-    rates = growth_rates(still, still.log_load_velocity)
-    assert growth_rates(scene, scene.log_load_velocity) == pytest.approx(rates)
+    rates = linear_growth_rates(still, still.log_load_velocity)
+    assert linear_growth_rates(scene, scene.log_load_velocity) == pytest.approx(rates)
     one, other = (LinearStability()(which, Accuracy()) for which in (scene, still))
     assert one.status is other.status is Status.OK
     assert dict(one.values) == pytest.approx(dict(other.values), rel=1e-12, nan_ok=True)

@@ -23,11 +23,11 @@ import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
-from rsfstudy.execution.plan import Plan
+from rsfstudy.execution.plan import CellPlan
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 from rsfstudy.storage import rebuild, schema
-from rsfstudy.storage.lattice import build_coordinates
+from rsfstudy.storage.lattice import build_lattice_coordinates
 
 BOTH = study_of(
     "both",
@@ -149,7 +149,9 @@ def test_cells_are_found_again_by_the_fields_of_their_measure(tmp_path):
 
 def test_cells_differ_even_where_a_measure_does_not_say_so():
     silent = type("Silent", (Scaled,), {"describe": lambda self: {"name": "silent"}})
-    assert len(Plan(scaled(Axis("factor", [1.0, 2.0]), measure=silent())).unique_cells) == 4
+    assert (
+        len(CellPlan(scaled(Axis("factor", [1.0, 2.0]), measure=silent())).unique_cell_numbers) == 4
+    )
 
 
 def test_claims_and_selection_reach_a_place_on_the_axis():
@@ -176,7 +178,8 @@ def test_the_file_alone_reproduces_its_cells(tmp_path):
     restored = rebuild.study_from_declaration(schema.read_declaration(rsfstudy.open(file)), {})
     assert restored.describe() == BOTH.describe()
     xr.testing.assert_identical(
-        xr.Dataset(coords=build_coordinates(restored)), xr.Dataset(coords=build_coordinates(BOTH))
+        xr.Dataset(coords=build_lattice_coordinates(restored)),
+        xr.Dataset(coords=build_lattice_coordinates(BOTH)),
     )
     table = rsfstudy.rerun(file, workers=0, progress=False)
     assert (table["values"] == table["identical"]).all()

@@ -12,8 +12,8 @@ from conftest import cot_phi
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.critical_steps.monotone_approach import single_state_evolution
-from rsfstudy.slider.equations import friction_relation
+from rsfstudy.critical_steps.monotone_approach import build_single_state_evolution_function
+from rsfstudy.slider.equations import build_friction_relation
 
 PAGE = (Path(__file__).parent.parent / "studies" / "MISPRINTS.md").read_text()
 
@@ -23,8 +23,10 @@ def test_eq_3():
     scene = Scene(alpha=0.56, phi=60.0)
     stress = 0.3  # of shear stress; normal stress follows
     change = cot_phi(scene) * stress
-    psi = friction_relation(scene)(stress)[0]  # the state at which V stays V_* under that stress
-    state_change = psi - friction_relation(scene)(stress)[2]
+    psi = build_friction_relation(scene)(stress)[
+        0
+    ]  # the state at which V stays V_* under that stress
+    state_change = psi - build_friction_relation(scene)(stress)[2]
     friction = scene.mu_star + state_change
     assert (1.0 + change) * friction == pytest.approx(scene.mu_star + stress, rel=1e-14)
     jump = -scene.alpha * math.log1p(change)
@@ -38,7 +40,7 @@ def test_eq_3():
 def test_eq_4b():
     """dTheta per unit slip is b dtheta/theta per unit slip, with dtheta/dt = 1 - theta V."""
     b, theta, rate = 0.029, 0.7, 3.0
-    per_slip = single_state_evolution(Scene(law="slowness", a=b / 2.0))(
+    per_slip = build_single_state_evolution_function(Scene(law="slowness", a=b / 2.0))(
         math.log(rate), b * math.log(theta)
     )
     assert per_slip == pytest.approx(b * (1.0 - theta * rate) / theta / rate, rel=1e-13)

@@ -11,7 +11,7 @@ from rsfstudy import Axis, Panel, Scene, Study, plots
 from rsfstudy.errors import DataError
 from rsfstudy.plots import _text, lines
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.rig.scales import Scale, apply_scales
+from rsfstudy.rig.scales import UnitScale, apply_scales_to_dataset
 from rsfstudy.status import Status
 from rsfstudy.study import catalogue
 
@@ -125,8 +125,8 @@ def test_more_panels_than_can_be_read_are_lines_or_maps():
 def test_what_is_in_units_is_called_no_ratio():
     held = {"scale": "D_c", "units": "1", "long_name": "load point displacement"}
     ratio = xr.Dataset({"moved": ((), 2.0, {**held, "symbol": r"$\delta_0/D_c$"})})
-    scales = {"D_c": Scale(10.0, "um"), "V_*": Scale(1.0, "um s-1")}
-    moved = apply_scales(ratio, scales)["moved"]
+    scales = {"D_c": UnitScale(10.0, "um"), "V_*": UnitScale(1.0, "um s-1")}
+    moved = apply_scales_to_dataset(ratio, scales)["moved"]
     assert moved.attrs == {"units": "um", "long_name": "load point displacement"}
 
 

@@ -10,7 +10,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.events import maximum
 from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.motion.neglected_inertia import estimate_neglected_inertia
+from rsfstudy.motion.neglected_inertia import estimate_neglected_inertia_error
 from rsfstudy.motion.recording import REGIME_COLUMN, Recording
 from rsfstudy.responses._readings import growth_rate_along_path
 from rsfstudy.responses.healing import Healing
@@ -70,14 +70,14 @@ def recorded(scene, rtol):
     recording, accuracy = Recording(), Accuracy(rtol, engine="compiled")
     list(integrate_events(scene, accuracy, WorkMeter(10_000_000, engine="compiled"), with_time=True,
                 recording=recording, until=12.0))  # fmt: skip
-    return recording, recording.table(scene)
+    return recording, recording.as_table(scene)
 
 
 def test_a_scene_without_inertia_neglects_none():
     scene = Scene(law="slip", stiffness_ratio=2.0, load_velocity_ratio=3.0)
     recording, rows = recorded(scene, 1e-6)
-    slow = recording.regime_number(scene.dynamics.regime)
-    assert not estimate_neglected_inertia(scene, rows, slow, 0.0).any()
+    slow = recording.index_of_regime(scene.dynamics.regime)
+    assert not estimate_neglected_inertia_error(scene, rows, slow, 0.0).any()
 
 
 def test_estimate_goes_with_the_accuracy():
@@ -87,8 +87,8 @@ def test_estimate_goes_with_the_accuracy():
     scene, found = CASES[2][2], []
     for rtol in (1e-4, 1e-5, 1e-6, 1e-8):
         recording, rows = recorded(scene, rtol)
-        slow = recording.regime_number(scene.dynamics.regime)
-        estimate = estimate_neglected_inertia(scene, rows, slow, 0.0)
+        slow = recording.index_of_regime(scene.dynamics.regime)
+        estimate = estimate_neglected_inertia_error(scene, rows, slow, 0.0)
         assert (np.diff(estimate) >= 0.0).all()
         found.append(estimate[-1] / rtol)
         assert (estimate[-1] > 0.0) == bool((rows[:, REGIME_COLUMN] == slow).any())

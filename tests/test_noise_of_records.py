@@ -12,8 +12,8 @@ from scipy.stats import chi2
 
 from rsfstudy.fitting import noise as noises
 from rsfstudy.fitting.noise import NoiseModel
-from rsfstudy.fitting.outliers import find_kept_mask, find_quantum
-from rsfstudy.fitting.sampling_runs import SamplingRun, find_level_changes, find_runs
+from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quantum
+from rsfstudy.fitting.sampling_runs import SamplingRun, find_level_changes, find_sampling_runs
 
 #: Coefficients of an autoregressive process of third order, with a pair of complex roots.
 AR3 = -np.real(np.poly([0.8, 0.5 + 0.4j, 0.5 - 0.4j]))[1:]
@@ -57,12 +57,21 @@ CHANGING = NoiseModel(JOINED, np.array([partial(AR3)] * 2), np.array(SIZES))
 def dense(noise: NoiseModel) -> np.ndarray:
     """The covariance: runs of an AR(3) and of an AR(1) process in blocks, or one AR(3) process."""
     seen = [correlations(AR3, 300), correlations(np.array([0.9]), 300)]
-    sizes = np.concatenate([[noise.level_sds[r.process]] * (r.stop - r.start) for r in noise.runs])
+    sizes = np.concatenate(
+        [
+            [noise.noise_level_standard_deviations[r.noise_process_index]]
+            * (r.stop_row - r.start_row)
+            for r in noise.sampling_runs
+        ]
+    )
     if noise is CHANGING:
         return np.asarray(toeplitz(seen[0][:130]) * np.outer(sizes, sizes))
     if not noise.partial_autocorrelations.any():
         return np.diag(sizes**2)
-    blocks = [toeplitz(seen[r.process][: r.stop - r.start]) for r in noise.runs]
+    blocks = [
+        toeplitz(seen[r.noise_process_index][: r.stop_row - r.start_row])
+        for r in noise.sampling_runs
+    ]
     return np.asarray(block_diag(*blocks) * np.outer(sizes, sizes))
 
 
@@ -70,7 +79,7 @@ def dense(noise: NoiseModel) -> np.ndarray:
 def test_whitening_is_that_of_the_triangle_of_the_correlation_matrix(noise: NoiseModel) -> None:
     matrix = dense(noise)
     triangle = np.linalg.cholesky(matrix)
-    found = noise.whiten(np.eye(len(matrix)))
+    found = noise.whiten_columns(np.eye(len(matrix)))
     # rounding times the condition of the matrix, 1e3
     np.testing.assert_allclose(found, np.linalg.inv(triangle), atol=1e-11)
     exact = 2.0 * np.log(np.diag(triangle)).sum()
@@ -84,7 +93,9 @@ def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices(
     rng = np.random.default_rng(1)
     jacobian = np.column_stack([np.ones(130), np.linspace(0.0, 50.0, 130), rng.normal(size=130)])
     residuals = 1e-3 * rng.normal(size=130)
-    products = noises._LaggedProducts(noise.runs, np.column_stack([jacobian, residuals]), 3)
+    products = noises._LaggedProducts(
+        noise.sampling_runs, np.column_stack([jacobian, residuals]), 3
+    )
 
     def exact(matrix: np.ndarray) -> float:
         told = jacobian.T @ np.linalg.solve(matrix, jacobian)
@@ -94,7 +105,7 @@ def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices(
         logs = np.linalg.slogdet(matrix)[1] + np.linalg.slogdet(told)[1]
         return float((130 - 3) * math.log(squares) + logs)
 
-    plain = NoiseModel(noise.runs, np.zeros((2, 3)), np.array([1.0, 2.0]))
+    plain = NoiseModel(noise.sampling_runs, np.zeros((2, 3)), np.array([1.0, 2.0]))
     apart = exact(dense(noise)) - exact(dense(plain))
     assert products.reml_objective(noise) - products.reml_objective(plain) == pytest.approx(
         apart, abs=1e-8
@@ -109,8 +120,8 @@ def test_independent_samples_of_first_order() -> None:
 def test_degrees_of_freedom_count_the_coefficients_that_are_found() -> None:
     """In closed form for first order; else by how the power at zero frequency scatters."""
     one = NoiseModel((SamplingRun(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
-    assert one.degrees_of_freedom == pytest.approx(500 / (1 + 2 * 1.9 / 0.1))
-    assert noises.white_noise(np.arange(500.0)).degrees_of_freedom == 500
+    assert one.degrees_of_freedom_of_slow_noise == pytest.approx(500 / (1 + 2 * 1.9 / 0.1))
+    assert noises.white_noise(np.arange(500.0)).degrees_of_freedom_of_slow_noise == 500
     rng, logs = np.random.default_rng(7), []
     for _ in range(400):
         drawn = lfilter([1.0], [1.0, *(-AR3)], rng.normal(size=3_200))[200:]
@@ -122,7 +133,7 @@ def test_degrees_of_freedom_count_the_coefficients_that_are_found() -> None:
         logs.append(math.log(np.var(drawn) / found.effective_sample_size))
     exact = NoiseModel(
         (SamplingRun(0, 3_000, 0, 0, 0),), np.array([partial(AR3)]), np.ones(1)
-    ).degrees_of_freedom
+    ).degrees_of_freedom_of_slow_noise
     # a variance of 400 draws has a standard error of a fourteenth
     assert 2.0 / np.var(logs) == pytest.approx(exact, rel=0.25)
 
@@ -155,7 +166,7 @@ def test_the_order_is_chosen(order: int, coefficients: np.ndarray) -> None:
     chosen = []
     for _ in range(20):
         left = lfilter([1.0], [1.0, *(-coefficients)], rng.normal(size=800))
-        chosen.append(noises._select_order([[left]]))
+        chosen.append(noises._select_autoregressive_order([[left]]))
     assert min(chosen) >= order
     assert np.median(chosen) == order  # the criterion takes too many at times, too few seldom
 
@@ -167,16 +178,20 @@ def test_noise_of_other_sampling_intervals_is_another() -> None:
     fast = lfilter([1.0], [1.0, -0.95], rng.normal(size=1_500))[600:] * math.sqrt(1 - 0.95**2)
     left = np.concatenate([slow, 3.0 * fast])
     found = noises.fit_noise("ar1", time, left, np.ones((1_500, 1)))
-    assert [(*run[:2], run.preceding_rows) for run in found.runs] == [
+    assert [(*run[:2], run.preceding_rows) for run in found.sampling_runs] == [
         (0, 600, 0),
         (600, 1_500, 600),
     ]
-    coefficients = dict(zip([run.process for run in found.runs], (0.5, 0.95), strict=True))
+    coefficients = dict(
+        zip([run.noise_process_index for run in found.sampling_runs], (0.5, 0.95), strict=True)
+    )
     for number, exact in coefficients.items():
         assert found.partial_autocorrelations[number, 0] == pytest.approx(exact, abs=0.12)
     for noise in (found, noises.fit_noise("white", time, left, np.ones((1_500, 1)))):
         # 900 samples at .95 are 23 independent ones, which tell a size to 15 per cent
-        sizes = noise.level_sds[[run.level for run in noise.runs]]
+        sizes = noise.noise_level_standard_deviations[
+            [run.noise_level_index for run in noise.sampling_runs]
+        ]
         assert sizes[1] / sizes[0] == pytest.approx(3.0, rel=0.5)
 
 
@@ -185,7 +200,7 @@ def test_a_clock_that_is_uneven_is_one_process(quantum: float) -> None:
     """Intervals that vary, or that a logger has rounded to one or two ticks, tell one noise."""
     rng = np.random.default_rng(6)
     time = np.cumsum(np.where(rng.random(2_000) < 0.5, 1.0, 2.0 if quantum else 1.2)) * 0.01
-    assert find_runs(time) == (SamplingRun(0, 2_000, 0, 0, 0),)
+    assert find_sampling_runs(time) == (SamplingRun(0, 2_000, 0, 0, 0),)
 
 
 @pytest.mark.parametrize("order", [0, 3])
@@ -209,11 +224,11 @@ def test_the_noise_level_may_change(rho: float) -> None:
     left = lfilter([1.0], [1.0, -rho], rng.normal(size=900))
     left[300:] *= 4.0
     found = noises.fit_noise("ar", np.arange(900.0), left, np.ones((900, 1)))
-    assert len(found.level_sds) == 2
-    assert abs(found.runs[1].start - 300) < 30
-    assert found.level_sds[1] == pytest.approx(4.0, rel=0.3)
+    assert len(found.noise_level_standard_deviations) == 2
+    assert abs(found.sampling_runs[1].start_row - 300) < 30
+    assert found.noise_level_standard_deviations[1] == pytest.approx(4.0, rel=0.3)
     # the level, not the whole record, decides on the error of the quiet part
-    weights = found.whiten(np.ones((900, 1)))[:, 0] ** 2
+    weights = found.whiten_columns(np.ones((900, 1)))[:, 0] ** 2
     assert weights[:250].sum() > 4.0 * weights[350:600].sum()
 
 
@@ -237,9 +252,11 @@ def test_a_clock_with_jitter_keeps_its_two_sampling_rates() -> None:
     rng = np.random.default_rng(13)
     gaps = np.repeat([0.2, 0.02], [200, 1_000])
     time = np.cumsum(gaps) + 0.3 * gaps * rng.uniform(-1.0, 1.0, 1_200)
-    runs = find_runs(time)
-    assert [run.process for run in runs] == [1, 0] or [run.process for run in runs] == [0, 1]
-    assert abs(runs[0].stop - 200) < 10
+    runs = find_sampling_runs(time)
+    assert [run.noise_process_index for run in runs] == [1, 0] or [
+        run.noise_process_index for run in runs
+    ] == [0, 1]
+    assert abs(runs[0].stop_row - 200) < 10
 
 
 def test_outliers_are_found_and_peaks_of_the_model_are_not() -> None:
@@ -249,24 +266,24 @@ def test_outliers_are_found_and_peaks_of_the_model_are_not() -> None:
     left[spikes] += 0.02
     curve[250:] = 0.05 * np.exp(-np.arange(250) / 2.0)
     left[250] += 0.02  # a misfit at the step
-    kept = find_kept_mask(left, curve, 0.0)
+    kept = find_non_outlier_mask(left, curve, 0.0)
     assert kept is not None
     assert np.flatnonzero(~kept).tolist() == spikes
-    assert find_kept_mask(1e-3 * rng.normal(size=500), curve, 0.0) is None
+    assert find_non_outlier_mask(1e-3 * rng.normal(size=500), curve, 0.0) is None
 
 
 @pytest.mark.parametrize("change", [130, 160])
 def test_rows_after_a_change_of_the_noise_level_are_no_outliers(change: int) -> None:
     left = 1e-4 * np.random.default_rng(16).normal(size=500)
     left[change:] *= 10.0
-    assert find_kept_mask(left, np.zeros(500), 0.0) is None
+    assert find_non_outlier_mask(left, np.zeros(500), 0.0) is None
 
 
 def test_the_quantum_of_values_is_found() -> None:
     rng = np.random.default_rng(15)
     values = 0.6 + 2e-3 * rng.normal(size=400)
-    assert find_quantum(np.round(values, 3)) == pytest.approx(1e-3)
-    assert find_quantum(values) == 0.0
-    assert find_quantum(np.full(10, 0.6)) == 0.0
+    assert find_rounding_quantum(np.round(values, 3)) == pytest.approx(1e-3)
+    assert find_rounding_quantum(values) == 0.0
+    assert find_rounding_quantum(np.full(10, 0.6)) == 0.0
     shear = 0.0025 * np.rint(20.0 * values / 0.0025)
-    assert find_quantum(shear / 20.0) == pytest.approx(0.0025 / 20.0)
+    assert find_rounding_quantum(shear / 20.0) == pytest.approx(0.0025 / 20.0)

@@ -16,9 +16,9 @@ from rsfstudy.critical_steps import critical_step
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.critical_steps.forward_motion import (
     has_frictional_damping_only,
-    is_neutral,
+    is_neutrally_stable,
     may_have_closed_orbits,
-    reaches_norm,
+    motion_reaches_norm,
 )
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.meter import WorkMeter
@@ -47,7 +47,9 @@ def test_an_extreme_law():
     )
     value, error, _outcome = found(scene)
     q = 1.0 / (1.0 + value)
-    start = closed_forms.offset_after_stress_fall(scene.mu_star, scene.a, scene.b_over_a, 0.4, q)
+    start = closed_forms.steady_state_offset_after_normal_stress_fall(
+        scene.mu_star, scene.a, scene.b_over_a, 0.4, q
+    )
     assert start == pytest.approx(math.asinh(2.0 * q), abs=(error + 1e-7 * abs(value)) / scene.a)
 
 
@@ -122,7 +124,7 @@ def test_either_side_of_a_fall(law, stress, dynamics, ratio, b_over_a, moves):
         return
     for side, reached in ((1.0 - 1e-4, False), (1.0 + 1e-4, True)):
         stepped = scene.with_(normal_stress_step=math.expm1(side * math.log1p(value)))
-        assert reaches_norm(stepped, Accuracy(1e-6), WorkMeter(200_000)) is reached
+        assert motion_reaches_norm(stepped, Accuracy(1e-6), WorkMeter(200_000)) is reached
 
 
 @pytest.mark.parametrize("dynamics", DYNAMICS, ids=str)
@@ -130,7 +132,7 @@ def test_paths_and_motions_agree(dynamics, monkeypatch):
     """What is shot for, and what a survey by motions alone closes in on."""
     scene = Scene(**STRESSES[2], **dynamics, stiffness_ratio=1.2, load_velocity_ratio=1.0)
     value, error, _outcome = found(scene)
-    for shot in ("find_by_critical_path", "find_by_touching_cycle"):
+    for shot in ("find_boundary_by_critical_path", "find_boundary_by_limit_cycle"):
         monkeypatch.setattr(critical_step, shot, lambda *_asked: None)
     forward, its_error, _outcome = found(scene, accuracy=Accuracy(1e-5))
     assert abs(value - forward) <= error + its_error
@@ -169,8 +171,8 @@ def test_normal_stress_that_is_imposed_is_constant_between_steps():
     after = stability.critical_stiffness(stepped, stepped.log_load_velocity)
     assert after == pytest.approx(1.25 * scene.critical_stiffness, rel=1e-9)
     law = {"law": "perrin_rice_zheng"}
-    assert is_neutral(stepped.with_(**law), 1e-6)
-    assert not is_neutral(scene.with_(**law, normal_stress_step=0.25), 1e-6)
+    assert is_neutrally_stable(stepped.with_(**law), 1e-6)
+    assert not is_neutrally_stable(scene.with_(**law, normal_stress_step=0.25), 1e-6)
 
 
 def test_coulomb_stresses_add_up():

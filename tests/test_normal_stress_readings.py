@@ -13,7 +13,7 @@ from rsfstudy.named_studies._normal_stress_transient import NormalStressTransien
 from rsfstudy import Scene, simulate
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.slider.stability import response_to_normal_stress
+from rsfstudy.slider.stability import spring_response_to_normal_stress
 from rsfstudy.status import Status
 
 LAWS = ("slip", "slowness")
@@ -48,7 +48,7 @@ def test_linear_theory_is_the_formula(law, velocity):
     a, b, stiffness, rate = scene.a, scene.b, scene.stiffness, math.log(velocity)
     mu, z = scene.mu_star + (a - b) * rate, 2j * math.pi / PERIOD / velocity
     form = stiffness * (mu + (mu - 0.3) * z) / (a * z * z + (stiffness - b + a) * z + stiffness)
-    ours = response_to_normal_stress(scene, rate, 2.0 * math.pi / PERIOD)
+    ours = spring_response_to_normal_stress(scene, rate, 2.0 * math.pi / PERIOD)
     assert ours == pytest.approx(form, rel=1e-11)
 
 
@@ -59,12 +59,12 @@ def test_waves_and_mass_resist():
         Scene(law="slip", **IMPOSED, **OSCILLATES, **more)
         for more in ({}, {"radiation_damping": 0.01}, HEAVY)
     )
-    base = response_to_normal_stress(plain, 0.0, abs(z))
+    base = spring_response_to_normal_stress(plain, 0.0, abs(z))
     stiffness = plain.stiffness
     above = stiffness * (plain.mu_star + (plain.mu_star - 0.3) * z)
     for scene, more in ((waves, 0.01 * z), (heavy, stiffness * 0.05**2 * z * z)):
         expected = above / (above / base + more * (1.0 + z))
-        ours = response_to_normal_stress(scene, 0.0, abs(z))
+        ours = spring_response_to_normal_stress(scene, 0.0, abs(z))
         assert ours == pytest.approx(expected, rel=1e-11)
 
 
@@ -82,7 +82,9 @@ def test_waves_and_mass_resist():
 def test_motions_tend_to_linear_theory_as_the_square_of_their_amplitude(fields):
     """What is left at two amplitudes falls by four; without that, they agree to the accuracy."""
     scene = Scene(**{**OSCILLATES, **fields})
-    linear = response_to_normal_stress(scene, scene.log_load_velocity, 2.0 * math.pi / PERIOD)
+    linear = spring_response_to_normal_stress(
+        scene, scene.log_load_velocity, 2.0 * math.pi / PERIOD
+    )
     large, small = (response(scene, amplitude) / linear - 1.0 for amplitude in (1e-3, 5e-4))
     assert abs(large / small) == pytest.approx(4.0, rel=0.1)
     assert abs(4.0 * small - large) / 3.0 < 0.02 * abs(large) + 2e-6

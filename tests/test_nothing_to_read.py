@@ -112,7 +112,7 @@ def test_each_number_is_described_once(measure):
     """
     own = {about.name: about for about in measure.quantities}
     assert len(own) == len(measure.quantities)
-    assert own.keys() & vocabulary.QUANTITIES.keys() <= SHARED
+    assert own.keys() & vocabulary.QUANTITY_BY_NAME.keys() <= SHARED
     for name in (*measure.variables, *measure.inner_coordinates):
         nothing_said = Quantity(name, "", "1", name.replace("_", " "))
         assert vocabulary.find_quantity(name, own) != nothing_said

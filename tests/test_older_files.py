@@ -74,7 +74,7 @@ def test_files_name_their_layout(tmp_path):
     words = ["simulate", "--set", "load_velocity_ratio=2", "--duration", "0.1", "--output"]
     call_main(*words, tmp_path / "m.png")
     for name in ("linear_stability.nc", "m.nc"):
-        assert xr.load_dataset(tmp_path / name).attrs["layout"] == schema.LAYOUT_VERSION
+        assert xr.load_dataset(tmp_path / name).attrs["layout"] == schema.FILE_LAYOUT_VERSION
 
 
 def test_a_motion_opens_and_is_drawn(older):

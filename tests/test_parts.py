@@ -50,7 +50,7 @@ def half_as_strong(friction, ratio, change, p):
 
 def test_every_part_states_its_equation():
     """In its own docstring or in those of its functions: the page of names shows them."""
-    for part in registry.FIELD_OWNERS.values():
+    for part in registry.PART_CLASS_BY_FIELD_NAME.values():
         functions = (one.__func__ for one in vars(part).values() if isinstance(one, staticmethod))
         stated = " ".join(inspect.getdoc(one) or "" for one in (part, *functions))
         assert part.name == "slider" or re.search(r"\.\. math::\n\n +[^\n]+", stated), part

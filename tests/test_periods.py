@@ -8,14 +8,18 @@ from rsfstudy.named_studies._bifurcation import Bifurcation
 
 from rsfstudy import Scene
 from rsfstudy.limit_cycles import return_map
-from rsfstudy.limit_cycles.cycle_search import CycleSearch, follow_to_orbit
+from rsfstudy.limit_cycles.cycle_search import LimitCycleSearch, follow_to_periodic_orbit
 from rsfstudy.limit_cycles.cycles import Cycle
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
-from rsfstudy.limit_cycles.return_map import ReturnMap, chain_derivatives, section_at
+from rsfstudy.limit_cycles.return_map import (
+    ReturnMap,
+    multiply_cycle_derivatives,
+    section_vector_at,
+)
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.slider.stability import growth_rates
+from rsfstudy.slider.stability import linear_growth_rates
 from rsfstudy.status import Status
 
 #: Slow oscillations of two slip states, started close to where they end (Gu et al. 1984).
@@ -38,7 +42,9 @@ def quick(rtol: float) -> Accuracy:
 
 
 def came_to(scene: Scene, events: int = 64, rtol: float = 1e-7, **how):
-    return follow_to_orbit(scene, quick(rtol), WorkMeter(2_000_000, engine=COMPILED), events, **how)
+    return follow_to_periodic_orbit(
+        scene, quick(rtol), WorkMeter(2_000_000, engine=COMPILED), events, **how
+    )
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
@@ -46,14 +52,14 @@ def test_the_multiplier_of_one_state_is_the_slope_of_its_return_map(law):
     """Which limit cycles have known all along, from two cycles in a row."""
     scene = Scene(law=law, stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
     accuracy, meter = Accuracy(1e-8), WorkMeter(2_000_000)
-    approach = CycleSearch(scene, accuracy, meter)
-    assert approach.run(300)
-    orbit = follow_to_orbit(scene, accuracy, meter, 64).orbit
+    approach = LimitCycleSearch(scene, accuracy, meter)
+    assert approach.follow_until_converged(300)
+    orbit = follow_to_periodic_orbit(scene, accuracy, meter, 64).orbit
     assert orbit.period == 1
-    multiplier, forgotten = orbit.multipliers
+    multiplier, forgotten = orbit.floquet_multipliers
     assert multiplier.imag == 0.0
     assert abs(forgotten) < 1e-12
-    assert approach.orbit.multipliers[0].real == pytest.approx(multiplier.real, abs=1e-3)
+    assert approach.orbit.floquet_multipliers[0].real == pytest.approx(multiplier.real, abs=1e-3)
 
 
 def test_close_to_critical_stiffness_a_multiplier_is_what_growth_leaves():
@@ -62,7 +68,7 @@ def test_close_to_critical_stiffness_a_multiplier_is_what_growth_leaves():
     """
     for off in (2e-3, 5e-4):
         scene = slow(1.0 - off, displacement_step=0.02 + 14.0 * math.sqrt(off))
-        fastest = growth_rates(scene, 0.0)[0]
+        fastest = linear_growth_rates(scene, 0.0)[0]
         expected = math.exp(-2.0 * fastest.real * 2.0 * math.pi / abs(fastest.imag))
         found = Bifurcation(transient=60, events=4)(scene, quick(1e-8)).values
         assert 1.0 - found["floquet_multiplier"] == pytest.approx(1.0 - expected, rel=40.0 * off)
@@ -81,10 +87,10 @@ def test_periods(ratio, period):
     found = LimitCycle(phases=50)(scene, quick(1e-7))
     assert found.status is Status.OK
     assert found.values["period_events"] == period
-    orbit = came_to(scene).orbit.from_largest_event
+    orbit = came_to(scene).orbit.starting_at_largest_event
     assert orbit.period == period
     assert orbit.is_attracting
-    begin, end = map(section_at, (orbit.cycles[0].start_point, orbit.cycles[-1].end_point))
+    begin, end = map(section_vector_at, (orbit.cycles[0].start_point, orbit.cycles[-1].end_point))
     assert np.abs(end - begin).max() < 1e-6 * scene.a
     # the orbit is that of the whole period, and the numbers are those of its largest event
     assert found.values["time"][-1] == pytest.approx(
@@ -110,11 +116,13 @@ def test_periods(ratio, period):
 
 def test_multipliers_of_a_period_are_those_of_all_its_events():
     orbit = came_to(slow(0.856)).orbit
-    whole = chain_derivatives(orbit.derivatives)
+    whole = multiply_cycle_derivatives(orbit.cycle_derivatives)
     size = len(whole)
-    assert whole == pytest.approx(np.linalg.multi_dot([e[:size] for e in orbit.derivatives[::-1]]))
-    turned = orbit.from_largest_event.multipliers
-    assert turned[0] == pytest.approx(orbit.multipliers[0], rel=1e-5)
+    assert whole == pytest.approx(
+        np.linalg.multi_dot([e[:size] for e in orbit.cycle_derivatives[::-1]])
+    )
+    turned = orbit.starting_at_largest_event.floquet_multipliers
+    assert turned[0] == pytest.approx(orbit.floquet_multipliers[0], rel=1e-5)
 
 
 def test_a_multiplier_passes_minus_one_where_the_period_doubles():
@@ -167,11 +175,11 @@ def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
     found = Bifurcation(transient=transient, events=events)(scene, quick(1e-7)).values
     seen = came_to(scene, transient + events, 1e-7, follow_all=True).cycles
     by = ReturnMap(scene, quick(1e-7), WorkMeter(2_000_000, engine=COMPILED))
-    monkeypatch.setattr(return_map, "DIFFERENCE_STEP", 3e-5)
+    monkeypatch.setattr(return_map, "DIFFERENCE_STEP_OVER_LOG_RATE_RANGE", 3e-5)
     direction, grown = np.array([0.2, 1.0, -0.3]), []
     for cycle in seen:
-        begin = section_at(cycle.start_point)
-        (slopes,) = by.compute_derivatives(begin, 1, scene.a * cycle.log_slip_rate_range)
+        begin = section_vector_at(cycle.start_point)
+        (slopes,) = by.compute_cycle_derivatives(begin, 1, scene.a * cycle.log_slip_rate_range)
         direction = slopes[: len(begin)] @ direction / np.linalg.norm(direction)
         grown.append(math.log(np.linalg.norm(direction)))
     expected = np.mean(grown[transient:])

@@ -28,7 +28,7 @@ from rsfstudy import Axis, Rig, Scene, Study, read_record
 from rsfstudy.cli import command_line
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.fitting.record import Record
-from rsfstudy.referee.problem_files import shipped_problems
+from rsfstudy.referee.problem_files import shipped_problem_files
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider.registry import FIELD_NAMES
 from rsfstudy.storage import journal
@@ -292,7 +292,7 @@ def commands(place: Path) -> dict[str, list[str]]:
             *("--noise", "white", "--slip-distance", "10 um"),
         ],
         "problems": ["referee"],
-        "verify": [str(shipped_problems()[19].with_suffix(".csv"))],
+        "verify": [str(shipped_problem_files()[19].with_suffix(".csv"))],
     }
 
 

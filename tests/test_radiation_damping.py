@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rsfstudy import Scene
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.equations import equations_between_ruptures, friction_relation
+from rsfstudy.slider.equations import build_friction_relation, equations_between_ruptures
 
 
 @given(
@@ -25,8 +25,8 @@ def test_friction_and_radiation_balance_the_spring(
 ):
     damping = math.exp(log_damping)
     scene = Scene(normal_stress="constant") if constant else Scene(alpha=alpha)
-    scene, strength = scene.with_(radiation_damping=damping), friction_relation(scene)
-    point = equations_between_ruptures(scene, clock=False).evaluate_point((spring_stress, psi))
+    scene, strength = scene.with_(radiation_damping=damping), build_friction_relation(scene)
+    point = equations_between_ruptures(scene, with_time=False).evaluate_point((spring_stress, psi))
     x, friction = point.log_slip_rate, point.frictional_stress
     # rounding of the stresses, and of x times the slope of radiation in x
     radiated = damping * math.expm1(x)

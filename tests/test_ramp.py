@@ -53,7 +53,8 @@ def test_once_over_it_leaves_no_unknown():
     assert (during.state_count, after.state_count) == (2, 1)
     assert [*first[0, :2], *last[0, :2]] == [0.0, 4.0, 4.0, math.inf]
     assert (
-        after.numbers == Scene(**IMPOSED, normal_stress_step=0.1, load_velocity_ratio=1.0).numbers
+        after.parameter_values
+        == Scene(**IMPOSED, normal_stress_step=0.1, load_velocity_ratio=1.0).parameter_values
     )
 
 

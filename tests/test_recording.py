@@ -16,7 +16,7 @@ from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.events import Event, EventKind
 from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.motion.readings import sample_along_path
+from rsfstudy.motion.readings import resample_motion_along_path
 from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLES, Recording
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.status import Status
@@ -57,7 +57,7 @@ def recorded(scene: Scene, engine: str, times: np.ndarray, until: float = math.i
         events.append(event)
         if event.kind is EventKind.SAMPLED and math.isinf(until):
             break
-    return recording.table(scene), events
+    return recording.as_table(scene), events
 
 
 def row_of(scene: Scene, event: Event) -> list[float]:
@@ -141,7 +141,7 @@ def exactly(scene: Scene, times: np.ndarray) -> dict[str, np.ndarray]:
     recording, accuracy = Recording(sample_times=times), Accuracy(1e-11, 10**7, engine=COMPILED)
     meter = WorkMeter(10**7, engine=COMPILED)
     list(integrate_events(scene, accuracy, meter, until=float(times[-1]), recording=recording))
-    return dict(zip(RECORDED_VARIABLES, recording.table(scene).T, strict=False))
+    return dict(zip(RECORDED_VARIABLES, recording.as_table(scene).T, strict=False))
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-9])
@@ -202,8 +202,11 @@ def test_points_along_a_path_are_those_of_the_compiled_loop():
         changes += event.kind is EventKind.REGIME
         if changes == 2:
             break
-    table = recording.table(scene)
-    ours, theirs = sample_along_path(table, 50), sample_along_path(table, 50, engine=COMPILED)
+    table = recording.as_table(scene)
+    ours, theirs = (
+        resample_motion_along_path(table, 50),
+        resample_motion_along_path(table, 50, engine=COMPILED),
+    )
     for name, values in ours.items():
         off = np.abs(theirs[name] - values) > 1e-11 * max(1.0, np.ptp(values))
         assert np.count_nonzero(off) <= 4, name

@@ -49,7 +49,7 @@ def member_names(kind: type) -> set[str]:
     """Return the names of the members of a class, and of the fields of its instances."""
     names = {*dir(kind), *(name for base in kind.__mro__ for name in inspect.get_annotations(base))}
     names |= set(dir(Scene)) if kind is SceneBase else set()
-    names |= set(layout.MOTION.names) if kind is PythonMotionState else set()
+    names |= set(layout.MOTION_STATE_DTYPE.names) if kind is PythonMotionState else set()
     return names | (OF_SOME_SLOTS if kind is Part else set())
 
 

@@ -13,10 +13,10 @@ from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.events import EventKind, maximum, minimum
 from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.responses._readings import friction_event_quantity
+from rsfstudy.responses._readings import friction_quantity_for_events
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import stability
-from rsfstudy.slider.equations import friction_relation
+from rsfstudy.slider.equations import build_friction_relation
 from rsfstudy.status import Status
 
 CONSTANT, VARIABLE = {"normal_stress": "constant"}, {"normal_stress": "variable"}
@@ -28,7 +28,10 @@ def test_slip_forward_is_what_it_is_without(stress):
     plain = Scene(stiffness_ratio=1.5, **stress)
     both_ways = plain.with_(regularised=True)
     for friction in (-0.2, 0.0, 0.1):
-        there, here = friction_relation(both_ways)(friction), friction_relation(plain)(friction)
+        there, here = (
+            build_friction_relation(both_ways)(friction),
+            build_friction_relation(plain)(friction),
+        )
         assert there == pytest.approx(here, rel=1e-13, abs=1e-15)
     assert both_ways.critical_stiffness == pytest.approx(plain.critical_stiffness, rel=1e-9)
     step, other = (CriticalStep()(scene, Accuracy(1e-6)) for scene in (plain, both_ways))
@@ -45,12 +48,12 @@ def test_friction_is_odd_in_slip_rate():
     """Where stress is mirrored about zero, so is friction: same magnitude of slip rate."""
     scene = Scene(regularised=True, **CONSTANT)
     for above in (1e-6, 0.01, 0.3):
-        there, slope, *_ = friction_relation(scene)(above - scene.mu_star)
-        mirrored, other_slope, *_ = friction_relation(scene)(-above - scene.mu_star)
+        there, slope, *_ = build_friction_relation(scene)(above - scene.mu_star)
+        mirrored, other_slope, *_ = build_friction_relation(scene)(-above - scene.mu_star)
         assert mirrored == pytest.approx(there, rel=1e-12)
         assert other_slope == pytest.approx(-slope, rel=1e-12)
     # close to zero stress the fault is viscous: V = 2 V_* exp(-mu_*/a) tau/(a sigma)
-    value = friction_relation(scene)(1e-9 - scene.mu_star)[0]
+    value = build_friction_relation(scene)(1e-9 - scene.mu_star)[0]
     linear = math.log(2e-9 / scene.a) - scene.mu_star / scene.a
     assert value / scene.a == pytest.approx(linear, rel=1e-9)
 
@@ -128,7 +131,7 @@ def test_slip_back_is_a_mirror_of_slip_forward(law):
 def test_stress_turns_first_where_slip_back_is_as_fast_as_the_load_point():
     fields = {"law": "slowness", "a": 0.01, "b_over_a": 1.4, "stiffness": 0.02, **CONSTANT}
     scene = Scene(**fields, regularised=True, loading=protocol([{"velocity": -1.0}]))
-    of = friction_event_quantity(scene)[0]
+    of = friction_quantity_for_events(scene)[0]
     watches = [minimum(of, terminal=True), maximum(of, terminal=True)]
     *_before, turn = integrate_events(scene, Accuracy(1e-6), WorkMeter(10**5), watches, until=100.0)
     assert turn.kind is EventKind.MINIMUM

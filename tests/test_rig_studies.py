@@ -267,7 +267,7 @@ def test_figures_and_tables_show_units(cycles, capsys):
     texts = [axes.get_xlabel() + axes.get_ylabel() for axes in drawn.axes]
     assert any(r"Load point velocity" in text and r"($\mu$m/s)" in text for text in texts)
     assert any("(s)" in text for text in texts)
-    table_layout.print_piece(tables.headline_table(cycles))
+    table_layout.print_summary_piece(tables.build_primary_output_table(cycles))
     said = capsys.readouterr().out
     assert "recurrence interval of stick-slip, in s" in said
     interval = float(cycles.rsf.in_units()["recurrence_interval"][0, 0, 0])
@@ -279,7 +279,7 @@ def test_results_say_what_they_are_of(cycles):
     axis varies is not among them.
     """
 
-    of = summaries.describe_origin(cycles)
+    of = summaries.describe_dataset_origin(cycles)
     assert {"a = 0.01", "b_over_a = 1.4"} <= set(of["fixed"].split(", "))
     # in units of the slider the stiffness goes with D_c and sigma_*
     assert not {"stiffness", "load_velocity_ratio"} & set(of["fixed"].replace(",", "").split())
@@ -287,11 +287,11 @@ def test_results_say_what_they_are_of(cycles):
     assert "slip_distance" not in of["laboratory"]
     scene = RIG.scene(**LAW, hold_time="10 s")
     motion = RIG.in_units(rsfstudy.simulate(scene, duration=1.0))
-    assert summaries.describe_origin(motion)["laboratory"] == (
+    assert summaries.describe_dataset_origin(motion)["laboratory"] == (
         "normal_stress = 5 MPa, slip_distance = 10 um, reference_velocity = 1 um/s, "
         "stiffness = 0.01 MPa/um"
     )
-    assert "hold_time = 1" in summaries.describe_origin(motion)["scene"].split(", ")
+    assert "hold_time = 1" in summaries.describe_dataset_origin(motion)["scene"].split(", ")
 
 
 # ---- the command line ----------------------------------------------------------------------------
@@ -307,7 +307,7 @@ def test_a_study_of_no_rig_is_put_on_one(tmp_path):
     """Axes are in units then, what they hold is what they held; new values are in units."""
     studied = catalogue.load_study("slide_hold_slide")
     rig = Rig(**{n: v for n, v in STATED.items() if n != "stiffness"})
-    there = rig_studies.with_rig(studied, rig)
+    there = rig_studies.convert_study_to_rig_units(studied, rig)
     assert [axis.units for axis in there.axes[1:]] == [{"stiffness": "MPa/um"}, {"hold_time": "s"}]
     # what is fitted is what was: D_c/V_* is 10 s
     assert [fit.within for fit in there.reductions] == [(1e5, 1e9)] * 2
@@ -335,6 +335,6 @@ def test_what_a_rig_states_of_its_dynamics_takes_the_place_of_that_of_a_study():
     study = catalogue.load_study("limit_cycles")
     damped = replace(study, base=study.base.with_(inertia=False, radiation_damping=1e-4))
     for before, rig, mass in ((study, radiates, False), (damped, swings, True)):
-        there = rig_studies.with_rig(before, rig).base
+        there = rig_studies.convert_study_to_rig_units(before, rig).base
         assert there.has_mass is mass
         assert (there.radiation_damping == 0.0) is mass

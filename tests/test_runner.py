@@ -24,7 +24,9 @@ def test_serial_workers_and_any_grouping_give_identical_bits(cluster, monkeypatc
     serial = run()
     have_same_numbers(run(client=cluster), serial)
     for size in (1, 4, 100):
-        monkeypatch.setattr(plan.BatchIterator, "next_size", lambda _self, size=size: size)
+        monkeypatch.setattr(
+            plan.CellBatchIterator, "compute_next_batch_size", lambda _self, size=size: size
+        )
         have_same_numbers(run(client=cluster), serial)
         have_same_numbers(run(), serial)
 
@@ -156,11 +158,11 @@ def test_runs_share_processes_that_are_started_once(monkeypatch, tmp_path):
     monkeypatch.setattr(
         workers, "start_local_cluster", lambda n, file: (started.append(file), start(n, file))[1]
     )
-    with workers.Workers(1, log=tmp_path / "workers.log") as where:
+    with workers.WorkerPool(1, log_path=tmp_path / "workers.log") as where:
 
         def ran(name, fault=""):
             study = replace(faulty_study(fault, (3.0,) if fault else ()), name=name)
-            results = study_runs.prepare_run(
+            results = study_runs.prepare_run_with_progress(
                 study, runner.OutputOptions(output=tmp_path), where, False
             )()
             return [Status(code).name for code in results["status"].values]
@@ -189,9 +191,9 @@ def test_processes_that_are_lost_are_started_anew(monkeypatch, tmp_path):
         return contextlib.nullcontext()
 
     monkeypatch.setattr(workers, "start_local_cluster", start)
-    monkeypatch.setattr(workers, "make_client_mapper", lambda *_where: mapper)
-    with workers.Workers(1, log=tmp_path / "workers.log") as where:
-        begin = study_runs.prepare_run(
+    monkeypatch.setattr(workers, "make_dask_batch_mapper", lambda *_where: mapper)
+    with workers.WorkerPool(1, log_path=tmp_path / "workers.log") as where:
+        begin = study_runs.prepare_run_with_progress(
             faulty_study(), runner.OutputOptions(output=tmp_path), where, False
         )
         with pytest.raises(RunError, match="is lost"):

@@ -32,7 +32,7 @@ def test_the_driver_needs_less_than_a_kilobyte_a_cell(format):
 
 def test_few_batches_wait_on_the_scheduler(cluster, monkeypatch):
     """However many cells: what waits there fills its memory."""
-    monkeypatch.setattr(plan.BatchIterator, "next_size", lambda _self: 1)
+    monkeypatch.setattr(plan.CellBatchIterator, "compute_next_batch_size", lambda _self: 1)
     waiting, most = set(), []
     submit = cluster.submit
 
@@ -53,16 +53,16 @@ def test_few_batches_wait_on_the_scheduler(cluster, monkeypatch):
 )
 def test_batches_are_sized_by_what_finished_cells_took(seconds, size):
     """A fraction of a second each, and small enough to lose."""
-    batches = plan.BatchIterator(None, np.arange(100_000), workers=2)
-    assert batches.next_size() == 1
+    batches = plan.CellBatchIterator(None, np.arange(100_000), worker_count=2)
+    assert batches.compute_next_batch_size() == 1
     batches.record_time(seconds)
-    assert batches.next_size() == size
+    assert batches.compute_next_batch_size() == size
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 10, 999, 1000])
 def test_the_first_cells_are_a_sample_of_all(count):
     """Every cell once, and no two neighbours one after the other in a long list."""
-    order = plan.scatter_cells(np.arange(count))
+    order = plan.order_cells_by_golden_section(np.arange(count))
     assert sorted(order) == list(range(count))
     if count >= 10:
         assert (np.abs(np.diff(order)) > 1).all()
@@ -110,7 +110,7 @@ def test_a_store_that_is_there_is_not_replaced(tmp_path):
 def test_a_store_cut_short_is_not_taken_for_one(tmp_path, monkeypatch):
     """Interrupted between two pieces: nothing stays but the journal, and the command goes on."""
     monkeypatch.setattr(zarr_store, "_NUMBERS_PER_SLAB", 3)
-    original, written = zarr_store.build_variables, []
+    original, written = zarr_store.build_lattice_variables, []
 
     def interrupted(*words):
         written.append(1)
@@ -119,7 +119,7 @@ def test_a_store_cut_short_is_not_taken_for_one(tmp_path, monkeypatch):
         return original(*words)
 
     with monkeypatch.context() as patch:
-        patch.setattr(zarr_store, "build_variables", interrupted)
+        patch.setattr(zarr_store, "build_lattice_variables", interrupted)
         with pytest.raises(rsfstudy.errors.RunError, match="6 of 6 cells are finished"):
             run(SMALL_STUDY, output=tmp_path, format="zarr")
     assert os.listdir(tmp_path) == ["small.cells.sqlite"]

@@ -27,11 +27,11 @@ def test_a_field_of_a_users_own_may_bear_any_name():
 
 
 def test_every_synonym_leads_to_a_field_or_law_that_is_there():
-    for name, remedy in hints._FIELD_HINTS.items():
+    for name, remedy in hints._HINT_BY_WRONG_FIELD_NAME.items():
         assert name not in FIELD_NAMES
         if remedy.startswith("Write "):
             assert re.match(r"Write (\w+)", remedy)[1] in FIELD_NAMES
-    assert set(hints._LAW_ALIASES.values()) <= set(laws.BUILT_IN_PARTS)
+    assert set(hints._LAW_NAME_BY_ALIAS.values()) <= set(laws.BUILT_IN_PARTS)
 
 
 def test_a_scene_cannot_be_changed():
@@ -87,7 +87,9 @@ def test_tab_completion_offers_what_users_call_and_nothing_else():
     assert all(callable(getattr(rsfstudy, name)) for name in dir(rsfstudy))
     offered = dir(Scene(normal_stress="constant", stiffness=0.02))
     assert {"a", "law", "stiffness", "stiffness_ratio", "b", "parts", "with_"} <= set(offered)
-    assert not {"alpha", "phi", "functions", "combination", "_layout", "__init__"} & set(offered)
+    assert not {"alpha", "phi", "equation_functions", "combination", "_layout", "__init__"} & set(
+        offered
+    )
     assert {"alpha", "phi"} <= set(dir(Scene()))
 
 

@@ -10,19 +10,19 @@ import pytest
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
-from rsfstudy.measure_base.settling_checks import settles_to_steady_sliding
+from rsfstudy.measure_base.settling_checks import steady_sliding_is_linearly_stable
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
 from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.quantities import Quantity
-from rsfstudy.responses._recorded_motion import settled_flag
+from rsfstudy.responses._recorded_motion import flag_of_settled_friction
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS
 from rsfstudy.slider.parts import POSITIVE, Numbers, number
-from rsfstudy.slider.stability import largest_growth_rate
+from rsfstudy.slider.stability import largest_linear_growth_rate
 from rsfstudy.status import Status
 
 SLIDER = {
@@ -67,7 +67,7 @@ class Dissipation(Fluid):
     def effects(self):
         return ("dissipation",)
 
-    def numbers(self, scene: Scene) -> Numbers:
+    def parameter_values(self, scene: Scene) -> Numbers:
         return (self.energy_loss,)
 
 
@@ -105,7 +105,7 @@ def test_a_passive_unknown_does_not_end_a_damped_oscillation(engine):
 def test_no_motion_settles_where_small_changes_grow():
     """The distance from steady sliding falls by far more than the level after each rupture."""
     scene, accuracy = Scene(**CYCLES, fluid=Dissipation), Accuracy(1e-4)
-    growth = largest_growth_rate(scene, scene.log_load_velocity)
+    growth = largest_linear_growth_rate(scene, scene.log_load_velocity)
     assert growth is not None
     assert growth.is_positive
     asked, kinds = (
@@ -123,8 +123,8 @@ def test_an_excluded_unknown_is_left_out_of_the_distance():
     start, distance = (0.02, 0.01, 5.0, 0.0), []
     for fluid in (Dissipation, Excluded):
         scene = Scene(**CYCLES, fluid=fluid)
-        system, p = scene.functions.between_ruptures, scene.numbers
-        point = system.point_function(start, system.path_rates(start, p), p)
+        system, p = scene.equation_functions.functions_between_ruptures, scene.parameter_values
+        point = system.point_function(start, system.rates_along_path(start, p), p)
         distance.append(point.distance_from_steady_state)
         steady = point.state + scene.b * point.log_slip_rate
     assert distance[0] > 5.0
@@ -165,16 +165,16 @@ def test_growth_of_zero_is_undecided(off, settles):
     outcome = LimitCycle(phases=2)(scene, Accuracy(1e-4))
     if settles:
         assert outcome.status is Status.NO_LIMIT_CYCLE
-        assert settles_to_steady_sliding(scene)
+        assert steady_sliding_is_linearly_stable(scene)
     else:
         assert outcome.status is Status.UNVERIFIED
         assert "undecided" in outcome.message
         with pytest.raises(MotionStopped, match="undecided"):
-            settles_to_steady_sliding(scene)
+            steady_sliding_is_linearly_stable(scene)
 
 
 @pytest.mark.parametrize(("ratio", "flag"), [(0.99, 0.0), (1.0, math.nan), (1.2, 1.0)])
 def test_a_flat_record_has_settled_only_if_small_changes_decay(ratio, flag):
     scene = Scene(law="slip", normal_stress="constant", a=0.01, stiffness_ratio=ratio)
-    assert settled_flag(scene, is_flat=True) == pytest.approx(flag, nan_ok=True)
-    assert settled_flag(scene, is_flat=False) == 0.0
+    assert flag_of_settled_friction(scene, is_flat=True) == pytest.approx(flag, nan_ok=True)
+    assert flag_of_settled_friction(scene, is_flat=False) == 0.0

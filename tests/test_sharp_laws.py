@@ -8,7 +8,7 @@ from scipy.special import lambertw
 
 from rsfstudy import Scene
 from rsfstudy.slider import stability
-from rsfstudy.slider.law_slopes import compute_law_slopes
+from rsfstudy.slider.law_slopes import compute_state_evolution_derivatives
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import POSITIVE, Numbers, number
@@ -41,8 +41,8 @@ class Bent(Law):
     evolution = staticmethod(evolution)
     steady_states = staticmethod(steady_states)
 
-    def numbers(self, scene: Scene) -> Numbers:
-        return (*super().numbers(scene), self.bend_width)
+    def parameter_values(self, scene: Scene) -> Numbers:
+        return (*super().parameter_values(scene), self.bend_width)
 
 
 @pytest.mark.parametrize("width", [0.3, 0.1, 0.03, 0.005])
@@ -55,7 +55,7 @@ def test_critical_stiffness_of_a_law_that_bends_sharply(width, place):
     ours = stability.critical_stiffness(scene, log_slip_rate)
     steady = steady_sliding(scene, log_slip_rate)
     assert steady is not None
-    error = compute_law_slopes(scene, steady).relative_error
+    error = compute_state_evolution_derivatives(scene, steady).relative_error
     # the derivative is b/(b - a) = 2 times as large as its difference from a
     assert abs(ours / exact - 1.0) < 2.0 * error < 1e-8
 

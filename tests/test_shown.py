@@ -19,7 +19,7 @@ from rsfstudy.errors import IncompleteWarning
 from rsfstudy.quantities import html_symbol, html_table
 from rsfstudy.reductions import SobolIndices
 from rsfstudy.reporting import tables
-from rsfstudy.reporting.tables import answer_table, format_to_error
+from rsfstudy.reporting.tables import build_scene_answer_table, format_rounded_to_error
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
 from rsfstudy.storage import rebuild, store
@@ -151,7 +151,7 @@ def told_of(dataset, tmp_path, monkeypatch) -> str:
 def test_numbers_have_the_digits_that_their_errors_leave(value, share):
     """What is left out is a twentieth of the error at most; one digit less would be too few."""
     error = share * abs(value)
-    text = format_to_error(value, error)
+    text = format_rounded_to_error(value, error)
     assert abs(float(text) - value) <= 0.05 * error
     digits = len(re.sub(r"e.*|^[-0.]+|\.", "", text))
     assert digits <= math.ceil(-math.log10(share)) + 2
@@ -163,7 +163,7 @@ def test_an_answer_for_one_scene_has_units_and_words(tmp_path):
     scene = rig.scene(law="slowness", a=0.01, b_over_a=1.4, load_velocity_ratio=10)
     cycle = rsfstudy.limit_cycle(scene, rtol=1e-4, engine="compiled")
     cycle = rig.in_units(cycle, stress="MPa", length="um")
-    shown = {row["number"]: row["value"] for row in answer_table(cycle).rows}
+    shown = {row["number"]: row["value"] for row in build_scene_answer_table(cycle).rows}
     interval, units = shown["recurrence_interval"].split()
     left_out = abs(float(interval) - float(cycle.recurrence_interval))
     assert left_out <= 0.05 * float(cycle.recurrence_interval_error)
@@ -248,9 +248,9 @@ def test_indices_that_are_refused_say_why(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("sizes", [{"x": 5}, {"x": 3, "y": 28}, {"x": 9, "y": 9, "z": 2, "u": 7}])
 def test_a_sample_has_both_ends_and_so_many_cells_at_most(sizes):
-    at = tables.thin_dimensions(sizes, 24)
+    at = tables.select_thinned_points(sizes, 24)
     assert math.prod(map(len, at.values())) <= 24
     for name, size in sizes.items():
         assert at[name][0] == 0
         assert len(at[name]) == 1 or at[name][-1] == size - 1
-    assert len(tables.thin_dimensions({"x": 5}, 24)["x"]) == 5
+    assert len(tables.select_thinned_points({"x": 5}, 24)["x"]) == 5

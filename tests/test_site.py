@@ -25,7 +25,7 @@ from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measure_base.elasticities import Elasticities
 from rsfstudy.slider import registry
 from rsfstudy.status import Status
-from rsfstudy.vocabulary import QUANTITIES
+from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
 ROOT = Path(__file__).parent.parent
 SLIDER = ROOT / "rsfstudy" / "slider"
@@ -120,7 +120,7 @@ def examples():
 
 def test_examples_make_what_they_stand_beside(examples):
     for slot in registry.SLOTS:
-        for name, part in slot.choices.items():
+        for name, part in slot.built_in_parts.items():
             scene = eval(examples["SCENES"][name], {"Scene": rsfstudy.Scene})
             assert isinstance(getattr(scene.parts, slot.name), part)
 
@@ -160,7 +160,7 @@ def names() -> Iterator[tuple[str, list[str]]]:
     ]
     yield "reductions", kinds
     yield "statuses", [status.label for status in Status]
-    yield "numbers", [*QUANTITIES]
+    yield "numbers", [*QUANTITY_BY_NAME]
     params = [param for command in cli.commands.values() for param in command.params]
     yield "commands", [*cli.commands, *(o for p in params for o in p.opts if o.startswith("--"))]
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rsfstudy import Scene
 from rsfstudy.responses.linear_stability import compute_jacobian, max_growth_rate
 from rsfstudy.slider import closed_forms, laws, stability, steady_state
-from rsfstudy.slider.equations import equations_by_displacement, normal_stress_at
+from rsfstudy.slider.equations import effective_normal_stress_at, equations_against_displacement
 from rsfstudy.slider.laws.composite import lambert_w
 
 #: Laws with one b, by which steady friction is mu_* + (a - b) ln(V/V_*), as closed forms have it.
@@ -97,7 +97,7 @@ def test_steady_stresses_satisfy_the_inclined_geometry(log_slip_rate, phi):
     mu_ss = scene.mu_star - (scene.b - scene.a) * log_slip_rate
     assume(mu_ss * cot_phi(scene) < 0.99)
     found = steady_state.steady_sliding(scene, log_slip_rate)
-    ratio = normal_stress_at(scene, found.frictional_stress)
+    ratio = effective_normal_stress_at(scene, found.frictional_stress)
     assert ratio == pytest.approx(1.0 + cot_phi(scene) * found.frictional_stress, rel=1e-13)
     assert scene.mu_star + found.frictional_stress == pytest.approx(mu_ss * ratio, rel=1e-11)
 
@@ -111,7 +111,7 @@ def test_no_steady_state_below_the_slowest_rate():
     assert steady_state.steady_sliding(scene, slowest - 1e-6) is None
     assert math.isnan(stability.critical_stiffness(scene, slowest - 1.0))
     with pytest.raises(ValueError, match="no steady sliding"):
-        stability.growth_rates(scene, slowest - 1.0)
+        stability.linear_growth_rates(scene, slowest - 1.0)
     assert steady_state.min_steady_log_slip_rate(Scene(normal_stress="constant")) == -math.inf
 
 
@@ -119,9 +119,11 @@ def test_no_steady_state_below_the_slowest_rate():
 def test_a_small_mass_takes_no_digits_of_the_growth_rates(period):
     """But for its own root, 1e9 to 1e24 of the others, they are those without it."""
     scene = Scene(law="slip", fluid="dilatant", drainage=1e-3, dilatancy=1e-3, stiffness=0.003)
-    heavy = stability.growth_rates(scene.with_(inertia=True, period=period), 0.0)
+    heavy = stability.linear_growth_rates(scene.with_(inertia=True, period=period), 0.0)
     assert heavy[-1].real < -1e9
-    np.testing.assert_allclose(heavy[:-1].real, stability.growth_rates(scene, 0.0).real, rtol=1e-8)
+    np.testing.assert_allclose(
+        heavy[:-1].real, stability.linear_growth_rates(scene, 0.0).real, rtol=1e-8
+    )
 
 
 @pytest.mark.parametrize("off", [-1e-3, -1e-8, 1e-8, 1e-3])
@@ -133,7 +135,7 @@ def test_growth_close_to_critical_stiffness(off, effects):
     scene = Scene(stiffness_ratio=1.0 + off, **effects)
     expected = -0.25 * (scene.b_over_a - 1.0) * off
     # central differences are right to 6e-10 of rates of order one
-    grows = max_growth_rate(compute_jacobian(equations_by_displacement(scene), (0.0, 0.0)))
+    grows = max_growth_rate(compute_jacobian(equations_against_displacement(scene), (0.0, 0.0)))
     assert grows == pytest.approx(expected, rel=1e-5, abs=1e-9)
     assert grows * off < 0.0
 
@@ -184,6 +186,6 @@ def test_stress_keeps_its_sign_however_weak_a_regularised_fault_becomes(excess):
     """Strength ``mu_* + excess = a ln(2 sinh(mu/a))`` has a root of either sign."""
     scene = Scene(regularised=True, mu_star=0.05, normal_stress="constant")
     mu = scene.a * math.asinh(0.5 * math.exp((scene.mu_star + excess) / scene.a))
-    assert steady_state.stress_after_jump(scene, excess) + scene.mu_star == pytest.approx(
-        mu, rel=1e-9
-    )
+    assert steady_state.frictional_stress_after_jump(
+        scene, excess
+    ) + scene.mu_star == pytest.approx(mu, rel=1e-9)

@@ -17,19 +17,23 @@ from rsfstudy import Scene
 from rsfstudy.motion import layout
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import PYTHON, SCIPY
-from rsfstudy.motion.inplace import in_place_functions, unpack_function
-from rsfstudy.motion.integrate import events_along, integrate_events
-from rsfstudy.motion.loop import accept_step
+from rsfstudy.motion.inplace import build_in_place_functions, build_unpack_function
+from rsfstudy.motion.integrate import integrate_events, iterate_events_of_equations
+from rsfstudy.motion.loop import advance_to_step_end
 from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.motion.steppers import Stepper, unrolled_step
-from rsfstudy.motion.steppers.order_eight import OrderEight
-from rsfstudy.motion.steppers.scipy import METHODS, SciPyStepper, _float_interpolant
+from rsfstudy.motion.steppers.order_eight import OrderEightStepper
+from rsfstudy.motion.steppers.scipy import (
+    SCIPY_SOLVER_BY_METHOD_NAME,
+    SciPyStepper,
+    _build_float_interpolant,
+)
 from rsfstudy.motion.workspace import Workspace, create_workspace, workspace_size
 from rsfstudy.slider.equations import (
     Equations,
+    equations_at_imposed_slip_rate,
     equations_between_ruptures,
     equations_in_rupture,
-    equations_of_rigid_slider,
 )
 from rsfstudy.status import Status
 
@@ -37,10 +41,10 @@ SLOW = Scene(stiffness_ratio=1.5, load_velocity_ratio=1.5)
 CYCLE = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
 #: Systems of equations of one to five unknowns, each with a state somewhere within its domain.
 SYSTEMS = [
-    (equations_of_rigid_slider(Scene(), 2.0), (0.05,)),
-    (equations_between_ruptures(SLOW, clock=False), (0.01, 0.004)),
-    (equations_in_rupture(Scene(**CYCLE), clock=True), (0.2, 17.0, 0.19, 0.0)),
-    (equations_between_ruptures(Scene(fluid="dilatant", load_velocity_ratio=3.0), clock=True),
+    (equations_at_imposed_slip_rate(Scene(), 2.0), (0.05,)),
+    (equations_between_ruptures(SLOW, with_time=False), (0.01, 0.004)),
+    (equations_in_rupture(Scene(**CYCLE), with_time=True), (0.2, 17.0, 0.19, 0.0)),
+    (equations_between_ruptures(Scene(fluid="dilatant", load_velocity_ratio=3.0), with_time=True),
      (0.01, 0.004, 0.001, -0.01, 0.0)),
 ]  # fmt: skip
 
@@ -67,7 +71,7 @@ def plain_step(equations: Equations, y, length: float, tolerance: float):
     fifth = third = 0.0
     for i in n:
         rates = [k[i] for k in stages]
-        allowed = tolerance * (equations.scales[i] + max(abs(y[i]), abs(new[i])))
+        allowed = tolerance * (equations.unknown_scales[i] + max(abs(y[i]), abs(new[i])))
         fifth += (weighted(DOP853.E5, rates) / allowed) ** 2
         third += (weighted(DOP853.E3, rates) / allowed) ** 2
     error = abs(length) * fifth / math.sqrt((fifth + 0.01 * third) * len(y))
@@ -78,12 +82,12 @@ def plain_step(equations: Equations, y, length: float, tolerance: float):
 @pytest.mark.parametrize(("equations", "y"), SYSTEMS)
 def test_the_unrolled_step_is_that_of_plain_loops_to_the_bit(equations, y, length):
     n, tolerance = len(y), 1e-6
-    attempt = unrolled_step.build_attempt_function(
-        equations.rate_function, n, unpack_function(len(equations.parameters))
+    attempt = unrolled_step.build_step_attempt_function(
+        equations.rate_function, n, build_unpack_function(len(equations.parameters))
     )
     block = [math.nan] * (unrolled_step.HEADER_SIZE + 2 * n)
     block[unrolled_step.LENGTH_INDEX], block[unrolled_step.TOLERANCE_INDEX] = length, tolerance
-    block[unrolled_step.HEADER_SIZE + n :] = equations.scales
+    block[unrolled_step.HEADER_SIZE + n :] = equations.unknown_scales
     stages = [*equations.evaluate_rates(y), *[math.nan] * (n * unrolled_step.STAGE_COUNT)]
     attempt(y, stages, equations.parameters, block)
     by_loops, new, error = plain_step(equations, y, length, tolerance)
@@ -101,7 +105,7 @@ def scipy_solver(method, equations: Equations, y, tolerance: float, **options):
         np.array(y),
         math.copysign(math.inf, options.pop("direction", 1.0)),
         rtol=tolerance,
-        atol=tolerance * np.array(equations.scales),
+        atol=tolerance * np.array(equations.unknown_scales),
         **options,
     )
 
@@ -119,7 +123,7 @@ def test_a_step_is_scipys(equations, y):
 def ends_of_steps(equations: Equations, y, by: str, steps: int, **options):
     """Clocks at the ends of steps, and the meter."""
     meter = WorkMeter(10**5, engine=by)
-    path = events_along(equations, y, 1e-3, meter, [STEP_END_EVENT], **options)
+    path = iterate_events_of_equations(equations, y, 1e-3, meter, [STEP_END_EVENT], **options)
     return [event.clock for event in itertools.islice(path, steps + 1)], meter
 
 
@@ -150,18 +154,21 @@ def begun(
     stepper = kind((equations,), {equations.regime: method})
     n, states = len(y), equations.state_count
     given = {"tolerance": tolerance, "budget": 10**6, "direction": 1.0, "end_time": math.inf}
-    motion = SimpleNamespace(**{**dict.fromkeys(layout.MOTION.names, 0), **given})
+    motion = SimpleNamespace(**{**dict.fromkeys(layout.MOTION_STATE_DTYPE.names, 0), **given})
     arrays = (workspace_size(n, states, 0), 2 * n, n)
     block, unknowns, scales = (memoryview(np.zeros(numbers)) for numbers in arrays)
-    unknowns[:n], scales[:] = np.array(y, dtype=float), np.array(equations.scales)
-    functions = [*in_place_functions(equations)]
+    unknowns[:n], scales[:] = np.array(y, dtype=float), np.array(equations.unknown_scales)
+    functions = [*build_in_place_functions(equations)]
     others = memoryview(np.zeros(1)), 0, equations.parameters, equations.parameters, None, stepper
     space = create_workspace(block, unknowns, n, scales, states, functions, others)
-    stepper.begin(motion, space)
+    stepper.begin_regime(motion, space)
     return stepper, motion, space
 
 
-KINDS = [(OrderEight, "DOP853"), *((SciPyStepper, method) for method in sorted(METHODS))]
+KINDS = [
+    (OrderEightStepper, "DOP853"),
+    *((SciPyStepper, method) for method in sorted(SCIPY_SOLVER_BY_METHOD_NAME)),
+]
 
 
 @pytest.mark.parametrize(("kind", "method"), KINDS)
@@ -172,11 +179,11 @@ def test_a_step_taken_anew_ends_at_the_clock_asked_for(kind, method, part):
     stepper, motion, space = begun(equations, y, 1e-6, kind, method)
     for number in range(6):
         if number:
-            accept_step(motion, space)
-        assert stepper.attempt(motion, space, 1.0) == motion.end - motion.clock > 0.0
+            advance_to_step_end(motion, space)
+        assert stepper.attempt_step(motion, space, 1.0) == motion.end - motion.clock > 0.0
     began, start = motion.clock, tuple(space.y[:2])
     clock = began + part * (motion.end - began)
-    stepper.retake(motion, space, clock)
+    stepper.retake_step(motion, space, clock)
     assert motion.clock == began
     assert motion.end == clock
     assert motion.step_length == clock - began
@@ -185,13 +192,13 @@ def test_a_step_taken_anew_ends_at_the_clock_asked_for(kind, method, part):
         rtol=1e-12, atol=1e-14,
     ).y[:, -1]  # fmt: skip
     new = tuple(space.y_end[:2])
-    for ours, theirs, scale in zip(new, exact, equations.scales, strict=True):
+    for ours, theirs, scale in zip(new, exact, equations.unknown_scales, strict=True):
         assert ours == pytest.approx(theirs, abs=1e-4 * scale)
     assert tuple(space.rates_at_end[:2]) == pytest.approx(equations.evaluate_rates(new), rel=1e-12)
     # dense output of the step as it is now
-    stepper.unknowns_at(motion, space, clock)
+    stepper.interpolate_unknowns(motion, space, clock)
     assert tuple(space.y_within[:2]) == pytest.approx(new, rel=1e-12)
-    stepper.unknowns_at(motion, space, began)
+    stepper.interpolate_unknowns(motion, space, began)
     assert tuple(space.y_within[:2]) == pytest.approx(start, rel=1e-12)
 
 
@@ -206,12 +213,12 @@ def test_values_within_a_step_are_those_of_scipy(method):
     solver.step()
     dense = solver.dense_output()
     for clock in np.linspace(solver.t_old, solver.t, 7).tolist():
-        assert list(_float_interpolant(dense)(clock)) == pytest.approx(
+        assert list(_build_float_interpolant(dense)(clock)) == pytest.approx(
             dense(clock).tolist(), rel=1e-14
         )
 
 
-@pytest.mark.parametrize("method", sorted(METHODS))
+@pytest.mark.parametrize("method", sorted(SCIPY_SOLVER_BY_METHOD_NAME))
 def test_a_budget_ends_within_a_step(method):
     """LSODA may go on for ever within one; what follows is not disturbed."""
     regime = SYSTEMS[1][0].regime

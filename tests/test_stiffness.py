@@ -24,7 +24,7 @@ def test_stiffness_is_its_ratio_times_the_critical_one():
     assert absolute.stiffness_ratio == pytest.approx(1.2, rel=1e-15)
     assert absolute.as_dict()["stiffness_ratio"] is None
     assert relative.as_dict()["stiffness"] is None
-    assert absolute.numbers == relative.numbers
+    assert absolute.parameter_values == relative.parameter_values
     first, second = (CriticalStep()(scene, Accuracy(1e-5)) for scene in (relative, absolute))
     assert first.values == pytest.approx(second.values, rel=1e-12)
 
@@ -51,7 +51,7 @@ def test_without_rate_weakening_stiffness_is_given_by_itself():
 @pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {}, {"inertia": True}])
 def test_without_rate_weakening_nothing_grows(law, b_over_a, effects):
     scene = Scene(law=law, b_over_a=b_over_a, stiffness=0.05, load_velocity_ratio=3.0, **effects)
-    assert stability.growth_rates(scene, scene.log_load_velocity)[0].real < 0.0
+    assert stability.linear_growth_rates(scene, scene.log_load_velocity)[0].real < 0.0
     found = LinearStability()(scene, Accuracy())
     assert found.status is Status.STABLE_AT_ANY_STIFFNESS
     assert LimitCycle(phases=2)(scene, Accuracy(1e-4)).status is Status.NO_LIMIT_CYCLE

@@ -15,7 +15,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.slider import stability
-from rsfstudy.slider.equations import friction_relation
+from rsfstudy.slider.equations import build_friction_relation
 from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant"}
@@ -27,7 +27,9 @@ SHEAR, C = st.floats(-0.5, 2.0), st.floats(0.01, 5.0)
 
 @given(SHEAR, C)
 def test_at_constant_normal_stress_the_state_loses_c_times_the_change_of_friction(g, c):
-    value, slope, shift, shift_slope = friction_relation(Scene(stress_dependence=c, **CONSTANT))(g)
+    value, slope, shift, shift_slope = build_friction_relation(
+        Scene(stress_dependence=c, **CONSTANT)
+    )(g)
     assert (value, slope) == pytest.approx(((1.0 + c) * g, 1.0 + c), rel=1e-15)
     assert (shift, shift_slope) == (c * g, c)
 
@@ -36,7 +38,7 @@ def test_at_constant_normal_stress_the_state_loses_c_times_the_change_of_frictio
 def test_it_is_the_integral_of_c_dtau_over_sigma(g, c, phi):
     """c/cot ln(1 + cot g), on top of what changes of normal stress take."""
     with_, without = (
-        friction_relation(Scene(stress_dependence=x, phi=phi, alpha=0.3))(g) for x in (c, 0.0)
+        build_friction_relation(Scene(stress_dependence=x, phi=phi, alpha=0.3))(g) for x in (c, 0.0)
     )
     cot = cot_phi(Scene(phi=phi))
     extra = [one - other for one, other in zip(with_, without, strict=True)]
@@ -48,7 +50,7 @@ def test_it_is_the_integral_of_c_dtau_over_sigma(g, c, phi):
 def test_no_digits_are_lost_where_normal_stress_hardly_varies(g, tilt):
     """phi close to 90 degrees: c g (1 - cot g/2 + (cot g)**2/3), to the cube of 2e-3."""
     scene = Scene(stress_dependence=1.0, alpha=0.0, phi=90.0 - math.degrees(tilt))
-    shift, small = friction_relation(scene)(g)[2], cot_phi(scene) * g
+    shift, small = build_friction_relation(scene)(g)[2], cot_phi(scene) * g
     series = g * (1.0 - small / 2.0 + small**2 / 3.0)
     assert shift == pytest.approx(series, rel=1e-15 + abs(small) ** 3)
 
@@ -99,7 +101,7 @@ def equivalent(scene: Scene) -> Scene:
 def test_small_steps_look_like_another_slider_without_it(law, c, ratio):
     """Growth rates per D_c are those per (1 + c) D_c, over 1 + c."""
     scene = Scene(law=law, stress_dependence=c, stiffness_ratio=ratio, **CONSTANT)
-    ours, theirs = (stability.growth_rates(one, 0.0) for one in (scene, equivalent(scene)))
+    ours, theirs = (stability.linear_growth_rates(one, 0.0) for one in (scene, equivalent(scene)))
     assert (1.0 + c) * ours == pytest.approx(theirs, rel=1e-10)
 
 

@@ -78,9 +78,9 @@ def test_steps_and_ramps_of_normal_stress_are_found(rho: float, drift: float) ->
     shape = np.interp(time, [99.9, 100.0, 200.0, 210.0], [1.0, 1.2, 1.2, 0.8])
     noise = synthetic.correlated_noise(len(time), rho, 0.01, 5)
     first, second = find_stress_steps(time, level * (shape + noise))
-    assert (first.start, first.end) == pytest.approx((99.95, 99.95), abs=0.3)
+    assert (first.start_time, first.end_time) == pytest.approx((99.95, 99.95), abs=0.3)
     assert first.stress_after / first.stress_before == pytest.approx(1.2, abs=0.03)
-    assert (second.start, second.end) == pytest.approx((200.0, 210.0), abs=1.5)
+    assert (second.start_time, second.end_time) == pytest.approx((200.0, 210.0), abs=1.5)
     assert second.stress_after / second.stress_before == pytest.approx(0.8 / 1.2, abs=0.03)
 
 

@@ -14,12 +14,12 @@ from rsfstudy import Axis, Claim, Scene, Study, check
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import InvalidValue
 from rsfstudy.execution import cells
-from rsfstudy.execution.plan import Plan
+from rsfstudy.execution.plan import CellPlan
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.parts import number
-from rsfstudy.storage.lattice import build_coordinates
+from rsfstudy.storage.lattice import build_lattice_coordinates
 from rsfstudy.study import catalogue, study_index
 
 CASES = {
@@ -105,7 +105,7 @@ def declared(**fields) -> Study:
 def test_a_zipped_axis_bears_its_own_values_whatever_the_first_cell_needs(order):
     case = Axis("case", {"weak": {"alpha": 0.25}, "strong": {"alpha": 0.5}})
     study = declared(axes=[Axis("normal_stress", order), case])
-    assert build_coordinates(study)["alpha"][1].tolist() == [0.25, 0.5]
+    assert build_lattice_coordinates(study)["alpha"][1].tolist() == [0.25, 0.5]
 
 
 def test_claims_on_a_point_apply_if_its_value_is_given_again():
@@ -219,17 +219,17 @@ def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
     lattices, a sample of the cells.
     """
     study = MIXED if name == "mixed" else catalogue.load_study(name)
-    plan = Plan(study)
+    plan = CellPlan(study)
     numbers = np.unique(np.linspace(0, study.size - 1, 72).astype(int))
-    task = cells.Task(study.base, study.measure, study.accuracy)
-    monkeypatch.setattr(cells, "_load_task", lambda _sent: task)
-    monkeypatch.setattr(cells, "_HAND_OVER_INTERVAL", np.inf)
-    monkeypatch.setattr(task.packing, "pack_cell", lambda *finished: finished)
+    task = cells.CellTask(study.base, study.measure, study.accuracy)
+    monkeypatch.setattr(cells, "_load_cell_task", lambda _sent: task)
+    monkeypatch.setattr(cells, "_FINISHED_CELLS_HANDOVER_INTERVAL", np.inf)
+    monkeypatch.setattr(task.output_packing, "pack_cell", lambda *finished: finished)
     monkeypatch.setattr(cells, "compute_cell", lambda _task, cell: (cell, 0.0))
-    found = pickle.loads(cells.compute_batch(b"", cells.pack_batch(plan, numbers)))
+    found = pickle.loads(cells.compute_batch(b"", cells.pack_cell_batch(plan, numbers)))
     for place, (key, cell, _seconds) in zip(numbers.tolist(), found, strict=True):
         scene, changes = study.cell(place)
         assert plan.keys[place].tobytes() == key
         assert cell_key(scene, study.measure.with_(**changes)) == key
         assert cell == (scene, changes)
-        assert cell.scene.numbers == scene.numbers
+        assert cell.scene.numbers == scene.parameter_values

@@ -13,7 +13,7 @@ from rsfstudy.cli import printing, table_layout
 from rsfstudy.formatting import format_overrides
 from rsfstudy.measures import Outcome
 from rsfstudy.reporting import tables
-from rsfstudy.reporting.tables import Table
+from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import Status
 from rsfstudy.study import catalogue, study_index
 
@@ -35,12 +35,12 @@ def printed(monkeypatch, capsys):
     return at
 
 
-def pieces(table: Table) -> set[str]:
+def pieces(table: TextTable) -> set[str]:
     """What a reader must find in one piece: each text, but words of sentences and headings."""
     found = {word for head in table.rows[0] for word in head.split()}
     for row in table.rows:
         for head, text in row.items():
-            found |= set(text.split() if head in table.wrappable else [text])
+            found |= set(text.split() if head in table.wrappable_columns else [text])
     return found
 
 
@@ -53,14 +53,14 @@ def in_one_piece(piece: str, lines: list[str]) -> bool:
 def test_results_of_every_study(name, printed, tmp_path_factory):
     dataset, _path = named_results(name, tmp_path_factory)
     shown = [
-        tables.headline_table(dataset),
+        tables.build_primary_output_table(dataset),
         *tables.reduction_tables(dataset),
-        printing.contents_table(dataset),
+        printing.build_contents_table(dataset),
     ]
     shown += [tables.claims_table(study_runs.check(dataset))]
     for table in (table for table in shown if table.rows):
         for width in WIDTHS:
-            lines = printed(width, table_layout.print_piece, table)
+            lines = printed(width, table_layout.print_summary_piece, table)
             assert not [piece for piece in pieces(table) if not in_one_piece(piece, lines)]
 
 
@@ -69,7 +69,7 @@ def test_declarations_of_every_study(width, printed, tmp_path):
     """The points of their axes are there, each in one piece."""
     for name in study_index.study_names():
         study = catalogue.load_study(name)
-        lines = printed(width, printing.print_declaration, study, tmp_path)
+        lines = printed(width, printing.print_study_declaration, study, tmp_path)
         for axis in study.axes:
             shown = (
                 axis.point_names
@@ -92,20 +92,26 @@ def test_where_no_cell_has_a_number_the_status_is_explained():
 def test_a_relation_stays_with_its_number(printed):
     row = {"id": "C1", "claim": "a long sentence " * 9, "published": "< 1", "ours": "-4.56032e-07"}
     for width in range(16, 121):
-        lines = printed(width, table_layout.print_piece, Table([row, row], wrappable={"claim"}))
+        lines = printed(
+            width,
+            table_layout.print_summary_piece,
+            TextTable([row, row], wrappable_columns={"claim"}),
+        )
         assert sum(in_one_piece("< 1", [line]) for line in lines) == 2
         assert sum(in_one_piece("-4.56032e-07", [line]) for line in lines) == 2
 
 
 def test_what_is_wider_than_the_terminal_is_there_to_its_last_character(printed):
     path = "/a/very/long/path" * 9
-    lines = printed(40, table_layout.print_piece, {"file": path})
+    lines = printed(40, table_layout.print_summary_piece, {"file": path})
     assert path in "".join("".join(lines).split())
 
 
 def test_a_column_of_numbers_ends_at_one_place(printed):
     lines = printed(
-        80, table_layout.print_piece, Table([{"a": "x", "n": "1"}, {"a": "yy", "n": "-10.5"}])
+        80,
+        table_layout.print_summary_piece,
+        TextTable([{"a": "x", "n": "1"}, {"a": "yy", "n": "-10.5"}]),
     )
     found = [line.rstrip() for line in lines[2:4]]
     width = len(found[0])  # which depends on the version of rich
@@ -125,7 +131,7 @@ def test_a_cell_is_told_in_a_line_for_each_number_beside_that_of_its_file(printe
     orbit, other = np.linspace(0.0, 2.0, 400), np.linspace(0.0, 3.0, 400)
     there = xr.Dataset({"interval": 1.5, "orbit": ("phase", other)})
     now = Outcome(Status.OK, {"interval": 1.5, "orbit": orbit})
-    told = printed(80, printing.print_outcome, Scene(), now, there)
+    told = printed(80, printing.print_recomputed_cell, Scene(), now, there)
     lines = [" ".join(line.split()) for line in told]
     assert "interval 1.5 same" in lines
     assert "orbit 400 values, 0 to 2 400 values, 0 to 3" in lines

@@ -9,7 +9,10 @@ from rsfstudy.named_studies._critical_triggers import TRIGGERS, Triggers
 
 from rsfstudy import Scene
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.monotone_approach import monotone_rise_events, rises_monotonically
+from rsfstudy.critical_steps.monotone_approach import (
+    monotone_rise_events,
+    rises_monotonically_to_load_rate,
+)
 from rsfstudy.critical_steps.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
@@ -55,7 +58,7 @@ def test_what_is_said_to_rise_to_the_load_point_does(law, normal_stress, ratio):
         scene, accuracy, meter, [maximum("log_slip_rate"), approach_to_steady_state(1e-3), *levels]
     ):
         if event.specification in levels and not told[-1]:
-            told.append(rises_monotonically(scene, event.point))
+            told.append(rises_monotonically_to_load_rate(scene, event.point))
         assert not (event.kind is EventKind.MAXIMUM and told[-1])
         assert event.point.log_slip_rate <= scene.log_load_velocity or not told[-1]
         if event.kind is EventKind.SETTLED:
@@ -75,7 +78,7 @@ def test_oscillations_do_not_rise_to_the_load_point():
     scene = Scene(stiffness_ratio=1.1, load_velocity_ratio=1.1, radiation_damping=1e-12)
     start = next(integrate_events(scene, Accuracy(1e-6), WorkMeter(10**5)))
     assert start.point.log_slip_rate < scene.log_load_velocity
-    assert not rises_monotonically(scene, start.point)
+    assert not rises_monotonically_to_load_rate(scene, start.point)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

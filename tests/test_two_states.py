@@ -62,7 +62,7 @@ def test_a_state_that_hardly_acts_is_one_that_is_not_there(law, of_two, second):
     one = Scene(law=law, b_over_a=1.5, stiffness=1e-3, **CONSTANT)
     parts = {"b1_over_a": 1.5, "b2_over_a": second, "length_ratio": 3.0}
     two = Scene(law=of_two, stiffness=1e-3, **parts, **CONSTANT)
-    growth, again = (stability.growth_rates(scene, 0.0)[0] for scene in (one, two))
+    growth, again = (stability.linear_growth_rates(scene, 0.0)[0] for scene in (one, two))
     assert again == pytest.approx(growth, rel=3.0 * second)
 
 
@@ -105,7 +105,7 @@ def test_what_stress_takes_is_shared_within_bounds(law, effect):
         scene = Scene(
             law=law, b1_over_a=1.5, b2_over_a=second, length_ratio=60.0, stiffness=0.01, **effect
         )
-        shares = scene.parts.law.numbers(scene)[2:4]
+        shares = scene.parts.law.parameter_values(scene)[2:4]
         assert shares == pytest.approx((0.5, 0.5), abs=1e-9)
         critical.append(scene.critical_stiffness)
     assert critical[0] == pytest.approx(critical[1], rel=1e-6)
@@ -127,11 +127,11 @@ WINDOW = {"b1_over_a": 1.136, "b2_over_a": -0.5, "length_ratio": 10.0, **CONSTAN
 @pytest.mark.parametrize("mass", [{}, {"inertia": True}, {"radiation_damping": 1e-9}])
 def test_growth_confirms_a_threshold_close_to_another(mass):
     scene = Scene(law="two_slip_states", stiffness=0.01, **WINDOW, **mass)
-    first, second = stability.critical_stiffnesses(scene, 0.0)
+    first, second = stability.all_critical_stiffnesses(scene, 0.0)
     assert 0.5 * second < first < second
     assert second == pytest.approx(scene.critical_stiffness, rel=1e-4)
     for stiffness, grows in ((0.9 * first, False), (1.1 * first, True), (1.1 * second, False)):
-        rates = stability.growth_rates(scene.with_(stiffness=stiffness), 0.0)
+        rates = stability.linear_growth_rates(scene.with_(stiffness=stiffness), 0.0)
         assert bool(rates[0].real > 0.0) is grows
     found = LinearStability()(scene, Accuracy())
     assert found.status is Status.OK
@@ -147,7 +147,7 @@ def test_below_a_window_of_instability_motions_settle(ratio, margin):
     assert forward_motion.is_linearly_stable(scene) is (margin > 0.0)
     if ratio == 0.2:
         assert LimitCycle(phases=2)(scene, Accuracy(1e-4)).status is Status.NO_LIMIT_CYCLE
-        small = forward_motion.reaches_norm(scene, Accuracy(1e-4), WorkMeter(2_000_000))
+        small = forward_motion.motion_reaches_norm(scene, Accuracy(1e-4), WorkMeter(2_000_000))
         assert not small
 
 
@@ -181,8 +181,8 @@ class ThreeSlipStates(laws.Law):
     evolutions = staticmethod(evolutions)
     steady_states = staticmethod(steady_states)
 
-    def numbers(self, scene):
-        return (*super().numbers(scene), self.second, self.third)
+    def parameter_values(self, scene):
+        return (*super().parameter_values(scene), self.second, self.third)
 
 
 @pytest.mark.parametrize("engine", [SCIPY, COMPILED])

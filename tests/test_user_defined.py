@@ -24,7 +24,7 @@ from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider.laws import Law, LawBase
 from rsfstudy.slider.normal_stress import NormalStress
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.parts import collect_numbers, number
+from rsfstudy.slider.parts import collect_parameter_values, number
 from rsfstudy.status import Status
 
 # ---- reductions ---------------------------------------------------------------------------------
@@ -131,7 +131,7 @@ class Overridden(Declared):
 
     name = "overridden"
 
-    def numbers(self, scene):
+    def parameter_values(self, scene):
         return (scene.a * self.b_over_a, math.log(self.speed), self.slowness**2)
 
 
@@ -145,7 +145,7 @@ class Further(Overridden):
 def test_fields_of_a_law_follow_b_in_the_order_of_their_declaration():
     common = {"a": 0.01, "b_over_a": 2.0, "normal_stress": "constant", "stiffness": 0.01}
     scene = Scene(law=Declared, speed=3.0, slowness=1.5, **common)
-    assert scene.numbers[LAW:] == pytest.approx((0.02, 3.0, 1.5), rel=1e-15)
+    assert scene.parameter_values[LAW:] == pytest.approx((0.02, 3.0, 1.5), rel=1e-15)
     # the evolution is twice as fast as that of the slip law: so is D_c, and with it k_cr
     slip = Scene(law="slip", **common)
     assert scene.critical_stiffness == pytest.approx(2.0 * slip.critical_stiffness, rel=1e-5)
@@ -153,7 +153,7 @@ def test_fields_of_a_law_follow_b_in_the_order_of_their_declaration():
 
 def test_numbers_that_a_law_returns_itself_are_not_repeated():
     law = Further(speed=math.e, slowness=3.0, offset=7.0)
-    found = collect_numbers(law, Scene(a=0.01, stiffness=0.01))
+    found = collect_parameter_values(law, Scene(a=0.01, stiffness=0.01))
     assert found[:-1] == pytest.approx((0.02, 1.0, 9.0, 7.0))
     assert math.isnan(found[-1])
 
@@ -170,9 +170,9 @@ def test_fields_of_other_parts_are_passed_too():
         name = "states"
 
     scene = Scene()
-    assert collect_numbers(Stress(), scene) == (0.5,)
+    assert collect_parameter_values(Stress(), scene) == (0.5,)
     # not the fields of all laws, which have places of their own
-    assert collect_numbers(States(), scene) == (0.25,)
+    assert collect_parameter_values(States(), scene) == (0.25,)
 
 
 # ---- measures that follow a motion --------------------------------------------------------------

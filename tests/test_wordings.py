@@ -36,8 +36,8 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantities import Output
 from rsfstudy.reductions import Reduction
 from rsfstudy.rig.units import convert_to_si
-from rsfstudy.slider.parts import RULES, field_names, is_boolean_field
-from rsfstudy.slider.registry import FIELD_OWNERS, SLOTS
+from rsfstudy.slider.parts import VALUE_RULES, field_names, is_boolean_field
+from rsfstudy.slider.registry import PART_CLASS_BY_FIELD_NAME, SLOTS
 from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.study import catalogue
 from rsfstudy.study.claims import Claim
@@ -69,13 +69,17 @@ def calling(part: type) -> dict[str, Any]:
         return {}
     if part.selected_by:
         return {part.selected_by: True if is_boolean_field(part, part.selected_by) else 1.0}
-    slot = next(slot for slot in SLOTS if part in slot.choices.values())
-    return {slot.name: part.name} if not slot.selectors and part.name != slot.default else {}
+    slot = next(slot for slot in SLOTS if part in slot.built_in_parts.values())
+    return (
+        {slot.name: part.name}
+        if not slot.parts_by_selecting_field and part.name != slot.default_part_name
+        else {}
+    )
 
 
 def broken() -> Iterator[tuple[dict[str, Any], str, str]]:
     """A scene with one wrong value, the field, and the rule that it breaks."""
-    for name, part in FIELD_OWNERS.items():
+    for name, part in PART_CLASS_BY_FIELD_NAME.items():
         wrong = {"yes": "must be true or false"}
         if not is_boolean_field(part, name):
             rule = part.__dataclass_fields__[name].metadata["rule"]
@@ -85,7 +89,7 @@ def broken() -> Iterator[tuple[dict[str, Any], str, str]]:
 
 
 def test_every_rule_is_broken_here():
-    assert set(BREAKING) == set(RULES)
+    assert set(BREAKING) == set(VALUE_RULES)
 
 
 @pytest.mark.parametrize(("fields", "name", "rule"), list(broken()), ids=str)
@@ -100,11 +104,11 @@ def test_each_field_is_held_to_its_rule(fields, name, rule):
 def foreign() -> Iterator[tuple[dict[str, Any], str]]:
     """A field that another part of its slot brings, beside one that does without."""
     for slot in SLOTS:
-        for part in slot.choices.values():
-            for other in slot.choices.values():
+        for part in slot.built_in_parts.values():
+            for other in slot.built_in_parts.values():
                 calls = calling(other)
                 for name in sorted({*field_names(part)} - {*field_names(other), part.selected_by}):
-                    if FIELD_OWNERS[name] is part:
+                    if PART_CLASS_BY_FIELD_NAME[name] is part:
                         yield {**calls, name: 0.5}, name
 
 

@@ -14,24 +14,24 @@ from rsfstudy._lazy import lazy_exports
 if TYPE_CHECKING:
     from rsfstudy.api.html_report import write_report
     from rsfstudy.api.result_paths import find_results
-    from rsfstudy.api.simulation import BEYOND_NORM_ATTRIBUTE
-    from rsfstudy.api.study_runs import apply_overrides, prepare_run
+    from rsfstudy.api.simulation import BEYOND_NORM_ATTRIBUTE_NAME
+    from rsfstudy.api.study_runs import apply_overrides_to_study, prepare_run_with_progress
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
             "api.html_report": ("write_report",),
             "api.result_paths": ("find_results",),
-            "api.simulation": ("BEYOND_NORM_ATTRIBUTE",),
-            "api.study_runs": ("apply_overrides", "prepare_run"),
+            "api.simulation": ("BEYOND_NORM_ATTRIBUTE_NAME",),
+            "api.study_runs": ("apply_overrides_to_study", "prepare_run_with_progress"),
         },
     )
 
 __all__ = [
-    "BEYOND_NORM_ATTRIBUTE",
-    "apply_overrides",
+    "BEYOND_NORM_ATTRIBUTE_NAME",
+    "apply_overrides_to_study",
     "find_results",
-    "prepare_run",
+    "prepare_run_with_progress",
     "write_report",
 ]
 from rsfstudy.api import accessor as accessor  # registers the accessor of datasets

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rsfstudy.slider import Scene
     from rsfstudy.study import Study
 
-_FOREIGN_DATASET = (
+_FOREIGN_DATASET_MESSAGE = (
     "the dataset is not of rsfstudy: it has neither the attribute 'scene' nor 'declaration'. "
     "Take it from rsfstudy.simulate, critical_step, limit_cycle, run or open, or from a file of "
     "theirs, with its attributes."
@@ -110,7 +110,7 @@ class Accessor:
         return study_of_dataset(self._dataset)
 
     @error_boundary
-    def to_si(self, **scales: Any) -> xr.Dataset:
+    def to_si(self, **scale_values: Any) -> xr.Dataset:
         """The dataset in SI units.
 
         Parameters
@@ -121,7 +121,7 @@ class Accessor:
         from rsfstudy.api.single_scene import to_si
 
         self._require_rsfstudy_dataset()
-        return to_si(self._dataset, **scales)
+        return to_si(self._dataset, **scale_values)
 
     @error_boundary
     def in_units(self, *, stress: str = "MPa", length: str = "um", time: str = "s") -> xr.Dataset:
@@ -138,10 +138,12 @@ class Accessor:
         InvalidValue
             For units of another kind, and for results that hold no scales: those of no rig.
         """
-        from rsfstudy.rig import convert_units, read_scales
+        from rsfstudy.rig import convert_dataset_units, read_si_scales
 
         self._require_rsfstudy_dataset()
-        return convert_units(self._dataset, read_scales(self._dataset), stress, length, time)
+        return convert_dataset_units(
+            self._dataset, read_si_scales(self._dataset), stress, length, time
+        )
 
     @error_boundary
     def check(self) -> pd.DataFrame:
@@ -151,11 +153,11 @@ class Accessor:
         from rsfstudy.api import study_runs
 
         self._require_study()
-        self._require_all_cells("claims are held against")
+        self._require_all_cells_present("claims are held against")
         return study_runs.check(self._dataset)
 
     @error_boundary
-    def plot(self, *what: Any, **how: Any) -> Figure:
+    def plot(self, *plot_arguments: Any, **plot_options: Any) -> Figure:
         """The figure of the results of a study, or the picture of a motion or a limit cycle, in the
         units that they have.
 
@@ -169,9 +171,9 @@ class Accessor:
         from rsfstudy.plots import plot_motion
 
         if self._is_study:
-            self._require_all_cells("figures show")
-            return study_runs.plot(self._dataset, *what, **how)
-        return plot_motion(self._dataset, *what, **how)
+            self._require_all_cells_present("figures show")
+            return study_runs.plot(self._dataset, *plot_arguments, **plot_options)
+        return plot_motion(self._dataset, *plot_arguments, **plot_options)
 
     @error_boundary
     def events(self, slip_rate: float | None = None) -> xr.Dataset:
@@ -312,13 +314,15 @@ class Accessor:
         """
         import pandas as pd
 
-        from rsfstudy.reporting import cells_frame
+        from rsfstudy.reporting import build_frame_of_cells
         from rsfstudy.status import Status
         from rsfstudy.storage import read_declaration
 
         if self._is_study:
             axes = [axis["dimension"] for axis in read_declaration(self._dataset).axes]
-            return cells_frame(self._dataset, self._dataset["status"] != int(Status.OK), axes)
+            return build_frame_of_cells(
+                self._dataset, self._dataset["status"] != int(Status.OK), axes
+            )
         ended = {name: self._dataset.attrs.get(name, "") for name in ("status", "message")}
         rows = [] if ended["status"] == Status.OK.label else [ended]
         return pd.DataFrame(rows, columns=list(ended))
@@ -330,16 +334,16 @@ class Accessor:
 
     def _require_rsfstudy_dataset(self) -> None:
         if not {"scene", "declaration"} & set(self._dataset.attrs):
-            raise DataError(_FOREIGN_DATASET)
+            raise DataError(_FOREIGN_DATASET_MESSAGE)
 
-    def _require_all_cells(self, what: str) -> None:
+    def _require_all_cells_present(self, requested_action: str) -> None:
         """Refuse results of which cells were selected."""
         from rsfstudy.storage import read_declaration
 
         axes = [axis["dimension"] for axis in read_declaration(self._dataset).axes]
         selected = [name for name in axes if name not in self._dataset["status"].dims]
         if selected:
-            text = f"{what} all results of a study, and of these {', '.join(selected)} is selected"
+            text = f"{requested_action} all results of a study, and of these {', '.join(selected)} is selected"
             raise DataError(f"{text}. Ask the dataset as it was opened.")
 
     def _require_study(self) -> None:

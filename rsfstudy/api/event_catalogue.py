@@ -22,25 +22,25 @@ from rsfstudy.fitting import (
     Record,
     read_drops,
 )
-from rsfstudy.netcdf import with_cf_encoding
+from rsfstudy.netcdf import copy_with_cf_encoding
 from rsfstudy.rig import convert_to_si, read_table, unit_factor
 
 #: What quantities are measured in: as these variables, by their scales.
-_REFERENCE_VARIABLES = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
+_RECORD_VARIABLE_BY_SCALE = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
 #: Quantities that are read from displacement.
-_SLIP_QUANTITIES = ("slip", "peak_slip_rate", "dynamic_stress_drop")
+_QUANTITIES_REQUIRING_DISPLACEMENT = ("slip", "peak_slip_rate", "dynamic_stress_drop")
 #: What part of an event is missing, by its flag.
-_CUT_MEANINGS = ("whole", "begins_before", "lasts_beyond", "both")
+_MEANINGS_OF_CUT_FLAGS = ("whole", "begins_before", "lasts_beyond", "both")
 
 #: Falls of stress, in smallest drops, from which it is suspect that no drop is found.
-_SUSPICIOUS_VARIATION = 10.0
+_SUSPICIOUS_DECREASE_OVER_MIN_DROP = 10.0
 
 
 def build_catalogue(
-    found: Sequence[EventNumbers], about: Mapping[str, Mapping[Any, Any]]
+    event_numbers: Sequence[EventNumbers], variable_attributes: Mapping[str, Mapping[Any, Any]]
 ) -> xr.Dataset:
     """Events as a dataset, in the units of what they were read from."""
-    rows = [numbers for numbers, _cut in found]
+    rows = [numbers for numbers, _cut in event_numbers]
     for row, earlier in zip(rows, [{}, *rows], strict=False):
         (time, error), (before, unsure) = row["time"], earlier.get("time", (math.nan, math.nan))
         row["interval"] = time - before, error + unsure
@@ -50,17 +50,21 @@ def build_catalogue(
         if rows and name not in rows[0]:
             continue
         values, errors = np.array([row[name] for row in rows]).reshape(-1, 2).T
-        units = _unit_attributes(scale, about)
+        units = _build_unit_attributes(scale, variable_attributes)
         dataset[name] = "event", values, {"long_name": words, **units}
         of_error = {"long_name": f"error estimate of {words}", **units}
         dataset[f"{name}_error"] = "event", errors, of_error
     flags = {
         "long_name": "what of the event the record leaves out",
-        "flag_values": np.arange(len(_CUT_MEANINGS), dtype=np.int8),
-        "flag_meanings": " ".join(_CUT_MEANINGS),
+        "flag_values": np.arange(len(_MEANINGS_OF_CUT_FLAGS), dtype=np.int8),
+        "flag_meanings": " ".join(_MEANINGS_OF_CUT_FLAGS),
     }
-    dataset["cut"] = "event", np.array([cut for _numbers, cut in found], dtype=np.int8), flags
-    return with_cf_encoding(
+    dataset["cut"] = (
+        "event",
+        np.array([cut for _numbers, cut in event_numbers], dtype=np.int8),
+        flags,
+    )
+    return copy_with_cf_encoding(
         dataset.assign_attrs(
             title="Catalogue of events",
             Conventions="CF-1.11",
@@ -69,18 +73,20 @@ def build_catalogue(
     )
 
 
-def _unit_attributes(scale: str, about: Mapping[str, Mapping[Any, Any]]) -> dict[str, str]:
+def _build_unit_attributes(
+    scale: str, variable_attributes: Mapping[str, Mapping[Any, Any]]
+) -> dict[str, str]:
     """Return the attributes ``units`` and ``scale`` of a quantity of an event.
 
     Times, slips and stresses have the units of the variable from which they were read. A slip
     rate is in units of slip over units of time. All other quantities are dimensionless.
     """
-    if scale in _REFERENCE_VARIABLES:
-        source = about[_REFERENCE_VARIABLES[scale]]
+    if scale in _RECORD_VARIABLE_BY_SCALE:
+        source = variable_attributes[_RECORD_VARIABLE_BY_SCALE[scale]]
         return {key: str(source[key]) for key in ("units", "scale") if key in source}
-    if not scale or "scale" in about["slip"]:
+    if not scale or "scale" in variable_attributes["slip"]:
         return {"units": "1", **({"scale": scale} if scale else {})}
-    time, slip = (about[name].get("units") for name in ("time", "slip"))
+    time, slip = (variable_attributes[name].get("units") for name in ("time", "slip"))
     return {"units": f"{slip} {time}-1"} if time and slip else {}
 
 
@@ -183,9 +189,9 @@ def events(
             remedy = "Pass a Dataset, a Record, the path of a CSV file, or arrays by name."
             raise InvalidValue("record", record, "is no record of stress", remedy=remedy)
         given = {name: record.get(name) for name in given}
-    times, stress = (_check_samples(name, given[name]) for name in ("time", "shear_stress"))
+    times, stress = (_check_record_samples(name, given[name]) for name in ("time", "shear_stress"))
     moved = given["displacement"]
-    moves = None if moved is None else _check_samples("displacement", moved)
+    moves = None if moved is None else _check_record_samples("displacement", moved)
     for name, samples in (("shear_stress", stress), ("displacement", moves)):
         if samples is not None and len(samples) != len(times):
             rule = f"must hold as many samples as time, which holds {len(times)}"
@@ -193,7 +199,7 @@ def events(
     if not (np.diff(times) > 0.0).all():
         late = int(np.argmax(np.diff(times) <= 0.0)) + 1
         raise InvalidValue("time", times[late], f"must increase, and does not at sample {late}")
-    direction = _stress_sign(stress, sign)
+    direction = _find_stress_sign(stress, sign)
     stress = direction * stress
     about = {name: dict(getattr(values, "attrs", {})) for name, values in given.items()}
     if stiffness is not None:
@@ -202,7 +208,7 @@ def events(
         moves = moves - stress / _parse_stiffness(stiffness, about)
     rows, detection, is_slip = read_drops(times, stress, moves, check_slip=stiffness is None)
     for row in rows if not is_slip else ():
-        row[0].update(dict.fromkeys(_SLIP_QUANTITIES, (math.nan, math.nan)))
+        row[0].update(dict.fromkeys(_QUANTITIES_REQUIRING_DISPLACEMENT, (math.nan, math.nan)))
     dataset = build_catalogue(rows, about | {"slip": about["displacement"]})
     if rows and not is_slip:
         why = "displacement moves no faster during the drops of stress than before and after"
@@ -225,32 +231,38 @@ def events(
     return dataset
 
 
-def _parse_stiffness(stated: Any, about: Mapping[str, Mapping[Any, Any]]) -> float:
+def _parse_stiffness(stiffness: Any, variable_attributes: Mapping[str, Mapping[Any, Any]]) -> float:
     """Shear stress over displacement, in the units of the record."""
-    if isinstance(stated, str):
-        stress, length = (about[n].get("units") for n in ("shear_stress", "displacement"))
+    if isinstance(stiffness, str):
+        stress, length = (
+            variable_attributes[n].get("units") for n in ("shear_stress", "displacement")
+        )
         if not (stress and length):
             remedy = "Give it as a number in the units of the record."
-            raise InvalidValue("stiffness", stated, "the record states no units", remedy=remedy)
+            raise InvalidValue("stiffness", stiffness, "the record states no units", remedy=remedy)
         ours = unit_factor("shear_stress", stress, "Pa") / unit_factor("displacement", length, "m")
-        return _parse_stiffness(convert_to_si("stiffness", stated, "Pa/m") / float(ours), about)
-    if not stated > 0.0:
-        raise InvalidValue("stiffness", stated, "must be positive")
-    return float(stated)
+        return _parse_stiffness(
+            convert_to_si("stiffness", stiffness, "Pa/m") / float(ours), variable_attributes
+        )
+    if not stiffness > 0.0:
+        raise InvalidValue("stiffness", stiffness, "must be positive")
+    return float(stiffness)
 
 
-def _check_samples(name: str, values: Any) -> np.ndarray:
+def _check_record_samples(variable_name: str, values: Any) -> np.ndarray:
     """Samples of a record, checked."""
     try:
         samples = np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
-        raise InvalidValue(name, values, "must be numbers") from error
+        raise InvalidValue(variable_name, values, "must be numbers") from error
     if samples.ndim != 1 or len(samples) < MIN_SAMPLES:
         rule = f"must be a list of {MIN_SAMPLES} samples at least, which tell the noise"
-        raise InvalidValue(name, samples.shape, rule)
+        raise InvalidValue(variable_name, samples.shape, rule)
     if not np.isfinite(samples).all():
         late = int(np.argmin(np.isfinite(samples)))
-        raise InvalidValue(name, samples[late], f"must be finite, and is not at sample {late}")
+        raise InvalidValue(
+            variable_name, samples[late], f"must be finite, and is not at sample {late}"
+        )
     return samples
 
 
@@ -273,16 +285,16 @@ def _record_to_dataset(record: Record) -> xr.Dataset:
     return xr.Dataset(data)
 
 
-def _stress_sign(stress: np.ndarray, stated: int | None) -> float:
+def _find_stress_sign(stress: np.ndarray, stated_sign: int | None) -> float:
     """Return the sign of shear stress in the direction of slip.
 
     If the user does not pass a sign, the sign is -1 if all samples are negative, and 1 otherwise.
     """
-    if stated is None:
+    if stated_sign is None:
         return -1.0 if stress.max() < 0.0 else 1.0
-    if stated not in (-1, 1):
-        raise InvalidValue("sign", stated, "is unknown", choices=("1", "-1"))
-    return float(stated)
+    if stated_sign not in (-1, 1):
+        raise InvalidValue("sign", stated_sign, "is unknown", choices=("1", "-1"))
+    return float(stated_sign)
 
 
 def _warn_if_no_drop(detection: Detection) -> str:
@@ -293,7 +305,7 @@ def _warn_if_no_drop(detection: Detection) -> str:
     str
         The text of the warning. The string is empty if no warning was issued.
     """
-    if not detection.max_decrease > _SUSPICIOUS_VARIATION * detection.detectable_drop:
+    if not detection.max_decrease > _SUSPICIOUS_DECREASE_OVER_MIN_DROP * detection.detectable_drop:
         return ""
     text = (
         f"no drop was found, although stress falls by {detection.max_decrease:.4g} in all, "

@@ -28,7 +28,7 @@ from rsfstudy.fitting import (
     parameters_of_law,
 )
 from rsfstudy.measures import Fit
-from rsfstudy.motion import COMPILED, DEFAULT_RTOL, SCIPY, Accuracy, is_installed
+from rsfstudy.motion import COMPILED, DEFAULT_RTOL, SCIPY, Accuracy, is_engine_installed
 from rsfstudy.reductions import Range
 from rsfstudy.rig import Rig, convert_to_si, is_friction_stiffness
 from rsfstudy.slider import Scene
@@ -46,23 +46,27 @@ DEFAULT_FREE_PARAMETERS = (
     "trend1",
 )
 #: Those of which a law has its own, and what is said of them.
-_EVOLUTION_EFFECTS = ("b", "b1", "b2")
+_EVOLUTION_EFFECT_PARAMETERS = ("b", "b1", "b2")
 _STATE_PARAMETERS_REMEDY = (
     "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
 )
 #: Slip distance to begin with, as part of the load point displacement that is fitted after a step.
-_SLIP_DISTANCE_GUESS_SHARE = 0.05
+_SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT = 0.05
 #: Largest number of windows.
 _MAX_WINDOWS = 1000
 #: Jumps of displacement back, relative to its noise and to its changes nearby, and to its extent,
 #: that are a new zero; and rows from which noise is known.
-_RESET_JUMP_FACTOR, _MIN_RESET_SHARE, _MIN_ROWS_FOR_NOISE = 10.0, 0.01, 20
+(
+    _MIN_DISPLACEMENT_RESET_OVER_NOISE,
+    _MIN_DISPLACEMENT_RESET_OVER_EXTENT,
+    _MIN_ROWS_FOR_NOISE_ESTIMATE,
+) = 10.0, 0.01, 20
 #: Shortest of several windows, as a part of what follows a step.
-_SHORTEST_WINDOW_SHARE = 0.5
+_SHORTEST_WINDOW_FRACTION = 0.5
 #: First guesses of a scene: those of a record take their place.
-_INITIAL_SCENE = {"a": 0.01, "mu_star": 0.6, "normal_stress": "constant"}
-_ONE_STATE_EFFECTS = {"b_over_a": 1.2}
-_TWO_STATE_EFFECTS = {"b1_over_a": 0.9, "b2_over_a": 0.3, "length_ratio": 10.0}
+_INITIAL_SCENE_FIELDS = {"a": 0.01, "mu_star": 0.6, "normal_stress": "constant"}
+_INITIAL_FIELDS_OF_ONE_STATE_LAW = {"b_over_a": 1.2}
+_INITIAL_FIELDS_OF_TWO_STATE_LAW = {"b1_over_a": 0.9, "b2_over_a": 0.3, "length_ratio": 10.0}
 
 
 @error_boundary
@@ -192,18 +196,18 @@ def fit(
         if not isinstance(one, Record):
             remedy = "Make one by rsfstudy.read_record."
             raise InvalidValue("record", one, "is no record", remedy=remedy)
-    records = tuple(_with_rig_normal_stress(one, rig) for one in records)
-    numbers = _step_numbers(records, steps)
+    records = tuple(_add_normal_stress_of_rig(one, rig) for one in records)
+    numbers = _select_step_numbers(records, steps)
     guess = _guess_slip_distance(records[0], rig, numbers[0], slip_distance)
     if "alpha" in scene:
         scene = {"normal_stress": "imposed", **scene}
     if "alpha" in free:
-        _check_normal_stress_changes(records, loading, numbers)
+        _check_normal_stress_changes_for_alpha(records, loading, numbers)
         scene = {"normal_stress": "imposed", **scene}
     ratio, machine = _initial_stiffness(rig, stiffness, free, records)
     if machine:
-        _check_compressive(records, numbers)
-        ratio = machine / FitWindow(records[0], numbers[0]).normal_stress
+        _check_normal_stress_is_compressive(records, numbers)
+        ratio = machine / FitWindow(records[0], numbers[0]).mean_normal_stress_before_step
     first = _initial_scene(laws, scene, ratio * guess)
     sought = _free_parameters(free, laws, first)
     there = tuple((one.name, n) for one in records for n in numbers if n <= len(one.loading_steps))
@@ -232,11 +236,11 @@ def fit(
         rule = f"must be a whole number from 1 to {_MAX_WINDOWS:,}"
         raise InvalidValue("windows", windows, rule)
     if windows > 1:
-        axes.append(Axis("part", np.linspace(1.0, _SHORTEST_WINDOW_SHARE, windows).tolist()))
+        axes.append(Axis("part", np.linspace(1.0, _SHORTEST_WINDOW_FRACTION, windows).tolist()))
         reductions = [Range(f"{n}_windows", n, over="part") for n in measure.parameters]
     chosen: Any = engine
     if engine is None:
-        chosen = COMPILED if is_installed(COMPILED) else SCIPY
+        chosen = COMPILED if is_engine_installed(COMPILED) else SCIPY
     study = Study(
         name="fit",
         title="Friction parameters of a record",
@@ -252,13 +256,13 @@ def fit(
     )
 
 
-def _step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]:
+def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]:
     """Numbers of the steps to fit, from 1: those stated, or all.
 
     Steps that lie outside of their record are refused, and a load point that does not move forward.
     """
     for record in records:
-        _check_displacement(record)
+        _check_displacement_was_not_reset(record)
     count = max(len(one.loading_steps) for one in records)
     if not count:
         remedy = "State them: record.with_steps([(begins, ends, before, after)])."
@@ -271,11 +275,11 @@ def _step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int,
             raise InvalidValue("steps", number, rule)
         for record in records:
             for step in record.loading_steps[number - 1 : number]:
-                _check_step(record, number, step)
+                _check_step_can_be_fitted(record, number, step)
     return numbers
 
 
-def _check_displacement(record: Record) -> None:
+def _check_displacement_was_not_reset(record: Record) -> None:
     """Raise ``InvalidValue`` if the load point displacement was reset to zero.
 
     A reset appears as a large backward jump between two rows.
@@ -283,10 +287,14 @@ def _check_displacement(record: Record) -> None:
     time, moved = record.time, record.columns["displacement"]
     jumps = np.diff(moved)
     row = int(np.argmin(jumps))
-    noise = math.sqrt(noise_variance(time, moved)) if len(time) > _MIN_ROWS_FOR_NOISE else 0.0
+    noise = (
+        math.sqrt(noise_variance(time, moved)) if len(time) > _MIN_ROWS_FOR_NOISE_ESTIMATE else 0.0
+    )
     beside = np.abs(np.delete(jumps[max(row - 5, 0) : row + 6], min(row, 5))).max(initial=0.0)
     back = -float(jumps[row]) > max(
-        _RESET_JUMP_FACTOR * beside, _RESET_JUMP_FACTOR * noise, _MIN_RESET_SHARE * np.ptp(moved)
+        _MIN_DISPLACEMENT_RESET_OVER_NOISE * beside,
+        _MIN_DISPLACEMENT_RESET_OVER_NOISE * noise,
+        _MIN_DISPLACEMENT_RESET_OVER_EXTENT * np.ptp(moved),
     )
     if record.specified_steps is None and back:
         rule = f"falls back between two rows at {time[row + 1]:g} s in {record.name}, as a load "
@@ -296,17 +304,17 @@ def _check_displacement(record: Record) -> None:
         raise InvalidValue("displacement", f"{jumps[row]:.4g} um", rule, remedy=remedy)
 
 
-def _check_step(record: Record, number: int, step: LoadingStep) -> None:
+def _check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep) -> None:
     time, moved = record.time, record.columns["displacement"]
     if not time[0] < step.start <= step.end < time[-1]:
         rule = f"is stated outside of {record.name}, {time[0]:g} to {time[-1]:g} s"
         remedy = "State steps in s, by the clock of the record: record.with_steps([...])."
-        raise InvalidValue(f"step {number}", tuple(step), rule, remedy=remedy)
+        raise InvalidValue(f"step {step_number}", tuple(step), rule, remedy=remedy)
     if min(step.velocity_before, step.velocity_after) < 0.0 or not moved[-1] > np.interp(
         step.end, time, moved
     ):
         told = (
-            f"{step.velocity_before:.4g} um/s before step {number}, "
+            f"{step.velocity_before:.4g} um/s before step {step_number}, "
             f"{step.velocity_after:.4g} um/s after it"
         )
         rule = "must grow: a load point moves forward"
@@ -314,15 +322,17 @@ def _check_step(record: Record, number: int, step: LoadingStep) -> None:
         raise InvalidValue("displacement", told, rule, remedy=remedy)
 
 
-def _check_normal_stress_changes(
-    records: Sequence[Record], loading: str, numbers: Sequence[int]
+def _check_normal_stress_changes_for_alpha(
+    records: Sequence[Record], loading_kind: str, step_numbers: Sequence[int]
 ) -> None:
     """Raise ``InvalidValue`` if alpha is fitted but normal stress is constant."""
     for record in records:
         stress = record.columns.get("normal_stress", np.zeros(1))
-        steps = [record.loading_steps[n - 1] for n in numbers if n <= len(record.loading_steps)]
-        by_steps = loading == "steps" and any(step.stress_ratio != 1.0 for step in steps)
-        if not by_steps and not (loading == "recorded" and np.ptp(stress) > 0.0):
+        steps = [
+            record.loading_steps[n - 1] for n in step_numbers if n <= len(record.loading_steps)
+        ]
+        by_steps = loading_kind == "steps" and any(step.stress_ratio != 1.0 for step in steps)
+        if not by_steps and not (loading_kind == "recorded" and np.ptp(stress) > 0.0):
             rule = "needs a normal stress that changes: "
             rule += f"that of {record.name} has no step among those that are fitted"
             remedy = "Leave alpha out, name a step of normal stress (steps=), or follow the "
@@ -330,19 +340,26 @@ def _check_normal_stress_changes(
             raise InvalidValue("free", "alpha", rule, remedy=remedy)
 
 
-def _guess_slip_distance(record: Record, rig: Rig | None, number: int, stated: Any) -> float:
+def _guess_slip_distance(
+    record: Record, rig: Rig | None, step_number: int, stated_slip_distance: Any
+) -> float:
     """Slip distance to begin with, in um."""
-    if stated is not None:
-        return _to_micrometres("slip_distance", stated)
+    if stated_slip_distance is not None:
+        return _to_micrometres("slip_distance", stated_slip_distance)
     if rig is not None:
         return float(rig.slip_distance * 1e6)
-    begins = record.loading_steps[number - 1].start
+    begins = record.loading_steps[step_number - 1].start
     moved = record.columns["displacement"]
-    return float(_SLIP_DISTANCE_GUESS_SHARE * (moved[-1] - np.interp(begins, record.time, moved)))
+    return float(
+        _SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT * (moved[-1] - np.interp(begins, record.time, moved))
+    )
 
 
 def _initial_stiffness(
-    rig: Rig | None, stated: Any, free: Sequence[str], records: Sequence[Record]
+    rig: Rig | None,
+    stated_stiffness: Any,
+    free_parameters: Sequence[str],
+    records: Sequence[Record],
 ) -> tuple[float, float]:
     """Return the initial stiffness of the fit, in the units that the user chose.
 
@@ -354,38 +371,42 @@ def _initial_stiffness(
     machine : float
         Stiffness of the machine in Pa/um, or 0 if the ratio is known.
     """
-    if stated is None:
+    if stated_stiffness is None:
         if rig is not None and rig.stiffness is not None:
             return 0.0, float(rig.stiffness * 1e-6)
-        if "stiffness" in free:
+        if "stiffness" in free_parameters:
             return 1e-3, 0.0
         remedy = "Give --stiffness (stiffness=), as in '1.6e-3 /um', "
         remedy += "or look for it: --free (free=)."
         raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
-    over_stress = isinstance(stated, Real) or is_friction_stiffness(stated)
-    if isinstance(stated, Real):
-        found = float(stated)
+    over_stress = isinstance(stated_stiffness, Real) or is_friction_stiffness(stated_stiffness)
+    if isinstance(stated_stiffness, Real):
+        found = float(stated_stiffness)
     else:
-        found = convert_to_si("stiffness", stated, "1/m" if over_stress else "Pa/m") * 1e-6
+        found = (
+            convert_to_si("stiffness", stated_stiffness, "1/m" if over_stress else "Pa/m") * 1e-6
+        )
     if not found > 0.0:
-        raise InvalidValue("stiffness", stated, "must be positive")
+        raise InvalidValue("stiffness", stated_stiffness, "must be positive")
     if over_stress:
         return found, 0.0
     for record in records:
         if "normal_stress" not in record.columns:
             remedy = "Give --normal-stress (normal_stress of read_record), or stiffness in 1/um."
             rule = f"needs a normal stress, and {record.name} has none"
-            raise InvalidValue("stiffness", stated, rule, remedy=remedy)
+            raise InvalidValue("stiffness", stated_stiffness, rule, remedy=remedy)
     return 0.0, found
 
 
-def _check_compressive(records: Sequence[Record], numbers: Sequence[int]) -> None:
+def _check_normal_stress_is_compressive(
+    records: Sequence[Record], step_numbers: Sequence[int]
+) -> None:
     """Raise ``InvalidValue`` if the normal stress before a step is not positive."""
     for record in records:
-        for number in numbers:
+        for number in step_numbers:
             if number > len(record.loading_steps):
                 continue
-            stress = FitWindow(record, number).normal_stress
+            stress = FitWindow(record, number).mean_normal_stress_before_step
             if not stress > 0.0:
                 rule = f"must be positive before step {number} of {record.name}, in Pa"
                 remedy = "Compression is positive: reverse the sign, as in columns={"
@@ -393,7 +414,7 @@ def _check_compressive(records: Sequence[Record], numbers: Sequence[int]) -> Non
                 raise InvalidValue("normal_stress", stress, rule, remedy=remedy)
 
 
-def _with_rig_normal_stress(record: Record, rig: Rig | None) -> Record:
+def _add_normal_stress_of_rig(record: Record, rig: Rig | None) -> Record:
     """Return the record with the normal stress of the rig if it has none of its own."""
     if rig is None or "normal_stress" in record.columns:
         return record
@@ -401,26 +422,45 @@ def _with_rig_normal_stress(record: Record, rig: Rig | None) -> Record:
     return replace(record, columns={**record.columns, "normal_stress": stress})
 
 
-def _initial_scene(laws: Sequence[str], stated: Mapping[str, Any], stiffness: float) -> Scene:
-    effects = _TWO_STATE_EFFECTS if str(laws[0]).startswith("two_") else _ONE_STATE_EFFECTS
-    return Scene(**{**_INITIAL_SCENE, **effects, "law": laws[0], "stiffness": stiffness, **stated})
+def _initial_scene(laws: Sequence[str], scene_fields: Mapping[str, Any], stiffness: float) -> Scene:
+    effects = (
+        _INITIAL_FIELDS_OF_TWO_STATE_LAW
+        if str(laws[0]).startswith("two_")
+        else _INITIAL_FIELDS_OF_ONE_STATE_LAW
+    )
+    return Scene(
+        **{
+            **_INITIAL_SCENE_FIELDS,
+            **effects,
+            "law": laws[0],
+            "stiffness": stiffness,
+            **scene_fields,
+        }
+    )
 
 
-def _free_parameters(stated: Sequence[str], laws: Sequence[str], scene: Scene) -> tuple[str, ...]:
+def _free_parameters(
+    stated_parameters: Sequence[str], laws: Sequence[str], scene: Scene
+) -> tuple[str, ...]:
     """Parameters to look for: those stated, each of which some law has, or those of all laws."""
-    free = tuple(stated) or DEFAULT_FREE_PARAMETERS
+    free = tuple(stated_parameters) or DEFAULT_FREE_PARAMETERS
     check_free_parameters(free)
     own = {law: parameters_of_law(scene.with_(law=law), free) for law in laws}
     shared = tuple(name for name in free if any(name in names for names in own.values()))
-    for name in stated:
+    for name in stated_parameters:
         if name not in shared:
             rule = f"is no parameter with {' or '.join(f'law={law!r}' for law in laws)}"
             remedy = (
-                _STATE_PARAMETERS_REMEDY if name in (*_EVOLUTION_EFFECTS, "slip_distance_2") else ""
+                _STATE_PARAMETERS_REMEDY
+                if name in (*_EVOLUTION_EFFECT_PARAMETERS, "slip_distance_2")
+                else ""
             )
             raise InvalidValue("free", name, rule, remedy=remedy)
     for law, names in own.items():
-        if not names or ({*_EVOLUTION_EFFECTS} & {*free} and not {*_EVOLUTION_EFFECTS} & {*names}):
+        if not names or (
+            {*_EVOLUTION_EFFECT_PARAMETERS} & {*free}
+            and not {*_EVOLUTION_EFFECT_PARAMETERS} & {*names}
+        ):
             rule = f"names no {'evolution effect' if names else 'parameter'} of law={law!r}"
             raise InvalidValue("free", free, rule, remedy=_STATE_PARAMETERS_REMEDY)
     return shared
@@ -452,5 +492,9 @@ def _describe_filter(averaging: Any, low_pass: str) -> str:
     return f"{kind} {seconds!r}"
 
 
-def _to_micrometres(name: str, value: Any) -> float:
-    return float(value) if isinstance(value, int | float) else convert_to_si(name, value, "m") * 1e6
+def _to_micrometres(argument_name: str, value: Any) -> float:
+    return (
+        float(value)
+        if isinstance(value, int | float)
+        else convert_to_si(argument_name, value, "m") * 1e6
+    )

@@ -11,15 +11,15 @@ import xarray as xr
 from rsfstudy.errors import InvalidValue
 from rsfstudy.execution import provenance_attributes
 from rsfstudy.fitting import LOGARITHMIC_PARAMETERS, fitted_fields
-from rsfstudy.netcdf import with_cf_encoding
+from rsfstudy.netcdf import copy_with_cf_encoding
 from rsfstudy.reporting import split_fits
 from rsfstudy.rig import Rig
 from rsfstudy.slider import Scene
 from rsfstudy.status import STATUS_LABELS
-from rsfstudy.storage import build_scene
+from rsfstudy.storage import build_scene_from_stored
 
 
-def _single_fit(dataset: xr.Dataset) -> xr.Dataset:
+def _require_single_fit(dataset: xr.Dataset) -> xr.Dataset:
     """The one fit that a dataset holds."""
     found = split_fits(dataset)
     if len(found) != 1:
@@ -28,11 +28,11 @@ def _single_fit(dataset: xr.Dataset) -> xr.Dataset:
     return found[0]
 
 
-def sample_parameters(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
+def sample_parameters(dataset: xr.Dataset, sample_count: int, seed: int = 0) -> xr.Dataset:
     """Samples of the parameters of one fit, as `Accessor.sample_parameters` says."""
-    one = _single_fit(dataset)
-    if not isinstance(n, int) or n < 1:
-        raise InvalidValue("n", n, "must be a whole number, 1 or more")
+    one = _require_single_fit(dataset)
+    if not isinstance(sample_count, int) or sample_count < 1:
+        raise InvalidValue("n", sample_count, "must be a whole number, 1 or more")
     has = one["covariance"].notnull().any("other_parameter").values  # of other laws: NaN
     names = [str(name) for name in one["parameter"].values[has]]
     at = np.array([one[name].item() for name in names])
@@ -45,8 +45,10 @@ def sample_parameters(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
     scales = np.where(logs, at, 1.0)
     rng = np.random.default_rng(seed)
     degrees = one["degrees_of_freedom"].item()
-    spread = rng.multivariate_normal(np.zeros(len(at)), covariance / np.outer(scales, scales), n)
-    spread /= np.sqrt(rng.chisquare(degrees, n) / degrees)[:, None]
+    spread = rng.multivariate_normal(
+        np.zeros(len(at)), covariance / np.outer(scales, scales), sample_count
+    )
+    spread /= np.sqrt(rng.chisquare(degrees, sample_count) / degrees)[:, None]
     drawn = np.where(logs, at * np.exp(np.where(logs, spread, 0.0)), at + spread)
     data = {
         name: (
@@ -62,16 +64,18 @@ def sample_parameters(dataset: xr.Dataset, n: int, seed: int = 0) -> xr.Dataset:
         "Conventions": "CF-1.11",
         **provenance_attributes("dataset.rsf.draw"),
     }
-    return with_cf_encoding(xr.Dataset(data, {"draw": ("draw", np.arange(n), number)}, about))
+    return copy_with_cf_encoding(
+        xr.Dataset(data, {"draw": ("draw", np.arange(sample_count), number)}, about)
+    )
 
 
 def fitted_scene(dataset: xr.Dataset) -> Scene:
     """The scene of one fit, with the parameters that it found and the velocity step that it is of,
     in units of its slip distance and of the velocity before the step.
     """
-    one = _single_fit(dataset)
+    one = _require_single_fit(dataset)
     plain = json.loads(dataset.attrs["declaration"])
-    first = build_scene(plain["base"], {})
+    first = build_scene_from_stored(plain["base"], {})
     if "law" in one.coords:
         first = first.with_(law=str(one["law"].item()))
     distances = (
@@ -86,7 +90,7 @@ def fitted_scene(dataset: xr.Dataset) -> Scene:
 
 def fitted_rig(dataset: xr.Dataset) -> Rig:
     """The rig of one fit, as `Accessor.rig` says."""
-    one, slider = _single_fit(dataset), fitted_scene(dataset)
+    one, slider = _require_single_fit(dataset), fitted_scene(dataset)
     stress = one["normal_stress_before"].item() if "normal_stress_before" in one else math.nan
     if not stress > 0.0:
         remedy = "Read the record with normal_stress=, or make a rsfstudy.Rig that states it."

@@ -20,26 +20,26 @@ from rsfstudy.api import study_runs
 from rsfstudy.api.result_paths import output_directory
 from rsfstudy.defaults import FIGURE_FORMATS, OUTPUT_DIRECTORY
 from rsfstudy.error_boundary import check_regular_file, error_boundary, format_exception
-from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, shorten
+from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, shorten_text
 from rsfstudy.execution import provenance_attributes
 from rsfstudy.formatting import format_overrides, pluralize
 from rsfstudy.quantities import HtmlMarkup, escape_html, html_table
 from rsfstudy.reporting import (
-    SummaryPiece,
-    Table,
+    TableMappingOrSentence,
+    TextTable,
+    build_summary_pieces,
     claims_table,
     count_pending,
     count_statuses,
-    describe_origin,
+    describe_dataset_origin,
     failures_table,
     is_fit,
     summarise_verdicts,
-    summary_pieces,
 )
 from rsfstudy.status import Status
-from rsfstudy.storage import is_single_scene, read_dataset, read_declaration
+from rsfstudy.storage import is_of_single_scene, read_dataset, read_declaration
 
-_UNREADABLE = "cannot be read"
+_UNREADABLE_FILE_STATUS = "cannot be read"
 #: What begins a page of ours, and a figure.
 _GENERATOR_TAG = b'<meta name="generator" content="rsfstudy">'
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -51,9 +51,9 @@ class _ResultSection:
 
     path: Path
     title: str = ""
-    verdicts: str = ""
-    status: str = Status.OK.label
-    colour: str = "green"
+    verdicts_summary: str = ""
+    status_text: str = Status.OK.label
+    status_colour: str = "green"
     html_parts: tuple[str, ...] = ()
 
     @property
@@ -106,102 +106,119 @@ def write_report(
             )
         files = sorted(file for ending in ("nc", "zarr") for file in place.glob(f"[!.]*.{ending}"))
         if not files:
-            raise DataError(f"{shorten(place)} holds no results, which end in .nc or .zarr.")
-        found = [_build_section(file, page.parent) for file in files]
+            raise DataError(f"{shorten_text(place)} holds no results, which end in .nc or .zarr.")
+        found = [_build_section_of_file(file, page.parent) for file in files]
         write_image(_build_page(place, found).encode(), page)
     except OSError as error:
-        raise DataError(f"{shorten(page)} cannot be written ({error})") from error
-    return page, [one.path for one in found if one.title == _UNREADABLE]
+        raise DataError(f"{shorten_text(page)} cannot be written ({error})") from error
+    return page, [one.path for one in found if one.title == _UNREADABLE_FILE_STATUS]
 
 
-def _build_page(directory: Path, found: list[_ResultSection]) -> str:
+def _build_page(directory: Path, file_sections: list[_ResultSection]) -> str:
     """The whole page."""
     rows = [
         {
             "results": HtmlMarkup(f'<a href="#{one.anchor}">{_escape(one.path.stem)}</a>'),
             "title": one.title,
-            "claims": one.verdicts or "-",
-            "status": one.status,
+            "claims": one.verdicts_summary or "-",
+            "status": one.status_text,
         }
-        for one in found
+        for one in file_sections
     ]
-    colours = [one.colour for one in found]
-    summary = Table(rows, wrappable={"title", "claims", "status"}, colours=colours)
+    colours = [one.status_colour for one in file_sections]
+    summary = TextTable(rows, wrappable_columns={"title", "claims", "status"}, colours=colours)
     made = provenance_attributes("rsfstudy report")
     when, by = made["history"].split()[0], made["source"].partition(",")[0]
     sections = (
         f'<section id="{one.anchor}">\n<h2>{_escape(one.path.stem)}: {_escape(one.title)}</h2>\n'
         + "\n".join(one.html_parts)
         + "\n</section>"
-        for one in found
+        for one in file_sections
     )
     page = Template(resources.files(__package__).joinpath("report.html").read_text("utf-8"))
     return page.substitute(
         title=f"Results in {_escape(directory.resolve().name)}",
-        made=_escape(f"{pluralize(len(found), 'file')}, read by {by}, {when}"),
-        summary=f"<nav>{_piece_html(summary)}</nav>",
+        made=_escape(f"{pluralize(len(file_sections), 'file')}, read by {by}, {when}"),
+        summary=f"<nav>{_format_summary_piece_as_html(summary)}</nav>",
         sections="\n".join(sections),
     )
 
 
-def _build_section(path: Path, beside: Path) -> _ResultSection:
+def _build_section_of_file(results_path: Path, page_directory: Path) -> _ResultSection:
     """What is told of a file, whatever it holds."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            found = _summarise_dataset(path, read_dataset(path))
+            found = _build_section_of_dataset(results_path, read_dataset(results_path))
         except Exception as error:  # damaged files raise almost anything
             why = str(error) if isinstance(error, RsfStudyError) else format_exception(error)
             found = _ResultSection(
-                path, _UNREADABLE, "", _UNREADABLE, "red", (_paragraph(why, "red"),)
+                results_path,
+                _UNREADABLE_FILE_STATUS,
+                "",
+                _UNREADABLE_FILE_STATUS,
+                "red",
+                (_html_paragraph(why, "red"),),
             )
     remarks = {str(one.message) for one in caught if issubclass(one.category, UserWarning)}
-    links = _links_html(path, beside)
-    return replace(found, html_parts=(*found.html_parts, *map(_paragraph, sorted(remarks)), links))
+    links = _format_file_links_as_html(results_path, page_directory)
+    return replace(
+        found, html_parts=(*found.html_parts, *map(_html_paragraph, sorted(remarks)), links)
+    )
 
 
-def _summarise_dataset(path: Path, dataset: xr.Dataset) -> _ResultSection:
+def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _ResultSection:
     """What is told of a file that can be read."""
     title = str(dataset.attrs.get("title", "answer for one scene"))
     numbers = dataset_html(dataset)
     # the accessor, which this module cannot import: it shows these tables
-    if is_single_scene(dataset):
-        figure = _figure_html(path, dataset.rsf.plot) if "slip" in dataset.variables else ""
+    if is_of_single_scene(dataset):
+        figure = (
+            _format_figure_as_html(results_path, dataset.rsf.plot)
+            if "slip" in dataset.variables
+            else ""
+        )
         status = Status[str(dataset.attrs["status"]).upper()]
         colour = "green" if status is Status.OK else "yellow" if status.is_answer else "red"
         return _ResultSection(
-            path, title, "", status.label.replace("_", " "), colour, (figure, numbers)
+            results_path, title, "", status.label.replace("_", " "), colour, (figure, numbers)
         )
     about = read_declaration(dataset)
-    parts = [_piece_html(about.summary)] if about.summary else []
+    parts = [_format_summary_piece_as_html(about.summary)] if about.summary else []
     if about.overrides:
-        parts.append(_paragraph(f"Not as declared: {format_overrides(about.overrides)}", "yellow"))
-    parts += [_figure_html(path, dataset.rsf.plot), numbers]
+        parts.append(
+            _html_paragraph(f"Not as declared: {format_overrides(about.overrides)}", "yellow")
+        )
+    parts += [_format_figure_as_html(results_path, dataset.rsf.plot), numbers]
     verdicts, wrong = summarise_verdicts(dataset, study_runs.check(dataset))
     if undone := count_pending(dataset):
         wrong.append(f"{undone} cells not computed")
-    failed, commands = failures_table(dataset, path.name)
+    failed, commands = failures_table(dataset, results_path.name)
     if commands:
         lines = _escape("\n".join(commands))
-        parts.append(f"<h3>Failures</h3>\n{_piece_html(failed)}<pre>{lines}</pre>")
-    parts.append(f"<h3>Provenance</h3>\n{_piece_html(describe_origin(dataset))}")
-    found = _ResultSection(path, title, verdicts, html_parts=tuple(parts))
+        parts.append(
+            f"<h3>Failures</h3>\n{_format_summary_piece_as_html(failed)}<pre>{lines}</pre>"
+        )
+    parts.append(
+        f"<h3>Provenance</h3>\n{_format_summary_piece_as_html(describe_dataset_origin(dataset))}"
+    )
+    found = _ResultSection(results_path, title, verdicts, html_parts=tuple(parts))
     if wrong:
-        return replace(found, status=", ".join(wrong), colour="red")
+        return replace(found, status_text=", ".join(wrong), status_colour="red")
     counts = count_statuses(dataset)
     if (len(counts) > 1 and is_fit(dataset)) or Status.OK.label not in counts:
         ended = ", ".join(f"{count} {label}" for label, count in counts.items())
-        return replace(found, status=ended.replace("_", " "), colour="yellow")
+        return replace(found, status_text=ended.replace("_", " "), status_colour="yellow")
     return found
 
 
 def dataset_html(dataset: xr.Dataset) -> str:
     """The numbers of a dataset in HTML, and the verdicts on those of a study."""
-    parts = list(map(_piece_html, summary_pieces(dataset)))
-    if is_single_scene(dataset):
-        parts.append(_piece_html(describe_origin(dataset)))
+    parts = list(map(_format_summary_piece_as_html, build_summary_pieces(dataset)))
+    if is_of_single_scene(dataset):
+        parts.append(_format_summary_piece_as_html(describe_dataset_origin(dataset)))
     elif claimed := claims_table(study_runs.check(dataset)):
-        parts += ["<h3>Claims</h3>", _piece_html(claimed)]
+        parts += ["<h3>Claims</h3>", _format_summary_piece_as_html(claimed)]
     return "\n".join(filter(None, parts))
 
 
@@ -213,26 +230,26 @@ def _escape(text: object) -> str:
     return escape_html(text)
 
 
-def _paragraph(text: str, colour: str = "") -> str:
+def _html_paragraph(text: str, colour: str = "") -> str:
     return f'<p class="{colour}">{_escape(text)}</p>'
 
 
-def _piece_html(piece: SummaryPiece) -> str:
+def _format_summary_piece_as_html(piece: TableMappingOrSentence) -> str:
     """A sentence, what is what, or a table, in a box of its own that scrolls where it is too wide;
     nothing of what is empty.
     """
     if isinstance(piece, str):
-        return _paragraph(piece)
-    if not isinstance(piece, Table):
+        return _html_paragraph(piece)
+    if not isinstance(piece, TextTable):
         rows = (f"<dt>{_escape(n)}</dt><dd>{_escape(value)}</dd>" for n, value in piece.items())
         return f"<dl>{''.join(rows)}</dl>" if piece else ""
     rows_ = []
     for row, colour in zip(piece.rows, piece.colours or [""] * len(piece.rows), strict=True):
-        whole = {head: "" if head in piece.wrappable else "whole" for head in row}
+        whole = {head: "" if head in piece.wrappable_columns else "whole" for head in row}
         whole[list(row)[-1]] += f" {colour}"
         texts = {head: c if isinstance(c, HtmlMarkup) else _escape(c) for head, c in row.items()}
         rows_.append([HtmlMarkup(f'<span class="{whole[h]}">{t}</span>') for h, t in texts.items()])
-    caption = _paragraph(piece.caption) if piece.caption else ""
+    caption = _html_paragraph(piece.caption) if piece.caption else ""
     return (
         f'{caption}<div class="wide">{html_table(list(piece.rows[0]), rows_)}</div>'
         if rows_
@@ -240,23 +257,23 @@ def _piece_html(piece: SummaryPiece) -> str:
     )
 
 
-def _figure_html(path: Path, draw: Callable[[], Any]) -> str:
+def _format_figure_as_html(results_path: Path, draw_figure: Callable[[], Any]) -> str:
     """The figure beside results, drawn anew where it is missing or older than they are."""
     from rsfstudy.plots import render_figure, style_context
 
-    beside = path.with_suffix(".png")
+    beside = results_path.with_suffix(".png")
     image = b""
-    if beside.is_file() and beside.stat().st_mtime >= path.stat().st_mtime:
+    if beside.is_file() and beside.stat().st_mtime >= results_path.stat().st_mtime:
         image = beside.read_bytes()
     try:
         if not image.startswith(_PNG_SIGNATURE):
             with style_context(None):
-                image = render_figure(draw(), "png")
+                image = render_figure(draw_figure(), "png")
     except Exception as error:  # of whatever kind, the numbers are there
-        return _paragraph(f"no figure: {error}", "yellow")
+        return _html_paragraph(f"no figure: {error}", "yellow")
     data = base64.b64encode(image).decode()
     inches = _png_width_in_inches(image)
-    about = f'alt="{_escape(f"figure of {path.stem}")}" style="--inches: {inches:.3g}"'
+    about = f'alt="{_escape(f"figure of {results_path.stem}")}" style="--inches: {inches:.3g}"'
     return f'<figure><img {about} src="data:image/png;base64,{data}"></figure>'
 
 
@@ -267,18 +284,18 @@ def _png_width_in_inches(image: bytes) -> float:
     return pixels / per_metre / 0.0254 if at > 3 and per_metre else 100.0
 
 
-def _links_html(path: Path, beside: Path) -> str:
+def _format_file_links_as_html(results_path: Path, page_directory: Path) -> str:
     """Links to the results and to what lies beside them, from where the page is."""
     endings = [
-        path.suffix,
+        results_path.suffix,
         *(f".{form}" for form in FIGURE_FORMATS),
         ".csv",
         ".mat",
         ".cells.sqlite",
     ]
-    files = [file for ending in endings if (file := path.with_suffix(ending)).exists()]
+    files = [file for ending in endings if (file := results_path.with_suffix(ending)).exists()]
     linked = (
-        f'<a href="{quote(Path(os.path.relpath(file, beside)).as_posix())}">'
+        f'<a href="{quote(Path(os.path.relpath(file, page_directory)).as_posix())}">'
         f"{_escape(file.name)}</a>"
         for file in files
     )

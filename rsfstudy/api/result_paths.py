@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rsfstudy.defaults import OUTPUT_DIRECTORY
-from rsfstudy.errors import DataError, InvalidValue, shorten
+from rsfstudy.errors import DataError, InvalidValue, shorten_text
 from rsfstudy.paths import check_path
 from rsfstudy.study import load_study, study_names
 
@@ -25,7 +25,7 @@ def output_directory(output: str | Path | None) -> Path | None:
     return check_path("output", output)
 
 
-def find_results(name: str | Path, output: str | Path | None) -> Path:
+def find_results(study_or_file: str | Path, output_path: str | Path | None) -> Path:
     """The results of a named study, or of the study that a file declares, in a directory; or the
     results file that is named itself. A file that declares a study is run, because results bear the
     name that its `Study` states.
@@ -35,31 +35,36 @@ def find_results(name: str | Path, output: str | Path | None) -> Path:
     DataError, InvalidValue
         If there are none.
     """
-    check_path("study", name)
-    path = Path(name)
+    check_path("study", study_or_file)
+    path = Path(study_or_file)
     if path.suffix in (".nc", ".zarr"):
         return path
-    study = load_study(str(path)).name if path.suffix == ".py" else str(name)
+    study = load_study(str(path)).name if path.suffix == ".py" else str(study_or_file)
     try:
-        return _results_of_study(study, output_directory(output) or OUTPUT_DIRECTORY)
+        return _result_path_of_study(study, output_directory(output_path) or OUTPUT_DIRECTORY)
     except OSError as error:
-        raise DataError(f"{shorten(name)} cannot be looked for: {error.strerror}") from error
+        raise DataError(
+            f"{shorten_text(study_or_file)} cannot be looked for: {error.strerror}"
+        ) from error
 
 
-def _results_of_study(name: str, output: Path) -> Path:
+def _result_path_of_study(study_name: str, output_path: Path) -> Path:
     """The results of a study, by its name."""
-    file, in_pieces = output / f"{name}.nc", output / f"{name}.zarr"
+    file, in_pieces = output_path / f"{study_name}.nc", output_path / f"{study_name}.zarr"
     if file.exists() and in_pieces.exists():
         raise DataError(f"{file} and {in_pieces} are both there: name one, ending and all.")
     if file.exists() or in_pieces.exists():
         return file if file.exists() else in_pieces
-    partial = output / f"{name}.partial.nc"
+    partial = output_path / f"{study_name}.partial.nc"
     if partial.exists():
         raise DataError(
             f"{file} does not exist, but {partial} does: run the study again, or name it."
         )
-    there = any(file.name.startswith(f"{name}.") for file in output.glob("*"))
-    if not there and name not in study_names():
-        rule, remedy = f"has no results in {shorten(output)}", "Results files end in .nc or .zarr."
-        raise InvalidValue("study", name, rule, choices=study_names(), remedy=remedy)
+    there = any(file.name.startswith(f"{study_name}.") for file in output_path.glob("*"))
+    if not there and study_name not in study_names():
+        rule, remedy = (
+            f"has no results in {shorten_text(output_path)}",
+            "Results files end in .nc or .zarr.",
+        )
+        raise InvalidValue("study", study_name, rule, choices=study_names(), remedy=remedy)
     return file

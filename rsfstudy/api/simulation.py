@@ -13,10 +13,10 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.error_boundary import error_boundary
-from rsfstudy.errors import IncompleteWarning, InvalidValue, NoResultWarning, shorten
+from rsfstudy.errors import IncompleteWarning, InvalidValue, NoResultWarning, shorten_text
 from rsfstudy.execution import provenance_attributes
 from rsfstudy.motion import (
-    DEFAULT_BUDGET,
+    DEFAULT_EVALUATION_BUDGET,
     DEFAULT_RTOL,
     FIRST_STATE_COLUMN,
     MOTION_VARIABLES,
@@ -29,17 +29,17 @@ from rsfstudy.motion import (
     MotionStopped,
     Recording,
     WorkMeter,
-    check_engine,
-    friction_coefficient,
+    check_engine_is_usable,
     integrate_events,
     larger_budget_remedy,
-    load_point_displacement,
+    recorded_friction_coefficient,
+    recorded_load_point_displacement,
     rise,
 )
-from rsfstudy.netcdf import with_cf_encoding
+from rsfstudy.netcdf import copy_with_cf_encoding
 from rsfstudy.parts import SEGMENT_START, SEGMENT_VELOCITY
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider import RUPTURE_REGIME, Point, SampledHistory, Scene, UserLoading
+from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, SampledHistory, Scene, UserLoading
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import find_quantity
 
@@ -48,24 +48,24 @@ from rsfstudy.vocabulary import find_quantity
 _MIN_TIME_ULPS, _MIN_TIME_DIFFERENCE = 4, 1e-290
 
 #: Time that a step is followed for, and load point displacement beyond what a protocol states.
-_DEFAULT_DURATION, _EXTRA_DISPLACEMENT = 50.0, 20.0
-_NOTHING_STEPPED = (
+_DEFAULT_DURATION, _DISPLACEMENT_AFTER_PROTOCOL = 50.0, 20.0
+_NOTHING_STEPPED_MESSAGE = (
     "nothing is stepped: the motion is steady sliding at V_*. State load_velocity_ratio, "
     "displacement_step, hold_time, velocity_steps, loading or initial_state in the scene."
 )
-_INSTABILITY_TIME_NAME = "time at which slip rate first passed the instability norm"
-_INSTABILITY_TIME = Quantity(
-    "instability_time", "$t V_*/D_c$", "1", _INSTABILITY_TIME_NAME, "D_c/V_*"
+_INSTABILITY_TIME_LONG_NAME = "time at which slip rate first passed the instability norm"
+_INSTABILITY_TIME_QUANTITY = Quantity(
+    "instability_time", "$t V_*/D_c$", "1", _INSTABILITY_TIME_LONG_NAME, "D_c/V_*"
 )
 #: Attribute that says from when on a motion is no physics.
-BEYOND_NORM_ATTRIBUTE = "beyond_instability_norm"
+BEYOND_NORM_ATTRIBUTE_NAME = "beyond_instability_norm"
 #: Attribute that holds time, slip and point of the end of a motion.
-END_ATTRIBUTE = "end"
+MOTION_END_ATTRIBUTE_NAME = "end"
 #: Slip rate over that of the load point that counts as instability where the load point alone
 #: reaches the norm, as it may where the period is not that of the slider.
-_INSTABILITY_RATE_FACTOR = 1e6
+_INSTABILITY_SLIP_RATE_OVER_LOAD_RATE = 1e6
 #: Variables along motions that are made of spring stress.
-_SPRING_STRESS_VARIABLES = ("shear_stress", "friction_coefficient")
+_VARIABLES_OF_SPRING_STRESS = ("shear_stress", "friction_coefficient")
 #: Those of our own dynamics; others stand behind them.
 _STANDARD_REGIMES = ("quasi_static", "slow_manifold", RUPTURE_REGIME, "quasi_dynamic")
 
@@ -73,12 +73,12 @@ _STANDARD_REGIMES = ("quasi_static", "slow_manifold", RUPTURE_REGIME, "quasi_dyn
 @error_boundary
 def simulate(
     scene: Scene,
-    *nameless: Never,
+    *extra_positional_arguments: Never,
     duration: float | None = None,
     times: Sequence[float] | np.ndarray | None = None,
     start: xr.Dataset | None = None,
     rtol: float = DEFAULT_RTOL,
-    budget: int = DEFAULT_BUDGET,
+    budget: int = DEFAULT_EVALUATION_BUDGET,
     engine: Any = SCIPY,
     accuracy: Accuracy | None = None,
     meter: WorkMeter | None = None,
@@ -146,13 +146,15 @@ def simulate(
         Where nothing is stepped: the slider goes on as it began, in steady sliding at V_*. And
         where it passes the instability norm with neither mass nor radiation damping.
     """
-    if nameless:
-        remedy = f"Write duration={shorten(nameless[0])}, in D_c/V_*."
-        raise InvalidValue("simulate", nameless[0], "is given without a name", remedy=remedy)
+    if extra_positional_arguments:
+        remedy = f"Write duration={shorten_text(extra_positional_arguments[0])}, in D_c/V_*."
+        raise InvalidValue(
+            "simulate", extra_positional_arguments[0], "is given without a name", remedy=remedy
+        )
     check_scene(scene)
-    since = None if start is None else _read_end(start, scene)
+    since = None if start is None else _read_end_of_motion(start, scene)
     began = since.time if since else 0.0
-    at = _check_times(times, duration, began)
+    at = _check_requested_times(times, duration, began)
     if at is not None:
         duration = float(at[-1]) - began
     duration = _loading_duration(scene) - began if duration is None else duration
@@ -168,12 +170,17 @@ def simulate(
         rule = "must be an Accuracy and a WorkMeter"
         remedy = "Pass accuracy=accuracy, meter=meter, as Measure.compute receives them."
         raise InvalidValue("accuracy, meter", (accuracy, meter), rule, remedy=remedy)
-    check_engine(accuracy.engine)
+    check_engine_is_usable(accuracy.engine)
     if is_alone and not scene.is_perturbed:
-        warnings.warn(_NOTHING_STEPPED, NoResultWarning, stacklevel=3)
+        warnings.warn(_NOTHING_STEPPED_MESSAGE, NoResultWarning, stacklevel=3)
     spent, by_regime = meter.evaluations, dict(meter.evaluations_by_regime)
     recording = Recording(list(_STANDARD_REGIMES), at)
-    status, message, limit, passed = Status.OK, "", _instability_limit(scene), math.nan
+    status, message, limit, passed = (
+        Status.OK,
+        "",
+        _log_slip_rate_limit_of_instability(scene),
+        math.nan,
+    )
     watches = [rise("log_slip_rate", limit)] if limit < math.inf else []
     until = began + duration if at is None else float(at[-1])
     moving = integrate_events(
@@ -189,9 +196,9 @@ def simulate(
         status, message = halt.status, str(halt)
         if status is Status.WORK_BUDGET_SPENT:
             message += larger_budget_remedy(budget)
-    seen = recording.table(scene)
+    seen = recording.as_table(scene)
     seen = with_increasing_times(seen) if at is None else seen
-    dataset = _recording_to_dataset(scene, seen, recording.regimes)
+    dataset = _recording_to_dataset(scene, seen, recording.regime_names)
     dataset = dataset.assign_attrs(
         {
             "title": f"Motion of a spring-slider, {scene.law} law",
@@ -216,32 +223,45 @@ def simulate(
         }
     )
     if status is Status.OK:
-        dataset.attrs[END_ATTRIBUTE] = json.dumps((last.time, last.slip, last.point))
+        dataset.attrs[MOTION_END_ATTRIBUTE_NAME] = json.dumps((last.time, last.slip, last.point))
     if isinstance(scene.parts.loading, SampledHistory):
-        dataset = dataset.assign(history_samples=_history_variable(scene.parts.loading))
+        dataset = dataset.assign(history_samples=_build_history_variable(scene.parts.loading))
     if passed >= 0.0:
         text = f"from {passed:.9g} D_c/V_* on, with neither mass nor radiation damping: no physics"
-        dataset[_INSTABILITY_TIME.name] = ((), passed, _INSTABILITY_TIME.attributes)
-        dataset = dataset.assign_attrs({BEYOND_NORM_ATTRIBUTE: text})
+        dataset[_INSTABILITY_TIME_QUANTITY.name] = (
+            (),
+            passed,
+            _INSTABILITY_TIME_QUANTITY.attributes,
+        )
+        dataset = dataset.assign_attrs({BEYOND_NORM_ATTRIBUTE_NAME: text})
         if is_alone:
             warnings.warn(f"beyond the instability norm {text}", NoResultWarning, stacklevel=3)
     if status is not Status.OK:
         text = f"the motion ends after {max([0.0, *seen[-1:, 0]]):.6g} of {duration:g} D_c/V_*"
         warnings.warn(f"{text}: {status.label} ({message})", IncompleteWarning, stacklevel=3)
-    return with_cf_encoding(dataset)
+    return copy_with_cf_encoding(dataset)
 
 
-def _recording_to_dataset(scene: Scene, seen: np.ndarray, regimes: Sequence[str]) -> xr.Dataset:
+def _recording_to_dataset(
+    scene: Scene, recorded_rows: np.ndarray, regime_names: Sequence[str]
+) -> xr.Dataset:
     """Convert the rows of a recording to a dataset along time."""
     fluid = scene.parts.fluid.unknowns
-    columns = {find_quantity(name): seen[:, column] for column, name in enumerate(MOTION_VARIABLES)}
+    columns = {
+        find_quantity(name): recorded_rows[:, column]
+        for column, name in enumerate(MOTION_VARIABLES)
+    }
     first = FIRST_STATE_COLUMN + scene.state_count - len(fluid)
-    columns |= {about: seen[:, first + i] for i, about in enumerate(fluid)}
+    columns |= {about: recorded_rows[:, first + i] for i, about in enumerate(fluid)}
     if scene.parts.law.state_count > 1:
         of_law = range(scene.parts.law.state_count)
-        columns |= {_state_quantity(i + 1): seen[:, FIRST_STATE_COLUMN + i] for i in of_law}
-    columns[find_quantity("load_point_displacement")] = load_point_displacement(scene, seen)
-    columns[find_quantity("friction_coefficient")] = friction_coefficient(seen)
+        columns |= {
+            _state_quantity(i + 1): recorded_rows[:, FIRST_STATE_COLUMN + i] for i in of_law
+        }
+    columns[find_quantity("load_point_displacement")] = recorded_load_point_displacement(
+        scene, recorded_rows
+    )
+    columns[find_quantity("friction_coefficient")] = recorded_friction_coefficient(recorded_rows)
     dataset = xr.Dataset(
         {
             q.name: ("time", values, motion_variable_attributes(q, scene))
@@ -250,46 +270,48 @@ def _recording_to_dataset(scene: Scene, seen: np.ndarray, regimes: Sequence[str]
     )
     flags = {
         "long_name": find_quantity("regime").long_name,
-        "flag_values": np.arange(len(regimes), dtype=np.int8),
-        "flag_meanings": " ".join(regimes),
+        "flag_values": np.arange(len(regime_names), dtype=np.int8),
+        "flag_meanings": " ".join(regime_names),
     }
-    dataset["regime"] = "time", seen[:, REGIME_COLUMN].astype(np.int8), flags
+    dataset["regime"] = "time", recorded_rows[:, REGIME_COLUMN].astype(np.int8), flags
     about_rate = find_quantity("reference_rate").attributes
     dataset["reference_rate"] = (), scene.reference_rate, about_rate
     return dataset.set_coords(["slip", "reference_rate"])
 
 
-def motion_variable_attributes(about: Quantity, scene: Scene) -> dict[str, Any]:
+def motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[str, Any]:
     """Return the attributes of a variable of a motion.
 
     If the scene has radiation damping, spring stress is reported minus the radiation damping stress
     at V_*. Spring stress and frictional stress are then equal at V_*.
     """
-    attributes = about.attributes
-    if about.name in _SPRING_STRESS_VARIABLES and scene.dynamics.radiated_stress_slope(0.0):
+    attributes = quantity.attributes
+    if quantity.name in _VARIABLES_OF_SPRING_STRESS and scene.dynamics.radiated_stress_slope(0.0):
         attributes["long_name"] += " less the radiation damping stress at V_star"
     return attributes
 
 
-def _state_quantity(number: int) -> Quantity:
-    about = f"state {number} of the law, as a part of the friction coefficient, freed of stress"
-    return Quantity(f"state_{number}", rf"$\Psi_{{{number}}}$", "1", about)
+def _state_quantity(state_number: int) -> Quantity:
+    about = (
+        f"state {state_number} of the law, as a part of the friction coefficient, freed of stress"
+    )
+    return Quantity(f"state_{state_number}", rf"$\Psi_{{{state_number}}}$", "1", about)
 
 
-def _read_end(motion: object, scene: Scene) -> Event:
+def _read_end_of_motion(motion: object, scene: Scene) -> Event:
     """The end of a motion of a scene, from which it can go on."""
-    if not isinstance(motion, xr.Dataset) or END_ATTRIBUTE not in motion.attrs:
+    if not isinstance(motion, xr.Dataset) or MOTION_END_ATTRIBUTE_NAME not in motion.attrs:
         remedy = "Give a motion that simulate returned, and that lasted as long as was asked."
         raise InvalidValue("start", motion, "is no motion with an end", remedy=remedy)
     if json.loads(motion.attrs["scene"]) != json.loads(json.dumps(scene.describe())):
         remedy = "Give the scene of the motion itself, motion.rsf.scene."
         raise InvalidValue("start", motion.attrs["title"], "is of another scene", remedy=remedy)
-    time, slip, numbers = json.loads(motion.attrs[END_ATTRIBUTE])
-    point = Point._make(tuple(x) if isinstance(x, list) else x for x in numbers)
+    time, slip, numbers = json.loads(motion.attrs[MOTION_END_ATTRIBUTE_NAME])
+    point = MotionPoint._make(tuple(x) if isinstance(x, list) else x for x in numbers)
     return Event(EventKind.END, None, time, slip, point, "", 0, 0.0)
 
 
-def _history_variable(history: SampledHistory) -> xr.Variable:
+def _build_history_variable(history: SampledHistory) -> xr.Variable:
     """The samples of a history, by which its scene can be made again."""
     about = {
         "long_name": "time, load point velocity, fall and rate of normal stress of the loading",
@@ -299,14 +321,14 @@ def _history_variable(history: SampledHistory) -> xr.Variable:
     return xr.Variable(("history_sample", "history_column"), history.sample_table, about)
 
 
-def _instability_limit(scene: Scene) -> float:
+def _log_slip_rate_limit_of_instability(scene: Scene) -> float:
     """ln(V/V_*) beyond which a motion is no physics."""
     if scene.has_mass or scene.dynamics.radiated_stress_slope(0.0):
         return math.inf
     loads = np.asarray(scene.parts.loading.segment_table)[:, SEGMENT_VELOCITY]
     fastest = math.log(max(1.0, float(abs(loads).max())))
     norm = scene.log_instability_rate
-    return norm if norm > fastest else fastest + math.log(_INSTABILITY_RATE_FACTOR)
+    return norm if norm > fastest else fastest + math.log(_INSTABILITY_SLIP_RATE_OVER_LOAD_RATE)
 
 
 def _loading_duration(scene: Scene) -> float:
@@ -320,11 +342,15 @@ def _loading_duration(scene: Scene) -> float:
     if len(loading.segments) == 1:
         return _DEFAULT_DURATION
     return stated + (
-        _EXTRA_DISPLACEMENT / abs(scene.load_velocity) if scene.load_velocity else _DEFAULT_DURATION
+        _DISPLACEMENT_AFTER_PROTOCOL / abs(scene.load_velocity)
+        if scene.load_velocity
+        else _DEFAULT_DURATION
     )
 
 
-def _check_times(times: Any, duration: float | None, began: float) -> np.ndarray | None:
+def _check_requested_times(
+    times: Any, duration: float | None, start_time: float
+) -> np.ndarray | None:
     """Times that were asked for, checked."""
     if times is None:
         return None
@@ -334,9 +360,15 @@ def _check_times(times: Any, duration: float | None, began: float) -> np.ndarray
     if not all(isinstance(time, Real) and not isinstance(time, bool) for time in given.flat):
         raise InvalidValue("times", times, "must be numbers, in D_c/V_*")
     at = given.astype(float)
-    right = at.ndim == 1 and at.size and np.isfinite(at).all() and at[0] >= began and at[-1] > began
+    right = (
+        at.ndim == 1
+        and at.size
+        and np.isfinite(at).all()
+        and at[0] >= start_time
+        and at[-1] > start_time
+    )
     if not right or not (np.diff(at) > 0.0).all():
-        rule = f"must increase from {began:g} or later, and be finite"
+        rule = f"must increase from {start_time:g} or later, and be finite"
         raise InvalidValue("times", times, rule)
     return at
 

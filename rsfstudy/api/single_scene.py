@@ -15,9 +15,15 @@ from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import NoResultWarning, RsfStudyWarning
 from rsfstudy.execution import provenance_attributes
 from rsfstudy.measures import CriticalStep, LimitCycle, Measure
-from rsfstudy.motion import DEFAULT_BUDGET, DEFAULT_RTOL, SCIPY, Accuracy, check_engine
-from rsfstudy.netcdf import with_cf_encoding
-from rsfstudy.rig import convert_to_si, convert_units, read_scales
+from rsfstudy.motion import (
+    DEFAULT_EVALUATION_BUDGET,
+    DEFAULT_RTOL,
+    SCIPY,
+    Accuracy,
+    check_engine_is_usable,
+)
+from rsfstudy.netcdf import copy_with_cf_encoding
+from rsfstudy.rig import convert_dataset_units, convert_to_si, read_si_scales
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import find_quantity
@@ -31,7 +37,7 @@ def critical_step(
     *,
     rtol: float = DEFAULT_RTOL,
     engine: Any = SCIPY,
-    budget: int = DEFAULT_BUDGET,
+    budget: int = DEFAULT_EVALUATION_BUDGET,
 ) -> xr.Dataset:
     """The critical step of one scene.
 
@@ -68,7 +74,7 @@ def critical_step(
         Where the instability norm is hardly faster than the load point, as on rigs whose period is
         short: ``instability_slip_rate`` tells how fast it is.
     """
-    return _measure_scene(
+    return _measure_scene_to_dataset(
         CriticalStep(of=of, direction=direction), scene, Accuracy(rtol, budget, engine=engine)
     )
 
@@ -80,7 +86,7 @@ def limit_cycle(
     events: int = LimitCycle.events,
     rtol: float = DEFAULT_RTOL,
     engine: Any = SCIPY,
-    budget: int = DEFAULT_BUDGET,
+    budget: int = DEFAULT_EVALUATION_BUDGET,
 ) -> xr.Dataset:
     """The stick-slip limit cycle of one scene.
 
@@ -109,7 +115,9 @@ def limit_cycle(
     NoResultWarning
         Where there is no cycle, with the status and the message; its numbers are NaN.
     """
-    return _measure_scene(LimitCycle(events=events), scene, Accuracy(rtol, budget, engine=engine))
+    return _measure_scene_to_dataset(
+        LimitCycle(events=events), scene, Accuracy(rtol, budget, engine=engine)
+    )
 
 
 @error_boundary
@@ -158,15 +166,15 @@ def to_si(
         for name, value in zip(units, given, strict=True)
         if value is not None
     }
-    return convert_units(dataset, read_scales(dataset, **stated), "Pa", "m", "s")
+    return convert_dataset_units(dataset, read_si_scales(dataset, **stated), "Pa", "m", "s")
 
 
-def _measure_scene(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
+def _measure_scene_to_dataset(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
     """A measure's named numbers as a small dataset that bears the names of the lattice; those that
     are None are missing.
     """
     check_scene(scene)
-    check_engine(accuracy.engine)
+    check_engine_is_usable(accuracy.engine)
     outcome = measure(scene, accuracy)
     if outcome.status is not Status.OK:
         why = outcome.message or outcome.status.meaning
@@ -208,4 +216,4 @@ def _measure_scene(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dat
         "reference_rate": rate,
         "instability_slip_rate": norm,
     }
-    return with_cf_encoding(xr.Dataset(variables, coordinates, about))
+    return copy_with_cf_encoding(xr.Dataset(variables, coordinates, about))

@@ -12,27 +12,28 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 import xarray as xr
 
+from rsfstudy._deprecation import renamed_keywords
 from rsfstudy.api import export
-from rsfstudy.api.progress import compile_with_notice, show_progress
+from rsfstudy.api.progress import compile_scenes_with_notice, show_progress
 from rsfstudy.api.result_paths import find_results, output_directory
 from rsfstudy.defaults import CELL_TIME_LIMIT, OUTPUT_DIRECTORY
 from rsfstudy.error_boundary import error_boundary, user_stacklevel
-from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning, shorten
-from rsfstudy.execution import OutputOptions, Workers, prepare_study_run, run_fingerprint
+from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning, shorten_text
+from rsfstudy.execution import OutputOptions, WorkerPool, prepare_study_run, run_fingerprint
 from rsfstudy.measures import Outcome
-from rsfstudy.motion import COMPILED, check_engine
-from rsfstudy.netcdf import with_cf_encoding
+from rsfstudy.motion import COMPILED, check_engine_is_usable
+from rsfstudy.netcdf import copy_with_cf_encoding
 from rsfstudy.quantities import html_table
-from rsfstudy.reporting import incomplete_notes, slow_norm_note
-from rsfstudy.slider import Scene, with_field_signature
+from rsfstudy.reporting import incomplete_notes, note_on_norms_near_load_velocity
+from rsfstudy.slider import Scene, with_scene_field_signature
 from rsfstudy.storage import (
     Comparison,
-    check_is_study,
+    check_is_of_study,
     compare_results,
     compare_same_lattice,
     find_cell_number,
-    find_differences,
-    is_single_scene,
+    find_fingerprint_differences,
+    is_of_single_scene,
     read_dataset,
     read_declaration,
     read_provenance,
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     from rsfstudy.plots import Figure
 
 
-class Studies(dict[str, Study]):
+class StudiesByName(dict[str, Study]):
     """Studies by name; a notebook shows what each is about."""
 
     def _repr_html_(self) -> str:
@@ -58,11 +59,11 @@ class Studies(dict[str, Study]):
 @error_boundary
 def studies() -> dict[str, Study]:
     """The named studies, by name."""
-    return Studies({name: load_study(name) for name in study_names()})
+    return StudiesByName({name: load_study(name) for name in study_names()})
 
 
 @error_boundary
-@with_field_signature()
+@with_scene_field_signature()
 def run(
     study: str | Path | Study,
     *,
@@ -139,51 +140,58 @@ def run(
     UserWarning
         Where answers for a rig are for an instability norm near the load point velocity.
     """
-    declared = apply_overrides(study, overrides, rtol=rtol, engine=engine, budget=budget)
+    declared = apply_overrides_to_study(study, overrides, rtol=rtol, engine=engine, budget=budget)
     keeping = OutputOptions(
         output=output_directory(output),
         format=format,
         fresh=fresh,
         keep_going=keep_going,
         despite_failures=despite_failures,
-        command=command,
+        command_line=command,
     )
-    with Workers(workers, client, time_limit) as where:
-        results = with_cf_encoding(prepare_run(declared, keeping, where, progress)())
+    with WorkerPool(workers, client, time_limit) as where:
+        results = copy_with_cf_encoding(
+            prepare_run_with_progress(declared, keeping, where, progress)()
+        )
     if told := incomplete_notes(results):
         warnings.warn("; ".join(told), IncompleteWarning, stacklevel=user_stacklevel())
-    if slow := slow_norm_note(results):
+    if slow := note_on_norms_near_load_velocity(results):
         warnings.warn(slow, RsfStudyWarning, stacklevel=user_stacklevel())
     return results
 
 
-def apply_overrides(
-    study: str | Path | Study, overrides: Mapping[str, Any], **accuracy: Any
+def apply_overrides_to_study(
+    study: str | Path | Study, overrides: Mapping[str, Any], **accuracy_fields: Any
 ) -> Study:
     """A study with other values and fields of its accuracy, those that are not None; checked."""
     declared = study if isinstance(study, Study) else load_study(str(study))
-    changes = {name: value for name, value in accuracy.items() if value is not None}
+    changes = {name: value for name, value in accuracy_fields.items() if value is not None}
     if changes:
         declared = replace(declared, accuracy=replace(declared.accuracy, **changes))
     return declared.with_(**overrides) if overrides else declared
 
 
-def prepare_run(
-    study: Study, keeping: OutputOptions, workers: Workers, progress: bool = True
+def prepare_run_with_progress(
+    study: Study,
+    output_options: OutputOptions,
+    worker_pool: WorkerPool,
+    show_progress_bar: bool = True,
 ) -> Callable[[], xr.Dataset]:
     """A function that runs the study, once everything has been checked; `progress` shows how
     far it has come.
 
     Raises `InvalidValue` for anything wrong with the study or the options.
     """
-    check_engine(study.accuracy.engine)
-    ready = prepare_study_run(study, keeping, workers)
+    check_engine_is_usable(study.accuracy.engine)
+    ready = prepare_study_run(study, output_options, worker_pool)
 
     def run() -> xr.Dataset:
         if study.accuracy.engine == COMPILED:
-            compile_with_notice(ready.plan.examples, study.measure.needs_time, progress)
-        with show_progress(study.name, progress) as show:
-            return ready(workers.cell_mapper(ready.worker_log_path), show)
+            compile_scenes_with_notice(
+                ready.plan.example_scenes, study.measure.needs_time, show_progress_bar
+            )
+        with show_progress(study.name, show_progress_bar) as show:
+            return ready(worker_pool.make_cell_batch_mapper(ready.worker_log_path), show)
 
     return run
 
@@ -211,25 +219,26 @@ def read_results(path: Path) -> xr.Dataset:
         If it is missing, unreadable, not written by rsfstudy, damaged, or of one scene.
     """
     dataset = read_dataset(path)
-    check_is_study(dataset, shorten(path))
+    check_is_of_study(dataset, shorten_text(path))
     return dataset
 
 
-def _load_results(dataset: xr.Dataset | str | Path) -> xr.Dataset:
+def _resolve_results_dataset(dataset: xr.Dataset | str | Path) -> xr.Dataset:
     """Results, as they are given or as their file holds them."""
     if not isinstance(dataset, xr.Dataset):
         return open(dataset)
-    check_is_study(dataset, "the dataset")
+    check_is_of_study(dataset, "the dataset")
     return dataset
 
 
-@partial(error_boundary, is_inner=True)
+@renamed_keywords
+@partial(error_boundary, is_called_internally=True)
 def plot(
     dataset: xr.Dataset | str | Path,
     variable: str | None = None,
     *,
     style: Any = None,
-    own: Any = None,
+    user_figure: Any = None,
 ) -> Figure:
     """The figure of a dataset (or of a named study's results, or of a file), as its study declares
     it; a notebook shows it, and its `savefig` writes it.
@@ -261,7 +270,9 @@ def plot(
     """
     from rsfstudy.plots import draw_figure
 
-    return draw_figure(_load_results(dataset), own, variable=variable, style=style)
+    return draw_figure(
+        _resolve_results_dataset(dataset), user_figure, variable=variable, style=style
+    )
 
 
 @error_boundary
@@ -274,7 +285,7 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
         One row a claim: published value, ours, tolerance and its reason, verdict, and ``moved``
         where the verdict is not the expected one.
     """
-    results = _load_results(dataset)
+    results = _resolve_results_dataset(dataset)
     declared = read_declaration(results)
     return build_verdict_table(results, list(declared.claims), declared.overrides)
 
@@ -318,7 +329,7 @@ def rerun(
         Where the file is damaged, or the run cannot finish.
     """
     theirs = read_dataset(find_results(file, OUTPUT_DIRECTORY))
-    if is_single_scene(theirs):
+    if is_of_single_scene(theirs):
         if study is not None:
             load_study(str(study))  # for the parts of its scene
         return export.rerun_motion(theirs)
@@ -333,10 +344,10 @@ def rerun(
         fresh=True,
         keep_going=True,
         despite_failures="reduced_despite" in theirs.attrs,
-        command=f"rsfstudy.rerun {file}",
+        command_line=f"rsfstudy.rerun {file}",
     )
-    with Workers(workers, client, time_limit) as where:
-        ours = prepare_run(declared, keeping, where, progress)()
+    with WorkerPool(workers, client, time_limit) as where:
+        ours = prepare_run_with_progress(declared, keeping, where, progress)()
     return compare_same_lattice(theirs, ours)
 
 
@@ -364,10 +375,10 @@ def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> 
     DataError
         Where a file is missing or damaged.
     """
-    return compare_results(_load_results(first), _load_results(second))
+    return compare_results(_resolve_results_dataset(first), _resolve_results_dataset(second))
 
 
-@partial(error_boundary, passed=(Exception,))
+@partial(error_boundary, unchanged_exceptions=(Exception,))
 def recompute_cell(
     file: str | Path, place: Mapping[str, Any], *, study: str | Path | None = None
 ) -> tuple[Scene, Outcome]:
@@ -396,7 +407,7 @@ def recompute_cell(
     UserWarning
         Where something that decides its numbers has changed since the file was made.
     """
-    declared, number, differs = _find_cell(file, place, study)
+    declared, number, differs = _find_cell_in_results_file(file, place, study)
     for name, (theirs, ours) in differs.items():
         text = f"{name}: {theirs} then, {ours} now"
         warnings.warn(text, RsfStudyWarning, stacklevel=user_stacklevel())
@@ -404,13 +415,17 @@ def recompute_cell(
     return scene, declared.measure.with_(**changes)(scene, declared.accuracy)
 
 
-@partial(error_boundary, is_inner=True)
-def _find_cell(
-    file: str | Path, place: Mapping[str, Any], study: str | Path | None
+@partial(error_boundary, is_called_internally=True)
+def _find_cell_in_results_file(
+    results_file: str | Path, cell_coordinates: Mapping[str, Any], study_file: str | Path | None
 ) -> tuple[Study, int, Mapping[str, tuple[Any, Any]]]:
     """The study of a file, the number of a cell, and what else decided it and has changed."""
-    results = open(file)
-    number = find_cell_number(results, place)
-    declared = rebuild_study(results, study)
+    results = open(results_file)
+    number = find_cell_number(results, cell_coordinates)
+    declared = rebuild_study(results, study_file)
     now = run_fingerprint(declared)
-    return declared, number, find_differences(read_provenance(results)["fingerprint"], now)
+    return (
+        declared,
+        number,
+        find_fingerprint_differences(read_provenance(results)["fingerprint"], now),
+    )

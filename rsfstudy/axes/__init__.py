@@ -14,10 +14,10 @@ from rsfstudy._lazy import lazy_exports
 if TYPE_CHECKING:
     from rsfstudy.axes.axis import (
         Axis,
-        Row,
+        AxisRow,
         check_storable_text,
-        fields_of_point,
-        row_kinds,
+        classify_rows_by_fields,
+        fields_of_axis_point,
         to_plain_value,
     )
 else:
@@ -26,10 +26,10 @@ else:
         {
             "axes.axis": (
                 "Axis",
-                "Row",
+                "AxisRow",
                 "check_storable_text",
-                "fields_of_point",
-                "row_kinds",
+                "fields_of_axis_point",
+                "classify_rows_by_fields",
                 "to_plain_value",
             ),
         },
@@ -37,9 +37,9 @@ else:
 
 __all__ = [
     "Axis",
-    "Row",
+    "AxisRow",
     "check_storable_text",
-    "fields_of_point",
-    "row_kinds",
+    "fields_of_axis_point",
+    "classify_rows_by_fields",
     "to_plain_value",
 ]

@@ -15,11 +15,11 @@ import numpy as np
 from rsfstudy._deprecation import renamed_keywords, renamed_members, warn_renamed
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.formatting import format_value, is_list_like
+from rsfstudy.formatting import format_value, is_sequence_of_axis_values
 from rsfstudy.quantities import is_variable_name
 from rsfstudy.slider import normalise_field_value
 
-Row = Mapping[str, Any]
+AxisRow = Mapping[str, Any]
 
 
 @renamed_keywords
@@ -52,7 +52,7 @@ class Axis:
     """
 
     dimension: str
-    rows: tuple[Row, ...]
+    rows: tuple[AxisRow, ...]
     labels: tuple[str, ...] | None
     units: Mapping[str, str]
     sampling_info: Mapping[str, Any]
@@ -68,13 +68,17 @@ class Axis:
             rule = "must be named by a Python identifier, its accents composed (NFC)"
             raise InvalidValue("axis", dimension, rule)
         labels: tuple[str, ...] | None = None
-        if isinstance(values, Mapping) and values and all(map(is_list_like, values.values())):
+        if (
+            isinstance(values, Mapping)
+            and values
+            and all(map(is_sequence_of_axis_values, values.values()))
+        ):
             rows = _rows_from_columns(dimension, values)
         elif isinstance(values, Mapping):
             labels, rows = tuple(values), _rows_from_points(dimension, values)
         else:
             listed = [values] if isinstance(values, str) else values
-            if not is_list_like(listed):
+            if not is_sequence_of_axis_values(listed):
                 raise InvalidValue(dimension, values, "must be a list of values")
             rows = tuple({dimension: to_plain_value(dimension, value)} for value in listed)
             if any(row[dimension] is None for row in rows):
@@ -133,7 +137,7 @@ class Axis:
         from rsfstudy.axes import samples  # loads scipy.stats
 
         drawn, how = samples.draw_samples(distribution, n, seed, method, covariance)
-        return cls(dimension, samples.compute_fields(drawn, fields), units, how)
+        return cls(dimension, samples.compute_field_values(drawn, fields), units, how)
 
     @classmethod
     def cases(
@@ -157,8 +161,8 @@ class Axis:
         """
         from rsfstudy.axes import samples
 
-        columns, stated = samples.read_columns(table)
-        made = samples.compute_fields(columns, fields)
+        columns, stated = samples.read_table_columns_and_units(table)
+        made = samples.compute_field_values(columns, fields)
         kept = {n: text for n, text in stated.items() if made.get(n) is columns[n]}
         return cls(dimension, made, kept | dict(units or {}))
 
@@ -208,19 +212,19 @@ class Axis:
 
     def with_rows(
         self,
-        rows: Sequence[Row],
+        rows: Sequence[AxisRow],
         units: Mapping[str, str],
         sampling_info: Mapping[str, Any] | None = None,
     ) -> Axis:
         """An axis of this kind with other fields set at its points."""
-        return Axis(self.dimension, self._constructor_values(rows), units, sampling_info)
+        return Axis(self.dimension, self._values_for_constructor(rows), units, sampling_info)
 
-    def _constructor_values(self, rows: Sequence[Row]) -> Any:
+    def _values_for_constructor(self, rows: Sequence[AxisRow]) -> Any:
         """What an axis of this kind with these rows is declared by."""
         if self.labels is not None:
             return {label: dict(row) for label, row in zip(self.labels, rows, strict=True)}
         if self.has_numbered_points:
-            return rows_to_columns(rows)
+            return rows_to_field_columns(rows)
         return [row.get(self.dimension) for row in rows]
 
     def __len__(self) -> int:
@@ -232,7 +236,7 @@ class Axis:
         stated = {name: about for name, about in beside.items() if about}
         return {
             "dimension": self.dimension,
-            "values": self._constructor_values(self.rows),
+            "values": self._values_for_constructor(self.rows),
             **stated,
         }
 
@@ -246,38 +250,40 @@ class Axis:
         return list(self.labels or values)
 
 
-def row_kinds(rows: Sequence[Row]) -> np.ndarray:
+def classify_rows_by_fields(axis_rows: Sequence[AxisRow]) -> np.ndarray:
     """The kind of each row of an axis, counted from 0 in the order of the first of each. Rows are
     of one kind if they set the same fields, to the same texts and flags, and of numbers to 0 or to
     any others: then scenes with them are made of the same parts.
     """
     known: dict[tuple[Any, ...], int] = {}
-    return np.array([known.setdefault(_row_kind(row), len(known)) for row in rows])
-
-
-def _row_kind(row: Row) -> tuple[Any, ...]:
-    return tuple(
-        (name, type(value), bool(value) if isinstance(value, float) else value)
-        for name, value in row.items()
+    return np.array(
+        [known.setdefault(_fields_and_texts_of_row(row), len(known)) for row in axis_rows]
     )
 
 
-def fields_of_point(point: Any) -> Any:
+def _fields_and_texts_of_row(axis_row: AxisRow) -> tuple[Any, ...]:
+    return tuple(
+        (name, type(value), bool(value) if isinstance(value, float) else value)
+        for name, value in axis_row.items()
+    )
+
+
+def fields_of_axis_point(axis_point: Any) -> Any:
     """Return the fields of a rig, or of another object with fields for an axis.
 
     Any other point is returned as it is.
     """
-    if hasattr(point, "axis_fields"):
-        return point.axis_fields
-    if hasattr(point, "on_axis"):
-        warn_renamed("on_axis", "axis_fields", type(point).__name__)
-        return point.on_axis
-    return point
+    if hasattr(axis_point, "axis_fields"):
+        return axis_point.axis_fields
+    if hasattr(axis_point, "on_axis"):
+        warn_renamed("on_axis", "axis_fields", type(axis_point).__name__)
+        return axis_point.on_axis
+    return axis_point
 
 
-def _rows_from_points(dimension: str, points: Mapping[str, Any]) -> tuple[Row, ...]:
+def _rows_from_points(dimension: str, labelled_points: Mapping[str, Any]) -> tuple[AxisRow, ...]:
     """The rows of a zipped axis: for each label the fields set there."""
-    rows = {label: fields_of_point(point) for label, point in points.items()}
+    rows = {label: fields_of_axis_point(point) for label, point in labelled_points.items()}
     for label, row in rows.items():
         check_storable_text(dimension, label)
         if not label:
@@ -287,41 +293,46 @@ def _rows_from_points(dimension: str, points: Mapping[str, Any]) -> tuple[Row, .
     return tuple({n: to_plain_value(n, v) for n, v in row.items()} for row in rows.values())
 
 
-def _rows_from_columns(dimension: str, values: Mapping[str, Sequence[Any]]) -> tuple[Row, ...]:
+def _rows_from_columns(
+    dimension: str, values_by_field: Mapping[str, Sequence[Any]]
+) -> tuple[AxisRow, ...]:
     """The rows of an axis whose points are numbered: at each, a value of each field."""
-    lengths = {name: len(column) for name, column in values.items()}
+    lengths = {name: len(column) for name, column in values_by_field.items()}
     for name, length in lengths.items():
         if not is_variable_name(name) or name == dimension:
             rule = f"must be named as a field is, and not as the axis, {dimension!r}"
             raise InvalidValue("column", name, rule)
         if length != max(lengths.values()):
             raise InvalidValue("columns", lengths, "must be of one length")
-    made = [[to_plain_value(name, value) for value in column] for name, column in values.items()]
-    return tuple(dict(zip(values, row, strict=True)) for row in zip(*made, strict=True))
+    made = [
+        [to_plain_value(name, value) for value in column]
+        for name, column in values_by_field.items()
+    ]
+    return tuple(dict(zip(values_by_field, row, strict=True)) for row in zip(*made, strict=True))
 
 
-def rows_to_columns(rows: Sequence[Row]) -> dict[str, list[Any]]:
+def rows_to_field_columns(rows: Sequence[AxisRow]) -> dict[str, list[Any]]:
     """Values of each field at points that all set the same fields."""
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
-def check_storable_text(name: str, text: object) -> None:
+def check_storable_text(argument_name: str, text: object) -> None:
     """A text that a file can hold."""
     if not isinstance(text, str) or "\0" in text:
-        raise InvalidValue(name, text, "must be a text")
+        raise InvalidValue(argument_name, text, "must be a text")
     try:
         text.encode()
     except UnicodeError as error:
-        raise InvalidValue(name, text, "must be a text that UTF-8 can hold") from error
+        raise InvalidValue(argument_name, text, "must be a text that UTF-8 can hold") from error
 
 
-def to_plain_value(field: str, value: Any) -> Any:
+def to_plain_value(field_name: str, value: Any) -> Any:
     """A value of a field as Python's own number, flag or text: whole numbers as float, a part of
     the user's own by its name.
     """
-    value = normalise_field_value(field, value)
+    value = normalise_field_value(field_name, value)
     if isinstance(value, np.ndarray) and value.ndim:
-        raise InvalidValue(field, value.tolist(), "must be one number, flag or text")
+        raise InvalidValue(field_name, value.tolist(), "must be one number, flag or text")
     value = value.item() if isinstance(value, np.generic | np.ndarray) else value
     if not isinstance(value, int) or isinstance(value, bool):
         return value

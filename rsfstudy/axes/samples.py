@@ -16,84 +16,86 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import parse_heading
 
 #: What a field is set by: a quantity that is drawn, or a function of all of them.
-FieldSource = str | Callable[[Mapping[str, np.ndarray]], Any]
+QuantityNameOrFunction = str | Callable[[Mapping[str, np.ndarray]], Any]
 
 SAMPLING_METHODS = ("sobol", "latin_hypercube", "random", "saltelli")
 #: Those that are made of Sobol points, whose number must be a power of two to be balanced.
 _SOBOL_METHODS = ("sobol", "saltelli")
 #: Probabilities nearer to 0 and 1 are none: a distribution without bounds would be infinite there.
-_MIN_PROBABILITY = 2.0**-40
+_MIN_SAMPLED_PROBABILITY = 2.0**-40
 #: Rounding error that an eigenvalue of a correlation, over the largest, may have.
 _EIGENVALUE_ROUNDING_ERROR = 1e-10
 
 
 def draw_samples(
-    distribution: Mapping[str, Any], n: int, seed: int, method: str, covariance: Any
+    distributions: Mapping[str, Any], sample_count: int, seed: int, method: str, covariance: Any
 ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Samples of each quantity, and how they were drawn as plain data; see `Axis.samples`."""
-    if not isinstance(distribution, Mapping) or not distribution:
-        raise InvalidValue("distribution", distribution, "must map names to distributions")
-    _check_arguments(distribution, n, seed, method)
-    deviations, correlation = _deviations_and_correlation(distribution, covariance, method)
-    scores = ndtri(_draw_probabilities(len(distribution), n, seed, method)) @ _matrix_square_root(
-        correlation
-    )
+    if not isinstance(distributions, Mapping) or not distributions:
+        raise InvalidValue("distribution", distributions, "must map names to distributions")
+    _check_sampling_arguments(distributions, sample_count, seed, method)
+    deviations, correlation = _deviations_and_correlation(distributions, covariance, method)
+    scores = ndtri(
+        _draw_uniform_samples(len(distributions), sample_count, seed, method)
+    ) @ _matrix_square_root(correlation)
     found = {}
     for (name, drawn), score, deviation in zip(
-        distribution.items(), scores.T, deviations, strict=True
+        distributions.items(), scores.T, deviations, strict=True
     ):
-        if _is_estimate(drawn):
+        if _is_value_with_error(drawn):
             found[name] = drawn + deviation * score
         else:
             found[name] = _compute_quantiles(name, drawn, ndtr(score))
     how = {
         "method": method,
-        "n": n * (len(distribution) + 2) if method == "saltelli" else n,
+        "n": sample_count * (len(distributions) + 2) if method == "saltelli" else sample_count,
         "seed": seed,
-        "of": {name: _describe_distribution(drawn) for name, drawn in distribution.items()},
+        "of": {name: _describe_distribution(drawn) for name, drawn in distributions.items()},
     }
     if covariance is not None:
         how["covariance"] = np.asarray(covariance, dtype=float).tolist()
     return found, how
 
 
-def _check_arguments(distribution: Mapping[str, Any], n: int, seed: int, method: str) -> None:
+def _check_sampling_arguments(
+    distributions: Mapping[str, Any], sample_count: int, seed: int, method: str
+) -> None:
     if method not in SAMPLING_METHODS:
         raise InvalidValue("method", method, "is unknown", choices=SAMPLING_METHODS)
-    for name, value, least in (("n", n, 1), ("seed", seed, 0)):
+    for name, value, least in (("n", sample_count, 1), ("seed", seed, 0)):
         if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
             raise InvalidValue(name, value, f"must be a whole number, {least} or more")
-    if n > MAX_ITEMS:
-        raise InvalidValue("n", n, f"must be at most {MAX_ITEMS:,}")
-    if method in _SOBOL_METHODS and n & (n - 1):
-        below = 1 << (int(n).bit_length() - 1)
+    if sample_count > MAX_ITEMS:
+        raise InvalidValue("n", sample_count, f"must be at most {MAX_ITEMS:,}")
+    if method in _SOBOL_METHODS and sample_count & (sample_count - 1):
+        below = 1 << (int(sample_count).bit_length() - 1)
         rule = "is no power of two, without which Sobol points are not balanced"
         remedy = f"Draw {below} or {2 * below}, or by method='latin_hypercube'."
-        raise InvalidValue("n", n, rule, remedy=remedy)
-    for name, drawn in distribution.items():
-        if not _is_estimate(drawn) and _quantile_function(drawn) is None:
+        raise InvalidValue("n", sample_count, rule, remedy=remedy)
+    for name, drawn in distributions.items():
+        if not _is_value_with_error(drawn) and _quantile_function(drawn) is None:
             rule = "is neither a distribution of scipy.stats with its parameters, nor an estimate"
             raise InvalidValue(name, drawn, rule, remedy="As in scipy.stats.norm(0.01, 0.001).")
 
 
 def _deviations_and_correlation(
-    distribution: Mapping[str, Any], covariance: Any, method: str
+    distributions: Mapping[str, Any], covariance: Any, method: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """Standard deviations of what is drawn, and the correlation of their normal scores."""
-    count = len(distribution)
-    estimates = [name for name, drawn in distribution.items() if _is_estimate(drawn)]
+    count = len(distributions)
+    estimates = [name for name, drawn in distributions.items() if _is_value_with_error(drawn)]
     if covariance is None:
         if estimates:
             rule = "is an estimate without a variance"
             remedy = "Give covariance=, or a distribution in its place."
-            raise InvalidValue(estimates[0], distribution[estimates[0]], rule, remedy=remedy)
+            raise InvalidValue(estimates[0], distributions[estimates[0]], rule, remedy=remedy)
         return np.ones(count), np.eye(count)
     try:
         given = np.asarray(covariance, dtype=float)
     except (TypeError, ValueError):
         given = np.empty(0)
     if given.shape != (count, count) or not np.isfinite(given).all():
-        rule = f"must be {count} by {count} finite numbers, in the order {', '.join(distribution)}"
+        rule = f"must be {count} by {count} finite numbers, in the order {', '.join(distributions)}"
         raise InvalidValue("covariance", covariance, rule)
     variances = np.diag(given)
     if not np.allclose(given, given.T, rtol=1e-9, atol=0.0) or (variances <= 0.0).any():
@@ -118,87 +120,109 @@ def _matrix_square_root(correlation: np.ndarray) -> np.ndarray:
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
 
-def _draw_probabilities(count: int, n: int, seed: int, method: str) -> np.ndarray:
+def _draw_uniform_samples(
+    quantity_count: int, sample_count: int, seed: int, method: str
+) -> np.ndarray:
     """Points of the unit cube, of shape (samples, count)."""
     random = np.random.default_rng(seed)
     if method == "random":
-        found = random.random((n, count))
+        found = random.random((sample_count, quantity_count))
     elif method == "latin_hypercube":
-        found = qmc.LatinHypercube(count, seed=random).random(n)
+        found = qmc.LatinHypercube(quantity_count, seed=random).random(sample_count)
     else:
-        found = qmc.Sobol(count * (1 + (method == "saltelli")), seed=random).random(n)
+        found = qmc.Sobol(quantity_count * (1 + (method == "saltelli")), seed=random).random(
+            sample_count
+        )
     if method == "saltelli":
         # of each point: A, B, and A with one coordinate from B after the other
-        ours, theirs = found[:, :count], found[:, count:]
-        mixed = np.where(np.eye(count, dtype=bool), theirs[:, None, :], ours[:, None, :])
+        ours, theirs = found[:, :quantity_count], found[:, quantity_count:]
+        mixed = np.where(np.eye(quantity_count, dtype=bool), theirs[:, None, :], ours[:, None, :])
         found = np.concatenate([ours[:, None], theirs[:, None], mixed], axis=1)
-    return np.clip(found.reshape(-1, count), _MIN_PROBABILITY, 1.0 - _MIN_PROBABILITY)
+    return np.clip(
+        found.reshape(-1, quantity_count), _MIN_SAMPLED_PROBABILITY, 1.0 - _MIN_SAMPLED_PROBABILITY
+    )
 
 
-def _is_estimate(drawn: Any) -> bool:
-    return isinstance(drawn, int | float | np.number) and not isinstance(drawn, bool)
+def _is_value_with_error(distribution: Any) -> bool:
+    return isinstance(distribution, int | float | np.number) and not isinstance(distribution, bool)
 
 
-def _quantile_function(drawn: Any) -> Any:
+def _quantile_function(distribution: Any) -> Any:
     """The function that gives quantiles of a distribution; None of what is none."""
-    return getattr(drawn, "ppf", None) if hasattr(drawn, "dist") else getattr(drawn, "icdf", None)
+    return (
+        getattr(distribution, "ppf", None)
+        if hasattr(distribution, "dist")
+        else getattr(distribution, "icdf", None)
+    )
 
 
-def _compute_quantiles(name: str, drawn: Any, probabilities: np.ndarray) -> np.ndarray:
+def _compute_quantiles(
+    quantity_name: str, distribution: Any, probabilities: np.ndarray
+) -> np.ndarray:
     """The quantiles of a distribution."""
     try:
-        found = np.asarray(_quantile_function(drawn)(probabilities), dtype=float)
+        found = np.asarray(_quantile_function(distribution)(probabilities), dtype=float)
     except ValueError:  # of parameters that are arrays
         found = np.empty(0)
     if found.shape != probabilities.shape or not np.isfinite(found).all():
         raise InvalidValue(
-            name, _describe_distribution(drawn), "has no finite quantiles: look at its parameters"
+            quantity_name,
+            _describe_distribution(distribution),
+            "has no finite quantiles: look at its parameters",
         )
     return found
 
 
-def _describe_distribution(drawn: Any) -> Any:
+def _describe_distribution(distribution: Any) -> Any:
     """A distribution in words; an estimate as it is."""
-    if _is_estimate(drawn):
-        return float(drawn)
-    if not hasattr(drawn, "dist"):
-        return str(drawn)
-    given = [*map(str, drawn.args), *(f"{name}={value}" for name, value in drawn.kwds.items())]
-    return f"{drawn.dist.name}({', '.join(given)})"
+    if _is_value_with_error(distribution):
+        return float(distribution)
+    if not hasattr(distribution, "dist"):
+        return str(distribution)
+    given = [
+        *map(str, distribution.args),
+        *(f"{name}={value}" for name, value in distribution.kwds.items()),
+    ]
+    return f"{distribution.dist.name}({', '.join(given)})"
 
 
-def compute_fields(
-    drawn: Mapping[str, Any], fields: Mapping[str, FieldSource] | None
+def compute_field_values(
+    sampled_values: Mapping[str, Any], field_sources: Mapping[str, QuantityNameOrFunction] | None
 ) -> dict[str, Sequence[Any] | np.ndarray]:
     """Values of each field that is set: by a quantity that is drawn, or a function of them all."""
-    if fields is None:
-        return dict(drawn)
+    if field_sources is None:
+        return dict(sampled_values)
     found = {}
-    for name, by in fields.items():
+    for name, by in field_sources.items():
         if isinstance(by, str):
-            if by not in drawn:
-                raise InvalidValue(name, by, "is not drawn", choices=drawn)
-            found[name] = drawn[by]
+            if by not in sampled_values:
+                raise InvalidValue(name, by, "is not drawn", choices=sampled_values)
+            found[name] = sampled_values[by]
         else:
-            found[name] = _evaluate_field(
-                name, by, {n: np.asarray(values) for n, values in drawn.items()}
+            found[name] = _evaluate_field_function(
+                name, by, {n: np.asarray(values) for n, values in sampled_values.items()}
             )
     return found
 
 
-def _evaluate_field(
-    name: str, by: Callable[..., Any], drawn: Mapping[str, np.ndarray]
+def _evaluate_field_function(
+    field_name: str, field_function: Callable[..., Any], sampled_values: Mapping[str, np.ndarray]
 ) -> np.ndarray:
-    count = len(next(iter(drawn.values())))
+    count = len(next(iter(sampled_values.values())))
     try:
-        made = np.asarray(by(drawn)).astype(float, casting="same_kind")
+        made = np.asarray(field_function(sampled_values)).astype(float, casting="same_kind")
         return np.broadcast_to(made, count)
     except Exception as error:
         rule = f"gives no number for each sample ({type(error).__name__}: {error})"
-        raise InvalidValue(name, getattr(by, "__name__", by), rule, choices=drawn) from error
+        raise InvalidValue(
+            field_name,
+            getattr(field_function, "__name__", field_function),
+            rule,
+            choices=sampled_values,
+        ) from error
 
 
-def read_columns(table: Any) -> tuple[dict[str, Any], dict[str, str]]:
+def read_table_columns_and_units(table: Any) -> tuple[dict[str, Any], dict[str, str]]:
     """Columns of a table by their names, and the units that it states of them."""
     if not hasattr(table, "keys") or getattr(table, "ndim", 2) != 2 or not len(table):
         rule = "is no table of columns"

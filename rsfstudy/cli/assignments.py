@@ -12,18 +12,20 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.rig import RIG_QUANTITIES, expand_range, parse_number
 from rsfstudy.slider import UserLoading
 
-_FLAG_VALUES = {"true": True, "yes": True, "false": False, "no": False}
+_FLAG_VALUE_BY_WORD = {"true": True, "yes": True, "false": False, "no": False}
 
 
 def parse_overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
     """Values of axes and fields of a study that ``--set`` states."""
     texts = {p for axis in study.axes for p in axis.point_names if axis.labels or "," in p}
-    found = _parse_each(settings, lambda text: parse_setting(text, texts))
+    found = _parse_each_assignment(settings, lambda text: parse_axis_assignment(text, texts))
     if "loading" in found:
         given, rig = found["loading"], study.rig
         several = isinstance(given, list)
         found["loading"] = (
-            [parse_loading(v, rig) for v in given] if several else parse_loading(given, rig)
+            [parse_loading_file(v, rig) for v in given]
+            if several
+            else parse_loading_file(given, rig)
         )
     return found
 
@@ -31,41 +33,43 @@ def parse_overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
 def parse_fields(settings: tuple[str, ...]) -> dict[str, Any]:
     """Fields of a scene that ``--set`` states."""
     rule = "must read FIELD=VALUE, as in law=slowness"
-    given = _parse_each(settings, lambda text: split_assignment("--set", text, rule))
-    return {name: parse_value(text) for name, text in given.items()}
+    given = _parse_each_assignment(settings, lambda text: split_assignment("--set", text, rule))
+    return {name: parse_flag_number_or_text(text) for name, text in given.items()}
 
 
-def _parse_each(
-    settings: tuple[str, ...], read: Callable[[str], tuple[str, Any]]
+def _parse_each_assignment(
+    settings: tuple[str, ...], parse_assignment: Callable[[str], tuple[str, Any]]
 ) -> dict[str, Any]:
     """What each of the settings states, no name twice."""
     found: dict[str, Any] = {}
     for text in settings:
-        name, given = read(text)
+        name, given = parse_assignment(text)
         if name in found:
             raise InvalidValue("--set", text, f"sets {name} twice")
         found[name] = given
     return found
 
 
-def parse_loading(value: Any, laboratory: Rig | None) -> Any:
+def parse_loading_file(file_path: Any, rig: Rig | None) -> Any:
     """A value of `loading`: what a CSV file tells, which goes by the name of the file."""
-    path = Path(str(value))
-    return loading_from_file(path, laboratory) if path.suffix.lower() == ".csv" else value
+    path = Path(str(file_path))
+    return read_loading_file(path, rig) if path.suffix.lower() == ".csv" else file_path
 
 
-def loading_from_file(path: Path, laboratory: Rig | None) -> UserLoading:
+def read_loading_file(path: Path, rig: Rig | None) -> UserLoading:
     """The loading that a table tells: a record where it has the column ``time``, else a
     protocol.
     """
     read = history if "time" in read_table(path) else read_protocol
-    return read(path, laboratory, name=path.stem)
+    return read(path, rig, name=path.stem)
 
 
-def parse_rig(texts: Mapping[str, str]) -> Rig:
+def parse_rig(option_texts: Mapping[str, str]) -> Rig:
     """The rig that options state."""
     stated = {
-        name: parse_number_or_text(text) for name, text in texts.items() if name in RIG_QUANTITIES
+        name: parse_number_or_text(text)
+        for name, text in option_texts.items()
+        if name in RIG_QUANTITIES
     }
     for field in fields(Rig):
         if field.default is MISSING and field.name not in stated:
@@ -83,42 +87,46 @@ def parse_cell_coordinate(text: str) -> tuple[str, str]:
     return name, value
 
 
-def split_assignment(option: str, text: str, rule: str) -> tuple[str, str]:
+def split_assignment(option_name: str, text: str, rule: str) -> tuple[str, str]:
     """Both sides of a text that reads NAME=VALUE; the rule names what it must read."""
     name, equals, given = (part.strip() for part in text.partition("="))
     if not (name and equals and given):
-        raise InvalidValue(option, text, rule)
+        raise InvalidValue(option_name, text, rule)
     return name, given
 
 
-def parse_columns(text: str | None) -> dict[str, str] | None:
+def parse_column_assignments(text: str | None) -> dict[str, str] | None:
     """Which heading stands above which quantity, of ``time=t (s),friction=mu``."""
     rule = "must read NAME=HEADING, as in 'time=t (s),friction=mu'"
     parts = (part for part in (text or "").split(",") if part.strip())
     return dict(split_assignment("--columns", part.strip(), rule) for part in parts) or None
 
 
-def parse_setting(text: str, labels: Collection[str]) -> tuple[str, Any]:
+def parse_axis_assignment(text: str, known_labels: Collection[str]) -> tuple[str, Any]:
     """One ``AXIS=VALUES``: a label, a single value, a comma list, start:stop:count, or
     start:stop:count:log. Labels may hold commas.
     """
     name, values = split_assignment("--set", text, "must read AXIS=VALUES, as in b_over_a=2,3,4")
-    if values in labels:
+    if values in known_labels:
         return name, [values]
-    for label in sorted(labels, key=len, reverse=True):
+    for label in sorted(known_labels, key=len, reverse=True):
         values = values.replace(label, label.replace(",", "\0"))
     parts = [part.strip().replace("\0", ",") for part in values.split(",")]
     if not all(parts):
         raise InvalidValue("--set", text, "leaves a value out")
     if len(parts) > 1:
-        return name, [parse_value(part) for part in parts]
-    return name, expand_range("--set", text, values) if ":" in values else parse_value(values)
+        return name, [parse_flag_number_or_text(part) for part in parts]
+    return name, expand_range(
+        "--set", text, values
+    ) if ":" in values else parse_flag_number_or_text(values)
 
 
-def parse_value(text: str) -> Any:
+def parse_flag_number_or_text(text: str) -> Any:
     """A flag, a number, or else a text."""
     return (
-        _FLAG_VALUES[text.lower()] if text.lower() in _FLAG_VALUES else parse_number_or_text(text)
+        _FLAG_VALUE_BY_WORD[text.lower()]
+        if text.lower() in _FLAG_VALUE_BY_WORD
+        else parse_number_or_text(text)
     )
 
 

@@ -24,20 +24,20 @@ from rsfstudy.errors import (
     InvalidValue,
     RsfStudyError,
     SignalInterrupt,
-    escape_control,
-    shorten,
+    escape_control_characters,
+    shorten_text,
 )
 from rsfstudy.study import study_titles
 
-OK, FAILED, WRONG_USAGE = 0, 1, 2
+EXIT_STATUS_OK, EXIT_STATUS_FAILED, EXIT_STATUS_WRONG_USAGE = 0, 1, 2
 #: Signals that end a command as Ctrl-C does.
-_ENDING_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
+_SIGNALS_THAT_END_COMMAND = (signal.SIGTERM, signal.SIGHUP)
 
 
-class OrderedGroup(click.Group):
+class GroupInOrderOfDefinition(click.Group):
     """A group whose help names commands in the order of this file."""
 
-    command_class = options.LazyCommand
+    command_class = options.LazilyLoadedCommand
 
     def list_commands(self, _context: click.Context) -> list[str]:
         """Names of the commands."""
@@ -52,7 +52,7 @@ class OrderedGroup(click.Group):
 
 
 @click.group(
-    cls=OrderedGroup,
+    cls=GroupInOrderOfDefinition,
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
     epilog="To begin with: rsfstudy list, then rsfstudy show NAME, then rsfstudy run NAME. "
     "Each command has a --help of its own.",
@@ -73,36 +73,36 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # which may be unable to say what a file says
             stream.reconfigure(errors="backslashreplace")
-    for number in _ENDING_SIGNALS:
+    for number in _SIGNALS_THAT_END_COMMAND:
         if signal.getsignal(number) is signal.SIG_DFL:  # and not ignored, as by nohup
-            signal.signal(number, _handle_signal)
+            signal.signal(number, _raise_signal_interrupt)
     try:
-        sys.exit(cli(standalone_mode=False) or OK)
+        sys.exit(cli(standalone_mode=False) or EXIT_STATUS_OK)
     except click.ClickException as error:
-        error.message = escape_control(shorten(error.message))  # type: ignore[misc]
+        error.message = escape_control_characters(shorten_text(error.message))  # type: ignore[misc]
         error.show()
-        sys.exit(WRONG_USAGE)
+        sys.exit(EXIT_STATUS_WRONG_USAGE)
     except (click.Abort, KeyboardInterrupt):
         _print_error("interrupted")
-        sys.exit(FAILED)
+        sys.exit(EXIT_STATUS_FAILED)
     except RsfStudyError as error:
         _print_error(f"error: {error}")
-        of_ours = WRONG_USAGE if isinstance(error, InvalidValue) else FAILED
+        of_ours = EXIT_STATUS_WRONG_USAGE if isinstance(error, InvalidValue) else EXIT_STATUS_FAILED
         sys.exit(error.exit_status if isinstance(error, Interrupted) else of_ours)
     except Exception as error:
         if os.environ.get("RSFSTUDY_TRACEBACK"):
             raise
         _print_error(
-            f"error: rsfstudy {shorten(shlex.join(sys.argv[1:]))}: "
+            f"error: rsfstudy {shorten_text(shlex.join(sys.argv[1:]))}: "
             f"{_describe_unexpected_error(error)}"
         )
-        sys.exit(FAILED)
+        sys.exit(EXIT_STATUS_FAILED)
 
 
 def _describe_unexpected_error(error: Exception) -> str:
     """Return a message for an exception that no command handles."""
     if isinstance(error, OSError) and error.strerror:
-        place = f" ({shorten(error.filename)})" if error.filename else ""
+        place = f" ({shorten_text(error.filename)})" if error.filename else ""
         remedy = "Check that the place exists, may be written to, and is not full."
         return f"{error.strerror}{place}. {remedy}"
     if isinstance(error, MemoryError):
@@ -113,11 +113,11 @@ def _describe_unexpected_error(error: Exception) -> str:
     )
 
 
-def _handle_signal(number: int, _frame: object) -> None:
+def _raise_signal_interrupt(signal_number: int, _frame: object) -> None:
     """End the command; it then takes its own time whatever follows: `timeout` sends two signals."""
-    for other in _ENDING_SIGNALS:
+    for other in _SIGNALS_THAT_END_COMMAND:
         signal.signal(other, signal.SIG_IGN)
-    raise SignalInterrupt(number)
+    raise SignalInterrupt(signal_number)
 
 
 class _WarnOnceHandler(logging.Handler):
@@ -143,13 +143,13 @@ _LOG_HANDLER = _WarnOnceHandler(logging.WARNING)
 
 def _print_warning(message: Warning | str) -> None:
     # not by the console, which knows nothing of a progress bar and would write over it
-    print(escape_control(shorten(f"warning: {message}", 5000)), file=sys.stderr)
+    print(escape_control_characters(shorten_text(f"warning: {message}", 5000)), file=sys.stderr)
 
 
 def _print_error(text: str) -> None:
-    from rsfstudy.cli.console import stderr
+    from rsfstudy.cli.console import stderr_console
 
-    stderr.print(text)
+    stderr_console.print(text)
 
 
 @cli.command("list", cls=click.Command)
@@ -165,10 +165,10 @@ def list_studies(context: click.Context) -> None:
 
 @cli.command()
 @click.argument("name")
-@options.set_option
+@options.set_values_option
 @options.rtol_option
 @options.output_option
-@options.study_option
+@options.study_file_option
 @options.rig_options
 def show() -> None:
     """Show a study before it is run, or what is in a results file.
@@ -180,8 +180,8 @@ def show() -> None:
 
 
 @cli.command()
-@options.study_argument
-@options.set_option
+@options.study_name_or_all_argument
+@options.set_values_option
 @options.output_option
 @options.rtol_option
 @options.engine_option
@@ -207,7 +207,7 @@ def run() -> None:
 
 
 @cli.command()
-@options.study_argument
+@options.study_name_or_all_argument
 @options.output_option
 @click.option(
     "--claim",
@@ -225,14 +225,14 @@ def check() -> None:
 
 
 @cli.command()
-@options.study_argument
+@options.study_name_or_all_argument
 @options.make_output_option(
     "Directory of the results and of the figure, or the figure itself, such as fig.pdf.  "
     "[default: outputs, and beside a FILE]"
 )
 @options.figure_options
 @click.option("--variable", metavar="NAME", help="Draw this variable: maps, or lines.")
-@options.study_option
+@options.study_file_option
 @options.abscissa_option
 def plot() -> None:
     """Draw the figure of results, or a motion, beside them.
@@ -281,7 +281,7 @@ def compare() -> None:
     metavar="AXIS=VALUE",
     help="Only this cell, in this process, failing as it fails.",
 )
-@options.study_option
+@options.study_file_option
 @options.make_output_option(
     "Directory to keep the new results in; nothing is written without it.", file_okay=False
 )
@@ -310,7 +310,7 @@ def export() -> None:
     """
 
 
-for one in command_line_scenes.COMMANDS:
+for one in command_line_scenes.SCENE_COMMANDS:
     cli.add_command(one)
 
 if __name__ == "__main__":

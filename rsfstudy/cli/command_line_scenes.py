@@ -13,11 +13,11 @@ import click
 from rsfstudy.cli import options
 from rsfstudy.cli.options import F
 from rsfstudy.defaults import FIT_BUDGET
-from rsfstudy.motion import DEFAULT_BUDGET, DEFAULT_RTOL, ENGINES, SCIPY
+from rsfstudy.motion import DEFAULT_EVALUATION_BUDGET, DEFAULT_RTOL, ENGINES, SCIPY
 
 
-@click.command(cls=options.LazyCommand, does="commands_scenes")
-@options.make_set_option(
+@click.command(cls=options.LazilyLoadedCommand, does="commands_scenes")
+@options.make_set_scene_fields_option(
     "A field of the scene, as in law=slowness; of a rig with units, as in hold_time='100 s'; "
     "a loading from a CSV file, as in loading=record.csv."
 )
@@ -32,7 +32,9 @@ from rsfstudy.motion import DEFAULT_BUDGET, DEFAULT_RTOL, ENGINES, SCIPY
 @options.abscissa_option
 @options.rig_options
 @click.option("--rtol", type=float, default=DEFAULT_RTOL, help="Accuracy.")
-@options.make_count_option("--budget", DEFAULT_BUDGET, "Right-hand sides it may evaluate.")
+@options.make_count_option(
+    "--budget", DEFAULT_EVALUATION_BUDGET, "Right-hand sides it may evaluate."
+)
 @click.option("--engine", type=click.Choice(ENGINES), default=SCIPY)
 @options.make_image_option(
     "--output", Path("motion.png"), "File of the picture; the data stand beside it as NetCDF."
@@ -66,21 +68,23 @@ def _parse_number_or_text(
 
 
 def _comma_list_option(
-    *names: str, words: str, default: str | None = None, metavar: str = "TEXT"
+    *option_names: str, help_text: str, default: str | None = None, metavar: str = "TEXT"
 ) -> Callable[[F], F]:
     """An option that is a comma list."""
     return click.option(
-        *names, callback=_split_commas, default=default, metavar=metavar, help=words
+        *option_names, callback=_split_commas, default=default, metavar=metavar, help=help_text
     )
 
 
-def _quantity_option(name: str, words: str, default: str | None = None) -> Callable[[F], F]:
+def _quantity_option(
+    option_name: str, help_text: str, default: str | None = None
+) -> Callable[[F], F]:
     """An option that is a number with its units; what help says of its default stands in words."""
-    about: dict[str, Any] = {"default": default, "show_default": False, "help": words}
-    return click.option(name, callback=_parse_number_or_text, **about)
+    about: dict[str, Any] = {"default": default, "show_default": False, "help": help_text}
+    return click.option(option_name, callback=_parse_number_or_text, **about)
 
 
-@click.command(cls=options.LazyCommand, does="commands_scenes")
+@click.command(cls=options.LazilyLoadedCommand, does="commands_scenes")
 @click.argument("records", nargs=-1, required=True, type=options.FilePath())
 @click.option(
     "--columns",
@@ -93,15 +97,15 @@ def _quantity_option(name: str, words: str, default: str | None = None) -> Calla
 @_quantity_option("--stiffness", "Over normal stress, as in '1.6e-3 /um', or as in '0.03 MPa/um'.")
 @_quantity_option("--slip-distance", "First guess of D_c, as in '10 um'.")
 @_comma_list_option(
-    "--law", "laws", default="slip,slowness", words="State evolution laws, a fit by each."
+    "--law", "laws", default="slip,slowness", help_text="State evolution laws, a fit by each."
 )
 @_comma_list_option(
     "--free",
-    words="Parameters to look for, of which each law is fitted with those that it has; also "
+    help_text="Parameters to look for, of which each law is fitted with those that it has; also "
     "stiffness, step_time, trend2, alpha; of law=family law_exponent.  [default: a, b (b1 and b2 "
     "of two states), slip_distance (slip_distance_2), mu_star, trend1]",
 )
-@_comma_list_option("--step", "steps", metavar="N,...", words="Steps to fit.  [default: all]")
+@_comma_list_option("--step", "steps", metavar="N,...", help_text="Steps to fit.  [default: all]")
 @click.option(
     "--together", is_flag=True, help="Fit these steps, of all RECORDS, as one, by one a, b and D_c."
 )
@@ -148,7 +152,7 @@ def _quantity_option(name: str, words: str, default: str | None = None) -> Calla
     show_default=False,
     help="Draws from the posterior, by emcee.  [default: none]",
 )
-@options.make_set_option("A field of the scene that is not looked for, as in a=0.01.")
+@options.make_set_scene_fields_option("A field of the scene that is not looked for, as in a=0.01.")
 @options.make_count_option("--budget", FIT_BUDGET, "Right-hand sides that a fit may evaluate.")
 @click.option(
     "--engine",
@@ -171,7 +175,7 @@ def fit() -> None:
     """
 
 
-@click.command(cls=options.LazyCommand, does="commands_referee")
+@click.command(cls=options.LazilyLoadedCommand, does="commands_referee")
 @click.argument("directory", metavar="DIR", type=options.FilePath())
 def problems() -> None:
     """Write the problems of the referee into a new directory.
@@ -180,7 +184,7 @@ def problems() -> None:
     """
 
 
-@click.command(cls=options.LazyCommand, does="commands_referee")
+@click.command(cls=options.LazilyLoadedCommand, does="commands_referee")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=options.FilePath())
 @click.option(
     "--problem",
@@ -205,4 +209,4 @@ def verify() -> None:
     """
 
 
-COMMANDS = (simulate, fit, problems, verify)
+SCENE_COMMANDS = (simulate, fit, problems, verify)

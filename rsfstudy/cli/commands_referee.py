@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rsfstudy.cli import assignments, printing
-from rsfstudy.cli.console import console
+from rsfstudy.cli.console import stdout_console
 from rsfstudy.cli.options import CommandOptions
 from rsfstudy.errors import InvalidValue
 from rsfstudy.referee import (
@@ -19,56 +19,62 @@ from rsfstudy.referee import (
 )
 
 
-def problems(given: CommandOptions) -> int:
+def problems(options: CommandOptions) -> int:
     """Write all problems."""
-    count = write_problems(given.directory)
-    console.print(f"wrote {count} problems into {given.directory}")
-    return printing.OK
+    count = write_problems(options.directory)
+    stdout_console.print(f"wrote {count} problems into {options.directory}")
+    return printing.EXIT_STATUS_OK
 
 
-def verify(given: CommandOptions) -> int:
+def verify(options: CommandOptions) -> int:
     """Hold files against answers; FAILED where one does not pass."""
-    if math.isnan(given.digits):  # which click finds in every range
-        raise InvalidValue("--digits", given.digits, "must be a number, from 1 to 12")
-    columns = assignments.parse_columns(given.columns)
-    problem = given.problem or ""
-    found = [compare_file(file, problem, columns, given.digits) for file in given.files]
-    for file, one in zip(given.files, found, strict=True):
+    if math.isnan(options.digits):  # which click finds in every range
+        raise InvalidValue("--digits", options.digits, "must be a number, from 1 to 12")
+    columns = assignments.parse_column_assignments(options.columns)
+    problem = options.problem or ""
+    found = [compare_file(file, problem, columns, options.digits) for file in options.files]
+    for file, one in zip(options.files, found, strict=True):
         _print_verdict(file, one)
-    console.print(summarise_comparisons(found), style="bold")
-    if given.figure is not None:
-        _draw_agreement(found, given.figure)
-    return printing.OK if all(one.passes for one in found) else printing.FAILED
+    stdout_console.print(summarise_comparisons(found), style="bold")
+    if options.figure is not None:
+        _draw_agreement(found, options.figure)
+    return (
+        printing.EXIT_STATUS_OK
+        if all(one.has_required_digits for one in found)
+        else printing.EXIT_STATUS_FAILED
+    )
 
 
-def _print_verdict(file: Path, one: AnswerComparison) -> None:
+def _print_verdict(answer_file: Path, comparison: AnswerComparison) -> None:
     """Print how far each quantity agrees, and what would explain it."""
-    problem = one.problem
+    problem = comparison.problem
     name = f"problem {problem.number}" if problem.number else f"known to {problem.digits} digits"
-    outcome = "passed" if one.passes else "not passed"
-    console.print(f"{file}: {problem.title} ({name}): {outcome}", style="bold")
-    for line in one.describe_agreements():
-        console.print(line)
-    if not one.passes:
-        console.print(f"  {one.explanation or 'no usual difference of conventions explains it'}")
+    outcome = "passed" if comparison.has_required_digits else "not passed"
+    stdout_console.print(f"{answer_file}: {problem.title} ({name}): {outcome}", style="bold")
+    for line in comparison.describe_agreements():
+        stdout_console.print(line)
+    if not comparison.has_required_digits:
+        stdout_console.print(
+            f"  {comparison.explanation or 'no usual difference of conventions explains it'}"
+        )
 
 
-def _draw_agreement(found: list[AnswerComparison], path: Path) -> None:
+def _draw_agreement(comparisons: list[AnswerComparison], figure_path: Path) -> None:
     """Digits along the rows of one problem, or by problem."""
     from rsfstudy.plots import draw_agreement, style_context
 
     digits: dict[str, list[tuple[float, float]]] = {}
-    problem, label = found[0].problem, "problem"
-    if len(found) == 1 and problem.index_column:
-        label = f"{problem.index_column} ({problem.units[problem.index_column]})"
-        for one in found[0].agreements:
+    problem, label = comparisons[0].problem, "problem"
+    if len(comparisons) == 1 and problem.index_column:
+        label = f"{problem.index_column} ({problem.quantity_units[problem.index_column]})"
+        for one in comparisons[0].quantity_agreements:
             along = -np.log10(np.maximum(one.relative_differences, 10.0**-problem.digits))
-            digits[one.quantity] = list(zip(problem.index_values, along, strict=True))
+            digits[one.quantity_name] = list(zip(problem.index_values, along, strict=True))
     else:
-        for number, verdict_of in enumerate(found, start=1):
+        for number, verdict_of in enumerate(comparisons, start=1):
             at = verdict_of.problem.number or number
-            for one in verdict_of.agreements:
-                digits.setdefault(one.quantity, []).append((at, one.digits))
+            for one in verdict_of.quantity_agreements:
+                digits.setdefault(one.quantity_name, []).append((at, one.agreeing_digits))
     with style_context(None):
-        drawn = draw_agreement(digits, label, found[0].required_digits)
-    printing.write_figure(drawn, path)
+        drawn = draw_agreement(digits, label, comparisons[0].required_digits)
+    printing.write_figure(drawn, figure_path)

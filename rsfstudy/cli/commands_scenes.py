@@ -10,9 +10,9 @@ import xarray as xr
 from rsfstudy import Rig, Scene, plot_motion, read_record
 from rsfstudy import fit as fit_record_fit
 from rsfstudy import simulate as simulated
-from rsfstudy.api import BEYOND_NORM_ATTRIBUTE
+from rsfstudy.api import BEYOND_NORM_ATTRIBUTE_NAME
 from rsfstudy.cli import assignments, printing, table_layout
-from rsfstudy.cli.console import console
+from rsfstudy.cli.console import stdout_console
 from rsfstudy.cli.options import CommandOptions
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
@@ -20,11 +20,11 @@ from rsfstudy.execution import provenance_attributes
 from rsfstudy.fitting import LoadingStep, Record
 from rsfstudy.plots import save_figure
 from rsfstudy.reporting import (
-    Table,
+    TextTable,
+    build_summary_pieces,
     is_fit,
     is_motion,
     motion_pieces,
-    summary_pieces,
 )
 from rsfstudy.rig import DISPLAY_BASE_UNITS
 from rsfstudy.status import Status
@@ -35,90 +35,94 @@ _UNPHYSICAL_EXIT_STATUS = 3
 #: Most steps of a record that are listed.
 _MAX_LISTED_STEPS = 24
 #: Options that `rsfstudy.fit` takes as they are.
-_FIT_OPTIONS = (
+_OPTIONS_PASSED_TO_FIT = (
     "stiffness", "slip_distance", "laws", "free", "together", "before", "after", "windows",
     "noise", "loading", "averaging", "low_pass", "posterior", "budget", "engine",
 )  # fmt: skip
 
 
-def simulate(given: CommandOptions) -> int:
+def simulate(options: CommandOptions) -> int:
     """Follow one motion, draw it and write it."""
-    _check_replaceable(given.output.with_suffix(".nc"), is_motion, "motion")
-    scene, laboratory = _scene_and_rig(given)
-    duration, accuracy = _parse_duration(given.duration, laboratory), ("rtol", "budget", "engine")
-    motion = simulated(scene, duration=duration, **given.select(*accuracy))
-    motion = motion.assign_attrs(provenance_attributes(given.command))
-    _write_motion(motion, laboratory, given)
+    _check_output_may_be_replaced(options.output.with_suffix(".nc"), is_motion, "motion")
+    scene, laboratory = _build_scene_and_rig(options)
+    duration, accuracy = _parse_duration(options.duration, laboratory), ("rtol", "budget", "engine")
+    motion = simulated(scene, duration=duration, **options.select_options(*accuracy))
+    motion = motion.assign_attrs(provenance_attributes(options.command_line))
+    _write_motion_and_figure(motion, laboratory, options)
     if motion.attrs["status"] != Status.OK.label:
-        return printing.FAILED
-    return _UNPHYSICAL_EXIT_STATUS if BEYOND_NORM_ATTRIBUTE in motion.attrs else printing.OK
+        return printing.EXIT_STATUS_FAILED
+    return (
+        _UNPHYSICAL_EXIT_STATUS
+        if BEYOND_NORM_ATTRIBUTE_NAME in motion.attrs
+        else printing.EXIT_STATUS_OK
+    )
 
 
-def _scene_and_rig(given: CommandOptions) -> tuple[Scene, Rig | None]:
+def _build_scene_and_rig(options: CommandOptions) -> tuple[Scene, Rig | None]:
     """The scene, and the rig if one is stated."""
-    fields, rig = assignments.parse_fields(given.settings), given.rig
+    fields, rig = assignments.parse_fields(options.settings), options.rig_option_texts
     if (velocity := rig.pop("load_velocity", None)) is not None:
         fields["load_velocity"] = assignments.parse_number_or_text(velocity)
     laboratory = assignments.parse_rig(rig) if rig else None
-    if given.protocol_file is not None:
-        fields["loading"] = assignments.loading_from_file(given.protocol_file, laboratory)
+    if options.protocol_file is not None:
+        fields["loading"] = assignments.read_loading_file(options.protocol_file, laboratory)
     elif "loading" in fields:
-        fields["loading"] = assignments.parse_loading(fields["loading"], laboratory)
+        fields["loading"] = assignments.parse_loading_file(fields["loading"], laboratory)
     return (laboratory.scene(**fields) if laboratory else Scene(**fields)), laboratory
 
 
-def _parse_duration(text: str | None, laboratory: Rig | None) -> float | None:
+def _parse_duration(text: str | None, rig: Rig | None) -> float | None:
     """In D_c/V_*."""
     time = None if text is None else assignments.parse_number_or_text(text)
-    if time is not None and laboratory is not None:
-        return laboratory.dimensionless(time, name="--duration")
+    if time is not None and rig is not None:
+        return rig.dimensionless(time, name="--duration")
     if isinstance(time, str):
         remedy = "Give a number in D_c/V_*, or state the rig too."
         raise InvalidValue("--duration", time, "has units, and no rig is stated", remedy=remedy)
     return time
 
 
-def _write_motion(motion: xr.Dataset, laboratory: Rig | None, given: CommandOptions) -> None:
+def _write_motion_and_figure(motion: xr.Dataset, rig: Rig | None, options: CommandOptions) -> None:
     """The picture, and the data beside it."""
     said = f"{motion.attrs['status']} {motion.attrs['message']}".strip()
     if not motion.sizes["time"]:
-        console.print(f"{said}\nnothing moved: there is nothing to draw or to keep")
+        stdout_console.print(f"{said}\nnothing moved: there is nothing to draw or to keep")
         return
-    data = given.output.with_suffix(".nc")
-    write_dataset(laboratory.in_units(motion, **DISPLAY_BASE_UNITS) if laboratory else motion, data)
-    printing.write_figure(plot_motion(motion, laboratory, against=given.against), given.output)
-    if not given.quiet:
+    data = options.output.with_suffix(".nc")
+    write_dataset(rig.in_units(motion, **DISPLAY_BASE_UNITS) if rig else motion, data)
+    printing.write_figure(plot_motion(motion, rig, against=options.against), options.output)
+    if not options.quiet:
         found = [motion, motion.rsf.events()]
-        if laboratory:
-            found = [laboratory.in_units(of, **DISPLAY_BASE_UNITS) for of in found]
+        if rig:
+            found = [rig.in_units(of, **DISPLAY_BASE_UNITS) for of in found]
         for piece in motion_pieces(found[0], motion.rsf.scene, found[1]):
-            table_layout.print_piece(piece)
-    console.print(f"{said}\nwrote {given.output} and {data}")
+            table_layout.print_summary_piece(piece)
+    stdout_console.print(f"{said}\nwrote {options.output} and {data}")
 
 
-def fit(given: CommandOptions) -> int:
+def fit(options: CommandOptions) -> int:
     """Fit records, print the parameters, draw the fits and write them."""
-    data = given.output.with_suffix(".nc")
-    _check_replaceable(data, is_fit, "fit")
-    columns = assignments.parse_columns(given.columns)
-    stress = given.normal_stress
-    about = {"normal_stress": stress, "stiffness": given.stiffness}
-    records = [read_record(path, columns, **about) for path in given.records]
+    data = options.output.with_suffix(".nc")
+    _check_output_may_be_replaced(data, is_fit, "fit")
+    columns = assignments.parse_column_assignments(options.columns)
+    stress = options.normal_stress
+    about = {"normal_stress": stress, "stiffness": options.stiffness}
+    records = [read_record(path, columns, **about) for path in options.records]
     for record in records:
         _print_steps(record)
     dataset = fit_record_fit(
         records,
-        steps=[_parse_step_number(text) for text in given.steps],
-        command=given.command,
-        **given.select(*_FIT_OPTIONS),
-        **assignments.parse_fields(given.settings),
+        steps=[_parse_step_number(text) for text in options.steps],
+        command=options.command_line,
+        **options.select_options(*_OPTIONS_PASSED_TO_FIT),
+        **assignments.parse_fields(options.settings),
     )
     dataset = write_dataset(dataset, data)
-    save_figure(dataset, given.output)
-    for piece in summary_pieces(dataset):
-        table_layout.print_piece(piece)
-    console.print(f"wrote {given.output} and {data}", soft_wrap=True)
-    return printing.exit_status(dataset)
+    save_figure(dataset, options.output)
+    for piece in build_summary_pieces(dataset):
+        table_layout.print_summary_piece(piece)
+    stdout_console.print(f"wrote {options.output} and {data}", soft_wrap=True)
+    return printing.exit_status_of_dataset(dataset)
 
 
 def _parse_step_number(text: str) -> int:
@@ -129,7 +133,7 @@ def _parse_step_number(text: str) -> int:
 
 def _print_steps(record: Record) -> None:
     """Print the steps of a record."""
-    console.print(f"{record.name}: {len(record):,} rows, {len(record.loading_steps)} steps")
+    stdout_console.print(f"{record.name}: {len(record):,} rows, {len(record.loading_steps)} steps")
     stressed = any(step.stress_ratio != 1.0 for step in record.loading_steps)
     rows = [
         {
@@ -138,31 +142,35 @@ def _print_steps(record: Record) -> None:
             "lasts (s)": f"{step.end - step.start:.6g}",
             "V0 (um/s)": f"{step.velocity_before:.6g}",
             "V1 (um/s)": f"{step.velocity_after:.6g}",
-            **_format_normal_stresses(step, stressed),
+            **_format_normal_stresses_of_step(step, stressed),
         }
         for number, step in enumerate(record.loading_steps[:_MAX_LISTED_STEPS], start=1)
     ]
-    table_layout.print_piece(Table(rows))
+    table_layout.print_summary_piece(TextTable(rows))
     if (left := len(record.loading_steps) - _MAX_LISTED_STEPS) > 0:
-        console.print(f"and {left} more")
+        stdout_console.print(f"and {left} more")
 
 
-def _format_normal_stresses(step: LoadingStep, listed: bool) -> dict[str, str]:
+def _format_normal_stresses_of_step(step: LoadingStep, is_shown: bool) -> dict[str, str]:
     """Format the normal stresses of a step in MPa if ``listed`` is True."""
     stresses = {"sigma0 (MPa)": step.stress_before, "sigma1 (MPa)": step.stress_after}
-    return {heading: f"{of * 1e-6:.6g}" for heading, of in stresses.items() if listed}
+    return {heading: f"{of * 1e-6:.6g}" for heading, of in stresses.items() if is_shown}
 
 
-def _check_replaceable(data: Path, is_one: Callable[[xr.Dataset], bool], kind: str) -> None:
+def _check_output_may_be_replaced(
+    output_path: Path, is_of_same_kind: Callable[[xr.Dataset], bool], kind_of_contents: str
+) -> None:
     """Raise ``InvalidValue`` if the output file exists and has different contents."""
-    check_regular_file("--output", data)
-    if not data.exists():
+    check_regular_file("--output", output_path)
+    if not output_path.exists():
         return
     try:
-        with xr.open_dataset(data, engine="netcdf4") as there:
-            if is_one(there):
+        with xr.open_dataset(output_path, engine="netcdf4") as there:
+            if is_of_same_kind(there):
                 return
     except (OSError, RuntimeError, ValueError):
         pass  # whatever it is, it is none
     remedy = "Choose another --output, or move it away first."
-    raise InvalidValue("--output", str(data), f"is there already, and no {kind}", remedy=remedy)
+    raise InvalidValue(
+        "--output", str(output_path), f"is there already, and no {kind_of_contents}", remedy=remedy
+    )

@@ -7,10 +7,10 @@ from typing import Any
 from rich.console import Console, ConsoleDimensions
 from rich.text import Text
 
-from rsfstudy.errors import RunError, escape_control, shorten
+from rsfstudy.errors import RunError, escape_control_characters, shorten_text
 
 #: Most characters of a text that is printed: what a file says may be without end.
-_MAX_TEXT_LENGTH = 5000
+_MAX_PRINTED_CHARACTERS = 5000
 #: Bounds of the width: the environment may state any.
 _MIN_WIDTH, _MAX_WIDTH = 16, 1000
 
@@ -35,7 +35,7 @@ class PlainConsole(Console):
 
     def render_str(self, text: str, **options: Any) -> Text:
         """Text with control characters spelt out, and without its middle where it is endless."""
-        return super().render_str(clean_text(text), **options)
+        return super().render_str(make_text_printable(text), **options)
 
     def print(self, *objects: Any, **options: Any) -> None:
         """Print; the output may go to a file on a full disk, which is a `RunError`."""
@@ -45,10 +45,10 @@ class PlainConsole(Console):
             raise RunError(f"cannot print: {error.strerror}.") from error
 
 
-def clean_text(text: str) -> str:
+def make_text_printable(text: str) -> str:
     """Text with control characters spelt out, and without its middle where it is endless."""
-    return escape_control(shorten(text, _MAX_TEXT_LENGTH))
+    return escape_control_characters(shorten_text(text, _MAX_PRINTED_CHARACTERS))
 
 
-console = PlainConsole(markup=False, emoji=False, highlight=False)
-stderr = PlainConsole(stderr=True, markup=False, emoji=False, highlight=False)
+stdout_console = PlainConsole(markup=False, emoji=False, highlight=False)
+stderr_console = PlainConsole(stderr=True, markup=False, emoji=False, highlight=False)

@@ -11,7 +11,7 @@ import xarray as xr
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import read_flag_meanings
-from rsfstudy.quantities import units_or_scale
+from rsfstudy.quantities import units_or_scale_of_variable
 
 
 def to_csv(dataset: xr.Dataset, path: Path) -> None:
@@ -23,7 +23,7 @@ def to_csv(dataset: xr.Dataset, path: Path) -> None:
         if flags := read_flag_meanings(dataset[name].attrs):
             table[name] = table[name].map(flags)
     headed = {
-        n: f"{n} ({units_or_scale(dataset[n].attrs) or 1})"
+        n: f"{n} ({units_or_scale_of_variable(dataset[n].attrs) or 1})"
         for n in table
         if table[n].dtype.kind in "iuf"
     }
@@ -51,7 +51,7 @@ def to_mat(dataset: xr.Dataset, path: Path) -> None:
         if values.dtype.kind in "OUT":
             data[name] = np.array(values.tolist(), dtype=object)
     about = {
-        "units": {name: units_or_scale(dataset[name].attrs) for name in data},
+        "units": {name: units_or_scale_of_variable(dataset[name].attrs) for name in data},
         "dimensions": {name: " ".join(map(str, dataset[name].dims)) for name in data},
         "attributes": dataset.attrs,
     }

@@ -33,27 +33,31 @@ class CommandOptions(SimpleNamespace):
     budget: Any = None
 
     @property
-    def command(self) -> str:
+    def command_line(self) -> str:
         """What was typed."""
         return shlex.join(["rsfstudy", *sys.argv[1:]])
 
-    def select(self, *names: str) -> dict[str, Any]:
+    def select_options(self, *option_names: str) -> dict[str, Any]:
         """Those of some names."""
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in option_names}
 
     @property
-    def rig(self) -> dict[str, str]:
+    def rig_option_texts(self) -> dict[str, str]:
         """What is stated of a rig."""
-        return {name: text for name in RIG_EXAMPLES if (text := getattr(self, name)) is not None}
+        return {
+            name: text
+            for name in EXAMPLE_VALUES_OF_RIG_OPTIONS
+            if (text := getattr(self, name)) is not None
+        }
 
 
-class LazyCommand(click.Command):
+class LazilyLoadedCommand(click.Command):
     """A command that is spelt here; what it does is the function of its name in a module of this
     folder, which is given the options and returns the exit status.
     """
 
-    def __init__(self, *args: Any, does: str = "commands", **about: Any) -> None:
-        super().__init__(*args, **about)
+    def __init__(self, *args: Any, does: str = "commands", **command_settings: Any) -> None:
+        super().__init__(*args, **command_settings)
         self._module_name = does
 
     def invoke(self, context: click.Context) -> Any:
@@ -65,8 +69,8 @@ class LazyCommand(click.Command):
 class FilePath(click.Path):
     """Parameter type for paths that are not empty and that the system accepts."""
 
-    def __init__(self, **kind: Any) -> None:
-        super().__init__(path_type=Path, **kind)
+    def __init__(self, **path_settings: Any) -> None:
+        super().__init__(path_type=Path, **path_settings)
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -77,28 +81,32 @@ class FilePath(click.Path):
         return super().convert(value, param, ctx)
 
 
-def option_group(*several: Callable[[Any], Any]) -> Callable[[F], F]:
+def combine_options(*option_decorators: Callable[[Any], Any]) -> Callable[[F], F]:
     """Several options as one, in their order."""
-    return lambda command: functools.reduce(lambda c, each: each(c), reversed(several), command)
+    return lambda command: functools.reduce(
+        lambda c, each: each(c), reversed(option_decorators), command
+    )
 
 
-def make_count_option(name: str, default: int | None, words: str) -> Callable[[F], F]:
+def make_count_option(option_name: str, default: int | None, help_text: str) -> Callable[[F], F]:
     """An option that is a whole number, 1 or more."""
     kind = click.IntRange(1)
-    return click.option(name, type=kind, metavar="N", default=default, help=words)
+    return click.option(option_name, type=kind, metavar="N", default=default, help=help_text)
 
 
-def make_output_option(words: str, default: Path | None = None, **kind: bool) -> Callable[[F], F]:
+def make_output_option(
+    help_text: str, default: Path | None = None, **path_settings: bool
+) -> Callable[[F], F]:
     """The option that says where results go."""
-    return click.option("--output", type=FilePath(**kind), default=default, help=words)
+    return click.option("--output", type=FilePath(**path_settings), default=default, help=help_text)
 
 
-study_argument = option_group(
+study_name_or_all_argument = combine_options(
     click.argument("name", required=False),
     click.option("--all", "every", is_flag=True, help="Every named study."),
 )
 output_option = make_output_option("Directory of the results.", OUTPUT_DIRECTORY, file_okay=False)
-set_option = click.option(
+set_values_option = click.option(
     "--set",
     "settings",
     multiple=True,
@@ -126,7 +134,7 @@ budget_option = make_count_option(
     "[default: the study's, 500000]",
 )
 #: Where cells are computed.
-worker_options = option_group(
+worker_options = combine_options(
     make_count_option("--workers", 2, "Worker processes of this machine."),
     click.option("--serial", is_flag=True, help="Compute in this process."),
     click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster."),
@@ -139,7 +147,7 @@ worker_options = option_group(
     ),
     click.option("--quiet", is_flag=True, help="Do not show how far it has come."),
 )
-study_option = click.option(
+study_file_option = click.option(
     "--study",
     type=FilePath(),
     help="File that declares the study, if its measure, a part or the figure is its own.",
@@ -156,7 +164,7 @@ abscissa_option = click.option(
 )
 
 
-def _check_style(
+def _check_style_option(
     _context: click.Context, _option: click.Parameter, value: str | None
 ) -> str | None:
     """Check a plotting style before the command starts, and return the style.
@@ -175,7 +183,7 @@ def _check_style(
 
 
 #: How figures look.
-figure_options = option_group(
+figure_options = combine_options(
     click.option(
         "--figure",
         "form",
@@ -185,7 +193,7 @@ figure_options = option_group(
     click.option(
         "--style",
         metavar="STYLE",
-        callback=_check_style,
+        callback=_check_style_option,
         help="Style sheet of matplotlib (FILE.mplstyle), or the name of one, on top of ours.",
     ),
 )
@@ -210,19 +218,21 @@ def _check_image_path(
     return value
 
 
-def make_image_option(name: str, default: Path | None, words: str) -> Callable[[F], F]:
+def make_image_option(option_name: str, default: Path | None, help_text: str) -> Callable[[F], F]:
     """An option that names the file of a figure."""
     kind = FilePath(dir_okay=False)
-    return click.option(name, type=kind, callback=_check_image_path, default=default, help=words)
+    return click.option(
+        option_name, type=kind, callback=_check_image_path, default=default, help=help_text
+    )
 
 
-def make_set_option(words: str) -> Callable[[F], F]:
+def make_set_scene_fields_option(help_text: str) -> Callable[[F], F]:
     """The option that sets fields of one scene."""
-    return click.option("--set", "settings", multiple=True, metavar="FIELD=VALUE", help=words)
+    return click.option("--set", "settings", multiple=True, metavar="FIELD=VALUE", help=help_text)
 
 
 #: Quantities of a rig, with an example of each.
-RIG_EXAMPLES = {
+EXAMPLE_VALUES_OF_RIG_OPTIONS = {
     "normal_stress": "5 MPa",
     "slip_distance": "10 um",
     "reference_velocity": "1 um/s",
@@ -237,9 +247,9 @@ RIG_EXAMPLES = {
 
 _RIG_OPTION_HELP = "Of the rig, as in '{}'; a plain number is in SI units."
 #: The options that state a rig.
-rig_options = option_group(
+rig_options = combine_options(
     *(
         click.option(f"--{n.replace('_', '-')}", help=_RIG_OPTION_HELP.format(e))
-        for n, e in RIG_EXAMPLES.items()
+        for n, e in EXAMPLE_VALUES_OF_RIG_OPTIONS.items()
     )
 )

@@ -13,20 +13,20 @@ from rsfstudy._lazy import lazy_exports
 
 if TYPE_CHECKING:
     from rsfstudy.critical_steps.critical_step import CriticalStep
-    from rsfstudy.critical_steps.loading_checks import SLOW_NORM_PREFIX
+    from rsfstudy.critical_steps.loading_checks import SLOW_NORM_WARNING_PREFIX
     from rsfstudy.critical_steps.triggered import Triggered
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
             "critical_steps.critical_step": ("CriticalStep",),
-            "critical_steps.loading_checks": ("SLOW_NORM_PREFIX",),
+            "critical_steps.loading_checks": ("SLOW_NORM_WARNING_PREFIX",),
             "critical_steps.triggered": ("Triggered",),
         },
     )
 
 __all__ = [
     "CriticalStep",
-    "SLOW_NORM_PREFIX",
+    "SLOW_NORM_WARNING_PREFIX",
     "Triggered",
 ]

@@ -36,8 +36,8 @@ from rsfstudy.motion import (
     MotionStopped,
     WorkMeter,
     build_root_finder,
-    compiled_engine,
     fall,
+    import_compiled_engine,
     maximum,
     rise,
 )
@@ -45,8 +45,8 @@ from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS, A, B
 from rsfstudy.slider import (
     FrictionFunctions,
     Function,
+    MotionPoint,
     Numbers,
-    Point,
     Scene,
     equations_between_ruptures,
 )
@@ -54,11 +54,11 @@ from rsfstudy.status import Status
 
 #: Number of right-hand-side evaluations, at a tolerance of 1e-5, after which the search for the
 #: start of a path is abandoned.
-_PATH_BUDGET = 1_500
+_PATH_EVALUATION_BUDGET = 1_500
 #: ln(V/V_*) at which a path is abandoned, about 1e-100 V_*.
 _MIN_LOG_SLIP_RATE = -230.0
 #: Distance in ln V above the norm at which a path is known to touch the norm from above.
-_NORM_OFFSET = 1e-6
+_LOG_RATE_OFFSET_ABOVE_NORM = 1e-6
 
 
 class CriticalPath(NamedTuple):
@@ -88,19 +88,19 @@ class CriticalPath(NamedTuple):
         True if the scene has one state. Scenes with several states have no critical path.
     """
 
-    log_norm_rate: float
+    log_slip_rate_at_norm: float
     min_frictional_stress: float
-    radiated_stress: float
-    initial_state: Numbers
+    radiated_stress_at_norm: float
+    unknowns_after_step: Numbers
     parameters: Numbers
     solve_tangency: Function
     evaluate_point: Function
-    driver: MotionDriver
+    motion_driver: MotionDriver
     engine: str
-    is_planar: bool
+    has_single_state: bool
 
     @classmethod
-    def of_scene(cls, scene: Scene, engine: str = SCIPY) -> CriticalPath:
+    def from_scene(cls, scene: Scene, engine: str = SCIPY) -> CriticalPath:
         """Create the critical path of a scene.
 
         Parameters
@@ -115,18 +115,23 @@ class CriticalPath(NamedTuple):
         CriticalPath
             Path with the load point velocity of the scene.
         """
-        slow, x = equations_between_ruptures(scene, clock=False), scene.log_instability_rate
+        slow, x = equations_between_ruptures(scene, with_time=False), scene.log_instability_rate
         weakest = scene.parts.normal_stress.min_frictional_stress(scene)
         begin = (scene.spring_stress_step, *(0.0,) * scene.state_count)
-        tangency, planar = _build_tangency_solver(scene.functions.friction), scene.state_count == 1
+        tangency, planar = (
+            _build_tangency_solver(scene.equation_functions.friction_functions),
+            scene.state_count == 1,
+        )
         return cls(
             x,
             weakest,
             scene.dynamics.radiated_stress(x),
             begin,
             slow.parameters,
-            scalar_function(tangency, engine, x, x, slow.parameters) if planar else tangency,
-            build_point_function(slow.rate_function, slow.point_function),
+            scalar_function_for_engine(tangency, engine, x, x, slow.parameters)
+            if planar
+            else tangency,
+            build_point_evaluator(slow.rate_function, slow.point_function),
             MotionDriver(slow, engine=engine),
             engine,
             planar,
@@ -158,20 +163,20 @@ class CriticalPath(NamedTuple):
         stress is the sum of frictional stress and radiated stress. The result is None if the scene
         has no tangency point, or if the scene has several states.
         """
-        if not self.is_planar:
+        if not self.has_single_state:
             return None
         g, psi = self.solve_tangency(
-            self.log_norm_rate, (1.0 - 1e-6) * self.min_frictional_stress, self.parameters
+            self.log_slip_rate_at_norm, (1.0 - 1e-6) * self.min_frictional_stress, self.parameters
         )
-        return None if math.isnan(g) else (g + self.radiated_stress, psi)
+        return None if math.isnan(g) else (g + self.radiated_stress_at_norm, psi)
 
-    def find_start(
+    def find_start_point(
         self,
         tolerance: float,
-        meter: WorkMeter,
-        crossing: tuple[str, float],
-        is_start: Callable[[Point], bool],
-    ) -> Point | None:
+        work_meter: WorkMeter,
+        crossing_quantity_and_level: tuple[str, float],
+        is_start: Callable[[MotionPoint], bool],
+    ) -> MotionPoint | None:
         """Integrate the path backwards to the start of a step.
 
         Parameters
@@ -192,20 +197,28 @@ class CriticalPath(NamedTuple):
             start.
         """
         above = rise(
-            "log_slip_rate", self.log_norm_rate + _NORM_OFFSET, terminal=True, may_defer=True
+            "log_slip_rate",
+            self.log_slip_rate_at_norm + _LOG_RATE_OFFSET_ABOVE_NORM,
+            terminal=True,
+            may_defer=True,
         )
         lost = fall("log_slip_rate", _MIN_LOG_SLIP_RATE, terminal=True, may_defer=True)
-        specs = (above, lost, rise(*crossing), fall(*crossing))
-        for event in self._iterate_events(tolerance, meter, specs, backward=True):
+        specs = (
+            above,
+            lost,
+            rise(*crossing_quantity_and_level),
+            fall(*crossing_quantity_and_level),
+        )
+        for event in self._iterate_events_along_path(tolerance, work_meter, specs, backward=True):
             if event.specification in specs[2:] and is_start(event.point):
                 return event.point
         return None
 
-    def _iterate_events(
+    def _iterate_events_along_path(
         self,
         tolerance: float,
-        meter: WorkMeter,
-        specs: Sequence[EventSpecification],
+        work_meter: WorkMeter,
+        event_specs: Sequence[EventSpecification],
         *,
         backward: bool,
     ) -> Iterator[Event]:
@@ -218,16 +231,22 @@ class CriticalPath(NamedTuple):
         start = self.tangency_point
         if start is None:
             return
-        enough = round(_PATH_BUDGET * math.pow(1e-5 / tolerance, 0.125))
+        enough = round(_PATH_EVALUATION_BUDGET * math.pow(1e-5 / tolerance, 0.125))
         try:
-            yield from self.driver.run(
-                start, meter, specs, tolerance, backward=backward, p=self.parameters, budget=enough
+            yield from self.motion_driver.iterate_events(
+                start,
+                work_meter,
+                event_specs,
+                tolerance,
+                backward=backward,
+                parameters=self.parameters,
+                evaluation_budget=enough,
             )
         except MotionStopped as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
 
-    def start_misfit(self, tolerance: float, meter: WorkMeter) -> float | None:
+    def state_misfit_at_start(self, tolerance: float, work_meter: WorkMeter) -> float | None:
         """Compute the misfit of the state at the start of the path.
 
         The misfit is Psi/a at the slip rate at which the motion of the scene starts. The misfit is
@@ -246,19 +265,19 @@ class CriticalPath(NamedTuple):
             Misfit, or None if the path does not pass this slip rate in the same direction as the
             motion.
         """
-        given = self.initial_state, self.parameters
-        begin = scalar_function(self.evaluate_point, self.engine, *given)(*given)
+        given = self.unknowns_after_step, self.parameters
+        begin = scalar_function_for_engine(self.evaluate_point, self.engine, *given)(*given)
         if begin.log_slip_rate_derivative == 0.0:
             return None
-        start = self.find_start(
+        start = self.find_start_point(
             tolerance,
-            meter,
+            work_meter,
             ("log_slip_rate", begin.log_slip_rate),
             lambda point: point.log_slip_rate_derivative * begin.log_slip_rate_derivative > 0.0,
         )
         return None if start is None else start.psi / self.parameters[A]
 
-    def cycle_misfit(self, tolerance: float, meter: WorkMeter) -> float | None:
+    def norm_misfit_of_next_peak(self, tolerance: float, work_meter: WorkMeter) -> float | None:
         """Compute the height of the next peak of ln V above the norm.
 
         The motion starts at the tangency point and is integrated forwards for one orbit. The misfit
@@ -276,12 +295,12 @@ class CriticalPath(NamedTuple):
         float or None
             Misfit, or None if ln V has no further peak.
         """
-        for event in self._iterate_return_events(tolerance, meter):
+        for event in self._iterate_return_events(tolerance, work_meter):
             if event.kind is EventKind.MAXIMUM:
-                return event.point.log_slip_rate - self.log_norm_rate
+                return event.point.log_slip_rate - self.log_slip_rate_at_norm
         return None
 
-    def exceeds_norm_on_return(self, tolerance: float, meter: WorkMeter) -> bool:
+    def exceeds_norm_on_return(self, tolerance: float, work_meter: WorkMeter) -> bool:
         """Return True if the next peak of the motion exceeds the norm.
 
         If the next peak exceeds the norm, other motions may reach the norm at their second peak.
@@ -298,17 +317,18 @@ class CriticalPath(NamedTuple):
         bool
             True if ln V rises above the norm after the motion has left the tangency point.
         """
-        beyond = rise("log_slip_rate", self.log_norm_rate + _NORM_OFFSET)
-        for event in self._iterate_return_events(tolerance, meter, beyond):
+        beyond = rise("log_slip_rate", self.log_slip_rate_at_norm + _LOG_RATE_OFFSET_ABOVE_NORM)
+        for event in self._iterate_return_events(tolerance, work_meter, beyond):
             if event.kind in (EventKind.RISE, EventKind.MAXIMUM):
                 # A time step may contain the rise above the norm and the following peak.
                 return (
-                    event.kind is EventKind.RISE or event.point.log_slip_rate > self.log_norm_rate
+                    event.kind is EventKind.RISE
+                    or event.point.log_slip_rate > self.log_slip_rate_at_norm
                 )
         return False
 
     def _iterate_return_events(
-        self, tolerance: float, meter: WorkMeter, *specs: EventSpecification
+        self, tolerance: float, work_meter: WorkMeter, *event_specs: EventSpecification
     ) -> Iterator[Event]:
         """Yield the events of the forward motion after V has fallen below V_0.
 
@@ -316,18 +336,18 @@ class CriticalPath(NamedTuple):
         """
         fallen = False
         asked = (
-            *specs,
+            *event_specs,
             maximum("log_slip_rate"),
             fall("log_slip_rate", self.parameters[LOG_LOAD_VELOCITY], may_defer=True),
         )
-        for event in self._iterate_events(tolerance, meter, asked, backward=False):
+        for event in self._iterate_events_along_path(tolerance, work_meter, asked, backward=False):
             if fallen:
                 yield event
             fallen = fallen or event.kind is EventKind.FALL
 
 
 @cache
-def _build_tangency_solver(friction: FrictionFunctions) -> Function:
+def _build_tangency_solver(friction_functions: FrictionFunctions) -> Function:
     r"""Build the function that solves for the tangency point.
 
     The function ``(x, weakest, p) -> (g, Psi)`` returns the frictional stress and the state at
@@ -344,7 +364,7 @@ def _build_tangency_solver(friction: FrictionFunctions) -> Function:
 
     with :math:`K = k D_c/\sigma_*`. This equation for :math:`g` is solved by Brent's method.
     """
-    strength, evolutions = friction.strength, friction.evolutions
+    strength, evolutions = friction_functions.strength, friction_functions.evolutions
 
     def acceleration(g: float, at: tuple[float, Numbers]) -> float:
         x, p = at
@@ -373,22 +393,24 @@ def _build_tangency_solver(friction: FrictionFunctions) -> Function:
 
 
 @cache
-def build_point_function(rate: Function, point: Function) -> Function:
+def build_point_evaluator(rate_function: Function, point_function: Function) -> Function:
     """``(state, p) -> Point``."""
 
-    def at(state: Numbers, p: Numbers) -> Point:
-        now: Point = point(state, rate(state, p), p)
+    def at(state: Numbers, p: Numbers) -> MotionPoint:
+        now: MotionPoint = point_function(state, rate_function(state, p), p)
         return now
 
     return at
 
 
-def scalar_function(function: Callable[..., Any], name: str, *arguments: float | Numbers) -> Any:
+def scalar_function_for_engine(
+    function: Callable[..., Any], engine: str, *arguments: float | Numbers
+) -> Any:
     """A function of floats and of tuples of floats as an engine calls it: compiled, for arguments
     of this form, where its loop is.
     """
     return (
-        compiled_engine().compile_scalar_function(function, *arguments)
-        if name == COMPILED
+        import_compiled_engine().compile_scalar_function(function, *arguments)
+        if engine == COMPILED
         else function
     )

@@ -22,32 +22,32 @@ from scipy.optimize import toms748
 
 from rsfstudy.critical_steps import forward_motion
 from rsfstudy.critical_steps.loading_checks import (
-    check_single_step,
-    norm_below_loading_outcome,
+    check_loading_is_single_step,
+    outcome_if_norm_is_below_load_velocity,
     slow_norm_warning,
 )
 from rsfstudy.critical_steps.path_solution import (
     StepBoundary,
-    find_by_critical_path,
-    find_by_touching_cycle,
+    find_boundary_by_critical_path,
+    find_boundary_by_limit_cycle,
 )
 from rsfstudy.critical_steps.shooting import StepFamily
-from rsfstudy.critical_steps.slow_manifold import inertia_matters
+from rsfstudy.critical_steps.slow_manifold import inertia_matters_below_norm
 from rsfstudy.critical_steps.step_types import DisplacementSteps, NormalStressSteps, RateSteps
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import Measure, Outcome
-from rsfstudy.motion import MIN_RTOL, ROUNDING_ERROR, Accuracy, MotionStopped, WorkMeter
+from rsfstudy.motion import MIN_RTOL, RELATIVE_ROUNDING_ERROR, Accuracy, MotionStopped, WorkMeter
 from rsfstudy.quantities import Output
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
-STEP_FAMILIES: Mapping[str, type[StepFamily]] = {
+STEP_FAMILY_BY_QUANTITY: Mapping[str, type[StepFamily]] = {
     "load_velocity_ratio": RateSteps,
     "displacement_step": DisplacementSteps,
     "normal_stress_step": NormalStressSteps,
 }
-DIRECTIONS = ("up", "down")
+STEP_DIRECTIONS = ("up", "down")
 #: Aliases of the quantities in ``STEP_FAMILIES``, which are names of scene fields.
 QUANTITY_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
@@ -55,22 +55,26 @@ QUANTITY_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 _CYCLE_BOUNDARY_RTOL = 1e-8
 
 #: Largest width of a bracket that confirms a boundary, relative to the step size.
-_MAX_CONFIRMING_WIDTH = 0.02
+_MAX_CONFIRMED_BRACKET_OVER_SIZE = 0.02
 
 #: Excess above which the first peak of a motion reaches the norm before the motion can approach a
 #: limit cycle.
-_FIRST_PEAK_EXCESS = 0.1
+_EXCESS_OF_PEAK_BEYOND_TOUCHING_CYCLE = 0.1
 
 #: Slip rate norm at which the effect of inertia is negligible.
-_MASSLESS_NORM = 1e-3
+_NORM_WITH_NEGLIGIBLE_INERTIA = 1e-3
 
 
 @cache
-def _outputs_for(of: str) -> tuple[Output, ...]:
+def _outputs_for_quantity(quantity: str) -> tuple[Output, ...]:
     """Return the outputs of a critical step of a given type."""
-    critical = STEP_FAMILIES[of].quantity
+    critical = STEP_FAMILY_BY_QUANTITY[quantity].critical_output_name
     confirmed = (f"{critical}_stable", f"{critical}_unstable")
-    beside = (*confirmed, *STEP_FAMILIES[of].extra_outputs, "critical_stiffness")
+    beside = (
+        *confirmed,
+        *STEP_FAMILY_BY_QUANTITY[quantity].extra_output_names,
+        "critical_stiffness",
+    )
     return Output(critical, error=True), *map(Output, beside)
 
 
@@ -141,20 +145,20 @@ class CriticalStep(Measure):
         """Check the fields, and replace aliases."""
         if isinstance(self.of, str):
             object.__setattr__(self, "of", QUANTITY_ALIASES.get(self.of, self.of))
-        if not isinstance(self.of, str) or self.of not in STEP_FAMILIES:
-            raise InvalidValue("of", self.of, "cannot be stepped", choices=STEP_FAMILIES)
-        if self.direction not in DIRECTIONS:
-            raise InvalidValue("direction", self.direction, "is unknown", choices=DIRECTIONS)
+        if not isinstance(self.of, str) or self.of not in STEP_FAMILY_BY_QUANTITY:
+            raise InvalidValue("of", self.of, "cannot be stepped", choices=STEP_FAMILY_BY_QUANTITY)
+        if self.direction not in STEP_DIRECTIONS:
+            raise InvalidValue("direction", self.direction, "is unknown", choices=STEP_DIRECTIONS)
 
     @property
     def primary_output(self) -> str:
         """Name of the critical step size."""
-        return STEP_FAMILIES[self.of].quantity
+        return STEP_FAMILY_BY_QUANTITY[self.of].critical_output_name
 
     @property
     def outputs(self) -> Sequence[Output]:
         """Critical step, the two confirming steps, and additional results."""
-        return _outputs_for(self.of)
+        return _outputs_for_quantity(self.of)
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
@@ -210,16 +214,16 @@ class CriticalStep(Measure):
         Outcome
             Status, results and message.
         """
-        check_single_step(scene)
+        check_loading_is_single_step(scene)
         if scene.starts_unsteady:
             rule = "is no steady sliding, from which critical steps start"
             remedy = "Ask whether the step of a scene triggers by the measure triggered."
             raise InvalidValue("initial_state", scene.initial_state, rule, remedy=remedy)
         sign = 1 if self.direction == "up" else -1
-        steps = STEP_FAMILIES[self.of](scene, sign)
+        steps = STEP_FAMILY_BY_QUANTITY[self.of](scene, sign)
         if steps.max_size <= steps.min_size:
             rate = 0.0 if self.of == "load_velocity_ratio" else steps.scene.load_velocity
-            return norm_below_loading_outcome(scene, rate)
+            return outcome_if_norm_is_below_load_velocity(scene, rate)
         below = (
             not forward_motion.may_have_closed_orbits(scene)
             or forward_motion.stiffness_ratio_after_step(scene) < 1.0
@@ -227,7 +231,9 @@ class CriticalStep(Measure):
         if (
             below
             and forward_motion.has_frictional_damping_only(scene)
-            and forward_motion.is_neutral(steps.scene_at(steps.max_size), 10.0 * accuracy.rtol)
+            and forward_motion.is_neutrally_stable(
+                steps.scene_with_step(steps.max_size), 10.0 * accuracy.rtol
+            )
         ):
             return Outcome(
                 Status.UNVERIFIED,
@@ -235,31 +241,35 @@ class CriticalStep(Measure):
             )
         if not scene.critical_stiffness:
             # Perturbations do not grow, so only the step itself can reach the norm.
-            return self._search_upward(steps, accuracy, meter)
-        if not inertia_matters(scene, accuracy):
+            return self._search_critical_step_upward(steps, accuracy, meter)
+        if not inertia_matters_below_norm(scene, accuracy):
             # A limit cycle attracts nearby paths weakly, so its boundary needs a smaller tolerance.
             rtols = accuracy.rtol, min(accuracy.rtol, _CYCLE_BOUNDARY_RTOL)
             for find, rtol in zip(
-                (find_by_critical_path, find_by_touching_cycle), rtols, strict=True
+                (find_boundary_by_critical_path, find_boundary_by_limit_cycle), rtols, strict=True
             ):
                 asked = accuracy if rtol == accuracy.rtol else accuracy.with_rtol(rtol)
                 boundary = find(steps, asked, meter)
-                if boundary is not None and not steps.inertia_shifts_size(
-                    boundary.size, asked.rtol
+                if boundary is not None and not steps.inertia_shifts_critical_size(
+                    boundary.step_size, asked.rtol
                 ):
-                    outcome = self._verify_boundary(steps, boundary, asked, meter)
+                    outcome = self._confirm_boundary_by_motions(steps, boundary, asked, meter)
                     if outcome.status is Status.OK:
                         return outcome
-            return self._search_upward(steps, accuracy, meter)
-        near = _massless_estimate(steps, meter)
-        if near is not None and steps.smaller_steps_decay(near):
-            bracket = _find_bracket(steps, near, accuracy, meter)
+            return self._search_critical_step_upward(steps, accuracy, meter)
+        near = _critical_size_without_inertia(steps, meter)
+        if near is not None and steps.motions_after_smaller_steps_decay(near):
+            bracket = _bracket_critical_log_size(steps, near, accuracy, meter)
             if bracket is not None:
-                return self._refine_bracket(steps, bracket, accuracy, meter)
-        return self._search_upward(steps, accuracy, meter)
+                return self._refine_size_bracket(steps, bracket, accuracy, meter)
+        return self._search_critical_step_upward(steps, accuracy, meter)
 
-    def _verify_boundary(
-        self, steps: StepFamily, boundary: StepBoundary, accuracy: Accuracy, meter: WorkMeter
+    def _confirm_boundary_by_motions(
+        self,
+        step_family: StepFamily,
+        boundary: StepBoundary,
+        accuracy: Accuracy,
+        work_meter: WorkMeter,
     ) -> Outcome:
         """Confirm a boundary with one motion on each side.
 
@@ -269,97 +279,124 @@ class CriticalStep(Measure):
         the boundary. A boundary that follows from a critical path is rejected at the first failure,
         because a smaller step may be critical if oscillations below the norm grow.
         """
-        first = boundary.relative_error if boundary.from_motions else 3.0 * boundary.relative_error
+        first = (
+            boundary.relative_error
+            if boundary.found_from_motions
+            else 3.0 * boundary.relative_error
+        )
         first = width = max(first, accuracy.rtol)
-        while width < _MAX_CONFIRMING_WIDTH:
-            inner, outer = boundary.size * (1.0 - width), boundary.size * (1.0 + width)
-            below, above = (_motion_excess(steps, size, accuracy, meter) for size in (inner, outer))
+        while width < _MAX_CONFIRMED_BRACKET_OVER_SIZE:
+            inner, outer = boundary.step_size * (1.0 - width), boundary.step_size * (1.0 + width)
+            below, above = (
+                _excess_after_step_of_size(step_family, size, accuracy, work_meter)
+                for size in (inner, outer)
+            )
             if below is not None and above is not None and above >= 0.0 > below:
-                at_once = width == first and not boundary.from_motions
+                at_once = width == first and not boundary.found_from_motions
                 relative = boundary.relative_error if at_once else width
-                error = steps.value_error(boundary.size, relative)
+                error = step_family.user_value_error(boundary.step_size, relative)
                 values = self._output_values(
-                    steps, boundary.size, error, steps.step_value(inner), steps.step_value(outer)
+                    step_family,
+                    boundary.step_size,
+                    error,
+                    step_family.user_value_of_step(inner),
+                    step_family.user_value_of_step(outer),
                 )
-                load = steps.scene_at(boundary.size).load_velocity
-                return Outcome(Status.OK, values, slow_norm_warning(steps.scene, load))
-            if not (boundary.from_motions or boundary.from_cycle):
+                load = step_family.scene_with_step(boundary.step_size).load_velocity
+                return Outcome(Status.OK, values, slow_norm_warning(step_family.scene, load))
+            if not (boundary.found_from_motions or boundary.found_from_limit_cycle):
                 break
-            if boundary.from_cycle and below is not None and below > _FIRST_PEAK_EXCESS:
+            if (
+                boundary.found_from_limit_cycle
+                and below is not None
+                and below > _EXCESS_OF_PEAK_BEYOND_TOUCHING_CYCLE
+            ):
                 break
             width *= 10.0
         return Outcome(
             Status.UNVERIFIED,
-            self._output_values(steps),
+            self._output_values(step_family),
             "no bracket within 2 % confirms "
-            f"{self.primary_output} = {steps.step_value(boundary.size):.9g}",
+            f"{self.primary_output} = {step_family.user_value_of_step(boundary.step_size):.9g}",
         )
 
     def _output_values(
         self,
-        steps: StepFamily,
-        size: float = math.nan,
-        error: float = math.nan,
-        stable: float = math.nan,
-        unstable: float = math.nan,
+        step_family: StepFamily,
+        step_size: float = math.nan,
+        value_error: float = math.nan,
+        stable_value: float = math.nan,
+        unstable_value: float = math.nan,
     ) -> dict[str, float]:
         """Return the results by name, with NaN for missing results."""
         of = self.primary_output
         return {
-            of: steps.step_value(size),
-            f"{of}_error": error,
-            f"{of}_stable": stable,
-            f"{of}_unstable": unstable,
-            "critical_stiffness": steps.scene.critical_stiffness,
-            **steps.extra_values(size),
+            of: step_family.user_value_of_step(step_size),
+            f"{of}_error": value_error,
+            f"{of}_stable": stable_value,
+            f"{of}_unstable": unstable_value,
+            "critical_stiffness": step_family.scene.critical_stiffness,
+            **step_family.extra_output_values(step_size),
         }
 
-    def _search_upward(self, steps: StepFamily, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def _search_critical_step_upward(
+        self, step_family: StepFamily, accuracy: Accuracy, work_meter: WorkMeter
+    ) -> Outcome:
         """Find the critical step from motions after steps of increasing size.
 
         The search continues until a motion reaches the norm, and the bracket is then refined.
         """
-        smallest, largest = math.log(steps.min_size), math.log(steps.max_size)
+        smallest, largest = math.log(step_family.min_size), math.log(step_family.max_size)
         spacing = (largest - smallest) / max(1, math.ceil((largest - smallest) / math.log(2.0)))
         stable: float | None = None
         unstable = smallest
         while unstable <= largest + 1e-9:
             try:
-                if forward_motion.reaches_norm(steps.scene_at(math.exp(unstable)), accuracy, meter):
+                if forward_motion.motion_reaches_norm(
+                    step_family.scene_with_step(math.exp(unstable)), accuracy, work_meter
+                ):
                     break
             except MotionStopped as halt:
                 if halt.status is Status.WORK_BUDGET_SPENT or stable is None:
                     raise
                 return self._no_critical_step_outcome(
-                    steps, math.exp(stable), meter, f", where {halt}"
+                    step_family, math.exp(stable), work_meter, f", where {halt}"
                 )
             stable, unstable = unstable, unstable + spacing
         else:
-            return self._no_critical_step_outcome(steps, steps.max_size, meter)
+            return self._no_critical_step_outcome(step_family, step_family.max_size, work_meter)
         if stable is None:
             return Outcome(
                 Status.UNSTABLE_AT_ANY_STEP,
-                self._output_values(steps, unstable=steps.step_value(steps.min_size)),
-                f"already a step to {steps.step_value(steps.min_size):.6g} is unstable",
+                self._output_values(
+                    step_family, unstable_value=step_family.user_value_of_step(step_family.min_size)
+                ),
+                f"already a step to {step_family.user_value_of_step(step_family.min_size):.6g} is unstable",
             )
-        return self._refine_bracket(steps, (stable, unstable), accuracy, meter)
+        return self._refine_size_bracket(step_family, (stable, unstable), accuracy, work_meter)
 
-    def _refine_bracket(
-        self, steps: StepFamily, bracket: tuple[float, float], accuracy: Accuracy, meter: WorkMeter
+    def _refine_size_bracket(
+        self,
+        step_family: StepFamily,
+        log_size_bracket: tuple[float, float],
+        accuracy: Accuracy,
+        work_meter: WorkMeter,
     ) -> Outcome:
         """Find the boundary between a stable and an unstable log size.
 
         The excess of the motions over the norm changes sign at the boundary. If a motion inside the
         bracket cannot continue, the boundary is the centre of the remaining bracket.
         """
-        stable, unstable = bracket
-        rtol = max(steps.size_tolerance(math.exp(unstable), accuracy.rtol), MIN_RTOL)
+        stable, unstable = log_size_bracket
+        rtol = max(
+            step_family.size_rtol_for_value_rtol(math.exp(unstable), accuracy.rtol), MIN_RTOL
+        )
         accuracy = accuracy.with_rtol(rtol)
 
         def excess(log_size: float) -> float:
             nonlocal stable, unstable
-            found = forward_motion.excess_over_norm(
-                steps.scene_at(math.exp(log_size)), accuracy, meter
+            found = forward_motion.motion_excess_over_norm(
+                step_family.scene_with_step(math.exp(log_size)), accuracy, work_meter
             )
             if found >= 0.0:
                 unstable = min(unstable, log_size)
@@ -368,80 +405,96 @@ class CriticalStep(Measure):
             return found
 
         try:
-            log_size = toms748(excess, *bracket, xtol=0.5 * accuracy.rtol, rtol=1e-15)
+            log_size = toms748(excess, *log_size_bracket, xtol=0.5 * accuracy.rtol, rtol=1e-15)
         except MotionStopped as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
-            if unstable - stable > _MAX_CONFIRMING_WIDTH:
+            if unstable - stable > _MAX_CONFIRMED_BRACKET_OVER_SIZE:
                 return self._no_critical_step_outcome(
-                    steps, math.exp(bracket[0]), meter, f", where {halt}"
+                    step_family, math.exp(log_size_bracket[0]), work_meter, f", where {halt}"
                 )
             log_size = 0.5 * (stable + unstable)
         # Motions with the same tolerances would repeat the same errors, so the verification uses
         # smaller tolerances.
         size = math.exp(log_size)
         error = max(
-            accuracy.rtol + steps.neutral_size_error(size, accuracy.rtol), unstable - stable
+            accuracy.rtol + step_family.size_error_if_neutrally_stable(size, accuracy.rtol),
+            unstable - stable,
         )
-        boundary = StepBoundary(size, error, from_motions=True)
-        return self._verify_boundary(steps, boundary, accuracy.refined(), meter)
+        boundary = StepBoundary(size, error, found_from_motions=True)
+        return self._confirm_boundary_by_motions(
+            step_family, boundary, accuracy.refined(), work_meter
+        )
 
     def _no_critical_step_outcome(
-        self, steps: StepFamily, largest: float, meter: WorkMeter, reason: str = ""
+        self, step_family: StepFamily, largest_size: float, work_meter: WorkMeter, reason: str = ""
     ) -> Outcome:
         """Return the outcome if no step up to the largest is critical.
 
         The status is ``norm_unreachable`` if inertia keeps the slip rate below the norm, ``ok`` if
         the largest step itself reaches the norm, and ``stable_for_all_steps`` otherwise.
         """
-        if steps.scene.has_mass and _massless_estimate(steps, meter) is not None:
+        if (
+            step_family.scene.has_mass
+            and _critical_size_without_inertia(step_family, work_meter) is not None
+        ):
             return Outcome(
                 Status.NORM_UNREACHABLE,
-                self._output_values(steps, stable=steps.step_value(largest)),
-                f"mass keeps every slip rate below the norm {steps.scene.instability_norm:g}",
+                self._output_values(
+                    step_family, stable_value=step_family.user_value_of_step(largest_size)
+                ),
+                f"mass keeps every slip rate below the norm {step_family.scene.instability_norm:g}",
             )
-        if steps.largest_step_reaches_norm and not steps.scene.has_mass and not reason:
-            value = steps.step_value(largest)
-            values = self._output_values(steps, largest, largest * ROUNDING_ERROR, value, value)
+        if step_family.largest_step_reaches_norm and not step_family.scene.has_mass and not reason:
+            value = step_family.user_value_of_step(largest_size)
+            values = self._output_values(
+                step_family, largest_size, largest_size * RELATIVE_ROUNDING_ERROR, value, value
+            )
             return Outcome(
                 Status.OK, values, "the jump of slip rate at the step itself is critical"
             )
         return Outcome(
             Status.STABLE_FOR_ALL_STEPS,
-            self._output_values(steps, stable=steps.step_value(largest)),
-            f"stable for every step up to {steps.step_value(largest):.6g}{reason}",
+            self._output_values(
+                step_family, stable_value=step_family.user_value_of_step(largest_size)
+            ),
+            f"stable for every step up to {step_family.user_value_of_step(largest_size):.6g}{reason}",
         )
 
 
-def _motion_excess(
-    steps: StepFamily, size: float, accuracy: Accuracy, meter: WorkMeter
+def _excess_after_step_of_size(
+    step_family: StepFamily, step_size: float, accuracy: Accuracy, work_meter: WorkMeter
 ) -> float | None:
     """Compute the excess of the motion after a step of a given size.
 
     The result is None if the motion cannot continue.
     """
     try:
-        return forward_motion.excess_over_norm(steps.scene_at(size), accuracy, meter)
+        return forward_motion.motion_excess_over_norm(
+            step_family.scene_with_step(step_size), accuracy, work_meter
+        )
     except MotionStopped as halt:
         if halt.status is Status.WORK_BUDGET_SPENT:
             raise
         return None
 
 
-def _massless_estimate(steps: StepFamily, meter: WorkMeter) -> float | None:
+def _critical_size_without_inertia(step_family: StepFamily, work_meter: WorkMeter) -> float | None:
     """Compute the critical step for a norm at which inertia is negligible.
 
     The estimate takes little work. The result is None if there is no critical path.
     """
-    norm = min(steps.scene.instability_norm, _MASSLESS_NORM)
-    massless = type(steps)(steps.scene.without_mass().with_(instability_norm=norm), steps.sign)
+    norm = min(step_family.scene.instability_norm, _NORM_WITH_NEGLIGIBLE_INERTIA)
+    massless = type(step_family)(
+        step_family.scene.without_mass().with_(instability_norm=norm), step_family.sign
+    )
     if massless.max_size <= massless.min_size or not massless.scene.critical_stiffness:
         return None
-    return next(massless.find_path_sizes((1e-6,), meter), None)
+    return next(massless.find_sizes_by_critical_path((1e-6,), work_meter), None)
 
 
-def _find_bracket(
-    steps: StepFamily, guess: float, accuracy: Accuracy, meter: WorkMeter
+def _bracket_critical_log_size(
+    step_family: StepFamily, size_guess: float, accuracy: Accuracy, work_meter: WorkMeter
 ) -> tuple[float, float] | None:
     """Find a stable and an unstable log size around a guess.
 
@@ -449,12 +502,19 @@ def _find_bracket(
     stable, the search tests sizes up to 1.37 times the guess. The result is None if the search
     finds no bracket.
     """
-    middle = math.log(guess)
-    reached = forward_motion.reaches_norm(steps.scene_at(guess), accuracy, meter)
+    middle = math.log(size_guess)
+    reached = forward_motion.motion_reaches_norm(
+        step_family.scene_with_step(size_guess), accuracy, work_meter
+    )
     inner, reach = middle, 1e-4
     while reach < 1.5:
-        outer = middle - reach if reached else min(middle + reach, math.log(steps.max_size))
-        if forward_motion.reaches_norm(steps.scene_at(math.exp(outer)), accuracy, meter) != reached:
+        outer = middle - reach if reached else min(middle + reach, math.log(step_family.max_size))
+        if (
+            forward_motion.motion_reaches_norm(
+                step_family.scene_with_step(math.exp(outer)), accuracy, work_meter
+            )
+            != reached
+        ):
             return (outer, inner) if reached else (inner, outer)
         inner, reach = outer, 5.0 * reach
     return None

@@ -10,40 +10,43 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.held_load_point import peak_excess
-from rsfstudy.critical_steps.monotone_approach import monotone_rise_events, rises_monotonically
-from rsfstudy.critical_steps.slow_manifold import inertia_matters
+from rsfstudy.critical_steps.held_load_point import peak_log_rate_excess_over_norm
+from rsfstudy.critical_steps.monotone_approach import (
+    monotone_rise_events,
+    rises_monotonically_to_load_rate,
+)
+from rsfstudy.critical_steps.slow_manifold import inertia_matters_below_norm
 from rsfstudy.motion import (
     Accuracy,
     EventKind,
     MotionStopped,
     WorkMeter,
     approach_to_steady_state,
-    events_along,
     initial_point,
     integrate_events,
-    manifold_point,
+    iterate_events_of_equations,
     maximum,
     minimum,
     rise,
+    slow_manifold_point,
 )
 from rsfstudy.slider import (
     RUPTURE_REGIME,
-    Point,
+    MotionPoint,
     Scene,
     SteadySliding,
     critical_stiffness,
     equations_without_mass,
-    growth_rates,
+    linear_growth_rates,
     steady_sliding,
 )
 from rsfstudy.status import Status
 
 #: Relative distance below the critical stiffness, and decay rate per D_c of slip, that cannot be
 #: distinguished from zero.
-_NEUTRAL_TOLERANCE = 1e-9
+_NEUTRAL_STABILITY_MARGIN = 1e-9
 #: Largest amplitude of ln V for which linear theory predicts the growth of oscillations.
-_MAX_LINEAR_AMPLITUDE = 0.05
+_MAX_LINEAR_LOG_RATE_AMPLITUDE = 0.05
 #: Ratio of the sizes of successive orbits when growth is slow, and smallest such ratio. A leap may
 #: skip limit cycles whose sizes differ by less than this ratio. Leaps are shortened if they would
 #: end above the norm.
@@ -51,18 +54,18 @@ _LEAP_FACTOR, _MIN_LEAP_FACTOR = 1.3, 1.002
 
 #: Number of successive equal peaks after which a motion with several states repeats. Close to an
 #: unstable cycle, the peaks would not remain equal.
-_REQUIRED_REPEATS = 4
+_REQUIRED_EQUAL_PEAKS_IN_A_ROW = 4
 #: Assumed height of the peak of ln V above the norm, if the motion is integrated only up to the
 #: norm.
-_OVERSHOOT_BEYOND_NORM = 1.0
+_ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM = 1.0
 #: Fraction of the largest distance from steady sliding below which a motion has settled.
-_STEADY_FRACTION = 1e-3
+_SETTLED_FRACTION_OF_MAX_DISTANCE = 1e-3
 
-_PEAK_EVENT = maximum("log_slip_rate")
+_SLIP_RATE_PEAK_EVENT = maximum("log_slip_rate")
 
 
 @dataclass(frozen=True)
-class _SteadySliding(SteadySliding):
+class _SteadySlidingWithMargin(SteadySliding):
     """Steady sliding at the load point velocity, with its stability margin.
 
     At constant normal stress and critical stiffness, steady sliding is neutrally stable and every
@@ -74,11 +77,11 @@ class _SteadySliding(SteadySliding):
 
     @property
     def is_stable(self) -> bool:
-        return self.stability_margin >= -_NEUTRAL_TOLERANCE
+        return self.stability_margin >= -_NEUTRAL_STABILITY_MARGIN
 
 
 @dataclass(frozen=True)
-class _Orbit:
+class _OrbitOutcome:
     """One orbit of the motion after a step.
 
     Parameters
@@ -93,13 +96,13 @@ class _Orbit:
         Value of ln V at the start, if the slip rate decreases from there.
     """
 
-    peaks: tuple[float, ...]
+    log_slip_rate_peaks: tuple[float, ...]
     reached_norm: bool
-    slow_growth_point: Point | None = None
+    point_of_too_slow_growth: MotionPoint | None = None
     initial_log_slip_rate: float = -math.inf
 
 
-def reaches_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> bool:
+def motion_reaches_norm(scene: Scene, accuracy: Accuracy, work_meter: WorkMeter) -> bool:
     """Return True if the slip rate reaches the norm after the step.
 
     Parameters
@@ -116,10 +119,10 @@ def reaches_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> bool:
     bool
         True if ``excess_over_norm`` is not negative.
     """
-    return excess_over_norm(scene, accuracy, meter) >= 0.0
+    return motion_excess_over_norm(scene, accuracy, work_meter) >= 0.0
 
 
-def excess_over_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> float:
+def motion_excess_over_norm(scene: Scene, accuracy: Accuracy, work_meter: WorkMeter) -> float:
     """Compute the excess of the motion after the step over the norm.
 
     The excess is negative if the slip rate never reaches the instability norm. With inertia, the
@@ -160,19 +163,21 @@ def excess_over_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> floa
     ``held_load_point`` handles held load points.
     """
     if scene.log_load_velocity == -math.inf:
-        return peak_excess(scene, accuracy, meter)
-    steady = _steady_sliding(scene)
-    norm, heavy = scene.log_instability_rate, inertia_matters(scene, accuracy)
+        return peak_log_rate_excess_over_norm(scene, accuracy, work_meter)
+    steady = _steady_sliding_with_margin(scene)
+    norm, heavy = scene.log_instability_rate, inertia_matters_below_norm(scene, accuracy)
     if may_have_closed_orbits(scene) and abs(steady.stability_margin) < accuracy.rtol:
-        top = _max_of_closed_orbit(scene, accuracy, meter)
+        top = _max_log_slip_rate_of_closed_orbit(scene, accuracy, work_meter)
         if not heavy or top < min(norm, -math.log(scene.inertial_time) - 7.0):
             return top - norm
-    first = _follow_orbit(scene, steady, None, accuracy, meter, with_inertia=heavy)
+    first = _follow_one_orbit(scene, steady, None, accuracy, work_meter, with_inertia=heavy)
     reached = first.reached_norm
-    if first.slow_growth_point is not None:
-        at = first.slow_growth_point
-        reached = _grows_to_norm(scene, steady, at, accuracy, meter, with_inertia=heavy)
-    excess = _compute_excess(first, norm, with_inertia=heavy)
+    if first.point_of_too_slow_growth is not None:
+        at = first.point_of_too_slow_growth
+        reached = _slow_orbit_grows_to_norm(
+            scene, steady, at, accuracy, work_meter, with_inertia=heavy
+        )
+    excess = _orbit_excess_over_norm(first, norm, with_inertia=heavy)
     return max(excess, 1e-12) if reached else min(excess, -1e-12)
 
 
@@ -236,7 +241,7 @@ def stiffness_ratio_after_step(scene: Scene) -> float:
     return scene.stiffness_ratio / (1.0 + scene.imposed_normal_stress)
 
 
-def is_neutral(scene: Scene, tolerance: float) -> bool:
+def is_neutrally_stable(scene: Scene, tolerance: float) -> bool:
     """Return True if growth and decay of perturbations are indistinguishable.
 
     The stiffness must be close to the critical stiffness, both at V_* and at the load point
@@ -276,7 +281,7 @@ def is_linearly_stable(scene: Scene) -> bool:
     bool
         True if small perturbations do not grow, or if the load point is held.
     """
-    return stability_margin(scene) >= -_NEUTRAL_TOLERANCE
+    return stability_margin(scene) >= -_NEUTRAL_STABILITY_MARGIN
 
 
 def stability_margin(scene: Scene) -> float:
@@ -305,11 +310,13 @@ def stability_margin(scene: Scene) -> float:
     return (
         math.inf
         if scene.log_load_velocity == -math.inf
-        else _steady_sliding(scene).stability_margin
+        else _steady_sliding_with_margin(scene).stability_margin
     )
 
 
-def _max_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> float:
+def _max_log_slip_rate_of_closed_orbit(
+    scene: Scene, accuracy: Accuracy, work_meter: WorkMeter
+) -> float:
     """Compute the largest ln V of a closed orbit.
 
     The largest ln V is the peak closest to the start, before or after the start. If the motion
@@ -318,17 +325,20 @@ def _max_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> 
     lose all digits.
     """
     begin = initial_point(scene)
-    equations, start = equations_without_mass(scene, clock=False), (begin.spring_stress, begin.psi)
+    equations, start = (
+        equations_without_mass(scene, with_time=False),
+        (begin.spring_stress, begin.psi),
+    )
     rising, norm = (
         equations.evaluate_point(start).log_slip_rate_derivative > 0.0,
         scene.log_instability_rate,
     )
-    specs = (_PEAK_EVENT, minimum("log_slip_rate"), rise("log_slip_rate", norm))
-    for event in events_along(
-        equations, start, accuracy.local_tolerance, meter, specs, backward=not rising
+    specs = (_SLIP_RATE_PEAK_EVENT, minimum("log_slip_rate"), rise("log_slip_rate", norm))
+    for event in iterate_events_of_equations(
+        equations, start, accuracy.local_tolerance, work_meter, specs, backward=not rising
     ):
         if event.kind is EventKind.RISE:
-            return norm + _OVERSHOOT_BEYOND_NORM
+            return norm + _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM
         if (
             event.specification is not None
             or event.point.log_slip_rate >= norm
@@ -338,22 +348,22 @@ def _max_of_closed_orbit(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> 
     raise AssertionError("a motion never ends by itself")
 
 
-def _shrinks_at_norm(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> bool:
+def _orbit_touching_norm_shrinks(scene: Scene, accuracy: Accuracy, work_meter: WorkMeter) -> bool:
     """Return True if the orbit that touches the norm shrinks.
 
     Paths in a plane cannot cross, so no orbit inside a shrinking orbit reaches the norm.
     """
-    path = CriticalPath.of_scene(scene, meter.engine)
-    misfit = path.cycle_misfit(accuracy.local_tolerance, meter)
+    path = CriticalPath.from_scene(scene, work_meter.engine)
+    misfit = path.norm_misfit_of_next_peak(accuracy.local_tolerance, work_meter)
     return misfit is not None and misfit < -100.0 * accuracy.local_tolerance
 
 
-def _grows_to_norm(
+def _slow_orbit_grows_to_norm(
     scene: Scene,
-    steady: _SteadySliding,
-    start: Point,
+    steady_state: _SteadySlidingWithMargin,
+    start_point: MotionPoint,
     accuracy: Accuracy,
-    meter: WorkMeter,
+    work_meter: WorkMeter,
     *,
     with_inertia: bool,
 ) -> bool:
@@ -362,82 +372,99 @@ def _grows_to_norm(
     The motion leaps from the orbit to larger orbits, until an orbit shrinks or reaches the norm. A
     leap is shortened if the first peak of the new orbit is above the norm.
     """
-    if not with_inertia and _shrinks_at_norm(scene, accuracy, meter):
+    if not with_inertia and _orbit_touching_norm_shrinks(scene, accuracy, work_meter):
         return False
     leap = _LEAP_FACTOR
     while True:
         spring_stress, *psis = (
             rest + leap * (current - rest)
             for rest, current in zip(
-                (steady.spring_stress, *steady.psis),
-                (start.spring_stress, *start.psis),
+                (steady_state.spring_stress, *steady_state.states),
+                (start_point.spring_stress, *start_point.psis),
                 strict=True,
             )
         )
-        beyond = manifold_point(scene, spring_stress, tuple(psis))
-        orbit = _follow_orbit(scene, steady, beyond, accuracy, meter, with_inertia=with_inertia)
-        if orbit.reached_norm and len(orbit.peaks) == 1 and leap > _MIN_LEAP_FACTOR:
+        beyond = slow_manifold_point(scene, spring_stress, tuple(psis))
+        orbit = _follow_one_orbit(
+            scene, steady_state, beyond, accuracy, work_meter, with_inertia=with_inertia
+        )
+        if orbit.reached_norm and len(orbit.log_slip_rate_peaks) == 1 and leap > _MIN_LEAP_FACTOR:
             leap = math.sqrt(leap)
-        elif orbit.slow_growth_point is None:
+        elif orbit.point_of_too_slow_growth is None:
             return orbit.reached_norm
         else:
-            start = orbit.slow_growth_point
+            start_point = orbit.point_of_too_slow_growth
 
 
-def _follow_orbit(
+def _follow_one_orbit(
     scene: Scene,
-    steady: _SteadySliding,
-    start: Point | None,
+    steady_state: _SteadySlidingWithMargin,
+    start_point: MotionPoint | None,
     accuracy: Accuracy,
-    meter: WorkMeter,
+    work_meter: WorkMeter,
     *,
     with_inertia: bool,
-) -> _Orbit:
+) -> _OrbitOutcome:
     """Integrate an orbit until the outcome of the motion is certain.
 
     The integration also ends if the orbit grows too slowly.
     """
     norm = scene.log_instability_rate
-    specs = [_PEAK_EVENT] if with_inertia else [_PEAK_EVENT, rise("log_slip_rate", norm)]
-    levels = monotone_rise_events(scene) if steady.is_stable else []
-    specs += [approach_to_steady_state(_STEADY_FRACTION), *levels] if steady.is_stable else []
-    planar, repeating = scene.state_count == 1, _RepetitionDetector(scene, steady, accuracy)
+    specs = (
+        [_SLIP_RATE_PEAK_EVENT]
+        if with_inertia
+        else [_SLIP_RATE_PEAK_EVENT, rise("log_slip_rate", norm)]
+    )
+    levels = monotone_rise_events(scene) if steady_state.is_stable else []
+    specs += (
+        [approach_to_steady_state(_SETTLED_FRACTION_OF_MAX_DISTANCE), *levels]
+        if steady_state.is_stable
+        else []
+    )
+    planar, repeating = (
+        scene.state_count == 1,
+        _CycleRepetitionDetector(scene, steady_state, accuracy),
+    )
     peaks: list[float] = []
     at_start = -math.inf
-    for event in integrate_events(scene, accuracy, meter, specs, start=start):
+    for event in integrate_events(scene, accuracy, work_meter, specs, start=start_point):
         top = event.point.log_slip_rate
         if event.kind is EventKind.START:
-            if start is None and event.point.log_slip_rate_derivative <= 0.0:
+            if start_point is None and event.point.log_slip_rate_derivative <= 0.0:
                 # The start is not a peak of an orbit, so later peaks are not compared with it.
                 at_start = top
                 if top >= norm:
-                    return _Orbit((), reached_norm=True, initial_log_slip_rate=top)
+                    return _OrbitOutcome((), reached_norm=True, initial_log_slip_rate=top)
             elif top >= norm and not with_inertia:
-                return _Orbit((top,), reached_norm=True)
+                return _OrbitOutcome((top,), reached_norm=True)
         elif event.specification in levels:
-            if rises_monotonically(scene, event.point):
-                return _Orbit(tuple(peaks), reached_norm=False, initial_log_slip_rate=at_start)
+            if rises_monotonically_to_load_rate(scene, event.point):
+                return _OrbitOutcome(
+                    tuple(peaks), reached_norm=False, initial_log_slip_rate=at_start
+                )
         elif event.kind is EventKind.RISE:
-            return _Orbit((*peaks, norm + _OVERSHOOT_BEYOND_NORM), reached_norm=True)
+            return _OrbitOutcome(
+                (*peaks, norm + _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM), reached_norm=True
+            )
         elif event.kind is EventKind.SETTLED:
-            return _Orbit(tuple(peaks), reached_norm=False, initial_log_slip_rate=at_start)
+            return _OrbitOutcome(tuple(peaks), reached_norm=False, initial_log_slip_rate=at_start)
         elif event.kind is EventKind.MAXIMUM:
             peaks.append(top)
             if top >= norm:
-                return _Orbit(tuple(peaks), reached_norm=True)
+                return _OrbitOutcome(tuple(peaks), reached_norm=True)
             if not planar:
-                if repeating.update(event.point):
-                    return _Orbit(tuple(peaks), reached_norm=False)
+                if repeating.is_repeating_at_peak(event.point):
+                    return _OrbitOutcome(tuple(peaks), reached_norm=False)
                 continue
-            if len(peaks) > 1 and _has_stopped_growing(peaks, steady, accuracy):
-                return _Orbit(tuple(peaks), reached_norm=False)
+            if len(peaks) > 1 and _peaks_have_stopped_growing(peaks, steady_state, accuracy):
+                return _OrbitOutcome(tuple(peaks), reached_norm=False)
             slow = len(peaks) > 1 and peaks[-1] - peaks[-2] < 0.2 * (norm - top)
-            if slow and not steady.is_stable and event.regime != RUPTURE_REGIME:
-                return _Orbit(tuple(peaks), False, event.point)
+            if slow and not steady_state.is_stable and event.regime != RUPTURE_REGIME:
+                return _OrbitOutcome(tuple(peaks), False, event.point)
     raise AssertionError("a motion never ends by itself")
 
 
-class _RepetitionDetector:
+class _CycleRepetitionDetector:
     """Detector of repeating motions in scenes with several states.
 
     A motion repeats if its unknowns are the same at several successive peaks, within numerical
@@ -446,11 +473,13 @@ class _RepetitionDetector:
     to measure.
     """
 
-    def __init__(self, scene: Scene, steady: _SteadySliding, accuracy: Accuracy) -> None:
-        self._steady, self._tolerance = steady, 30.0 * accuracy.local_tolerance * scene.a
+    def __init__(
+        self, scene: Scene, steady_state: _SteadySlidingWithMargin, accuracy: Accuracy
+    ) -> None:
+        self._steady, self._tolerance = steady_state, 30.0 * accuracy.local_tolerance * scene.a
         self._previous, self._repeat_count = (math.inf,) * (1 + scene.state_count), 0
 
-    def update(self, peak: Point) -> bool:
+    def is_repeating_at_peak(self, peak_point: MotionPoint) -> bool:
         """Update the detector, and return True if the motion repeats.
 
         Parameters
@@ -463,45 +492,52 @@ class _RepetitionDetector:
         bool
             True if the required number of successive peaks are equal.
         """
-        current = (peak.spring_stress, *peak.psis)
+        current = (peak_point.spring_stress, *peak_point.psis)
         change = max(abs(x - y) for x, y in zip(current, self._previous, strict=True))
         linear = (
-            peak.log_slip_rate - self._steady.log_slip_rate < _MAX_LINEAR_AMPLITUDE
+            peak_point.log_slip_rate - self._steady.log_slip_rate < _MAX_LINEAR_LOG_RATE_AMPLITUDE
             and not self._steady.is_stable
         )
         self._repeat_count = (
             self._repeat_count + 1 if change < self._tolerance and not linear else 0
         )
         self._previous = current
-        return self._repeat_count == _REQUIRED_REPEATS
+        return self._repeat_count == _REQUIRED_EQUAL_PEAKS_IN_A_ROW
 
 
-def _has_stopped_growing(
-    peaks: Sequence[float], steady: _SteadySliding, accuracy: Accuracy
+def _peaks_have_stopped_growing(
+    peaks: Sequence[float], steady_state: _SteadySlidingWithMargin, accuracy: Accuracy
 ) -> bool:
     """Return True if the last peak is not higher than the previous peak.
 
     If the growth is too small to measure, linear theory determines the sign of the growth.
     """
     slack = 100.0 * accuracy.local_tolerance
-    linear = peaks[-1] - steady.log_slip_rate < _MAX_LINEAR_AMPLITUDE and not steady.is_stable
+    linear = (
+        peaks[-1] - steady_state.log_slip_rate < _MAX_LINEAR_LOG_RATE_AMPLITUDE
+        and not steady_state.is_stable
+    )
     return peaks[-1] - peaks[-2] <= (-slack if linear else slack)
 
 
-def _compute_excess(orbit: _Orbit, norm: float, *, with_inertia: bool) -> float:
+def _orbit_excess_over_norm(
+    orbit: _OrbitOutcome, log_slip_rate_at_norm: float, *, with_inertia: bool
+) -> float:
     """Compute an excess that changes sign at the boundary.
 
     A single orbit may not reveal the sign of the excess.
     """
     if with_inertia:
-        highest = max((orbit.initial_log_slip_rate, *orbit.peaks))
-        return highest - norm if highest > -math.inf else -norm
-    if len(orbit.peaks) > 1:
-        return orbit.peaks[1] - orbit.peaks[0]
-    return orbit.peaks[0] - norm if orbit.peaks else -1.0
+        highest = max((orbit.initial_log_slip_rate, *orbit.log_slip_rate_peaks))
+        return highest - log_slip_rate_at_norm if highest > -math.inf else -log_slip_rate_at_norm
+    if len(orbit.log_slip_rate_peaks) > 1:
+        return orbit.log_slip_rate_peaks[1] - orbit.log_slip_rate_peaks[0]
+    return (
+        orbit.log_slip_rate_peaks[0] - log_slip_rate_at_norm if orbit.log_slip_rate_peaks else -1.0
+    )
 
 
-def _steady_sliding(scene: Scene) -> _SteadySliding:
+def _steady_sliding_with_margin(scene: Scene) -> _SteadySlidingWithMargin:
     """Compute steady sliding at the load point velocity of the scene.
 
     Raises
@@ -524,12 +560,12 @@ def _steady_sliding(scene: Scene) -> _SteadySliding:
         critical = critical_stiffness(scene, load)
         margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
     if (
-        margin < -_NEUTRAL_TOLERANCE
+        margin < -_NEUTRAL_STABILITY_MARGIN
         and scene.state_count > 1
         and _is_stable_to_small_perturbations(scene)
     ):
         margin = -margin
-    return _SteadySliding(**vars(sliding), stability_margin=margin)
+    return _SteadySlidingWithMargin(**vars(sliding), stability_margin=margin)
 
 
 def _is_stable_to_small_perturbations(scene: Scene) -> bool:
@@ -537,4 +573,6 @@ def _is_stable_to_small_perturbations(scene: Scene) -> bool:
 
     With several states, perturbations may decay below the critical stiffness.
     """
-    return bool(growth_rates(scene, scene.log_load_velocity)[0].real < -_NEUTRAL_TOLERANCE)
+    return bool(
+        linear_growth_rates(scene, scene.log_load_velocity)[0].real < -_NEUTRAL_STABILITY_MARGIN
+    )

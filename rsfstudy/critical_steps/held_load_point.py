@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from rsfstudy.critical_steps.slow_manifold import inertia_matters
+from rsfstudy.critical_steps.slow_manifold import inertia_matters_below_norm
 from rsfstudy.motion import (
     Accuracy,
     Event,
@@ -29,11 +29,11 @@ from rsfstudy.motion import (
 from rsfstudy.slider import (
     RUPTURE_REGIME,
     STOPPED_LOG_SLIP_RATE,
-    Point,
+    MotionPoint,
     Scene,
+    build_friction_relation,
+    build_state_evolution_function,
     compute_steady_states,
-    friction_relation,
-    state_evolution,
 )
 from rsfstudy.status import Status
 
@@ -45,10 +45,12 @@ _TESTED_LOG_RATE_DECREASES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 #: Increases of ln V that are tested as upper bounds of the effect of pore pressure.
 _TESTED_LOG_RATE_INCREASES = (1e-4, 1e-3, 1e-2, 0.1, 1.0)
 #: Largest weakening of friction, as a fraction of the decrease of spring stress.
-_MAX_WEAKENING_FRACTION = 0.5
+_MAX_WEAKENING_OVER_UNLOADING = 0.5
 
 
-def peak_excess(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> float:
+def peak_log_rate_excess_over_norm(
+    scene: Scene, accuracy: Accuracy, work_meter: WorkMeter
+) -> float:
     """Compute the height of the highest peak of ln V above the norm.
 
     If the effect of inertia is small, the motion is integrated only up to the norm. The excess is
@@ -73,17 +75,21 @@ def peak_excess(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> float:
     MotionStopped
         If the motion cannot continue. A motion that stops slipping does not raise the exception.
     """
-    norm, heavy, highest = scene.log_instability_rate, inertia_matters(scene, accuracy), -math.inf
+    norm, heavy, highest = (
+        scene.log_instability_rate,
+        inertia_matters_below_norm(scene, accuracy),
+        -math.inf,
+    )
     try:
         for event in integrate_events(
-            scene, accuracy, meter, _event_specifications(scene, norm, with_inertia=heavy)
+            scene, accuracy, work_meter, _events_at_held_load_point(scene, norm, with_inertia=heavy)
         ):
             if event.kind is EventKind.RISE:
                 return event.point.log_slip_rate_derivative**2
             if event.kind in (EventKind.START, EventKind.MAXIMUM):
                 highest = max(highest, event.point.log_slip_rate)
             over = highest >= norm and (event.kind is EventKind.MAXIMUM or not heavy)
-            if over or _is_last_peak(scene, event):
+            if over or _no_later_peak_reaches_norm(scene, event):
                 break
     except MotionStopped as halt:
         if halt.status is not Status.SLIP_STOPPED:
@@ -91,8 +97,8 @@ def peak_excess(scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> float:
     return highest - norm
 
 
-def _event_specifications(
-    scene: Scene, norm: float, *, with_inertia: bool
+def _events_at_held_load_point(
+    scene: Scene, log_slip_rate_at_norm: float, *, with_inertia: bool
 ) -> list[EventSpecification]:
     """Return the events at which the motion is tested.
 
@@ -101,17 +107,17 @@ def _event_specifications(
     """
     specs = [maximum("log_slip_rate")]
     if not with_inertia:
-        specs.append(rise("log_slip_rate", norm))
+        specs.append(rise("log_slip_rate", log_slip_rate_at_norm))
     if scene.state_count > 1:
         specs.append(fall("spring_stress", -scene.mu_star))
         below = _MIN_LEVEL_SPACING
-        while norm - below > STOPPED_LOG_SLIP_RATE:
-            specs.append(fall("log_slip_rate", norm - below))
+        while log_slip_rate_at_norm - below > STOPPED_LOG_SLIP_RATE:
+            specs.append(fall("log_slip_rate", log_slip_rate_at_norm - below))
             below += max(_MIN_LEVEL_SPACING, _RELATIVE_LEVEL_SPACING * below)
     return specs
 
 
-def _is_last_peak(scene: Scene, event: Event) -> bool:
+def _no_later_peak_reaches_norm(scene: Scene, event: Event) -> bool:
     """Return True if no later peak can reach the norm."""
     slows = event.kind is EventKind.START and event.point.log_slip_rate_derivative <= 0.0
     if scene.state_count == 1:
@@ -121,7 +127,7 @@ def _is_last_peak(scene: Scene, event: Event) -> bool:
     return scene.mu_star + event.point.spring_stress <= 0.0 or _stays_below_norm(scene, event.point)
 
 
-def _stays_below_norm(scene: Scene, point: Point) -> bool:
+def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     """Return True if ln V provably stays below the norm.
 
     The slip rate is decreasing at the point. A state that strengthens friction approaches its
@@ -131,17 +137,17 @@ def _stays_below_norm(scene: Scene, point: Point) -> bool:
     Pore pressure raises ln V by at most the loss of strength divided by a. The proof also requires
     that, at the raised ln V, the states weaken friction more slowly than spring stress decreases.
     """
-    _value, slope, shift, shift_slope = friction_relation(scene, point.psis)(
+    _value, slope, shift, shift_slope = build_friction_relation(scene, point.psis)(
         point.frictional_stress
     )
-    states, evolve = range(scene.parts.law.state_count), state_evolution(scene)
+    states, evolve = range(scene.parts.law.state_count), build_state_evolution_function(scene)
     strengthening = evolve(point.log_slip_rate, point.psis, shift)
     if min(strengthening[i] for i in states) < 0.0:
         return False
-    raised, least_shift = _bound_pressure_effect(scene, point)
+    raised, least_shift = _bound_pore_pressure_effect(scene, point)
     if point.log_slip_rate + raised >= scene.log_instability_rate:
         return False
-    fallen = scene.stiffness * slope * (1.0 - _MAX_WEAKENING_FRACTION)
+    fallen = scene.stiffness * slope * (1.0 - _MAX_WEAKENING_OVER_UNLOADING)
     for distance in _TESTED_LOG_RATE_DECREASES:
         x = point.log_slip_rate - distance
         rest = compute_steady_states(scene, x, shift)
@@ -154,7 +160,7 @@ def _stays_below_norm(scene: Scene, point: Point) -> bool:
     return True
 
 
-def _bound_pressure_effect(scene: Scene, point: Point) -> tuple[float, float]:
+def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float, float]:
     """Compute an upper bound of the increase of ln V by pore pressure.
 
     The second result is the state shift due to stress at the upper bound. The first result is
@@ -162,7 +168,7 @@ def _bound_pressure_effect(scene: Scene, point: Point) -> tuple[float, float]:
     the increased ln V reduces strength by less than a times the increase.
     """
     fluid, psis = scene.parts.fluid, point.psis
-    value, _slope, shift, _ = friction_relation(scene, psis)(point.frictional_stress)
+    value, _slope, shift, _ = build_friction_relation(scene, psis)(point.frictional_stress)
     if not fluid.unknowns:
         return 0.0, shift
     own = psis[-len(fluid.unknowns) :]
@@ -170,7 +176,7 @@ def _bound_pressure_effect(scene: Scene, point: Point) -> tuple[float, float]:
         pressure = fluid.highest_pressure(point.log_slip_rate + bound, own)
         if math.isinf(pressure):
             break
-        weaker, _slope, shift, _ = friction_relation(scene, (*psis[:-1], pressure))(
+        weaker, _slope, shift, _ = build_friction_relation(scene, (*psis[:-1], pressure))(
             point.frictional_stress
         )
         if weaker - value < bound * scene.a:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base import Outcome, check_steady_loading
+from rsfstudy.measure_base import Outcome, check_loading_lets_motion_settle
 from rsfstudy.slider import Scene, SliderParameters
 from rsfstudy.status import Status
 
 #: Slip rate over that of the load point from which on a norm is that of an instability.
-_MIN_NORM_TO_LOAD_RATIO = 1e3
+_MIN_NORM_OVER_LOAD_VELOCITY = 1e3
 #: How a text begins that tells of a slower one.
-SLOW_NORM_PREFIX = "the instability norm "
+SLOW_NORM_WARNING_PREFIX = "the instability norm "
 
 
-def check_single_step(scene: Scene) -> None:
+def check_loading_is_single_step(scene: Scene) -> None:
     """Check that the loading is a single step.
 
     Parameters
@@ -28,7 +28,7 @@ def check_single_step(scene: Scene) -> None:
     InvalidValue
         If the loading has several segments, or changes stress continuously.
     """
-    check_steady_loading(scene)
+    check_loading_lets_motion_settle(scene)
     loading = scene.parts.loading
     if len(loading.segments) > 1:
         rule = "is no single step, after which a motion decides"
@@ -36,7 +36,7 @@ def check_single_step(scene: Scene) -> None:
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)
 
 
-def norm_below_loading_outcome(scene: Scene, load_velocity: float = 0.0) -> Outcome:
+def outcome_if_norm_is_below_load_velocity(scene: Scene, load_velocity: float = 0.0) -> Outcome:
     """Return the outcome if the loading itself reaches the instability norm.
 
     Steady sliding before the step, or the load point after the step, may already be faster than the
@@ -84,13 +84,13 @@ def slow_norm_warning(scene: Scene, load_velocity: float) -> str:
     """
     rate, load = math.exp(scene.log_instability_rate), max(1.0, abs(load_velocity))
     if (
-        rate >= _MIN_NORM_TO_LOAD_RATIO * load
+        rate >= _MIN_NORM_OVER_LOAD_VELOCITY * load
         or scene.reference_rate == SliderParameters.reference_rate
     ):
         return ""
     return (
-        f"{SLOW_NORM_PREFIX}{scene.instability_norm:g} is a slip rate of {rate:.3g} V_*, only "
+        f"{SLOW_NORM_WARNING_PREFIX}{scene.instability_norm:g} is a slip rate of {rate:.3g} V_*, only "
         f"{rate / load:.3g} times that of the load point: what reaches it may be no instability. "
-        f"Give one above {_MIN_NORM_TO_LOAD_RATIO * load:.3g} V_*, of a rig as a slip rate, as in "
+        f"Give one above {_MIN_NORM_OVER_LOAD_VELOCITY * load:.3g} V_*, of a rig as a slip rate, as in "
         "rig.scene(instability_norm='10 mm/s')"
     )

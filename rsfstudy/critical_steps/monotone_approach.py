@@ -19,17 +19,17 @@ import numpy as np
 
 from rsfstudy.motion import EventSpecification, rise
 from rsfstudy.slider import (
-    Point,
+    MotionPoint,
     Scene,
+    build_friction_relation,
+    build_state_evolution_function,
     compute_steady_states,
-    friction_relation,
-    state_evolution,
-    steady_friction_excess,
-    stress_for_friction,
+    frictional_stress_for_friction,
+    steady_friction_minus_reference,
 )
 
 #: Distances of ln V below the load point velocity at which the motion is tested.
-_TESTED_DISTANCES = (10.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0, 0.5, 0.2)
+_TESTED_LOG_RATE_DISTANCES = (10.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0, 0.5, 0.2)
 #: The first number is the lag of the second curve, relative to the lag that a state at rest would
 #: have after a slip of D_c. The second number is the fraction of the evolution that must remain to
 #: cross the curve. The third number is the smallest distance in ln V from the load point velocity
@@ -45,7 +45,7 @@ _TESTED_DISTANCES = (10.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0, 0.5
 ) = 2.0, 0.25, 1e-4, 0.25, 1e-5
 #: Largest change of ln V over a slip of D_c, relative to the distance from the load point velocity,
 #: at which the test is worthwhile. Such a slow motion would take hundreds of steps.
-_MAX_RELATIVE_GROWTH = 0.02
+_MAX_LOG_RATE_GROWTH_OVER_DISTANCE = 0.02
 
 
 def monotone_rise_events(scene: Scene) -> list[EventSpecification]:
@@ -65,14 +65,14 @@ def monotone_rise_events(scene: Scene) -> list[EventSpecification]:
     load = scene.log_load_velocity
     if scene.state_count > 1 or scene.has_mass:
         return []
-    if not scene.stiffness < _MAX_RELATIVE_GROWTH * (
+    if not scene.stiffness < _MAX_LOG_RATE_GROWTH_OVER_DISTANCE * (
         scene.a + scene.dynamics.radiated_stress_slope(load)
     ):
         return []
-    return [rise("log_slip_rate", load - below) for below in _TESTED_DISTANCES]
+    return [rise("log_slip_rate", load - below) for below in _TESTED_LOG_RATE_DISTANCES]
 
 
-def rises_monotonically(scene: Scene, point: Point) -> bool:
+def rises_monotonically_to_load_rate(scene: Scene, point: MotionPoint) -> bool:
     """Return True if ln V rises to the load point velocity and not beyond.
 
     The test is based on a finite number of points between the present slip rate and the load point
@@ -91,7 +91,7 @@ def rises_monotonically(scene: Scene, point: Point) -> bool:
         True if the motion is between the two curves, and if motions at all tested points cross the
         curves inwards.
     """
-    change, load = _build_change_function(scene), scene.log_load_velocity
+    change, load = _build_rate_and_lag_change_function(scene), scene.log_load_velocity
     distance = load - point.log_slip_rate
 
     def farthest(x: float) -> float:
@@ -115,17 +115,24 @@ def rises_monotonically(scene: Scene, point: Point) -> bool:
     return True
 
 
-def _build_change_function(scene: Scene) -> Callable[[float, float], tuple[float, float]]:
+def _build_rate_and_lag_change_function(
+    scene: Scene,
+) -> Callable[[float, float], tuple[float, float]]:
     """Build a function that computes the changes of ln V and of the lag.
 
     The arguments of the function are ln(V/V_*) and the lag of the state behind the steady state.
     The results are changes per D_c of slip, or NaN if no stress corresponds to this value of
     friction.
     """
-    relation, evolution = friction_relation(scene), single_state_evolution(scene)
+    relation, evolution = (
+        build_friction_relation(scene),
+        build_single_state_evolution_function(scene),
+    )
 
     def at(x: float, lag: float) -> tuple[float, float]:
-        friction = stress_for_friction(scene, steady_friction_excess(scene, x) + lag)
+        friction = frictional_stress_for_friction(
+            scene, steady_friction_minus_reference(scene, x) + lag
+        )
         if friction is None:
             return np.nan, np.nan
         _value, slope, _shift, shift_slope = relation(friction)
@@ -144,7 +151,7 @@ def _build_change_function(scene: Scene) -> Callable[[float, float], tuple[float
     return at
 
 
-def single_state_evolution(scene: Scene) -> Callable[[float, float], float]:
+def build_single_state_evolution_function(scene: Scene) -> Callable[[float, float], float]:
     """The law of a scene with one state: (ln(V/V_*), Theta) -> dTheta per unit slip."""
-    evolve = state_evolution(scene)
+    evolve = build_state_evolution_function(scene)
     return lambda log_slip_rate, state: evolve(log_slip_rate, (state,), 0.0)[0]

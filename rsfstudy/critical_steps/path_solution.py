@@ -13,15 +13,15 @@ from dataclasses import dataclass, replace
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.forward_motion import stability_margin
-from rsfstudy.critical_steps.shooting import LOOSE_TOLERANCE, StepFamily
-from rsfstudy.critical_steps.slow_manifold import slow_manifold_error
+from rsfstudy.critical_steps.shooting import LOCAL_TOLERANCE_OF_FIRST_ROOT, StepFamily
+from rsfstudy.critical_steps.slow_manifold import slow_manifold_relative_error
 from rsfstudy.motion import MIN_LOCAL_TOLERANCE, Accuracy, WorkMeter, estimate_error
 
 #: Error that two paths may share by chance, as a fraction of the requested relative accuracy.
-_COINCIDENCE_FLOOR = 0.004
+_ERROR_FLOOR_OVER_RTOL = 0.004
 
 #: Largest number of local tolerances with which a path is integrated.
-_MAX_PATHS = 5
+_MAX_TOLERANCES_PER_BOUNDARY = 5
 
 
 @dataclass(frozen=True)
@@ -40,14 +40,14 @@ class StepBoundary:
         True if a limit cycle touches the norm at the boundary.
     """
 
-    size: float
+    step_size: float
     relative_error: float
-    from_motions: bool = False
-    from_cycle: bool = False
+    found_from_motions: bool = False
+    found_from_limit_cycle: bool = False
 
 
-def find_by_critical_path(
-    steps: StepFamily, accuracy: Accuracy, meter: WorkMeter
+def find_boundary_by_critical_path(
+    step_family: StepFamily, accuracy: Accuracy, work_meter: WorkMeter
 ) -> StepBoundary | None:
     """Find the boundary that corresponds to the critical path.
 
@@ -68,24 +68,28 @@ def find_by_critical_path(
     StepBoundary or None
         The boundary, or None if there is no critical path or if smaller steps may be unstable.
     """
-    boundary = _find_boundary(steps, steps.find_path_sizes, accuracy, meter)
-    if boundary is None or not steps.smaller_steps_decay(boundary.size):
+    boundary = _find_boundary_with_error(
+        step_family, step_family.find_sizes_by_critical_path, accuracy, work_meter
+    )
+    if boundary is None or not step_family.motions_after_smaller_steps_decay(boundary.step_size):
         return None
     # If all orbits are closed at the critical stiffness, a motion never returns to a higher peak.
-    if steps.scene.parts.law.has_closed_orbits:
+    if step_family.scene.parts.law.has_closed_orbits:
         return boundary
-    scene = steps.scene_at(boundary.size)
+    scene = step_family.scene_with_step(boundary.step_size)
     if scene.log_load_velocity == -math.inf:
         return boundary
     return (
         None
-        if CriticalPath.of_scene(scene, meter.engine).exceeds_norm_on_return(LOOSE_TOLERANCE, meter)
+        if CriticalPath.from_scene(scene, work_meter.engine).exceeds_norm_on_return(
+            LOCAL_TOLERANCE_OF_FIRST_ROOT, work_meter
+        )
         else boundary
     )
 
 
-def find_by_touching_cycle(
-    steps: StepFamily, accuracy: Accuracy, meter: WorkMeter
+def find_boundary_by_limit_cycle(
+    step_family: StepFamily, accuracy: Accuracy, work_meter: WorkMeter
 ) -> StepBoundary | None:
     """Find the boundary at which a limit cycle touches the norm.
 
@@ -107,21 +111,24 @@ def find_by_touching_cycle(
         The boundary, or None if there is no such limit cycle.
     """
     small, large = (
-        stability_margin(steps.scene_at(size)) for size in (steps.min_size, steps.max_size)
+        stability_margin(step_family.scene_with_step(size))
+        for size in (step_family.min_size, step_family.max_size)
     )
     if large >= 0.0 or small - large < 10.0 * accuracy.rtol:
         return None
-    boundary = _find_boundary(steps, steps.find_cycle_sizes, accuracy, meter)
+    boundary = _find_boundary_with_error(
+        step_family, step_family.find_sizes_by_limit_cycle, accuracy, work_meter
+    )
     # A limit cycle attracts nearby motions weakly, so the errors of two runs may be similar.
     error = 5.0 * boundary.relative_error if boundary else math.nan
-    return boundary and replace(boundary, relative_error=error, from_cycle=True)
+    return boundary and replace(boundary, relative_error=error, found_from_limit_cycle=True)
 
 
-def _find_boundary(
-    steps: StepFamily,
-    find_sizes: Callable[[Iterable[float], WorkMeter], Iterator[float]],
+def _find_boundary_with_error(
+    step_family: StepFamily,
+    find_sizes_by_tolerance: Callable[[Iterable[float], WorkMeter], Iterator[float]],
     accuracy: Accuracy,
-    meter: WorkMeter,
+    work_meter: WorkMeter,
 ) -> StepBoundary | None:
     """Find a boundary, and estimate its error from several tolerances.
 
@@ -131,20 +138,22 @@ def _find_boundary(
     the largest step.
     """
     boundary = None
-    of_path = slow_manifold_error(steps.scene) if steps.scene.has_mass else 0.0
-    for size, refined in itertools.pairwise(find_sizes(_decreasing_tolerances(accuracy), meter)):
-        if not steps.min_size <= size <= steps.max_size:
+    of_path = slow_manifold_relative_error(step_family.scene) if step_family.scene.has_mass else 0.0
+    for size, refined in itertools.pairwise(
+        find_sizes_by_tolerance(_decreasing_local_tolerances(accuracy), work_meter)
+    ):
+        if not step_family.min_size <= size <= step_family.max_size:
             break
-        error = estimate_error(size, refined, _COINCIDENCE_FLOOR * accuracy.rtol) / size
+        error = estimate_error(size, refined, _ERROR_FLOOR_OVER_RTOL * accuracy.rtol) / size
         boundary = StepBoundary(size, error + of_path)
-        if error <= steps.size_tolerance(size, accuracy.rtol):
+        if error <= step_family.size_rtol_for_value_rtol(size, accuracy.rtol):
             break
     return boundary
 
 
-def _decreasing_tolerances(accuracy: Accuracy) -> Iterator[float]:
+def _decreasing_local_tolerances(accuracy: Accuracy) -> Iterator[float]:
     """Yield local tolerances, each a tenth of the previous tolerance."""
-    for _ in range(_MAX_PATHS):
+    for _ in range(_MAX_TOLERANCES_PER_BOUNDARY):
         if accuracy.local_tolerance > MIN_LOCAL_TOLERANCE:
             yield accuracy.local_tolerance
         accuracy = accuracy.refined()

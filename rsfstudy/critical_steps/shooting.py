@@ -19,26 +19,26 @@ from scipy.optimize import brentq
 from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.forward_motion import is_linearly_stable
 from rsfstudy.motion import WorkMeter
-from rsfstudy.slider import Scene, log_slip_rate_at
+from rsfstudy.slider import Scene, quasi_static_log_slip_rate
 
 #: Smallest step size of the search, and its upper limit as a fraction of the largest step size.
 MIN_STEP_SIZE, _MIN_SIZE_FRACTION = 1e-3, 0.1
 #: Extension of the largest step, in ln V, if inertia delays the rise of slip rate.
-INERTIAL_LOG_RATE_MARGIN = 5.0
+LOG_RATE_MARGIN_FOR_INERTIA = 5.0
 #: Largest effect of a delay by inertia that is neglected, as a fraction of the requested accuracy.
 INERTIA_TOLERANCE_FRACTION = 0.01
 #: Number of step sizes at which stability is tested, if stability may change repeatedly with size.
-_STABILITY_TEST_COUNT = 24
+_STABILITY_TESTED_SIZE_COUNT = 24
 #: Local tolerance of the approximate root.
-LOOSE_TOLERANCE = 1e-5
+LOCAL_TOLERANCE_OF_FIRST_ROOT = 1e-5
 #: Smallest and largest distance in log size over which the slope of the misfit is computed. If a
 #: correction of the approximate root exceeds the largest distance, the refinement ends.
 _MIN_SLOPE_DISTANCE, _MAX_SLOPE_DISTANCE = 1e-3, 0.05
-_MAX_CORRECTIONS = 8
+_MAX_SECANT_ITERATIONS = 8
 #: Largest stride and upper end of the search for a sign change, in logit(size/largest size).
 _MAX_STRIDE, _MAX_POSITION = 0.7, 4.0
 #: Number of successive strides without a critical path after which the search is abandoned.
-_MAX_FAILURES = 3
+_MAX_STRIDES_WITHOUT_PATH = 3
 
 
 class StepFamily:
@@ -63,9 +63,9 @@ class StepFamily:
     """
 
     #: Name of the critical step in the results.
-    quantity: ClassVar[str]
+    critical_output_name: ClassVar[str]
     #: Names of additional results for the critical step.
-    extra_outputs: ClassVar[tuple[str, ...]] = ()
+    extra_output_names: ClassVar[tuple[str, ...]] = ()
     #: True if the largest step itself raises the slip rate to the norm immediately.
     largest_step_reaches_norm = False
 
@@ -74,7 +74,7 @@ class StepFamily:
         self.max_size = self._compute_max_size() * (1.0 - 1e-9)
         self.min_size = min(MIN_STEP_SIZE, _MIN_SIZE_FRACTION * self.max_size)
 
-    def scene_at(self, size: float) -> Scene:
+    def scene_with_step(self, step_size: float) -> Scene:
         """Return the scene with a step of a given size.
 
         Parameters
@@ -89,7 +89,7 @@ class StepFamily:
         """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
-    def step_value(self, size: float) -> float:
+    def user_value_of_step(self, step_size: float) -> float:
         """Return the value of the scene field for a step of a given size.
 
         Parameters
@@ -104,7 +104,7 @@ class StepFamily:
         """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
-    def value_error(self, size: float, relative_error: float) -> float:
+    def user_value_error(self, step_size: float, relative_error: float) -> float:
         """Return the error of the step value.
 
         Parameters
@@ -121,7 +121,7 @@ class StepFamily:
         """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
-    def size_tolerance(self, size: float, rtol: float) -> float:
+    def size_rtol_for_value_rtol(self, step_size: float, rtol: float) -> float:
         r"""Return the size tolerance for a tolerance of the step value.
 
         If the size has the returned relative error, the change of the step value has the relative
@@ -145,10 +145,10 @@ class StepFamily:
 
         .. math:: \mathrm{rtol}\,\frac{|v(s) - v(0)|}{dv/d\ln s}.
         """
-        change = abs(self.step_value(size) - self.step_value(0.0))
-        return min(rtol, rtol * change / self.value_error(size, 1.0))
+        change = abs(self.user_value_of_step(step_size) - self.user_value_of_step(0.0))
+        return min(rtol, rtol * change / self.user_value_error(step_size, 1.0))
 
-    def extra_values(self, size: float) -> dict[str, float]:
+    def extra_output_values(self, step_size: float) -> dict[str, float]:
         """Return the additional results for a critical step.
 
         Parameters
@@ -163,7 +163,9 @@ class StepFamily:
         """
         return {}
 
-    def find_path_sizes(self, tolerances: Iterable[float], meter: WorkMeter) -> Iterator[float]:
+    def find_sizes_by_critical_path(
+        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+    ) -> Iterator[float]:
         """Yield sizes of the step at which the critical path starts.
 
         Parameters
@@ -180,7 +182,9 @@ class StepFamily:
         """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
-    def find_cycle_sizes(self, tolerances: Iterable[float], meter: WorkMeter) -> Iterator[float]:
+    def find_sizes_by_limit_cycle(
+        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+    ) -> Iterator[float]:
         """Yield sizes of the step whose limit cycle touches the norm.
 
         Parameters
@@ -197,7 +201,7 @@ class StepFamily:
         """
         return iter(())
 
-    def inertia_shifts_size(self, size: float, rtol: float) -> bool:
+    def inertia_shifts_critical_size(self, step_size: float, rtol: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
         With inertia, the slip rate after the step rises to the critical path only after a delay.
@@ -216,7 +220,7 @@ class StepFamily:
         """
         return False
 
-    def neutral_size_error(self, size: float, rtol: float) -> float:
+    def size_error_if_neutrally_stable(self, step_size: float, rtol: float) -> float:
         """Return the size error if steady sliding is nearly neutral.
 
         Close to neutral stability, forward motions cannot distinguish growth from decay.
@@ -235,7 +239,7 @@ class StepFamily:
         """
         return 0.0
 
-    def smaller_steps_decay(self, size: float) -> bool:
+    def motions_after_smaller_steps_decay(self, step_size: float) -> bool:
         """Return True if steady sliding is stable after every smaller step.
 
         If steady sliding is unstable after a smaller step, small oscillations grow, and the smaller
@@ -253,16 +257,16 @@ class StepFamily:
         bool
             True if all tested steps are linearly stable.
         """
-        sizes = [self.min_size, size]
+        sizes = [self.min_size, step_size]
         if self.scene.parts.law.steady_states is not None:
-            sizes = np.geomspace(self.min_size, size, _STABILITY_TEST_COUNT).tolist()
-        return all(is_linearly_stable(self.scene_at(each)) for each in sizes)
+            sizes = np.geomspace(self.min_size, step_size, _STABILITY_TESTED_SIZE_COUNT).tolist()
+        return all(is_linearly_stable(self.scene_with_step(each)) for each in sizes)
 
     def _compute_max_size(self) -> float:
         raise TypeError(f"{type(self).__name__} steps nothing")
 
 
-def inertial_slip_lag(scene: Scene) -> tuple[float, float]:
+def slip_lag_due_to_inertia(scene: Scene) -> tuple[float, float]:
     r"""Compute the delay of a slider with inertia after a step.
 
     Parameters
@@ -278,7 +282,7 @@ def inertial_slip_lag(scene: Scene) -> tuple[float, float]:
     rate : float
         Slip rate immediately after the step without inertia, in units of V_*.
     """
-    rate = math.exp(log_slip_rate_at(scene, scene.spring_stress_step, 0.0))
+    rate = math.exp(quasi_static_log_slip_rate(scene, scene.spring_stress_step, 0.0))
     return scene.stiffness / scene.a * (scene.inertial_time * rate) ** 2, rate
 
 
@@ -302,16 +306,18 @@ class ShootingSteps(StepFamily):
         instability.
     """
 
-    trigger_sign: ClassVar[int]
+    sign_of_triggering_steps: ClassVar[int]
 
-    def value_error(self, size: float, relative_error: float) -> float:
+    def user_value_error(self, step_size: float, relative_error: float) -> float:
         """Return the error of the step value, whose logarithm is the size.
 
         See the base class for the parameters.
         """
-        return math.exp(self.sign * size) * size * relative_error
+        return math.exp(self.sign * step_size) * step_size * relative_error
 
-    def find_path_sizes(self, tolerances: Iterable[float], meter: WorkMeter) -> Iterator[float]:
+    def find_sizes_by_critical_path(
+        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+    ) -> Iterator[float]:
         """Yield sizes of the step at which the critical path starts.
 
         The critical path of this step begins with the state before the step. An approximate root
@@ -319,16 +325,20 @@ class ShootingSteps(StepFamily):
         one to three paths. With several states, there are no critical paths. See the base class for
         the parameters.
         """
-        path_at = self.path_factory(meter.engine)
-        loose = self._loose_root(path_at, meter) if self.scene.state_count == 1 else None
+        path_at = self.build_critical_path_factory(work_meter.engine)
+        loose = (
+            self._find_loose_misfit_root(path_at, work_meter)
+            if self.scene.state_count == 1
+            else None
+        )
         if loose is not None:
-            yield from _refine_root(
+            yield from _refine_misfit_root(
                 *loose,
-                tolerances,
-                lambda size, tolerance: path_at(size).start_misfit(tolerance, meter),
+                local_tolerances,
+                lambda size, tolerance: path_at(size).state_misfit_at_start(tolerance, work_meter),
             )
 
-    def path_factory(self, engine: str) -> Callable[[float], CriticalPath]:
+    def build_critical_path_factory(self, engine: str) -> Callable[[float], CriticalPath]:
         """Return a function that computes the critical path after a step.
 
         Parameters
@@ -341,19 +351,21 @@ class ShootingSteps(StepFamily):
         callable
             Function ``size -> CriticalPath``.
         """
-        return lambda size: CriticalPath.of_scene(self.scene_at(size), engine)
+        return lambda size: CriticalPath.from_scene(self.scene_with_step(size), engine)
 
-    def find_cycle_sizes(self, tolerances: Iterable[float], meter: WorkMeter) -> Iterator[float]:
+    def find_sizes_by_limit_cycle(
+        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+    ) -> Iterator[float]:
         """Yield the size of the step whose limit cycle touches the norm.
 
         The step is the smallest step after which an orbit that touches the norm does not shrink.
         Each misfit requires the integration of one orbit. See the base class for the parameters.
         """
-        found, path_at = dict[float, float](), self.path_factory(meter.engine)
+        found, path_at = dict[float, float](), self.build_critical_path_factory(work_meter.engine)
 
         @cache
-        def misfit(log_size: float, tolerance: float = LOOSE_TOLERANCE) -> float:
-            higher = path_at(math.exp(log_size)).cycle_misfit(tolerance, meter)
+        def misfit(log_size: float, tolerance: float = LOCAL_TOLERANCE_OF_FIRST_ROOT) -> float:
+            higher = path_at(math.exp(log_size)).norm_misfit_of_next_peak(tolerance, work_meter)
             if higher is None:
                 return math.nan
             found[log_size] = higher
@@ -364,12 +376,12 @@ class ShootingSteps(StepFamily):
         bracket = next((pair for pair in pairs if misfit(pair[0]) < 0.0 <= misfit(pair[1])), None)
         root = _find_misfit_root(misfit, found, *bracket) if bracket else None
         if root is not None:
-            yield from _refine_root(
-                *root, tolerances, lambda size, tolerance: misfit(math.log(size), tolerance)
+            yield from _refine_misfit_root(
+                *root, local_tolerances, lambda size, tolerance: misfit(math.log(size), tolerance)
             )
 
-    def _loose_root(
-        self, path_at: Callable[[float], CriticalPath], meter: WorkMeter
+    def _find_loose_misfit_root(
+        self, build_critical_path: Callable[[float], CriticalPath], work_meter: WorkMeter
     ) -> tuple[float, float] | None:
         """Return the log size at which the misfit vanishes, and its slope.
 
@@ -380,16 +392,20 @@ class ShootingSteps(StepFamily):
         @cache
         def misfit(log_size: float) -> float:
             size = math.exp(log_size)
-            state = path_at(size).start_misfit(LOOSE_TOLERANCE, meter)
+            state = build_critical_path(size).state_misfit_at_start(
+                LOCAL_TOLERANCE_OF_FIRST_ROOT, work_meter
+            )
             if state is None:
-                return self._misfit_without_path(self.scene_at(size), meter)
+                return self._misfit_without_path(self.scene_with_step(size), work_meter)
             found[log_size] = state
             return state
 
-        bracket = self._bracket(misfit)
+        bracket = self._bracket_misfit_root(misfit)
         return None if bracket is None else _find_misfit_root(misfit, found, *bracket)
 
-    def _bracket(self, misfit: Callable[[float], float]) -> tuple[float, float] | None:
+    def _bracket_misfit_root(
+        self, misfit_function: Callable[[float], float]
+    ) -> tuple[float, float] | None:
         """Return two log sizes between which the misfit changes sign.
 
         The search proceeds outwards from a guess, and first in the direction that the sign of the
@@ -408,13 +424,15 @@ class ShootingSteps(StepFamily):
         lowest, guess = position(self.min_size), position(self._guess_size())
 
         def outwards(*ways: int) -> tuple[float, float] | None:
-            ends = dict.fromkeys(ways, (guess, misfit(log_size(guess))))
+            ends = dict.fromkeys(ways, (guess, misfit_function(log_size(guess))))
             last = {1: _MAX_POSITION, -1: lowest}
             stride, failures = 0.2, 0
-            while failures < _MAX_FAILURES and any(ends[way][0] != last[way] for way in ways):
+            while failures < _MAX_STRIDES_WITHOUT_PATH and any(
+                ends[way][0] != last[way] for way in ways
+            ):
                 for way, (at, value) in ends.items():
                     further = min(max(at + way * stride, lowest), _MAX_POSITION)
-                    beyond = misfit(log_size(further))
+                    beyond = misfit_function(log_size(further))
                     if further != at and value * beyond <= 0.0:
                         return log_size(min(at, further)), log_size(max(at, further))
                     ends[way] = further, beyond
@@ -422,24 +440,24 @@ class ShootingSteps(StepFamily):
                 stride = min(1.5 * stride, _MAX_STRIDE)
             return None
 
-        way = self._search_direction(misfit(log_size(guess)))
+        way = self._search_direction(misfit_function(log_size(guess)))
         return outwards(way) or outwards(-way) if way else outwards(1, -1)
 
-    def _search_direction(self, misfit: float) -> int:
+    def _search_direction(self, misfit_at_guess: float) -> int:
         """Return the direction in which the critical size is expected.
 
         The result is 1 for larger sizes, -1 for smaller sizes, and 0 if the misfit does not
         indicate a direction.
         """
-        if self.sign != self.trigger_sign or math.isnan(misfit):
+        if self.sign != self.sign_of_triggering_steps or math.isnan(misfit_at_guess):
             return 0
-        return int(math.copysign(1.0, misfit))
+        return int(math.copysign(1.0, misfit_at_guess))
 
     def _guess_size(self) -> float:
         """Return a size at which the search starts."""
         raise TypeError(f"{type(self).__name__} steps nothing")
 
-    def _misfit_without_path(self, scene: Scene, meter: WorkMeter) -> float:
+    def _misfit_without_path(self, scene: Scene, work_meter: WorkMeter) -> float:
         """Return the sign of the misfit if there is no critical path.
 
         The sign is positive if the motion after the step is stable. The result is NaN if the sign
@@ -449,7 +467,7 @@ class ShootingSteps(StepFamily):
 
 
 def _find_misfit_root(
-    misfit: Callable[[float], float], known_misfits: Mapping[float, float], *bracket: float
+    misfit_function: Callable[[float], float], known_misfits: Mapping[float, float], *bracket: float
 ) -> tuple[float, float] | None:
     """Find the log size at which a misfit vanishes, and its slope.
 
@@ -458,7 +476,7 @@ def _find_misfit_root(
     magnitude.
     """
     try:
-        brentq(misfit, *bracket, xtol=1e-4)
+        brentq(misfit_function, *bracket, xtol=1e-4)
     except ValueError:
         # The misfit is NaN somewhere in the bracket.
         return None
@@ -475,7 +493,7 @@ def _find_misfit_root(
 
     for beside in (root + 2.0 * _MIN_SLOPE_DISTANCE, root - 2.0 * _MIN_SLOPE_DISTANCE):
         if not others():
-            misfit(beside)
+            misfit_function(beside)
     other = min(others(), key=lambda log_size: abs(log_size - root), default=None)
     return (
         None
@@ -484,11 +502,11 @@ def _find_misfit_root(
     )
 
 
-def _refine_root(
+def _refine_misfit_root(
     log_size: float,
-    slope: float,
-    tolerances: Iterable[float],
-    misfit: Callable[[float, float], float | None],
+    misfit_slope: float,
+    local_tolerances: Iterable[float],
+    misfit_function: Callable[[float, float], float | None],
 ) -> Iterator[float]:
     """Yield sizes at which a misfit vanishes, for decreasing local tolerances.
 
@@ -496,22 +514,22 @@ def _refine_root(
     respect to the log size. The iteration for each tolerance ends when the residual is below thirty
     local tolerances. The iterator ends early if the secant method does not converge.
     """
-    if not math.isfinite(slope) or slope == 0.0:
+    if not math.isfinite(misfit_slope) or misfit_slope == 0.0:
         return
-    for tolerance in tolerances:
+    for tolerance in local_tolerances:
         previous: tuple[float, float] | None = None
-        for _ in range(_MAX_CORRECTIONS):
+        for _ in range(_MAX_SECANT_ITERATIONS):
             # The error of V_0 is the error of its logarithm times V_0.
-            value = misfit(math.exp(log_size), tolerance / max(1.0, math.exp(log_size)))
+            value = misfit_function(math.exp(log_size), tolerance / max(1.0, math.exp(log_size)))
             if value is None or not math.isfinite(value):
                 return
             if previous is not None and value != previous[1]:
-                slope = (value - previous[1]) / (log_size - previous[0])
+                misfit_slope = (value - previous[1]) / (log_size - previous[0])
             previous = log_size, value
-            log_size -= value / slope
-            if abs(value) > _MAX_SLOPE_DISTANCE * abs(slope):
+            log_size -= value / misfit_slope
+            if abs(value) > _MAX_SLOPE_DISTANCE * abs(misfit_slope):
                 return
-            if min(abs(value), abs(value / slope)) < 30.0 * tolerance:
+            if min(abs(value), abs(value / misfit_slope)) < 30.0 * tolerance:
                 break
         else:
             return

@@ -6,14 +6,14 @@ from rsfstudy.motion import Accuracy
 from rsfstudy.slider import Scene
 
 
-def inertia_matters(scene: Scene, accuracy: Accuracy) -> bool:
+def inertia_matters_below_norm(scene: Scene, accuracy: Accuracy) -> bool:
     """True if mass matters up to the instability norm, beyond what the slow manifold holds of
     it.
     """
-    return scene.has_mass and slow_manifold_error(scene) > 0.1 * accuracy.rtol
+    return scene.has_mass and slow_manifold_relative_error(scene) > 0.1 * accuracy.rtol
 
 
-def slow_manifold_error(scene: Scene) -> float:
+def slow_manifold_relative_error(scene: Scene) -> float:
     """Relative error of a boundary computed on the slow manifold up to the norm w of a scene:
     ``3 [(K/a) w**2]**2``.
 

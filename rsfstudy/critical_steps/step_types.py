@@ -13,44 +13,44 @@ from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.forward_motion import (
     is_linearly_stable,
     may_have_closed_orbits,
-    reaches_norm,
+    motion_reaches_norm,
     stability_margin,
 )
 from rsfstudy.critical_steps.shooting import (
     INERTIA_TOLERANCE_FRACTION,
-    INERTIAL_LOG_RATE_MARGIN,
-    LOOSE_TOLERANCE,
+    LOCAL_TOLERANCE_OF_FIRST_ROOT,
+    LOG_RATE_MARGIN_FOR_INERTIA,
     MIN_STEP_SIZE,
     ShootingSteps,
     StepFamily,
-    inertial_slip_lag,
+    slip_lag_due_to_inertia,
 )
-from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter, manifold_point
+from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter, slow_manifold_point
 from rsfstudy.slider import (
     Scene,
     compute_steady_states,
     effective_friction,
-    log_slip_rate_at,
+    frictional_stress_after_jump,
     min_steady_log_slip_rate,
+    quasi_static_log_slip_rate,
     steady_sliding,
-    stress_after_jump,
 )
 from rsfstudy.status import Status
 
 #: Smallest load point velocity of the search, in units of V_*.
 MIN_LOAD_VELOCITY = 1e-20
 #: Smallest b/a - 1 in the formula of the first guess, because some laws weaken friction with b < a.
-_MIN_GUESSED_WEAKENING = 1e-6
+_MIN_B_OVER_A_EXCESS_FOR_GUESS = 1e-6
 #: Largest spring stress after a step, in units of sigma_*.
 _MAX_SPRING_STRESS = 1e6
-_MAX_FLOAT_LOGARITHM = math.log(sys.float_info.max)
+_LOG_OF_MAX_FLOAT = math.log(sys.float_info.max)
 #: Largest |ln(sigma/sigma_*)| after a step.
-_MAX_LOG_STRESS_CHANGE = math.log(1e3)
+_MAX_LOG_NORMAL_STRESS_RATIO = math.log(1e3)
 #: Relative accuracy of the largest step size.
-_MAX_SIZE_RTOL = 1e-6
+_RTOL_OF_MAX_STEP_SIZE = 1e-6
 #: Smallest effective friction in the formula of the first guess, as a fraction of mu_*. The effect
 #: of normal stress on the state may cancel friction completely.
-_MIN_RELATIVE_FRICTION = 0.1
+_MIN_EFFECTIVE_FRICTION_OVER_MU_STAR = 0.1
 
 
 class RateSteps(ShootingSteps):
@@ -64,48 +64,52 @@ class RateSteps(ShootingSteps):
         Direction of the steps, 1 for upward and -1 for downward.
     """
 
-    quantity = "critical_velocity_ratio"
-    trigger_sign = 1
+    critical_output_name = "critical_velocity_ratio"
+    sign_of_triggering_steps = 1
 
-    def scene_at(self, size: float) -> Scene:
+    def scene_with_step(self, step_size: float) -> Scene:
         """Return the scene with a step of a given size.
 
         See the base class for the parameters.
         """
-        return self.scene.with_(load_velocity_ratio=self.step_value(size))
+        return self.scene.with_(load_velocity_ratio=self.user_value_of_step(step_size))
 
-    def path_factory(self, engine: str) -> Callable[[float], CriticalPath]:
+    def build_critical_path_factory(self, engine: str) -> Callable[[float], CriticalPath]:
         """Return a function that computes the critical path after a step.
 
         Only the load point velocity of the path depends on the size. See the base class for the
         parameters.
         """
-        path = CriticalPath.of_scene(self.scene, engine)
-        return lambda size: path.with_load_velocity(self.step_value(size))
+        path = CriticalPath.from_scene(self.scene, engine)
+        return lambda size: path.with_load_velocity(self.user_value_of_step(size))
 
-    def step_value(self, size: float) -> float:
+    def user_value_of_step(self, step_size: float) -> float:
         """Return the velocity ratio V_0/V_* of a step of a given size.
 
         See the base class for the parameters.
         """
-        return math.exp(self.sign * size)
+        return math.exp(self.sign * step_size)
 
     def _guess_size(self) -> float:
         """Return a guess based on the closed forms of Gu et al. (1984).
 
         The closed forms apply to the slip law.
         """
-        weakening = max(self.scene.parts.law.b_over_a - 1.0, _MIN_GUESSED_WEAKENING)
+        weakening = max(self.scene.parts.law.b_over_a - 1.0, _MIN_B_OVER_A_EXCESS_FOR_GUESS)
         return float(np.logaddexp(0.0, self.scene.stiffness_ratio - 1.0 - math.log(weakening)))
 
-    def _misfit_without_path(self, scene: Scene, meter: WorkMeter) -> float:
+    def _misfit_without_path(self, scene: Scene, work_meter: WorkMeter) -> float:
         """Return the sign of the misfit from a forward motion.
 
         The result is NaN for downward steps.
         """
-        if self.sign != self.trigger_sign:
+        if self.sign != self.sign_of_triggering_steps:
             return math.nan
-        return -1.0 if reaches_norm(scene, Accuracy(LOOSE_TOLERANCE), meter) else 1.0
+        return (
+            -1.0
+            if motion_reaches_norm(scene, Accuracy(LOCAL_TOLERANCE_OF_FIRST_ROOT), work_meter)
+            else 1.0
+        )
 
     def _compute_max_size(self) -> float:
         """Return the largest size of the search.
@@ -134,36 +138,36 @@ class DisplacementSteps(StepFamily):
         Direction of the steps, 1 for upward and -1 for downward.
     """
 
-    quantity = "critical_displacement"
-    extra_outputs = ("slip_rate_after_step", "slip_rate_after_closed_form_step")
+    critical_output_name = "critical_displacement"
+    extra_output_names = ("slip_rate_after_step", "slip_rate_after_closed_form_step")
 
     def __init__(self, scene: Scene, sign: int) -> None:
         if scene.load_velocity_ratio is None:
             scene = scene.with_(load_velocity_ratio=0.0)
         super().__init__(scene, sign)
 
-    def scene_at(self, size: float) -> Scene:
+    def scene_with_step(self, step_size: float) -> Scene:
         """Return the scene with a step of a given size.
 
         See the base class for the parameters.
         """
-        return self.scene.with_(displacement_step=self.step_value(size))
+        return self.scene.with_(displacement_step=self.user_value_of_step(step_size))
 
-    def step_value(self, size: float) -> float:
+    def user_value_of_step(self, step_size: float) -> float:
         """Return the displacement of a step of a given size, in units of D_c.
 
         See the base class for the parameters.
         """
-        return self.sign * size
+        return self.sign * step_size
 
-    def value_error(self, size: float, relative_error: float) -> float:
+    def user_value_error(self, step_size: float, relative_error: float) -> float:
         """Return the error of the displacement, in units of D_c.
 
         See the base class for the parameters.
         """
-        return size * relative_error
+        return step_size * relative_error
 
-    def inertia_shifts_size(self, size: float, rtol: float) -> bool:
+    def inertia_shifts_critical_size(self, step_size: float, rtol: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
         With inertia, the slider follows the critical path with a delay, which changes the critical
@@ -174,12 +178,12 @@ class DisplacementSteps(StepFamily):
         scene = self.scene
         if not scene.has_mass:
             return False
-        behind, rate = inertial_slip_lag(self.scene_at(size))
+        behind, rate = slip_lag_due_to_inertia(self.scene_with_step(step_size))
         missed = 0.5 * scene.a * scene.parts.law.state_change_over_a / scene.stiffness
         loaded = scene.load_velocity / rate if rate else 0.0
-        return behind * (loaded + missed) > INERTIA_TOLERANCE_FRACTION * rtol * size
+        return behind * (loaded + missed) > INERTIA_TOLERANCE_FRACTION * rtol * step_size
 
-    def smaller_steps_decay(self, size: float) -> bool:
+    def motions_after_smaller_steps_decay(self, step_size: float) -> bool:
         """Return True if steady sliding is stable after every smaller step.
 
         A displacement step does not change the stability of steady sliding. See the base class for
@@ -187,7 +191,7 @@ class DisplacementSteps(StepFamily):
         """
         return is_linearly_stable(self.scene)
 
-    def extra_values(self, size: float) -> dict[str, float]:
+    def extra_output_values(self, step_size: float) -> dict[str, float]:
         """Return the slip rates immediately after two steps, in units of V_*.
 
         The first step is the critical step. The second step is the displacement D_c a/(b - a) of
@@ -196,25 +200,27 @@ class DisplacementSteps(StepFamily):
         """
 
         def after(step: float) -> float:
-            log_slip_rate = log_slip_rate_at(self.scene, self.scene.stiffness * step, 0.0)
-            return math.exp(log_slip_rate) if log_slip_rate < _MAX_FLOAT_LOGARITHM else math.inf
+            log_slip_rate = quasi_static_log_slip_rate(self.scene, self.scene.stiffness * step, 0.0)
+            return math.exp(log_slip_rate) if log_slip_rate < _LOG_OF_MAX_FLOAT else math.inf
 
         weakening = self.scene.parts.law.b_over_a - 1.0
         closed_form = after(self.sign / weakening) if weakening > 0.0 else math.nan
-        critical = math.nan if math.isnan(size) else after(self.step_value(size))
-        return dict(zip(self.extra_outputs, (critical, closed_form), strict=True))
+        critical = math.nan if math.isnan(step_size) else after(self.user_value_of_step(step_size))
+        return dict(zip(self.extra_output_names, (critical, closed_form), strict=True))
 
-    def find_path_sizes(self, tolerances: Iterable[float], meter: WorkMeter) -> Iterator[float]:
+    def find_sizes_by_critical_path(
+        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+    ) -> Iterator[float]:
         """Yield the size of the step at which the critical path starts.
 
         A displacement step changes only spring stress and leaves Psi = 0. The critical step is
         therefore the point of the path at which Psi = 0, and each tolerance needs only one
         integration. See the base class for the parameters.
         """
-        path, sign = CriticalPath.of_scene(self.scene, meter.engine), self.sign
-        for tolerance in tolerances:
-            start = path.find_start(
-                tolerance, meter, ("psi", 0.0), lambda point: sign * point.spring_stress > 0.0
+        path, sign = CriticalPath.from_scene(self.scene, work_meter.engine), self.sign
+        for tolerance in local_tolerances:
+            start = path.find_start_point(
+                tolerance, work_meter, ("psi", 0.0), lambda point: sign * point.spring_stress > 0.0
             )
             if start is None:
                 return
@@ -233,8 +239,10 @@ class DisplacementSteps(StepFamily):
         if self.sign < 0:
             weakest = scene.parts.normal_stress.min_frictional_stress(scene)
             return min(scene.mu_star, -weakest) / scene.stiffness
-        farther = INERTIAL_LOG_RATE_MARGIN if scene.has_mass else 0.0
-        friction = stress_after_jump(scene, scene.a * (scene.log_instability_rate + farther))
+        farther = LOG_RATE_MARGIN_FOR_INERTIA if scene.has_mass else 0.0
+        friction = frictional_stress_after_jump(
+            scene, scene.a * (scene.log_instability_rate + farther)
+        )
         if friction is None:
             return _MAX_SPRING_STRESS / scene.stiffness
         self.largest_step_reaches_norm = True
@@ -258,9 +266,9 @@ class NormalStressSteps(ShootingSteps):
         Direction of the steps, 1 for upward and -1 for downward.
     """
 
-    quantity = "critical_normal_stress_step"
-    trigger_sign = -1
-    extra_outputs = ("slip_rate_after_step",)
+    critical_output_name = "critical_normal_stress_step"
+    sign_of_triggering_steps = -1
+    extra_output_names = ("slip_rate_after_step",)
 
     def __init__(self, scene: Scene, sign: int) -> None:
         held = 0.0 if scene.load_velocity_ratio is None else scene.load_velocity_ratio
@@ -271,48 +279,54 @@ class NormalStressSteps(ShootingSteps):
         # The change of ln V is larger than the size by a factor of mu_*/a.
         self.min_size = min(self.min_size, MIN_STEP_SIZE * scene.a / scene.mu_star)
 
-    def scene_at(self, size: float) -> Scene:
+    def scene_with_step(self, step_size: float) -> Scene:
         """Return the scene with a step of a given size.
 
         See the base class for the parameters.
         """
-        return self.scene.with_(normal_stress_step=self.step_value(size))
+        return self.scene.with_(normal_stress_step=self.user_value_of_step(step_size))
 
-    def step_value(self, size: float) -> float:
+    def user_value_of_step(self, step_size: float) -> float:
         """Return the change of normal stress of a step, in units of sigma_*.
 
         See the base class for the parameters.
         """
-        return math.expm1(self.sign * size)
+        return math.expm1(self.sign * step_size)
 
-    def inertia_shifts_size(self, size: float, rtol: float) -> bool:
+    def inertia_shifts_critical_size(self, step_size: float, rtol: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
         With inertia, the slip rate rises with a delay after the step. The effect on the size
         depends on the slip rate immediately after the step. See the base class for the parameters.
         """
         scene = self.scene
-        behind = inertial_slip_lag(self.scene_at(size))[0] if scene.has_mass else 0.0
+        behind = (
+            slip_lag_due_to_inertia(self.scene_with_step(step_size))[0] if scene.has_mass else 0.0
+        )
         missed = max(1.0, 0.5 * scene.parts.law.state_change_over_a) * behind
-        return missed > INERTIA_TOLERANCE_FRACTION * rtol * size * scene.mu_star / scene.a
+        return missed > INERTIA_TOLERANCE_FRACTION * rtol * step_size * scene.mu_star / scene.a
 
-    def neutral_size_error(self, size: float, rtol: float) -> float:
+    def size_error_if_neutrally_stable(self, step_size: float, rtol: float) -> float:
         """Return the size error if steady sliding is nearly neutral.
 
         The critical stiffness is proportional to normal stress, and the size is the logarithm of
         normal stress. See the base class for the parameters.
         """
-        scene = self.scene_at(size)
+        scene = self.scene_with_step(step_size)
         near = may_have_closed_orbits(scene) and abs(stability_margin(scene)) < 10.0 * rtol
-        return 2.0 * rtol / size if near else 0.0
+        return 2.0 * rtol / step_size if near else 0.0
 
-    def extra_values(self, size: float) -> dict[str, float]:
+    def extra_output_values(self, step_size: float) -> dict[str, float]:
         """Return the slip rate immediately after the critical step.
 
         The slip rate is in units of V_*. See the base class for the parameters.
         """
-        rate = math.nan if math.isnan(size) else math.exp(self._log_slip_rate_after(size))
-        return dict(zip(self.extra_outputs, (rate,), strict=True))
+        rate = (
+            math.nan
+            if math.isnan(step_size)
+            else math.exp(self._log_slip_rate_after_step(step_size))
+        )
+        return dict(zip(self.extra_output_names, (rate,), strict=True))
 
     def _guess_size(self) -> float:
         """Return a guess of the critical size.
@@ -326,18 +340,22 @@ class NormalStressSteps(ShootingSteps):
             return math.log(scene.stiffness_ratio)
         _follows, alpha = scene.parts.normal_stress.coupling or (0.0, 0.0)
         friction = effective_friction(scene.mu_star, max(law.b_over_a, 1.0), alpha)
-        friction = max(abs(friction), _MIN_RELATIVE_FRICTION * scene.mu_star)
+        friction = max(abs(friction), _MIN_EFFECTIVE_FRICTION_OVER_MU_STAR * scene.mu_star)
         return scene.a * scene.stiffness_ratio / friction
 
-    def _misfit_without_path(self, scene: Scene, meter: WorkMeter) -> float:
+    def _misfit_without_path(self, scene: Scene, work_meter: WorkMeter) -> float:
         """Return the sign of the misfit from a forward motion.
 
         The result is NaN for increases of normal stress, or if the motion cannot continue.
         """
-        if self.sign != self.trigger_sign:
+        if self.sign != self.sign_of_triggering_steps:
             return math.nan
         try:
-            return -1.0 if reaches_norm(scene, Accuracy(LOOSE_TOLERANCE), meter) else 1.0
+            return (
+                -1.0
+                if motion_reaches_norm(scene, Accuracy(LOCAL_TOLERANCE_OF_FIRST_ROOT), work_meter)
+                else 1.0
+            )
         except MotionStopped as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
@@ -355,10 +373,12 @@ class NormalStressSteps(ShootingSteps):
         scene = self.scene
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
             return 0.0
-        level = scene.log_instability_rate + (INERTIAL_LOG_RATE_MARGIN if scene.has_mass else 0.0)
+        level = scene.log_instability_rate + (
+            LOG_RATE_MARGIN_FOR_INERTIA if scene.has_mass else 0.0
+        )
 
         def excess(size: float) -> float:
-            return self._log_slip_rate_after(size) - level
+            return self._log_slip_rate_after_step(size) - level
 
         if excess(0.0) >= 0.0:
             return 0.0
@@ -369,7 +389,7 @@ class NormalStressSteps(ShootingSteps):
         if self._allows_steady_sliding(largest):
             return largest
         self.largest_step_reaches_norm, smaller = False, 0.0
-        while largest - smaller > _MAX_SIZE_RTOL * largest:
+        while largest - smaller > _RTOL_OF_MAX_STEP_SIZE * largest:
             middle = 0.5 * (smaller + largest)
             smaller, largest = (
                 (middle, largest) if self._allows_steady_sliding(middle) else (smaller, middle)
@@ -385,21 +405,23 @@ class NormalStressSteps(ShootingSteps):
         """
         follows, _alpha = self.scene.parts.normal_stress.coupling or (0.0, 0.0)
         if self.sign > 0 or not follows:
-            return _MAX_LOG_STRESS_CHANGE
-        return min(_MAX_LOG_STRESS_CHANGE, (1.0 - 1e-6) * -math.log(self.scene.mu_star * follows))
+            return _MAX_LOG_NORMAL_STRESS_RATIO
+        return min(
+            _MAX_LOG_NORMAL_STRESS_RATIO, (1.0 - 1e-6) * -math.log(self.scene.mu_star * follows)
+        )
 
-    def _allows_steady_sliding(self, size: float) -> bool:
+    def _allows_steady_sliding(self, step_size: float) -> bool:
         """Return True if sliding can be steady after the step.
 
         The result is also True if the load point is held, because steady sliding is not required in
         this case.
         """
-        scene = self.scene_at(size)
+        scene = self.scene_with_step(step_size)
         load = scene.log_load_velocity
         return load == -math.inf or steady_sliding(scene, load) is not None
 
-    def _log_slip_rate_after(self, size: float) -> float:
+    def _log_slip_rate_after_step(self, step_size: float) -> float:
         """Return ln(V/V_*) immediately after the step, without inertia."""
-        scene = self.scene_at(size).without_mass()
+        scene = self.scene_with_step(step_size).without_mass()
         steady_states = compute_steady_states(scene, 0.0, 0.0)
-        return manifold_point(scene, scene.spring_stress_step, steady_states).log_slip_rate
+        return slow_manifold_point(scene, scene.spring_stress_step, steady_states).log_slip_rate

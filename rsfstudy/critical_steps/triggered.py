@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.critical_steps.forward_motion import is_neutral, reaches_norm
+from rsfstudy.critical_steps.forward_motion import is_neutrally_stable, motion_reaches_norm
 from rsfstudy.critical_steps.loading_checks import (
-    check_single_step,
-    norm_below_loading_outcome,
+    check_loading_is_single_step,
+    outcome_if_norm_is_below_load_velocity,
     slow_norm_warning,
 )
 from rsfstudy.error_boundary import guard_methods
@@ -79,16 +79,16 @@ class Triggered(Measure):
         Outcome
             Status, results and message.
         """
-        check_single_step(scene)
+        check_loading_is_single_step(scene)
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
-            return norm_below_loading_outcome(scene, scene.load_velocity)
+            return outcome_if_norm_is_below_load_velocity(scene, scene.load_velocity)
         if not scene.is_perturbed:
             return Outcome(Status.OK, {"unstable": 0.0, "unstable_error": 0.0}, "there is no step")
         accuracies = accuracy, accuracy.refined()
-        answer, again = (reaches_norm(scene, asked, meter) for asked in accuracies)
+        answer, again = (motion_reaches_norm(scene, asked, meter) for asked in accuracies)
         # If the stiffness is critical within the tolerance, growth and decay of perturbations are
         # indistinguishable.
-        if answer != again or is_neutral(scene, 10.0 * accuracy.rtol):
+        if answer != again or is_neutrally_stable(scene, 10.0 * accuracy.rtol):
             return Outcome(
                 Status.UNVERIFIED, message="the tolerance decides: ask for a smaller rtol"
             )

@@ -14,29 +14,29 @@ from rsfstudy._lazy import lazy_exports
 
 if TYPE_CHECKING:
     from rsfstudy.execution.clusters import connect_to_cluster
-    from rsfstudy.execution.plan import Plan, estimate_cost
+    from rsfstudy.execution.plan import CellPlan, estimate_cost
     from rsfstudy.execution.preparation import prepare_study_run
     from rsfstudy.execution.provenance import provenance_attributes, run_fingerprint
     from rsfstudy.execution.runner import OutputOptions, ProgressCallback
-    from rsfstudy.execution.workers import Workers
+    from rsfstudy.execution.workers import WorkerPool
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
             "execution.clusters": ("connect_to_cluster",),
-            "execution.plan": ("Plan", "estimate_cost"),
+            "execution.plan": ("CellPlan", "estimate_cost"),
             "execution.preparation": ("prepare_study_run",),
             "execution.provenance": ("provenance_attributes", "run_fingerprint"),
             "execution.runner": ("OutputOptions", "ProgressCallback"),
-            "execution.workers": ("Workers",),
+            "execution.workers": ("WorkerPool",),
         },
     )
 
 __all__ = [
     "OutputOptions",
-    "Plan",
+    "CellPlan",
     "ProgressCallback",
-    "Workers",
+    "WorkerPool",
     "connect_to_cluster",
     "estimate_cost",
     "prepare_study_run",

@@ -21,34 +21,34 @@ import cloudpickle
 import numpy as np
 
 from rsfstudy.defaults import CELL_TIME_LIMIT
-from rsfstudy.errors import InvalidValue, RunError, shorten
+from rsfstudy.errors import InvalidValue, RunError, shorten_text
 from rsfstudy.execution import provenance
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion import Accuracy, compilation_log, register_steppers
-from rsfstudy.slider import Scene, UserPart, register_parts
+from rsfstudy.motion import Accuracy, compilation_log, register_user_steppers
+from rsfstudy.slider import Scene, UserPart, register_user_parts
 from rsfstudy.status import Status
-from rsfstudy.storage import CellRow, OutputPacking
+from rsfstudy.storage import OutputPacking, StoredCellRow
 from rsfstudy.study import STUDIES_PACKAGE, Cell, CellChanges
 
 if TYPE_CHECKING:
-    from rsfstudy.execution.plan import BatchIterator, Plan
+    from rsfstudy.execution.plan import CellBatchIterator, CellPlan
 
 #: Wall time that a cell may take, over its limit of CPU time: for cells that sleep or wait.
-WALL_TIME_FACTOR = 10.0
+WALL_OVER_CPU_TIME_LIMIT = 10.0
 #: Seconds after which finished cells are handed over; the disk may take 30 ms to keep them.
-_HAND_OVER_INTERVAL = 0.5
+_FINISHED_CELLS_HANDOVER_INTERVAL = 0.5
 #: Identifies this process.
 _PROCESS_ID = uuid.uuid4().hex
 #: CPU time that Dask itself may use on a worker, over that of the cells.
-_DASK_CPU_SHARE = 0.25
+_DASK_CPU_TIME_OVER_CELL_TIME = 0.25
 #: Characters of a message that are kept.
 _MAX_MESSAGE_LENGTH = 2000
 
-CellRows = list[CellRow]
+StoredCellRows = list[StoredCellRow]
 
 
 @dataclass(frozen=True)
-class Task:
+class CellTask:
     """Scene, measure, accuracy and conditions that every cell is computed with.
 
     Parameters
@@ -68,44 +68,47 @@ class Task:
         The process that made the task.
     """
 
-    base: Scene
+    base_scene: Scene
     measure: Measure
     accuracy: Accuracy
     time_limit: float = CELL_TIME_LIMIT
     user_parts: tuple[UserPart, ...] = ()
-    steppers: tuple[type, ...] = ()
+    user_stepper_classes: tuple[type, ...] = ()
     code_fingerprint: Mapping[str, str] = field(default_factory=dict)
-    origin_process: str = _PROCESS_ID
+    origin_process_id: str = _PROCESS_ID
 
     @functools.cached_property
-    def packing(self) -> OutputPacking:
+    def output_packing(self) -> OutputPacking:
         """Places of the numbers of a cell."""
         return OutputPacking(self.measure)
 
 
 #: Takes a task and batches, and yields the finished cells, in any order.
-CellMapper = Callable[[Task, "BatchIterator"], Generator[CellRows]]
+CellBatchMapper = Callable[[CellTask, "CellBatchIterator"], Generator[StoredCellRows]]
 
 
-def compute_serially(task: Task, batches: BatchIterator) -> Generator[CellRows]:
+def compute_serially(task: CellTask, batches: CellBatchIterator) -> Generator[StoredCellRows]:
     """Compute in this process, one cell after the other. Finished cells are handed over in groups,
     because recording each on its own may cost more than computing it: each group is as large as all
     before it, unless it takes too long.
     """
-    finished: CellRows = []
+    finished: StoredCellRows = []
     handed_over, since = 0, time.monotonic()
-    for key, changes in (cell for some in batches for cell in batches.plan.cells(some)):
-        cell = changes.apply_to(task.base)
-        outcome, seconds = compute_cell(task, cell, propagated=(KeyboardInterrupt,))
-        finished.append(task.packing.pack_cell(key, outcome, seconds))
-        if len(finished) >= max(1, handed_over) or time.monotonic() - since > _HAND_OVER_INTERVAL:
+    for key, changes in (cell for some in batches for cell in batches.plan.select_cells(some)):
+        cell = changes.build_cell(task.base_scene)
+        outcome, seconds = compute_cell(task, cell, propagated_exceptions=(KeyboardInterrupt,))
+        finished.append(task.output_packing.pack_cell(key, outcome, seconds))
+        if (
+            len(finished) >= max(1, handed_over)
+            or time.monotonic() - since > _FINISHED_CELLS_HANDOVER_INTERVAL
+        ):
             yield finished
             handed_over += len(finished)
             finished, since = [], time.monotonic()
     yield finished
 
 
-def serialize_task(task: Task) -> bytes:
+def serialize_task(task: CellTask) -> bytes:
     """A task as bytes, with all the code that workers cannot import, and that of named studies, to
     import which would load all that declares and reduces them.
 
@@ -116,7 +119,7 @@ def serialize_task(task: Task) -> bytes:
     """
     cloudpickle.register_pickle_by_value(importlib.import_module(STUDIES_PACKAGE))
     each: list[tuple[str, str, object]] = [("part", part.name, part) for part in task.user_parts]
-    each += [("engine", task.accuracy.engine, stepper) for stepper in task.steppers]
+    each += [("engine", task.accuracy.engine, stepper) for stepper in task.user_stepper_classes]
     for what, name, value in (*each, ("measure", task.measure.name, task)):
         try:
             sent = cloudpickle.dumps(value)
@@ -128,7 +131,7 @@ def serialize_task(task: Task) -> bytes:
 
 
 @functools.lru_cache(maxsize=4)
-def _load_task(sent: bytes) -> Task:
+def _load_cell_task(serialized_task: bytes) -> CellTask:
     """The task, in a worker process, which must run the same code as the process that sent it.
 
     Raises
@@ -137,13 +140,13 @@ def _load_task(sent: bytes) -> Task:
         Where the worker runs other code.
     """
     try:
-        task: Task = cloudpickle.loads(sent)
+        task: CellTask = cloudpickle.loads(serialized_task)
     except Exception as error:
         raise RunError(
             f"a worker cannot load the measure, or a part ({type(error).__name__}: {error}). Give "
             "the workers the files it needs, or put them beside the study file"
         ) from error
-    used = *task.measure.code_classes, *task.user_parts, *task.steppers
+    used = *task.measure.code_classes, *task.user_parts, *task.user_stepper_classes
     ours = provenance.code_fingerprint(task.accuracy.engine, used)
     for name, wanted in task.code_fingerprint.items():
         if ours.get(name) != wanted:
@@ -154,18 +157,18 @@ def _load_task(sent: bytes) -> Task:
     return task
 
 
-def pack_batch(plan: Plan, numbers: np.ndarray) -> bytes:
+def pack_cell_batch(plan: CellPlan, cell_numbers: np.ndarray) -> bytes:
     """Cells of a plan in as few bytes as possible, because Dask's scheduler keeps what it has
     passed on. Parts of the user's own are sent by their names; a worker has them from the task.
     """
     cells = [
         (key, {n: getattr(v, "name", v) for n, v in of_scene.items()}, of_measure)
-        for key, (of_scene, of_measure) in plan.cells(numbers)
+        for key, (of_scene, of_measure) in plan.select_cells(cell_numbers)
     ]
     return zlib.compress(pickle.dumps(cells), level=1)
 
 
-def compute_batch(sent: bytes, batch: bytes) -> bytes:
+def compute_batch(serialized_task: bytes, packed_batch: bytes) -> bytes:
     """Compute a packed batch in a worker process; a cell over its time limit ends the process.
 
     Returns
@@ -179,46 +182,52 @@ def compute_batch(sent: bytes, batch: bytes) -> bytes:
     RunError
         Where the worker cannot load the task, or runs other code than the sender.
     """
-    task = _load_task(sent)
-    finished: CellRows = []
+    task = _load_cell_task(serialized_task)
+    finished: StoredCellRows = []
     began = time.monotonic()
-    ours = task.origin_process == _PROCESS_ID  # a worker may be a thread of the user's own process
+    ours = (
+        task.origin_process_id == _PROCESS_ID
+    )  # a worker may be a thread of the user's own process
     if not ours:
-        compilation_log.context = _cpu_time_limits.suspended
-    with contextlib.nullcontext() if ours else _cpu_time_limits.enforced(task.time_limit):
-        register_parts(task.user_parts)
-        register_steppers(task.steppers)
-        for key, *changes in pickle.loads(zlib.decompress(batch)):
-            cell = CellChanges(*changes).apply_to(task.base)
-            finished.append(task.packing.pack_cell(key, *compute_cell(task, cell)))
-            if time.monotonic() - began > _HAND_OVER_INTERVAL:
+        compilation_log.context_while_compiling = _cpu_time_limits.suspend_temporarily
+    with (
+        contextlib.nullcontext()
+        if ours
+        else _cpu_time_limits.enforce_in_this_thread(task.time_limit)
+    ):
+        register_user_parts(task.user_parts)
+        register_user_steppers(task.user_stepper_classes)
+        for key, *changes in pickle.loads(zlib.decompress(packed_batch)):
+            cell = CellChanges(*changes).build_cell(task.base_scene)
+            finished.append(task.output_packing.pack_cell(key, *compute_cell(task, cell)))
+            if time.monotonic() - began > _FINISHED_CELLS_HANDOVER_INTERVAL:
                 break
     return pickle.dumps(finished)
 
 
 def compute_cell(
-    task: Task, cell: Cell, propagated: tuple[type[BaseException], ...] = ()
+    task: CellTask, cell: Cell, propagated_exceptions: tuple[type[BaseException], ...] = ()
 ) -> tuple[Outcome, float]:
     """The outcome of one cell, and its wall time in s, without that of compiling; an exception is
     an outcome too.
     """
-    begin = time.perf_counter() - compilation_log.seconds
+    begin = time.perf_counter() - compilation_log.total_compilation_seconds
     try:
         outcome = task.measure.with_(**cell.measure_changes)(cell.scene, task.accuracy)
-    except propagated:
+    except propagated_exceptions:
         raise
     except BaseException as error:  # a cell may raise SystemExit or CancelledError too
         # not str(error), which may raise as well
         text = traceback.format_exception_only(error)[-1].strip()
         outcome = Outcome(Status.CELL_RAISED, message=text)
     if outcome.message:
-        outcome = replace(outcome, message=_to_storable_message(outcome.message))
-    return outcome, time.perf_counter() - compilation_log.seconds - begin
+        outcome = replace(outcome, message=_shorten_message_for_storage(outcome.message))
+    return outcome, time.perf_counter() - compilation_log.total_compilation_seconds - begin
 
 
-def _to_storable_message(message: str) -> str:
+def _shorten_message_for_storage(message: str) -> str:
     """A message as a file can hold it."""
-    text = shorten(message, _MAX_MESSAGE_LENGTH).encode(errors="backslashreplace").decode()
+    text = shorten_text(message, _MAX_MESSAGE_LENGTH).encode(errors="backslashreplace").decode()
     return text.replace("\0", "\\0")
 
 
@@ -232,32 +241,32 @@ class _CpuTimeLimits:
     """
 
     def __init__(self) -> None:
-        self._active_threads, self._limit = 0, 0.0
+        self._active_threads, self._process_cpu_limit = 0, 0.0
         self._lock = threading.Lock()
 
     @contextlib.contextmanager
-    def enforced(self, seconds: float) -> Iterator[None]:
+    def enforce_in_this_thread(self, seconds: float) -> Iterator[None]:
         """Allow this thread so many seconds of CPU time for a cell of a batch."""
-        self._update(1, seconds)
+        self._update_threads_and_timers(1, seconds)
         try:
             yield
         finally:
-            self._update(-1, seconds)
+            self._update_threads_and_timers(-1, seconds)
 
-    def _update(self, threads: int, seconds: float) -> None:
+    def _update_threads_and_timers(self, thread_ids: int, seconds: float) -> None:
         with self._lock:
-            self._active_threads += threads
-            self._limit = self._active_threads * seconds
-            self._set_timers(self._limit)
+            self._active_threads += thread_ids
+            self._process_cpu_limit = self._active_threads * seconds
+            self._set_timers(self._process_cpu_limit)
 
     @contextlib.contextmanager
-    def suspended(self) -> Iterator[None]:
+    def suspend_temporarily(self) -> Iterator[None]:
         """No limit for a while; it starts anew afterwards."""
         self._set_timers(0.0)
         try:
             yield
         finally:
-            self._set_timers(self._limit)
+            self._set_timers(self._process_cpu_limit)
 
     @staticmethod
     def _set_timers(seconds: float) -> None:
@@ -266,11 +275,12 @@ class _CpuTimeLimits:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         if seconds:
             faulthandler.dump_traceback_later(
-                WALL_TIME_FACTOR * seconds + _HAND_OVER_INTERVAL, exit=True
+                WALL_OVER_CPU_TIME_LIMIT * seconds + _FINISHED_CELLS_HANDOVER_INTERVAL, exit=True
             )
             faulthandler.register(signal.SIGPROF, chain=True)  # which then ends the process
             signal.setitimer(
-                signal.ITIMER_PROF, (1.0 + _DASK_CPU_SHARE) * seconds + _HAND_OVER_INTERVAL
+                signal.ITIMER_PROF,
+                (1.0 + _DASK_CPU_TIME_OVER_CELL_TIME) * seconds + _FINISHED_CELLS_HANDOVER_INTERVAL,
             )
 
 

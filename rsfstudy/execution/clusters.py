@@ -18,15 +18,15 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from rsfstudy.errors import InvalidValue, RunError, shorten
+from rsfstudy.errors import InvalidValue, RunError, shorten_text
 
 #: Time in s to wait for a process of this machine that does not answer.
-_CONNECT_TIMEOUT = 600
+_CLUSTER_CONNECT_TIMEOUT = 600
 #: What ends a run in order, where it is handled.
-_ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_SIGNALS_THAT_END_RUN = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-def check_main_guard(workers: int) -> None:
+def check_script_has_main_guard(worker_count: int) -> None:
     """Refuse a script that worker processes, which import it, would run as well: one whose line
     that leads here stands below no condition.
 
@@ -50,7 +50,7 @@ def check_main_guard(workers: int) -> None:
     remedy = (
         'Put what runs below `if __name__ == "__main__":`, or compute in this process: workers=0.'
     )
-    raise InvalidValue("workers", workers, rule, remedy=remedy)
+    raise InvalidValue("workers", worker_count, rule, remedy=remedy)
 
 
 @contextlib.contextmanager
@@ -60,7 +60,7 @@ def _delay_interrupts() -> Iterator[None]:
     run, and then its workers. A second Ctrl-C is not delayed.
     """
     held: list[int] = []
-    found = {int(number): signal.getsignal(number) for number in _ENDING_SIGNALS}
+    found = {int(number): signal.getsignal(number) for number in _SIGNALS_THAT_END_RUN}
     handlers = {number: handler for number, handler in found.items() if callable(handler)}
 
     def hold(number: int, frame: FrameType | None) -> None:
@@ -86,7 +86,7 @@ def _delay_interrupts() -> Iterator[None]:
             handlers[held[0]](held[0], None)
 
 
-def _unregister_safely(unregister: Callable[..., None]) -> Any:
+def _ignore_unknown_names_in_unregister(unregister: Callable[..., None]) -> Any:
     """Wrap ``resource_tracker.unregister`` so that unknown names cause no traceback.
 
     If the tracker process is killed, Python starts another tracker process. The new process does
@@ -102,18 +102,20 @@ def _unregister_safely(unregister: Callable[..., None]) -> Any:
     return unregister_known
 
 
-def _tolerate_lost_tracker() -> None:
+def _tolerate_lost_resource_tracker() -> None:
     """Install ``_unregister_safely`` for the lifetime of the process.
 
     The wrapper must stay installed, because semaphores are released whenever they are
     garbage-collected.
     """
     if not hasattr(resource_tracker.unregister, "__wrapped__"):
-        resource_tracker.unregister = _unregister_safely(resource_tracker.unregister)
+        resource_tracker.unregister = _ignore_unknown_names_in_unregister(
+            resource_tracker.unregister
+        )
 
 
 @contextlib.contextmanager
-def start_local_cluster(workers: int, log: Path) -> Iterator[Any]:
+def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
     """A Dask client of worker processes on this machine, with one thread each.
 
     Parameters
@@ -142,24 +144,24 @@ def start_local_cluster(workers: int, log: Path) -> Iterator[Any]:
         # by default each process ticks 50 times and samples its stack 100 times a second
         "distributed.admin.tick.interval": "1s",
         "distributed.worker.profile.enabled": False,
-        "distributed.comm.timeouts.connect": f"{_CONNECT_TIMEOUT}s",
+        "distributed.comm.timeouts.connect": f"{_CLUSTER_CONNECT_TIMEOUT}s",
         "distributed.nanny.pre-spawn-environ": dict.fromkeys(
             ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
         ),
     }
     with dask.config.set(quiet), contextlib.ExitStack() as stack:
-        _tolerate_lost_tracker()
+        _tolerate_lost_resource_tracker()
         resource_tracker.ensure_running()  # before workers start, because it unblocks signals
         with _delay_interrupts():
             try:
                 cluster = LocalCluster(
-                    n_workers=workers,
+                    n_workers=worker_count,
                     threads_per_worker=1,
                     processes=True,
                     dashboard_address="127.0.0.1:0",  # its pages listen, even where it has none
                     scheduler_kwargs={"dashboard": False},
                     silence_logs=logging.ERROR,
-                    plugins=(worker_log.StderrToFile(log.resolve()),),
+                    plugins=(worker_log.RedirectStderrPlugin(log_path.resolve()),),
                 )
             except Exception as error:
                 raise RunError(
@@ -169,22 +171,22 @@ def start_local_cluster(workers: int, log: Path) -> Iterator[Any]:
                 ) from error
             stack.enter_context(cluster)
         yield stack.enter_context(Client(cluster))
-        said = log.stat().st_size
+        said = log_path.stat().st_size
         stack.close()
-        os.truncate(log, said)  # that a heartbeat found the scheduler closed is no news
+        os.truncate(log_path, said)  # that a heartbeat found the scheduler closed is no news
 
 
-async def _check_scheduler_answers(address: str) -> None:
+async def _check_scheduler_answers(scheduler_address: str) -> None:
     """Check that Dask answers; its client would wait for ever if another program listens there."""
     from distributed import Security
     from distributed.comm.core import connect
 
-    comm = await connect(address, **Security().get_connection_args("client"))
+    comm = await connect(scheduler_address, **Security().get_connection_args("client"))
     comm.abort()
 
 
 @contextlib.contextmanager
-def connect_to_cluster(address: str, *, timeout: float = 30.0) -> Iterator[Any]:
+def connect_to_cluster(scheduler_address: str, *, timeout: float = 30.0) -> Iterator[Any]:
     """A client of a Dask scheduler that is already running, with the certificates of Dask's
     configuration.
 
@@ -200,12 +202,12 @@ def connect_to_cluster(address: str, *, timeout: float = 30.0) -> Iterator[Any]:
     # closed
     with silence_logging_cmgr(logging.CRITICAL + 1):
         try:
-            asyncio.run(asyncio.wait_for(_check_scheduler_answers(address), timeout))
-            client = Client(address, timeout=timeout)
+            asyncio.run(asyncio.wait_for(_check_scheduler_answers(scheduler_address), timeout))
+            client = Client(scheduler_address, timeout=timeout)
         except Exception as error:  # Dask raises errors of many kinds for a wrong address
             raise RunError(
-                f"no Dask scheduler answers at {shorten(address)!r}: "
-                f"{shorten(error) or 'it took too long'}. "
+                f"no Dask scheduler answers at {shorten_text(scheduler_address)!r}: "
+                f"{shorten_text(error) or 'it took too long'}. "
                 "Start one with `dask scheduler` (certificates for tls:// are those of Dask's "
                 "configuration), or leave --scheduler out."
             ) from error

@@ -39,9 +39,9 @@ _INSTALLATION_DIRECTORIES = tuple(
         site.getusersitepackages(),
     }
 )
-_PLAIN_TYPES = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
+_TYPES_DIGESTED_BY_REPR = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
 #: What containers, and what wraps functions, are made of.
-_CONTAINER_PARTS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
+_GETTERS_OF_CONTAINER_PARTS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
     (property, lambda value: (value.fget, value.fset)),
     (functools.cached_property, lambda value: value.func),
     (functools.partial, lambda value: (value.func, value.args, value.keywords)),
@@ -51,62 +51,68 @@ _CONTAINER_PARTS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
 )
 
 
-def digest_sources(sources: Mapping[str, bytes]) -> str:
+def digest_sources(sources_by_file_name: Mapping[str, bytes]) -> str:
     """Digest of the code in files, given by their names."""
     # a third of the time of parsing it to a tree that Python can see; 2 leaves docstrings out
-    compiled = (compile(text, name, "exec", optimize=2) for name, text in sources.items())
-    return _hash_texts(_CodeWalker().texts((*sources, *compiled), ()))
+    compiled = (
+        compile(text, name, "exec", optimize=2) for name, text in sources_by_file_name.items()
+    )
+    return _hash_texts(_DigestTextCollector().collect_texts((*sources_by_file_name, *compiled), ()))
 
 
-def digest_with_measures(physics: str, measures: Iterable[type]) -> str:
+def digest_physics_and_measures(physics_digest: str, measure_classes: Iterable[type]) -> str:
     """Digest of the physics and measures: that of the physics alone, unless one of them stands in
     the file of a named study.
     """
-    theirs = tuple(measure for measure in measures if _is_study_module(measure.__module__))
-    return _hash_texts((physics, *_CodeWalker().texts(theirs, ()))) if theirs else physics
+    theirs = tuple(measure for measure in measure_classes if _is_study_module(measure.__module__))
+    return (
+        _hash_texts((physics_digest, *_DigestTextCollector().collect_texts(theirs, ())))
+        if theirs
+        else physics_digest
+    )
 
 
-def digest_classes(*used: object) -> str:
+def digest_user_classes(*classes_or_data: object) -> str:
     """Digest of classes and of all they use, and of data such as protocols; "none" where all of
     them are classes of rsfstudy.
     """
     own = tuple(
         one if isinstance(one, type) else repr(one)
-        for one in used
+        for one in classes_or_data
         if not isinstance(one, type) or _is_user_module(one.__module__)
     )
-    return _hash_texts(_CodeWalker().texts(own, ())) if own else "none"
+    return _hash_texts(_DigestTextCollector().collect_texts(own, ())) if own else "none"
 
 
-def _hash_texts(parts: Iterable[str]) -> str:
+def _hash_texts(texts: Iterable[str]) -> str:
     sha256 = hashlib.sha256()
-    for part in parts:
+    for part in texts:
         sha256.update(part.encode(errors="surrogatepass") + b"\0")
     return sha256.hexdigest()[:16]
 
 
-class _CodeWalker:
+class _DigestTextCollector:
     """Texts that differ wherever the code differs; each object is visited once."""
 
     def __init__(self) -> None:
         self._visited: dict[Hashable, Any] = {}
 
-    def texts(self, value: Any, names: Iterable[str]) -> Iterator[str]:
+    def collect_texts(self, value: Any, used_names: Iterable[str]) -> Iterator[str]:
         """The texts for a value, given the names that the code around it uses."""
-        if isinstance(value, _PLAIN_TYPES):
+        if isinstance(value, _TYPES_DIGESTED_BY_REPR):
             yield repr(value)
         elif isinstance(value, ModuleType):
-            yield from self._module_texts(value, names)
+            yield from self._module_texts(value, used_names)
         elif isinstance(value, CodeType):
             yield from self._code_texts(value)
         elif isinstance(value, tuple):  # may be one object here and two elsewhere
             for part in value:
-                yield from self.texts(part, names)
+                yield from self.collect_texts(part, used_names)
         elif id(value) not in self._visited:
             self._visited[id(value)] = value
-            yield from self._texts_of_new_object(value, names)
+            yield from self._texts_of_new_object(value, used_names)
 
-    def _texts_of_new_object(self, value: Any, names: Iterable[str]) -> Iterator[str]:
+    def _texts_of_new_object(self, value: Any, used_names: Iterable[str]) -> Iterator[str]:
         if isinstance(value, FunctionType):
             yield from self._function_texts(value)
         elif isinstance(value, type):
@@ -116,67 +122,69 @@ class _CodeWalker:
         elif type(value) is np.ndarray and value.dtype.kind != "O":
             yield f"{value.dtype} {value.shape} {value.tobytes().hex()}"
         elif kept := next(
-            (parts for kind, parts in _CONTAINER_PARTS if isinstance(value, kind)), None
+            (parts for kind, parts in _GETTERS_OF_CONTAINER_PARTS if isinstance(value, kind)), None
         ):
-            yield from self.texts(kept(value), names)
+            yield from self.collect_texts(kept(value), used_names)
         elif hasattr(value, "__wrapped__"):  # a cached function
-            yield from self.texts(value.__wrapped__, names)
+            yield from self.collect_texts(value.__wrapped__, used_names)
         else:
             yield from self._class_texts(type(value))
-            yield from self._state_texts(value, names)
+            yield from self._texts_of_instance_state(value, used_names)
 
-    def _module_texts(self, module: ModuleType, names: Iterable[str]) -> Iterator[str]:
+    def _module_texts(self, module: ModuleType, used_names: Iterable[str]) -> Iterator[str]:
         """Only what is used of a module counts."""
-        if not _is_digested_module(module.__name__):
+        if not _is_digested_by_used_names(module.__name__):
             yield module.__name__
             return
-        asked = (id(module), *names)
+        asked = (id(module), *used_names)
         if asked not in self._visited:
             self._visited[asked] = module
-            used = [name for name in names if name in vars(module)]
-            yield from self.texts(tuple(vars(module)[name] for name in used), names)
+            used = [name for name in used_names if name in vars(module)]
+            yield from self.collect_texts(tuple(vars(module)[name] for name in used), used_names)
 
     def _function_texts(self, function: FunctionType) -> Iterator[str]:
         yield function.__qualname__
-        if not _is_digested_module(function.__module__):
+        if not _is_digested_by_used_names(function.__module__):
             return
         yield from self._code_texts(function.__code__)
         cells = [cell.cell_contents for cell in function.__closure__ or () if cell != CellType()]
-        names = tuple(_used_names(function.__code__))
-        yield from self.texts((function.__defaults__, function.__kwdefaults__, *cells), names)
+        names = tuple(_names_used_by_code(function.__code__))
+        yield from self.collect_texts(
+            (function.__defaults__, function.__kwdefaults__, *cells), names
+        )
         for name in names:
             if name in function.__globals__:
                 yield name
-                yield from self.texts(function.__globals__[name], names)
+                yield from self.collect_texts(function.__globals__[name], names)
 
     def _code_texts(self, code: CodeType) -> Iterator[str]:
         yield from (code.co_name, code.co_code.hex(), *code.co_names, *code.co_varnames)
-        yield from self.texts(code.co_consts[_has_docstring_slot(code) :], ())
+        yield from self.collect_texts(code.co_consts[_has_docstring_slot(code) :], ())
 
-    def _class_texts(self, kind: type) -> Iterator[str]:
-        yield kind.__qualname__
-        if not _is_digested_module(kind.__module__):
+    def _class_texts(self, digested_class: type) -> Iterator[str]:
+        yield digested_class.__qualname__
+        if not _is_digested_by_used_names(digested_class.__module__):
             return
-        yield from self.texts(kind.__bases__, ())
-        for name, value in sorted(vars(kind).items()):
-            if not _is_generated(name, value):
+        yield from self.collect_texts(digested_class.__bases__, ())
+        for name, value in sorted(vars(digested_class).items()):
+            if not _is_generated_class_member(name, value):
                 yield name
-                yield from self.texts(value, ())
+                yield from self.collect_texts(value, ())
 
-    def _state_texts(self, value: Any, names: Iterable[str]) -> Iterator[str]:
-        if _is_digested_module(type(value).__module__):
-            yield from self.texts(_state_without_caches(value), names)
+    def _texts_of_instance_state(self, value: Any, used_names: Iterable[str]) -> Iterator[str]:
+        if _is_digested_by_used_names(type(value).__module__):
+            yield from self.collect_texts(_state_without_caches(value), used_names)
             return
         content = io.BytesIO()
         try:
-            _PicklerWithoutCaches(content, protocol=4).dump(value)
+            _PicklerWithoutCachedProperties(content, protocol=4).dump(value)
         except Exception:  # a lock or a file decides no number
             yield type(value).__qualname__
         else:
             yield content.getvalue().hex()
 
 
-class _PicklerWithoutCaches(pickle.Pickler):
+class _PicklerWithoutCachedProperties(pickle.Pickler):
     """Pickler that leaves out the cached properties of all objects.
 
     Whether a property has been computed differs between processes, and decides no number.
@@ -211,41 +219,41 @@ def _has_docstring_slot(code: CodeType) -> bool:
     return bool(code.co_flags & inspect.CO_NEWLOCALS) and not code.co_name.startswith("<")
 
 
-def _is_generated(name: str, value: Any) -> bool:
+def _is_generated_class_member(member_name: str, value: Any) -> bool:
     """True of what Python, dataclasses and msgspec make for a class, which decides no number."""
-    if name == "_abc_impl" or name.startswith("__annot"):
+    if member_name == "_abc_impl" or member_name.startswith("__annot"):
         return True
     made = getattr(getattr(value, "__code__", None), "co_qualname", "").startswith("__create_fn__")
-    return made or (name.startswith("__") and not callable(value))
+    return made or (member_name.startswith("__") and not callable(value))
 
 
-def _used_names(code: CodeType) -> Iterator[str]:
+def _names_used_by_code(code: CodeType) -> Iterator[str]:
     """Names a function uses, those of the functions within it included."""
     yield from code.co_names
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
-            yield from _used_names(constant)
+            yield from _names_used_by_code(constant)
 
 
-def _is_digested_module(name: str | None) -> bool:
+def _is_digested_by_used_names(module_name: str | None) -> bool:
     """True if what is digested of a module is what is used of it."""
-    return _is_study_module(name) or _is_user_module(name)
+    return _is_study_module(module_name) or _is_user_module(module_name)
 
 
-def _is_study_module(name: str | None) -> bool:
-    return (name or "").startswith(f"{STUDIES}.")
+def _is_study_module(module_name: str | None) -> bool:
+    return (module_name or "").startswith(f"{STUDIES}.")
 
 
-def _is_user_module(name: str | None) -> bool:
+def _is_user_module(module_name: str | None) -> bool:
     """True if a module is neither Python's nor installed nor of rsfstudy."""
-    top = (name or "").partition(".")[0]
+    top = (module_name or "").partition(".")[0]
     if not top or top == _PACKAGE_NAME or (top in sys.stdlib_module_names and top != "__main__"):
         return False
     return not _is_installed_file(getattr(sys.modules.get(top), "__file__", None))
 
 
 @functools.cache
-def _is_installed_file(file: str | None) -> bool:
-    return file is not None and any(
-        Path(file).resolve().is_relative_to(p) for p in _INSTALLATION_DIRECTORIES
+def _is_installed_file(file_path: str | None) -> bool:
+    return file_path is not None and any(
+        Path(file_path).resolve().is_relative_to(p) for p in _INSTALLATION_DIRECTORIES
     )

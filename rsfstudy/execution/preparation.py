@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from rsfstudy.execution.cells import Task, compute_serially, serialize_task
+from rsfstudy.execution.cells import CellTask, compute_serially, serialize_task
 from rsfstudy.execution.provenance import code_fingerprint
 from rsfstudy.execution.runner import OutputOptions, StudyRun
-from rsfstudy.execution.workers import Workers
-from rsfstudy.motion import user_stepper
+from rsfstudy.execution.workers import WorkerPool
+from rsfstudy.motion import find_user_stepper
 from rsfstudy.study import Study
 
 
-def prepare_study_run(study: Study, options: OutputOptions, workers: Workers) -> StudyRun:
+def prepare_study_run(study: Study, options: OutputOptions, workers: WorkerPool) -> StudyRun:
     """Prepare the run of a study on workers.
 
     Raises
@@ -18,15 +18,15 @@ def prepare_study_run(study: Study, options: OutputOptions, workers: Workers) ->
     InvalidValue
         For anything wrong with the study, and for code that cannot be sent to the workers.
     """
-    task = Task(
+    task = CellTask(
         study.base,
         study.measure,
         study.accuracy,
-        workers.time_limit,
+        workers.cell_time_limit,
         user_parts=tuple(study.user_parts.values()),
-        steppers=user_stepper(study.accuracy.engine),
+        user_stepper_classes=find_user_stepper(study.accuracy.engine),
         code_fingerprint=code_fingerprint(study.accuracy.engine, study.user_classes),
     )
-    if workers.cell_mapper() is not compute_serially:
+    if workers.make_cell_batch_mapper() is not compute_serially:
         serialize_task(task)  # raises before any work if it cannot be sent
     return StudyRun(study, options, task, workers.count_concurrent_cells())

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _PACKAGE_DIRECTORY = Path(__file__).parent.parent
 #: Code whose change may change a number.
-_PHYSICS_PACKAGES = (
+_PACKAGES_THAT_DECIDE_NUMBERS = (
     "slider",
     "motion",
     "measure_base",
@@ -35,19 +35,23 @@ _PHYSICS_PACKAGES = (
 )
 
 
-def read_sources(package: Path) -> dict[str, bytes]:
+def read_physics_sources(package_directory: Path) -> dict[str, bytes]:
     """Source of everything that decides the number of a cell in every study, by the path in the
     package.
     """
-    files = [file for part in _PHYSICS_PACKAGES for file in sorted((package / part).rglob("*.py"))]
-    return {file.relative_to(package).as_posix(): file.read_bytes() for file in files}
+    files = [
+        file
+        for part in _PACKAGES_THAT_DECIDE_NUMBERS
+        for file in sorted((package_directory / part).rglob("*.py"))
+    ]
+    return {file.relative_to(package_directory).as_posix(): file.read_bytes() for file in files}
 
 
 #: Read at import, because later changes to the files do not change the code that runs.
-_PHYSICS_SOURCES = read_sources(_PACKAGE_DIRECTORY)
+_PHYSICS_SOURCES_AT_IMPORT = read_physics_sources(_PACKAGE_DIRECTORY)
 
 
-def code_fingerprint(engine: str = SCIPY, used: Iterable[object] = ()) -> dict[str, str]:
+def code_fingerprint(engine: str = SCIPY, user_classes: Iterable[object] = ()) -> dict[str, str]:
     """Versions, and digests of code, that decide the numbers of a cell.
 
     Parameters
@@ -58,7 +62,7 @@ def code_fingerprint(engine: str = SCIPY, used: Iterable[object] = ()) -> dict[s
     """
     return {
         "physics": _physics_digest(),
-        "own_code": code_digest.digest_classes(*used),
+        "own_code": code_digest.digest_user_classes(*user_classes),
         "python": f"{sys.version_info.major}.{sys.version_info.minor}",  # whose code is digested
         "numpy": version("numpy"),
         "scipy": version("scipy"),
@@ -68,7 +72,7 @@ def code_fingerprint(engine: str = SCIPY, used: Iterable[object] = ()) -> dict[s
 
 @functools.cache
 def _physics_digest() -> str:
-    return code_digest.digest_sources(_PHYSICS_SOURCES)
+    return code_digest.digest_sources(_PHYSICS_SOURCES_AT_IMPORT)
 
 
 def run_fingerprint(study: Study) -> dict[str, Any]:
@@ -83,11 +87,13 @@ def run_fingerprint(study: Study) -> dict[str, Any]:
         "methods": [list(pair) for pair in accuracy.methods],
         "engine": accuracy.engine,
         **shared,
-        "physics": code_digest.digest_with_measures(shared["physics"], study.measure.code_classes),
+        "physics": code_digest.digest_physics_and_measures(
+            shared["physics"], study.measure.code_classes
+        ),
     }
 
 
-def collect_provenance(study: Study, command: str) -> dict[str, Any]:
+def collect_provenance(study: Study, command_line: str) -> dict[str, Any]:
     """Where, when and from what a run was made, and by which versions.
 
     Parameters
@@ -98,21 +104,21 @@ def collect_provenance(study: Study, command: str) -> dict[str, Any]:
     """
     return {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": command,
+        "command": command_line,
         "declared_in": study.source_file,
         "versions": {
             "python": platform.python_version(),
-            **{name: version(name) for name in _DEPENDENCIES},
+            **{name: version(name) for name in _PACKAGES_WITH_RECORDED_VERSION},
         },
         "fingerprint": run_fingerprint(study),
-        "git": git_state(_PACKAGE_DIRECTORY.parent),
+        "git": read_git_commit_and_state(_PACKAGE_DIRECTORY.parent),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         "mathematical_library": " ".join(platform.libc_ver()).strip() or "unknown",
         "byte_order": sys.byteorder,
     }
 
 
-def provenance_attributes(command: str) -> dict[str, str]:
+def provenance_attributes(command_line: str) -> dict[str, str]:
     """Root attributes that say which rsfstudy made a dataset of one scene, when, and how.
 
     Parameters
@@ -121,26 +127,34 @@ def provenance_attributes(command: str) -> dict[str, str]:
         What the user typed, or called.
     """
     when = datetime.now(UTC).isoformat(timespec="seconds")
-    return {"source": _source_attribute(), "history": f"{when} {command}"}
+    return {"source": _build_source_attribute(), "history": f"{when} {command_line}"}
 
 
 @functools.cache
-def _source_attribute() -> str:
-    commit = git_state(_PACKAGE_DIRECTORY.parent)
+def _build_source_attribute() -> str:
+    commit = read_git_commit_and_state(_PACKAGE_DIRECTORY.parent)
     return f"rsfstudy {version('rsfstudy')}, commit {commit}, numerical model of a spring-slider"
 
 
-_DEPENDENCIES = ("rsfstudy", "numpy", "scipy", "xarray", "dask", "distributed", "netCDF4")
+_PACKAGES_WITH_RECORDED_VERSION = (
+    "rsfstudy",
+    "numpy",
+    "scipy",
+    "xarray",
+    "dask",
+    "distributed",
+    "netCDF4",
+)
 
 
-def git_state(root: Path) -> str:
+def read_git_commit_and_state(checkout_directory: Path) -> str:
     """Commit of a checkout of this project, and whether what decides numbers was clean; where its
     root is none, as for an installed wheel, the commit that it was built from, or "none".
     """
 
     def run_git(*words: str) -> str:
         return subprocess.run(
-            ["git", "-C", str(root), *words],
+            ["git", "-C", str(checkout_directory), *words],
             capture_output=True,
             text=True,
             check=True,
@@ -148,7 +162,7 @@ def git_state(root: Path) -> str:
         ).stdout.strip()
 
     with contextlib.suppress(OSError, subprocess.SubprocessError):
-        if Path(run_git("rev-parse", "--show-toplevel")) == root.resolve():
+        if Path(run_git("rev-parse", "--show-toplevel")) == checkout_directory.resolve():
             # what runs leave in the checkout changes nothing
             changed = run_git(
                 "status", "--porcelain", "--", _PACKAGE_DIRECTORY.name, "studies", "pyproject.toml"

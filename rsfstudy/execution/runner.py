@@ -16,15 +16,15 @@ import xarray as xr
 from rsfstudy.defaults import RESULT_FORMATS
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
 from rsfstudy.execution import provenance
-from rsfstudy.execution.cells import CellMapper, CellRows, Task
-from rsfstudy.execution.plan import BatchIterator, Plan, scatter_cells
+from rsfstudy.execution.cells import CellBatchMapper, CellTask, StoredCellRows
+from rsfstudy.execution.plan import CellBatchIterator, CellPlan, order_cells_by_golden_section
 from rsfstudy.reductions import apply_reductions
 from rsfstudy.status import Status
 from rsfstudy.storage import (
     CellColumns,
-    Journal,
+    CellJournal,
     assemble_dataset,
-    check_not_existing,
+    check_store_does_not_exist,
     check_zarr_installed,
     clean_attributes,
     write_dataset,
@@ -33,10 +33,10 @@ from rsfstudy.storage import (
 from rsfstudy.study import Study
 
 #: Statuses of cells that ended their worker.
-_LOST_STATUSES = (Status.WORKER_LOST.name, Status.TIME_LIMIT_SPENT.name)
-_ANSWER_STATUSES = frozenset(status.name for status in Status if status.is_answer)
+_STATUSES_OF_LOST_CELLS = (Status.WORKER_LOST.name, Status.TIME_LIMIT_SPENT.name)
+_STATUSES_WITH_ANSWER = frozenset(status.name for status in Status if status.is_answer)
 #: A run ends early when this many cells have failed and none has succeeded.
-_MAX_FIRST_FAILURES = 10
+_MAX_FAILURES_WITHOUT_SUCCESS = 10
 
 ProgressCallback = Callable[[int, int], None]
 
@@ -66,7 +66,7 @@ class OutputOptions:
     fresh: bool = False
     keep_going: bool = False
     despite_failures: bool = False
-    command: str = "rsfstudy.run"
+    command_line: str = "rsfstudy.run"
 
     def __post_init__(self) -> None:
         if self.format not in RESULT_FORMATS:
@@ -95,17 +95,21 @@ class StudyRun:
         its lattice, before anything is computed.
     """
 
-    def __init__(self, study: Study, options: OutputOptions, task: Task, workers: int = 1) -> None:
+    def __init__(
+        self, study: Study, options: OutputOptions, task: CellTask, workers: int = 1
+    ) -> None:
         self.study, self.options, self.task, self.workers = study, options, task, workers
-        self.plan = Plan(study)
-        self.provenance = provenance.collect_provenance(study, options.command)
-        self._dry_run()
+        self.plan = CellPlan(study)
+        self.provenance = provenance.collect_provenance(study, options.command_line)
+        self._check_reductions_and_claims()
 
-    def _dry_run(self) -> None:
+    def _check_reductions_and_claims(self) -> None:
         """Apply the reductions to a lattice of pending cells, to find mistakes before any work.
         Unless values were overridden, each claim must name a variable and a place of the result.
         """
-        pending = CellColumns.pending(self.study.size, self.task.packing.width)
+        pending = CellColumns.build_pending_cells(
+            self.study.size, self.task.output_packing.packed_number_count
+        )
         lattice = assemble_dataset(self.study, pending, self.provenance)
         for reduction in self.study.reductions:
             try:
@@ -118,17 +122,19 @@ class StudyRun:
         for claim in () if self.study.overrides else self.study.claims:
             claim.check_selection(lattice)
 
-    def output_path(self, ending: str) -> Path:
+    def output_path(self, file_suffix: str) -> Path:
         """A file of this run."""
         assert self.options.output is not None
-        return self.options.output / f"{self.study.name}{ending}"
+        return self.options.output / f"{self.study.name}{file_suffix}"
 
     @property
     def worker_log_path(self) -> Path | None:
         """The file for the last words of worker processes, if anything is written."""
         return None if self.options.output is None else self.output_path(".workers.log")
 
-    def __call__(self, mapper: CellMapper, progress: ProgressCallback) -> xr.Dataset:
+    def __call__(
+        self, cell_batch_mapper: CellBatchMapper, progress_callback: ProgressCallback
+    ) -> xr.Dataset:
         """Compute the missing cells, then assemble, reduce and write the dataset.
 
         Parameters
@@ -149,43 +155,46 @@ class StudyRun:
         """
         keeping = self.options
         if keeping.format == "zarr":
-            check_not_existing(self.output_path(".zarr"))
+            check_store_does_not_exist(self.output_path(".zarr"))
         path = None if keeping.output is None else self.output_path(".cells.sqlite")
-        fingerprint, layout = self.provenance["fingerprint"], self.task.packing
-        with Journal(path, fingerprint, layout, fresh=keeping.fresh) as journal:
+        fingerprint, layout = self.provenance["fingerprint"], self.task.output_packing
+        with CellJournal(path, fingerprint, layout, fresh=keeping.fresh) as journal:
             try:
-                self._compute_missing(journal, mapper, progress)
+                self._compute_missing(journal, cell_batch_mapper, progress_callback)
                 return self._write_results(journal)
             except (KeyboardInterrupt, RunError) as error:
                 raise self._save_partial_results(journal, error) from error
             except DataError as error:
-                raise DataError(f"{error} {self._resume_hint(journal)}") from error
+                raise DataError(f"{error} {self._describe_how_to_resume(journal)}") from error
 
     def _compute_missing(
-        self, journal: Journal, mapper: CellMapper, progress: ProgressCallback
+        self,
+        journal: CellJournal,
+        cell_batch_mapper: CellBatchMapper,
+        progress_callback: ProgressCallback,
     ) -> None:
-        cells = self.plan.unique_cells
+        cells = self.plan.unique_cell_numbers
         # failures are tried again
         answered = journal.statuses(self.plan.keys[cells]) < int(Status.WORK_BUDGET_SPENT)
-        missing = scatter_cells(cells[~answered])
+        missing = order_cells_by_golden_section(cells[~answered])
         done, failed, total = int(answered.sum()), 0, len(cells)
-        progress(done, total)
+        progress_callback(done, total)
         if self.worker_log_path is not None:
             self.worker_log_path.unlink(missing_ok=True)  # of an earlier run
         if not len(missing):
             return
-        batches = BatchIterator(self.plan, missing, self.workers)
-        with contextlib.closing(mapper(self.task, batches)) as arriving:
+        batches = CellBatchIterator(self.plan, missing, self.workers)
+        with contextlib.closing(cell_batch_mapper(self.task, batches)) as arriving:
             for finished in arriving:
-                journal.add(finished)
+                journal.add_cells(finished)
                 self._warn_of_lost_cells(finished)
                 for row in finished:
                     batches.record_time(row[4])
-                    failed += row[1] not in _ANSWER_STATUSES
+                    failed += row[1] not in _STATUSES_WITH_ANSWER
                 done += len(finished)
-                progress(done, total)
+                progress_callback(done, total)
                 if (
-                    failed == done >= _MAX_FIRST_FAILURES
+                    failed == done >= _MAX_FAILURES_WITHOUT_SUCCESS
                     and done < total
                     and not self.options.keep_going
                 ):
@@ -196,10 +205,10 @@ class StudyRun:
                         "Mend that, or go on all the same with --keep-going (keep_going=True)"
                     )
 
-    def _warn_of_lost_cells(self, finished: CellRows) -> None:
+    def _warn_of_lost_cells(self, finished_cells: StoredCellRows) -> None:
         """Warn of cells that ended their worker."""
-        for key, status, message, *_ in finished:
-            if status in _LOST_STATUSES:
+        for key, status, message, *_ in finished_cells:
+            if status in _STATUSES_OF_LOST_CELLS:
                 cell = int(np.flatnonzero(self.plan.keys == np.void(key))[0])
                 warnings.warn(
                     f"cell {self.study.describe_cell(cell)} failed, {Status[status].label}: "
@@ -209,7 +218,7 @@ class StudyRun:
 
     # ---- from cells to results ------------------------------------------------------------------
 
-    def _write_results(self, journal: Journal) -> xr.Dataset:
+    def _write_results(self, journal: CellJournal) -> xr.Dataset:
         zarr = self.options.format == "zarr"
         try:
             results = (
@@ -228,7 +237,7 @@ class StudyRun:
             self.output_path(stale).unlink(missing_ok=True)
         return written
 
-    def assemble_lattice(self, journal: Journal) -> xr.Dataset:
+    def assemble_lattice(self, journal: CellJournal) -> xr.Dataset:
         """The dataset of the cells in the journal, without reductions."""
         return assemble_dataset(self.study, journal.read_cells(self.plan.keys), self.provenance)
 
@@ -236,7 +245,7 @@ class StudyRun:
         despite = self.options.despite_failures
         return apply_reductions(lattice, tuple(self.study.reductions), despite_failures=despite)
 
-    def _write_zarr_in_slabs(self, journal: Journal) -> xr.Dataset:
+    def _write_zarr_in_slabs(self, journal: CellJournal) -> xr.Dataset:
         def read(some: slice) -> CellColumns:
             return journal.read_cells(self.plan.keys[some])
 
@@ -244,7 +253,7 @@ class StudyRun:
             self.study, read, self.provenance, self._apply_reductions, self.output_path(".zarr")
         )
 
-    def _save_partial_results(self, journal: Journal, error: BaseException) -> RunError:
+    def _save_partial_results(self, journal: CellJournal, error: BaseException) -> RunError:
         """Write what is finished, and give the error for a run that ended early."""
         why = f"{self.study.name}: {str(error) or 'interrupted'}. "
         if self.options.output is not None and self.options.format == "netcdf":
@@ -256,9 +265,9 @@ class StudyRun:
             except DataError as unwritten:
                 why += f"{unwritten} "
         kind = Interrupted if isinstance(error, KeyboardInterrupt) else RunError
-        return kind(why + self._resume_hint(journal))
+        return kind(why + self._describe_how_to_resume(journal))
 
-    def _resume_hint(self, journal: Journal) -> str:
+    def _describe_how_to_resume(self, journal: CellJournal) -> str:
         """A sentence: how many cells are finished, where they are, and how to go on."""
         known = int((journal.statuses(self.plan.keys) != int(Status.PENDING)).sum())
         text = f"{known} of {self.study.size} cells are finished"

@@ -20,11 +20,11 @@ from rsfstudy.errors import DataError
 
 _STDERR_FILE_NUMBER = 2
 #: Loggers in this process of Dask and of the libraries below it.
-_LOGGER_NAMES = ("distributed", "tornado", "asyncio")
+_NAMES_OF_DASK_LOGGERS = ("distributed", "tornado", "asyncio")
 
 
 @contextlib.contextmanager
-def open_worker_log(log: Path | None) -> Iterator[Path]:
+def open_worker_log(log_path: Path | None) -> Iterator[Path]:
     """The file, ready for writing; a temporary one where no name is given. It is removed if
     it stays empty.
 
@@ -34,29 +34,29 @@ def open_worker_log(log: Path | None) -> Iterator[Path]:
         If it cannot be written.
     """
     try:
-        if log is None:
+        if log_path is None:
             number, name = tempfile.mkstemp(prefix="rsfstudy.", suffix=".workers.log")
             os.close(number)
-            log = Path(name)
-        log.touch()
+            log_path = Path(name)
+        log_path.touch()
     except OSError as error:
-        raise DataError(f"cannot write {log or 'a temporary file'}: {error}.") from error
+        raise DataError(f"cannot write {log_path or 'a temporary file'}: {error}.") from error
     try:
-        with _redirect_loggers(log):
-            yield log
+        with _redirect_loggers(log_path):
+            yield log_path
     finally:
         with contextlib.suppress(OSError):
-            if not log.stat().st_size:
-                log.unlink()
+            if not log_path.stat().st_size:
+                log_path.unlink()
 
 
 @contextlib.contextmanager
-def _redirect_loggers(log: Path) -> Iterator[None]:
+def _redirect_loggers(log_file: Path) -> Iterator[None]:
     """Write errors that are logged in this process to the file, and nowhere else."""
-    handler = logging.FileHandler(log, delay=True)
+    handler = logging.FileHandler(log_file, delay=True)
     handler.setLevel(logging.ERROR)
     handler.setFormatter(logging.Formatter("%(asctime)s - %(name)s - %(message)s"))
-    loggers = [logging.getLogger(name) for name in _LOGGER_NAMES]
+    loggers = [logging.getLogger(name) for name in _NAMES_OF_DASK_LOGGERS]
     before = [(logger.handlers, logger.propagate) for logger in loggers]
     for logger in loggers:
         logger.handlers, logger.propagate = [handler], False
@@ -69,7 +69,7 @@ def _redirect_loggers(log: Path) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class StderrToFile(WorkerPlugin):
+class RedirectStderrPlugin(WorkerPlugin):
     """A Dask worker whose process writes errors to a file.
 
     Parameters
@@ -77,13 +77,13 @@ class StderrToFile(WorkerPlugin):
     log : Path
     """
 
-    log: Path
+    log_path: Path
 
     def setup(self, worker: Any) -> None:
         """Called by Dask when the worker starts."""
         if sys.__stderr__ is None:  # the number of a closed one may belong to another file by now
             return
         with contextlib.suppress(OSError):
-            file = os.open(self.log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+            file = os.open(self.log_path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
             os.dup2(file, _STDERR_FILE_NUMBER)
             os.close(file)

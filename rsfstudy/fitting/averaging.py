@@ -7,7 +7,7 @@ from scipy.linalg import cholesky_banded, solve_banded
 
 #: Variance added to the diagonal of the correlation matrix, so that frequencies without noise do
 #: not receive an infinite weight, and largest number of rows within an averaging time.
-_EXTRA_VARIANCE, _MAX_LAG = 0.002, 200
+_UNAVERAGED_NOISE_VARIANCE_FRACTION, _MAX_ROWS_PER_AVERAGING_TIME = 0.002, 200
 
 
 class AveragingCorrelation:
@@ -36,17 +36,17 @@ class AveragingCorrelation:
 
     def __init__(self, time: np.ndarray, averaging_time: float) -> None:
         clock = np.concatenate([[0], np.cumsum(np.diff(time) <= 0.0)])
-        band = [np.full(len(time), 1.0 + _EXTRA_VARIANCE)]
-        for lag in range(1, min(_MAX_LAG, len(time) - 1)):
+        band = [np.full(len(time), 1.0 + _UNAVERAGED_NOISE_VARIANCE_FRACTION)]
+        for lag in range(1, min(_MAX_ROWS_PER_AVERAGING_TIME, len(time) - 1)):
             apart = np.abs(time[lag:] - time[:-lag]) / averaging_time
             overlap = np.where(clock[lag:] == clock[:-lag], np.maximum(1.0 - apart, 0.0), 0.0)
             if not overlap.any():
                 break
             band.append(np.append(overlap, np.zeros(lag)))
         self.cholesky_factor = cholesky_banded(np.array(band), lower=True)
-        self.rows_per_independent_row = float(1.0 + 2.0 * np.sum(band[1:]) / len(time))
+        self.row_count_per_independent_sample = float(1.0 + 2.0 * np.sum(band[1:]) / len(time))
 
-    def whiten(self, columns: np.ndarray) -> np.ndarray:
+    def whiten_columns(self, sample_columns: np.ndarray) -> np.ndarray:
         """Remove the correlation from columns.
 
         Parameters
@@ -59,10 +59,10 @@ class AveragingCorrelation:
         ndarray, shape (rows, columns)
             Columns multiplied by the inverse of the Cholesky factor.
         """
-        if not columns.size:
-            return columns
+        if not sample_columns.size:
+            return sample_columns
         return np.asarray(
-            solve_banded((len(self.cholesky_factor) - 1, 0), self.cholesky_factor, columns)
+            solve_banded((len(self.cholesky_factor) - 1, 0), self.cholesky_factor, sample_columns)
         )
 
     @property
@@ -71,7 +71,9 @@ class AveragingCorrelation:
         return float(2.0 * np.sum(np.log(self.cholesky_factor[0])))
 
 
-def apply_running_mean(time: np.ndarray, columns: np.ndarray, averaging_time: float) -> np.ndarray:
+def apply_running_mean(
+    time: np.ndarray, sample_columns: np.ndarray, averaging_time: float
+) -> np.ndarray:
     """Average columns over a time interval centred at each row.
 
     The columns are interpolated linearly between the rows. Before the first row and after the last
@@ -92,9 +94,9 @@ def apply_running_mean(time: np.ndarray, columns: np.ndarray, averaging_time: fl
         Averaged columns.
     """
     at = np.concatenate([[time[0] - averaging_time], time, [time[-1] + averaging_time]])
-    padded = np.concatenate([columns[:1], columns, columns[-1:]])
+    padded = np.concatenate([sample_columns[:1], sample_columns, sample_columns[-1:]])
     pieces = 0.5 * np.diff(at)[:, None] * (padded[1:] + padded[:-1])
-    sums = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(pieces, axis=0)])
+    sums = np.concatenate([np.zeros((1, sample_columns.shape[1])), np.cumsum(pieces, axis=0)])
     ends = [
         np.column_stack([np.interp(time + side, at, column) for column in sums.T])
         for side in (0.5 * averaging_time, -0.5 * averaging_time)

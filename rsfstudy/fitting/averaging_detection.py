@@ -20,18 +20,24 @@ from rsfstudy.fitting.fit_solution import FitSolution, compute_aic
 
 #: Number of rows of the running means that are tested, smallest decrease of the AIC, and smallest
 #: change of a parameter in standard errors.
-_TESTED_WINDOW_ROWS, _MIN_AIC_GAIN, _MIN_PARAMETER_CHANGE = range(2, 21), 20.0, 0.5
+_TESTED_AVERAGE_LENGTHS_IN_ROWS, _MIN_AIC_GAIN_OF_RUNNING_MEAN, _MIN_PARAMETER_CHANGE_IN_STDERRS = (
+    range(2, 21),
+    20.0,
+    0.5,
+)
 #: Smallest decrease of the AIC for low-pass filters. The value is larger than for running means
 #: because an inaccurate step time or stiffness has a similar effect.
-_MIN_LOW_PASS_GAIN = 60.0
+_MIN_AIC_GAIN_OF_LOW_PASS = 60.0
 #: Corner frequencies of the low-pass filters that are tested, relative to the sampling rate.
-_TESTED_CORNER_FREQUENCIES = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.025, 0.015)
+_TESTED_CORNER_OVER_SAMPLING_RATES = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.025, 0.015)
 #: Largest number of rows that are tested, and number of alternating estimates of the noise and the
 #: parameters.
-_MAX_ROWS, _PASSES = 20_000, 2
+_MAX_ROWS_FOR_FILTER_TEST, _NOISE_ESTIMATION_PASSES = 20_000, 2
 
 
-def find_filter(found: FitSolution, time: np.ndarray, noise: str) -> tuple[str, ...]:
+def detect_unspecified_filter(
+    fit_solution: FitSolution, time: np.ndarray, noise: str
+) -> tuple[str, ...]:
     """Test whether friction was filtered before it was recorded.
 
     Running means are tested for all records. Low-pass filters are tested only if the noise is
@@ -53,41 +59,50 @@ def find_filter(found: FitSolution, time: np.ndarray, noise: str) -> tuple[str, 
         best. The tuple is empty if no filter describes the record better than unfiltered friction.
     """
     windows = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) <= 0.0) + 1)
-    least = found.quantum / math.sqrt(12.0)
+    least = fit_solution.friction_rounding_quantum / math.sqrt(12.0)
     # The delay caused by a filter is similar to an error of the step time.
-    delays = found.by_loading[:, :0] if "step_time" in found.free else found.by_loading
-    columns = np.column_stack([found.jacobian, delays, found.model_friction])
-    free = len(found.coordinate_stderr)
+    delays = (
+        fit_solution.loading_error_sensitivity[:, :0]
+        if "step_time" in fit_solution.free_parameters
+        else fit_solution.loading_error_sensitivity
+    )
+    columns = np.column_stack([fit_solution.jacobian, delays, fit_solution.model_friction])
+    free = len(fit_solution.coordinate_stderr)
 
     def describe(kind: str, size: float) -> tuple[float, float]:
         """Return the AIC and the largest change of a parameter.
 
         The change is relative to the standard error of the parameter.
         """
-        parts = [_filtered(kind, size, time[rows], columns[rows]) for rows in windows]
+        parts = [
+            _apply_filter_to_columns(kind, size, time[rows], columns[rows]) for rows in windows
+        ]
         filtered = np.concatenate(parts)
-        left = found.residuals + columns[:, -1] - filtered[:, -1]
-        jacobian, kept = filtered[:, :-1], found.noise.kept_mask
+        left = fit_solution.residuals + columns[:, -1] - filtered[:, -1]
+        jacobian, kept = filtered[:, :-1], fit_solution.noise_model.non_outlier_mask
         averaging = size if kind == "mean" else 0.0
         moved = np.zeros(jacobian.shape[1])
-        for _ in range(_PASSES):
+        for _ in range(_NOISE_ESTIMATION_PASSES):
             guessed = left - jacobian @ moved
-            there = noises.guess_noise(noise, time, guessed, kept, least, averaging)[0]
-            whitened = there.whiten(np.column_stack([jacobian, left]))
+            there = noises.guess_noise_by_moments(noise, time, guessed, kept, least, averaging)[0]
+            whitened = there.whiten_columns(np.column_stack([jacobian, left]))
             moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
         innovations = whitened[:, -1] - whitened[:, :-1] @ moved
         criterion = compute_aic(innovations, there, len(moved), len(time))
-        return criterion, float(np.max(np.abs(moved[:free]) / found.coordinate_stderr))
+        return criterion, float(np.max(np.abs(moved[:free]) / fit_solution.coordinate_stderr))
 
-    if len(time) > _MAX_ROWS or not np.isfinite(columns).all():
+    if len(time) > _MAX_ROWS_FOR_FILTER_TEST or not np.isfinite(columns).all():
         return ()
     # The noise model of the fit may describe unfiltered friction better than this estimate.
-    plain = min(describe("", 0.0)[0], found.aic)
+    plain = min(describe("", 0.0)[0], fit_solution.aic)
     interval = float(np.median(np.diff(time[windows[0]])))
-    tried = [(*describe(kind, size), kind, size) for kind, size in _candidates(found, interval)]
+    tried = [
+        (*describe(kind, size), kind, size)
+        for kind, size in _iterate_candidate_filters(fit_solution, interval)
+    ]
     best, change, kind, size = min(tried)
-    least_gain = _MIN_AIC_GAIN if kind == "mean" else _MIN_LOW_PASS_GAIN
-    if not (plain - best > least_gain and change > _MIN_PARAMETER_CHANGE):
+    least_gain = _MIN_AIC_GAIN_OF_RUNNING_MEAN if kind == "mean" else _MIN_AIC_GAIN_OF_LOW_PASS
+    if not (plain - best > least_gain and change > _MIN_PARAMETER_CHANGE_IN_STDERRS):
         return ()
     if kind == "mean":
         seems, remedy = f"averaged over about {size:.3g} s", "`averaging=` (`--averaging`)"
@@ -99,22 +114,26 @@ def find_filter(found: FitSolution, time: np.ndarray, noise: str) -> tuple[str, 
     )
 
 
-def _candidates(found: FitSolution, interval: float) -> Iterator[tuple[str, float]]:
+def _iterate_candidate_filters(
+    fit_solution: FitSolution, sampling_interval: float
+) -> Iterator[tuple[str, float]]:
     """Yield the kinds and sizes of the filters that are tested."""
-    for rows in _TESTED_WINDOW_ROWS:
-        yield "mean", rows * interval
-    if found.noise.order:
+    for rows in _TESTED_AVERAGE_LENGTHS_IN_ROWS:
+        yield "mean", rows * sampling_interval
+    if fit_solution.noise_model.order:
         for kind in LOW_PASS_ORDERS:
-            for corner in _TESTED_CORNER_FREQUENCIES:
-                yield kind, corner / interval
+            for corner in _TESTED_CORNER_OVER_SAMPLING_RATES:
+                yield kind, corner / sampling_interval
 
 
-def _filtered(kind: str, size: float, time: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def _apply_filter_to_columns(
+    filter_kind: str, filter_size: float, time: np.ndarray, columns: np.ndarray
+) -> np.ndarray:
     """Return the filtered columns of a window, with shape (rows, columns)."""
-    if not kind:
+    if not filter_kind:
         return columns
-    if kind == "mean":
-        return apply_running_mean(time, columns, size)
-    one = Filter(kind, size)
+    if filter_kind == "mean":
+        return apply_running_mean(time, columns, filter_size)
+    one = Filter(filter_kind, filter_size)
     at = one.sample_times(time)
     return np.column_stack([one.apply(time, np.interp(at, time, each)) for each in columns.T])

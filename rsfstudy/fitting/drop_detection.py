@@ -27,30 +27,30 @@ from scipy.stats import norm
 FALSE_DETECTION_PROBABILITY = 1e-4
 #: Length of the shortest window in samples, and smallest ratio of the record length to the length
 #: of the longest window.
-MIN_WINDOW, SAMPLES_PER_WINDOW = 4, 100
+MIN_WINDOW_SAMPLES, MIN_RECORD_OVER_WINDOW_LENGTH = 4, 100
 #: Smallest number of samples in a record.
-MIN_SAMPLES = MIN_WINDOW * SAMPLES_PER_WINDOW
+MIN_SAMPLES = MIN_WINDOW_SAMPLES * MIN_RECORD_OVER_WINDOW_LENGTH
 #: Number of standard deviations above the threshold at which a drop is missed with a probability of
 #: 0.001.
-DETECTION_MARGIN = 3.1
+DETECTION_MARGIN_IN_STANDARD_DEVIATIONS = 3.1
 #: Scaled difference at which a drop ends on both sides of its peak, in standard deviations.
-_EXTENT_THRESHOLD = 2.0
+_DROP_EXTENT_THRESHOLD_SIGMAS = 2.0
 #: Fraction of the values in the shortest interval from which the noise is estimated.
-_MODE_FRACTION = 0.4
+_FRACTION_OF_VALUES_IN_MODE = 0.4
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
-_SD_PER_MAD = 1.4826
+_STANDARD_DEVIATION_PER_MAD = 1.4826
 #: Ratio of the longest to the shortest sampling interval above which a record is resampled.
-_MAX_INTERVAL_RATIO = 3.0
+_MAX_SAMPLING_INTERVAL_RATIO = 3.0
 #: Ratio of scores that shows that a window covers only a part of a drop. The score of the window is
 #: compared with the scores of windows that are twice and four times as long.
-_PARTIAL_SCORE_RATIO = 1.4
+_MIN_SCORE_RATIO_OF_LONGER_WINDOW = 1.4
 #: Index of the shortest window, 16 samples long, from which the noise correlation is estimated.
-_CORRELATION_SCALE_INDEX = 2
+_SHORTEST_CORRELATION_WINDOW_INDEX = 2
 #: Smallest prominence of a separate peak, relative to its height.
 _MIN_RELATIVE_PROMINENCE = 0.5
 
 
-class Candidate(NamedTuple):
+class DropCandidate(NamedTuple):
     """Detected drop of stress.
 
     Parameters
@@ -65,10 +65,10 @@ class Candidate(NamedTuple):
         Factor by which the correlation of the noise increases the standard error of a mean.
     """
 
-    start: float
-    end: float
-    window: float
-    difference_stderr: float
+    start_time: float
+    end_time: float
+    window_duration: float
+    mean_difference_stderr: float
     correlation_factor: float
 
 
@@ -100,7 +100,7 @@ class Detection(NamedTuple):
     0.01
     """
 
-    candidates: list[Candidate]
+    candidates: list[DropCandidate]
     noise_sd: float
     detectable_drop: float
     max_decrease: float
@@ -119,10 +119,10 @@ def robust_sd(values: np.ndarray) -> float:
     float
         Estimated standard deviation.
     """
-    return _SD_PER_MAD * float(np.median(np.abs(values - np.median(values))))
+    return _STANDARD_DEVIATION_PER_MAD * float(np.median(np.abs(values - np.median(values))))
 
 
-def find_resolution(values: np.ndarray) -> float:
+def find_smallest_value_step(values: np.ndarray) -> float:
     """Return the smallest nonzero difference between successive samples.
 
     Parameters
@@ -139,7 +139,7 @@ def find_resolution(values: np.ndarray) -> float:
     return float(steps[steps > 0.0].min(initial=math.inf))
 
 
-def estimate_mode(values: np.ndarray) -> tuple[float, float]:
+def estimate_mean_and_sd_of_mode(values: np.ndarray) -> tuple[float, float]:
     """Estimate the mean and standard deviation of the most frequent values.
 
     The function finds the shortest interval that contains 40 % of the values. The mean and the
@@ -159,14 +159,16 @@ def estimate_mode(values: np.ndarray) -> tuple[float, float]:
         Standard deviation of the Gaussian distribution.
     """
     ordered = np.sort(values)
-    count = max(int(_MODE_FRACTION * len(ordered)), 1)
+    count = max(int(_FRACTION_OF_VALUES_IN_MODE * len(ordered)), 1)
     widths = ordered[count:] - ordered[:-count]
     first = int(np.argmin(widths))
     middle = 0.5 * float(ordered[first] + ordered[first + count])
-    return middle, float(widths[first]) / (2.0 * float(norm.ppf(0.5 + 0.5 * _MODE_FRACTION)))
+    return middle, float(widths[first]) / (
+        2.0 * float(norm.ppf(0.5 + 0.5 * _FRACTION_OF_VALUES_IN_MODE))
+    )
 
 
-def window_mean_decreases(values: np.ndarray, window: int) -> np.ndarray:
+def window_mean_decreases(values: np.ndarray, window_samples: int) -> np.ndarray:
     """Compute the decrease of the window mean at each sample.
 
     Parameters
@@ -182,8 +184,12 @@ def window_mean_decreases(values: np.ndarray, window: int) -> np.ndarray:
         Mean of the window before a sample minus the mean of the window from this sample on.
     """
     sums = np.concatenate([[0.0], np.cumsum(values - values.mean())])
-    fallen = 2.0 * sums[window:-window] - sums[: -2 * window] - sums[2 * window :]
-    return np.asarray(fallen / window)
+    fallen = (
+        2.0 * sums[window_samples:-window_samples]
+        - sums[: -2 * window_samples]
+        - sums[2 * window_samples :]
+    )
+    return np.asarray(fallen / window_samples)
 
 
 def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
@@ -201,25 +207,29 @@ def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
     """
     t, s = _resample_evenly(time, stress)
     apart = float(t[-1] - t[0]) / (len(t) - 1)
-    windows = [MIN_WINDOW]
-    while 2 * windows[-1] * SAMPLES_PER_WINDOW <= len(s):
+    windows = [MIN_WINDOW_SAMPLES]
+    while 2 * windows[-1] * MIN_RECORD_OVER_WINDOW_LENGTH <= len(s):
         windows.append(2 * windows[-1])
-    quantum = min(find_resolution(stress), float(np.ptp(stress)))
+    quantum = min(find_smallest_value_step(stress), float(np.ptp(stress)))
     looks = float(norm.isf(FALSE_DETECTION_PROBABILITY / (len(s) * len(windows))))
-    scales = [_WindowScale(s, window, looks, quantum) for window in windows]
-    found: list[Candidate] = []
+    scales = [_WindowMeanDifferences(s, window, looks, quantum) for window in windows]
+    found: list[DropCandidate] = []
     for number, scale in enumerate(scales):
-        for first, last in scale.find_peaks_of_scale(scales[number + 1 : number + 3]):
+        for first, last in scale.find_drops_best_seen_in_window(scales[number + 1 : number + 3]):
             begins, ends = float(t[max(first - 1, 0)]), float(t[min(last, len(t) - 1)])
-            length = scale.window * apart
+            length = scale.window_samples * apart
             reach = length if found else 0.0
-            if any(begins < one.end + reach and one.start - reach < ends for one in found):
+            if any(
+                begins < one.end_time + reach and one.start_time - reach < ends for one in found
+            ):
                 continue
-            wider = min(max(number + 1, _CORRELATION_SCALE_INDEX), len(scales) - 1)
-            correlation = scales[wider].correlation_factor
-            found.append(Candidate(begins, ends, length, scale.spread, correlation))
+            wider = min(max(number + 1, _SHORTEST_CORRELATION_WINDOW_INDEX), len(scales) - 1)
+            correlation = scales[wider].noise_correlation_factor
+            found.append(
+                DropCandidate(begins, ends, length, scale.decrease_standard_deviation, correlation)
+            )
     best = min(scales, key=lambda scale: scale.detectable_drop)
-    means = np.convolve(s, np.full(best.window, 1.0 / best.window), "valid")
+    means = np.convolve(s, np.full(best.window_samples, 1.0 / best.window_samples), "valid")
     variation = float((np.maximum.accumulate(means) - means).max())
     return Detection(sorted(found), scales[-1].noise_sd, best.detectable_drop, variation)
 
@@ -231,14 +241,14 @@ def _resample_evenly(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, 
     a new interval are averaged. Values for empty intervals are interpolated.
     """
     gaps = np.diff(time)
-    if gaps.max() < _MAX_INTERVAL_RATIO * gaps.min():
+    if gaps.max() < _MAX_SAMPLING_INTERVAL_RATIO * gaps.min():
         return time, stress
     ordered = np.sort(gaps)
     sums = np.cumsum(ordered)
     apart = float(ordered[np.searchsorted(sums, 0.5 * sums[-1])])
     bins = np.floor((time - time[0]) / apart + 1e-9).astype(int)
     count = int(bins[-1]) + 1
-    if not MIN_WINDOW * SAMPLES_PER_WINDOW <= count <= 4 * len(time):
+    if not MIN_WINDOW_SAMPLES * MIN_RECORD_OVER_WINDOW_LENGTH <= count <= 4 * len(time):
         return time, stress
     samples = np.bincount(bins, minlength=count)
     has = samples > 0
@@ -249,7 +259,7 @@ def _resample_evenly(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, 
     return even, np.interp(even, t, s)
 
 
-class _WindowScale:
+class _WindowMeanDifferences:
     """Differences of window means for one window length.
 
     Parameters
@@ -265,24 +275,41 @@ class _WindowScale:
         Resolution of stress.
     """
 
-    def __init__(self, stress: np.ndarray, window: int, looks: float, quantum: float) -> None:
-        change = window_mean_decreases(stress, window)
-        self.window, self.sample_count = window, len(stress)
-        self.typical_decrease, decrease_sd = estimate_mode(change)
+    def __init__(
+        self,
+        stress: np.ndarray,
+        window_samples: int,
+        threshold_sigmas: float,
+        rounding_quantum: float,
+    ) -> None:
+        change = window_mean_decreases(stress, window_samples)
+        self.window_samples, self.sample_count = window_samples, len(stress)
+        self.typical_decrease, decrease_sd = estimate_mean_and_sd_of_mode(change)
         # If there is no noise, the resolution of stress determines the spread.
-        self.spread = max(decrease_sd, quantum / math.sqrt(6.0 * window))
+        self.decrease_standard_deviation = max(
+            decrease_sd, rounding_quantum / math.sqrt(6.0 * window_samples)
+        )
         # The spread has an error, because it is estimated from few independent windows.
-        surely = 1.0 + 2.33 / math.sqrt(len(stress) / (2.0 * window))
-        self.threshold = max(looks * surely * self.spread, 2.0 * quantum)
-        self.detectable_drop = self.threshold + DETECTION_MARGIN * self.spread
+        surely = 1.0 + 2.33 / math.sqrt(len(stress) / (2.0 * window_samples))
+        self.detection_threshold = max(
+            threshold_sigmas * surely * self.decrease_standard_deviation, 2.0 * rounding_quantum
+        )
+        self.detectable_drop = (
+            self.detection_threshold
+            + DETECTION_MARGIN_IN_STANDARD_DEVIATIONS * self.decrease_standard_deviation
+        )
         self.excess_decrease = change - max(0.0, self.typical_decrease)
-        lag = estimate_mode(stress[window:] - stress[:-window])[1]
-        self.noise_sd = max(lag / math.sqrt(2.0), quantum / math.sqrt(12.0))
+        lag = estimate_mean_and_sd_of_mode(stress[window_samples:] - stress[:-window_samples])[1]
+        self.noise_sd = max(lag / math.sqrt(2.0), rounding_quantum / math.sqrt(12.0))
         # The limits correspond to white noise, and to noise that is constant within a window.
-        ratio = self.spread / (self.noise_sd or 1.0) / math.sqrt(2.0 / window)
-        self.correlation_factor = min(max(ratio, 1.0), math.sqrt(window))
+        ratio = (
+            self.decrease_standard_deviation
+            / (self.noise_sd or 1.0)
+            / math.sqrt(2.0 / window_samples)
+        )
+        self.noise_correlation_factor = min(max(ratio, 1.0), math.sqrt(window_samples))
 
-    def compute_score(self, indices: np.ndarray) -> np.ndarray:
+    def compute_detection_scores(self, sample_indices: np.ndarray) -> np.ndarray:
         """Compute the score of samples.
 
         The score is the scaled difference divided by the square root of the window length.
@@ -297,14 +324,18 @@ class _WindowScale:
         ndarray
             Score of each sample, or 0 for samples that are too close to the ends of the record.
         """
-        at = indices - self.window
+        at = sample_indices - self.window_samples
         inside = (at >= 0) & (at < len(self.excess_decrease))
         net = np.where(
             inside, self.excess_decrease[np.clip(at, 0, len(self.excess_decrease) - 1)], 0.0
         )
-        return np.asarray(net / (self.spread or 1.0) / math.sqrt(self.window))
+        return np.asarray(
+            net / (self.decrease_standard_deviation or 1.0) / math.sqrt(self.window_samples)
+        )
 
-    def find_peaks_of_scale(self, longer_scales: list[_WindowScale]) -> list[tuple[int, int]]:
+    def find_drops_best_seen_in_window(
+        self, longer_windows: list[_WindowMeanDifferences]
+    ) -> list[tuple[int, int]]:
         """Find the drops that are detected best with this window length.
 
         Parameters
@@ -321,22 +352,26 @@ class _WindowScale:
         """
         # The padding allows for peaks at the ends.
         padded = np.concatenate([[0.0], self.excess_decrease, [0.0]])
-        peaks, about = find_peaks(padded, height=self.threshold, prominence=0.0)
+        peaks, about = find_peaks(padded, height=self.detection_threshold, prominence=0.0)
         peaks = peaks[about["prominences"] > _MIN_RELATIVE_PROMINENCE * padded[peaks]]
-        places = peaks - 1 + self.window
+        places = peaks - 1 + self.window_samples
         better = [
-            scale.compute_score(places) > _PARTIAL_SCORE_RATIO * self.compute_score(places)
-            for scale in longer_scales
+            scale.compute_detection_scores(places)
+            > _MIN_SCORE_RATIO_OF_LONGER_WINDOW * self.compute_detection_scores(places)
+            for scale in longer_windows
         ]
         complete = ~np.any(better, axis=0) if better else np.ones(len(peaks), dtype=bool)
-        least = min(_EXTENT_THRESHOLD * self.spread, self.threshold)
+        least = min(
+            _DROP_EXTENT_THRESHOLD_SIGMAS * self.decrease_standard_deviation,
+            self.detection_threshold,
+        )
         below = np.flatnonzero(padded <= least)
         found = []
         for peak in peaks[complete].tolist():
             place = int(np.searchsorted(below, peak))
             start, stop = int(below[place - 1]), int(below[place])
             # A sudden drop affects all windows that contain the drop.
-            begin = min(start + self.window - 1, peak - 1)
-            end = max(stop - 1 - self.window, peak - 1)
-            found.append((begin + self.window, end + self.window))
+            begin = min(start + self.window_samples - 1, peak - 1)
+            end = max(stop - 1 - self.window_samples, peak - 1)
+            found.append((begin + self.window_samples, end + self.window_samples))
         return found

@@ -20,35 +20,40 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.fitting.drop_detection import Candidate
+from rsfstudy.fitting.drop_detection import DropCandidate
 
 #: Extent of the fit on each side of the drop, in windows and in durations of the drop, and smallest
 #: and largest number of samples on each side.
-_SIDE_WINDOWS, _SIDE_DURATIONS, _MIN_SIDE_SAMPLES, _MAX_SIDE_SAMPLES = 3.0, 1.0, 16, 400
+_SIDE_LENGTH_IN_WINDOWS, _SIDE_LENGTH_IN_DROP_DURATIONS, _MIN_SIDE_SAMPLES, _MAX_SIDE_SAMPLES = (
+    3.0,
+    1.0,
+    16,
+    400,
+)
 #: Largest number of samples in a fit. If there are more samples, blocks of samples are averaged.
-_MAX_FIT_SAMPLES = 300
+_MAX_SAMPLES_IN_FIT = 300
 #: Number of windows around the candidate in which the drop may begin or end.
-_SEARCH_WINDOWS = 2.0
+_SEARCH_MARGIN_IN_WINDOWS = 2.0
 #: Number of start times and of end times in each grid, and number of grid refinements.
-_GRID_SIZE, _GRID_REFINEMENTS = 16, 3
+_SEARCH_GRID_SIZE, _SEARCH_GRID_REFINEMENTS = 16, 3
 #: Largest rate of decrease before and after the drop, relative to the rate during the drop.
-_MAX_SLOPE_RATIO = 0.3
+_MAX_SIDE_OVER_DROP_SLOPE = 0.3
 #: Largest excess decrease on one side compared with the slope of the other side, relative to the
 #: drop.
-_MAX_SIDE_FALL_RATIO = 0.5
+_MAX_SIDE_FALL_OVER_DROP = 0.5
 #: Excess of the sum of squares at the ends of 95 % confidence intervals, in noise variances. The
 #: first value, -2 ln 0.0253, applies to the time of a sudden change, and the second value applies
 #: to a parameter.
-_TIME_INTERVAL_EXCESS, _SIZE_INTERVAL_EXCESS = 7.4, 3.84
+_TIME_INTERVAL_EXCESS_SQUARES, _SIZE_INTERVAL_EXCESS_SQUARES = 7.4, 3.84
 #: Half width of a 95 % confidence interval in standard errors.
-CI_STDERR_FACTOR = 1.96
+STDERRS_PER_95_PERCENT_HALF_WIDTH = 1.96
 #: Error of a time between two samples, relative to the sampling interval.
-_SAMPLING_TIME_ERROR = 0.55
+_TIME_ERROR_OVER_SAMPLING_INTERVAL = 0.55
 #: Fewest samples next to a drop that determine the stress before or after the drop.
-_MIN_END_SAMPLES = 3
+_MIN_SAMPLES_BESIDE_DROP = 3
 
 
-class Drop(NamedTuple):
+class FittedStressDrop(NamedTuple):
     """Fitted drop of stress.
 
     Errors are half widths of 95 % confidence intervals.
@@ -71,8 +76,8 @@ class Drop(NamedTuple):
         True if the record has too few samples before the drop, or after the drop.
     """
 
-    start: float
-    end: float
+    start_time: float
+    end_time: float
     stress_before: float
     stress_after: float
     start_error: float
@@ -85,7 +90,7 @@ class Drop(NamedTuple):
     ends_after_record: bool
 
 
-class _LineFits(NamedTuple):
+class _ThreeLineFits(NamedTuple):
     """Least-squares fits of three connected lines, one for each pair of times.
 
     Parameters
@@ -100,27 +105,31 @@ class _LineFits(NamedTuple):
         Sum of squared residuals.
     """
 
-    pairs: np.ndarray
+    corner_time_pairs: np.ndarray
     coefficients: np.ndarray
     inverse_normal_matrix: np.ndarray
-    residual_squares: np.ndarray
+    residual_sums_of_squares: np.ndarray
 
     @property
-    def best_index(self) -> int:
+    def best_pair_index(self) -> int:
         """Index of the first pair with the smallest sum of squares.
 
         Differences due to rounding errors are ignored.
         """
-        return int(np.argmax(self.residual_squares <= self.residual_squares.min() * (1.0 + 1e-9)))
+        return int(
+            np.argmax(
+                self.residual_sums_of_squares <= self.residual_sums_of_squares.min() * (1.0 + 1e-9)
+            )
+        )
 
 
 def fit_drop(
     time: np.ndarray,
     stress: np.ndarray,
-    candidate: Candidate,
-    limits: tuple[float, float],
-    noise: float,
-) -> Drop:
+    candidate: DropCandidate,
+    neighbour_limits: tuple[float, float],
+    noise_sd: float,
+) -> FittedStressDrop:
     """Fit three connected lines to the stress around a drop.
 
     Parameters
@@ -139,113 +148,149 @@ def fit_drop(
     Drop
         Times and stresses of the drop with errors.
     """
-    rows = _rows_around(time, candidate, limits)
-    every = -(-len(rows) // _MAX_FIT_SAMPLES)
+    rows = _select_rows_around_drop(time, candidate, neighbour_limits)
+    every = -(-len(rows) // _MAX_SAMPLES_IN_FIT)
     whole = rows[: len(rows) // every * every]
     t, y = (of[whole].reshape(-1, every).mean(axis=1) for of in (time, stress))
     origin, scale = float(t[0]), float(t[-1] - t[0])
     t = (t - origin) / scale
     begins, ends = ((at - origin) / scale for at in candidate[:2])
-    lines = _search_times(t, y, begins, ends, candidate.window / scale)
-    best = lines.best_index
-    left = float(lines.residual_squares[best]) / max(len(t) - 6, 1)
-    variance = max(left, 0.25 * noise**2 / every) * candidate.correlation_factor**2
-    excess = lines.residual_squares - lines.residual_squares[best]
-    late = np.abs(lines.pairs[excess <= _TIME_INTERVAL_EXCESS * variance] - lines.pairs[best]).max(
-        axis=0
-    )
+    lines = _search_drop_times(t, y, begins, ends, candidate.window_duration / scale)
+    best = lines.best_pair_index
+    left = float(lines.residual_sums_of_squares[best]) / max(len(t) - 6, 1)
+    variance = max(left, 0.25 * noise_sd**2 / every) * candidate.correlation_factor**2
+    excess = lines.residual_sums_of_squares - lines.residual_sums_of_squares[best]
+    late = np.abs(
+        lines.corner_time_pairs[excess <= _TIME_INTERVAL_EXCESS_SQUARES * variance]
+        - lines.corner_time_pairs[best]
+    ).max(axis=0)
     sizes = lines.coefficients[:, 0] - lines.coefficients[:, 1]
-    spread = float(np.abs(sizes[excess <= _SIZE_INTERVAL_EXCESS * variance] - sizes[best]).max())
+    spread = float(
+        np.abs(sizes[excess <= _SIZE_INTERVAL_EXCESS_SQUARES * variance] - sizes[best]).max()
+    )
     inverse = lines.inverse_normal_matrix[best]
     variances = np.array([inverse[0, 0], inverse[1, 1], inverse[:2, :2].trace()])
     variances[2] -= 2.0 * inverse[0, 1]
-    of_before, of_after, of_drop = CI_STDERR_FACTOR * np.sqrt(np.maximum(variance * variances, 0.0))
-    begins, t1 = t0, _ = lines.pairs[best].tolist()
+    of_before, of_after, of_drop = STDERRS_PER_95_PERCENT_HALF_WIDTH * np.sqrt(
+        np.maximum(variance * variances, 0.0)
+    )
+    begins, t1 = t0, _ = lines.corner_time_pairs[best].tolist()
     (early, later), gaps = np.searchsorted(t, (t0, t1), "right"), np.diff(t)
     last = len(gaps) - 1
     gap0, gap1 = (float(gaps[min(max(at - 1, 0), last)]) for at in (early, later))
     if not ((t > t0) & (t < t1)).any():  # The drop occurs between two samples.
         begins = float(t[max(early - 1, 0)]) + 0.5 * gap0
-    return Drop(
-        start=origin + scale * begins,
-        end=origin + scale * t1,
+    return FittedStressDrop(
+        start_time=origin + scale * begins,
+        end_time=origin + scale * t1,
         stress_before=float(lines.coefficients[best, 0]),
         stress_after=float(lines.coefficients[best, 1]),
-        start_error=scale * (float(late[0]) + _SAMPLING_TIME_ERROR * gap0),
+        start_error=scale * (float(late[0]) + _TIME_ERROR_OVER_SAMPLING_INTERVAL * gap0),
         end_error=scale * (float(late[1]) + gap1),
         stress_before_error=float(of_before + spread),
         stress_after_error=float(of_after + spread),
         drop_error=float(of_drop + spread),
         residual_sd=float(np.sqrt(left * every)),
-        starts_before_record=bool(rows[0] == 0 and (t <= t0).sum() < _MIN_END_SAMPLES),
-        ends_after_record=bool(rows[-1] == len(time) - 1 and (t >= t1).sum() <= _MIN_END_SAMPLES),
+        starts_before_record=bool(rows[0] == 0 and (t <= t0).sum() < _MIN_SAMPLES_BESIDE_DROP),
+        ends_after_record=bool(
+            rows[-1] == len(time) - 1 and (t >= t1).sum() <= _MIN_SAMPLES_BESIDE_DROP
+        ),
     )
 
 
-def _rows_around(time: np.ndarray, candidate: Candidate, limits: tuple[float, float]) -> np.ndarray:
+def _select_rows_around_drop(
+    time: np.ndarray, candidate: DropCandidate, neighbour_limits: tuple[float, float]
+) -> np.ndarray:
     """Return the indices of the samples around a drop.
 
     Samples of neighbouring drops are excluded.
     """
     begins, ends, window = candidate[:3]
-    reach = max(_SIDE_WINDOWS * window, _SIDE_DURATIONS * (ends - begins))
+    reach = max(_SIDE_LENGTH_IN_WINDOWS * window, _SIDE_LENGTH_IN_DROP_DURATIONS * (ends - begins))
     first = int(np.searchsorted(time, begins, "left"))
     last = int(np.searchsorted(time, ends, "right"))
     start = min(int(np.searchsorted(time, begins - reach)), first - _MIN_SIDE_SAMPLES)
     stop = max(int(np.searchsorted(time, ends + reach)), last + _MIN_SIDE_SAMPLES)
-    start = max(start, first - _MAX_SIDE_SAMPLES, int(np.searchsorted(time, limits[0])), 0)
+    start = max(
+        start, first - _MAX_SIDE_SAMPLES, int(np.searchsorted(time, neighbour_limits[0])), 0
+    )
     stop = min(
-        stop, last + _MAX_SIDE_SAMPLES, int(np.searchsorted(time, limits[1], "right")), len(time)
+        stop,
+        last + _MAX_SIDE_SAMPLES,
+        int(np.searchsorted(time, neighbour_limits[1], "right")),
+        len(time),
     )
     start, stop = min(start, max(first - 2, 0)), max(stop, min(last + 2, len(time)))
     return np.arange(start, stop)
 
 
-def _search_times(
-    t: np.ndarray, y: np.ndarray, begins: float, ends: float, window: float
-) -> _LineFits:
+def _search_drop_times(
+    time: np.ndarray,
+    stress: np.ndarray,
+    start_candidates: float,
+    end_candidates: float,
+    window_duration: float,
+) -> _ThreeLineFits:
     """Search for the times at which the drop begins and ends.
 
     The search evaluates a grid of pairs of times. The grid is then refined several times around the
     best pair of times.
     """
-    reach = max(_SEARCH_WINDOWS * window, ends - begins)
-    halves = np.sort(np.concatenate([t, 0.5 * (t[1:] + t[:-1])]))
-    starts = halves[(halves >= begins - reach) & (halves < ends)]
-    stops = halves[(halves > begins) & (halves <= ends + reach)]
-    parts: list[_LineFits] = []
-    for level in range(_GRID_REFINEMENTS + 1):
+    reach = max(_SEARCH_MARGIN_IN_WINDOWS * window_duration, end_candidates - start_candidates)
+    halves = np.sort(np.concatenate([time, 0.5 * (time[1:] + time[:-1])]))
+    starts = halves[(halves >= start_candidates - reach) & (halves < end_candidates)]
+    stops = halves[(halves > start_candidates) & (halves <= end_candidates + reach)]
+    parts: list[_ThreeLineFits] = []
+    for level in range(_SEARCH_GRID_REFINEMENTS + 1):
         pairs = np.array(
-            [(u, v) for u in _select_evenly(starts) for v in _select_evenly(stops) if u < v]
+            [
+                (u, v)
+                for u in _select_evenly_spaced_times(starts)
+                for v in _select_evenly_spaced_times(stops)
+                if u < v
+            ]
         )
         if len(pairs):
-            parts.append(_fit_lines(t, y, pairs))
-        found = parts[int(np.argmin([part.residual_squares.min() for part in parts]))]
-        best = found.pairs[found.best_index]
-        near = [_select_nearby(halves, at, ends - begins + 2.0 * reach, level) for at in best]
+            parts.append(_fit_three_lines(time, stress, pairs))
+        found = parts[int(np.argmin([part.residual_sums_of_squares.min() for part in parts]))]
+        best = found.corner_time_pairs[found.best_pair_index]
+        near = [
+            _select_times_near_centre(
+                halves, at, end_candidates - start_candidates + 2.0 * reach, level
+            )
+            for at in best
+        ]
         starts, stops = near
-    return _LineFits(*map(np.concatenate, zip(*parts, strict=True)))
+    return _ThreeLineFits(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def _select_evenly(times: np.ndarray) -> list[float]:
+def _select_evenly_spaced_times(times: np.ndarray) -> list[float]:
     """Select an evenly spaced subset of the times."""
-    places = np.unique(np.linspace(0, len(times) - 1, _GRID_SIZE).round().astype(int))
+    places = np.unique(np.linspace(0, len(times) - 1, _SEARCH_GRID_SIZE).round().astype(int))
     return [float(times[place]) for place in places] if len(times) else []
 
 
-def _select_nearby(times: np.ndarray, centre: float, extent: float, level: int) -> np.ndarray:
+def _select_times_near_centre(
+    times: np.ndarray, centre: float, search_extent: float, refinement_level: int
+) -> np.ndarray:
     """Select the times near the best time for the next level of the search.
 
     At the last levels of the search, the nearest neighbours of the best time are selected.
     """
-    reach = extent / _GRID_SIZE * (4.0 / _GRID_SIZE) ** level
+    reach = search_extent / _SEARCH_GRID_SIZE * (4.0 / _SEARCH_GRID_SIZE) ** refinement_level
     place = int(np.searchsorted(times, centre))
-    around = times[max(place - _GRID_SIZE // 3, 0) : place + _GRID_SIZE // 3 + 1]
+    around = times[max(place - _SEARCH_GRID_SIZE // 3, 0) : place + _SEARCH_GRID_SIZE // 3 + 1]
     within = times[np.abs(times - centre) <= 2.0 * reach]
-    return within if level < _GRID_REFINEMENTS - 1 and len(within) > len(around) else around
+    return (
+        within
+        if refinement_level < _SEARCH_GRID_REFINEMENTS - 1 and len(within) > len(around)
+        else around
+    )
 
 
-def _fit_lines(t: np.ndarray, y: np.ndarray, pairs: np.ndarray) -> _LineFits:
+def _fit_three_lines(
+    time: np.ndarray, stress: np.ndarray, corner_time_pairs: np.ndarray
+) -> _ThreeLineFits:
     """Fit three connected lines for each pair of times.
 
     The coefficients are the stresses at both times, and the slopes before and after the drop. A
@@ -254,23 +299,30 @@ def _fit_lines(t: np.ndarray, y: np.ndarray, pairs: np.ndarray) -> _LineFits:
     case if the decrease on one side is larger than expected from the slope on the other side, and
     the difference exceeds half of the drop.
     """
-    t0, t1 = pairs[:, :1], pairs[:, 1:]
-    share = np.clip((t - t0) / (t1 - t0), 0.0, 1.0)
-    columns = np.stack([1.0 - share, share, np.minimum(t - t0, 0.0), np.maximum(t - t1, 0.0)], -1)
+    t0, t1 = corner_time_pairs[:, :1], corner_time_pairs[:, 1:]
+    share = np.clip((time - t0) / (t1 - t0), 0.0, 1.0)
+    columns = np.stack(
+        [1.0 - share, share, np.minimum(time - t0, 0.0), np.maximum(time - t1, 0.0)], -1
+    )
     turned = columns.transpose(0, 2, 1)
     normal = turned @ columns
     # The small ridge term is necessary because one side may have no samples.
-    normal += 1e-9 * np.eye(4) * len(t)
+    normal += 1e-9 * np.eye(4) * len(time)
     inverse = np.linalg.inv(normal)
-    centre = y.mean()
-    values = (inverse @ (turned @ (y - centre))[:, :, None])[:, :, 0]
-    left = y - centre - (columns @ values[:, :, None])[:, :, 0]
+    centre = stress.mean()
+    values = (inverse @ (turned @ (stress - centre))[:, :, None])[:, :, 0]
+    left = stress - centre - (columns @ values[:, :, None])[:, :, 0]
     squares = np.square(left).sum(axis=1)
     drop, lasts = values[:, 0] - values[:, 1], (t1 - t0)[:, 0]
-    goes_on = (values[:, 2:].min(axis=1) < -_MAX_SLOPE_RATIO * drop / lasts) | (drop <= 0.0)
-    for own, other, beside in ((2, 3, pairs[:, 0] - t[0]), (3, 2, t[-1] - pairs[:, 1])):
+    goes_on = (values[:, 2:].min(axis=1) < -_MAX_SIDE_OVER_DROP_SLOPE * drop / lasts) | (
+        drop <= 0.0
+    )
+    for own, other, beside in (
+        (2, 3, corner_time_pairs[:, 0] - time[0]),
+        (3, 2, time[-1] - corner_time_pairs[:, 1]),
+    ):
         fall = np.minimum(values[:, other], 0.0) - values[:, own]
-        goes_on |= fall * np.maximum(beside, 0.0) > _MAX_SIDE_FALL_RATIO * drop
+        goes_on |= fall * np.maximum(beside, 0.0) > _MAX_SIDE_FALL_OVER_DROP * drop
     values[:, :2] += centre
-    squares[goes_on] += 1e3 * (float(np.square(y - centre).sum()) + 1e-300)
-    return _LineFits(pairs, values, inverse, squares)
+    squares[goes_on] += 1e3 * (float(np.square(stress - centre).sum()) + 1e-300)
+    return _ThreeLineFits(corner_time_pairs, values, inverse, squares)

@@ -13,22 +13,22 @@ import numpy as np
 from scipy.stats import norm
 
 from rsfstudy.fitting.drop_detection import (
-    DETECTION_MARGIN,
+    DETECTION_MARGIN_IN_STANDARD_DEVIATIONS,
     FALSE_DETECTION_PROBABILITY,
     Detection,
-    find_resolution,
+    find_smallest_value_step,
     robust_sd,
     window_mean_decreases,
 )
-from rsfstudy.fitting.drop_fit import CI_STDERR_FACTOR
-from rsfstudy.fitting.stress_drops import EventNumbers, FittedCandidate, find_drops
+from rsfstudy.fitting.drop_fit import STDERRS_PER_95_PERCENT_HALF_WIDTH
+from rsfstudy.fitting.stress_drops import EventNumbers, FittedDropCandidate, find_drops
 
 #: Smallest excess of slip during the drops, in standard deviations and as a fraction of the
 #: displacement around the drops.
-_MIN_EXCESS_SIGMAS, _MIN_EXCESS_FRACTION = 3.0, 0.1
+_MIN_EXCESS_SLIP_SIGMAS, _MIN_EXCESS_SLIP_FRACTION = 3.0, 0.1
 
 
-class DropIndices(NamedTuple):
+class DropSampleIndices(NamedTuple):
     """Location of a drop among the samples.
 
     Parameters
@@ -41,12 +41,12 @@ class DropIndices(NamedTuple):
         Number of samples before and after the drop that are averaged.
     """
 
-    start: int
-    end: int
-    window: int
+    start_index: int
+    end_index: int
+    window_sample_count: int
 
 
-class DropReadings(NamedTuple):
+class DropMeasurements(NamedTuple):
     """Stress drops in a record.
 
     Parameters
@@ -59,14 +59,14 @@ class DropReadings(NamedTuple):
         False if the displacement was checked, and is not faster during the drops than around them.
     """
 
-    rows: list[EventNumbers]
+    event_rows: list[EventNumbers]
     detection: Detection
-    is_slip: bool
+    displacement_shows_slip: bool
 
 
 def read_drops(
     times: np.ndarray, stress: np.ndarray, displacement: np.ndarray | None, *, check_slip: bool
-) -> DropReadings:
+) -> DropMeasurements:
     """Find the stress drops in a record, and compute their properties.
 
     Parameters
@@ -96,22 +96,22 @@ def read_drops(
     [1.0, 1.0, 1.0]
     """
     found, detection = find_drops(times, stress)
-    ends = [-math.inf, *(of.drop.end for of in found)]
-    begins = [*(of.drop.start for of in found[1:]), math.inf]
+    ends = [-math.inf, *(of.drop.end_time for of in found)]
+    begins = [*(of.drop.start_time for of in found[1:]), math.inf]
     rooms = [*zip(ends, begins, strict=False)][: len(found)]
     places = [locate_drop(times, *of) for of in zip(found, rooms, strict=True)]
     each = zip(found, places, rooms, strict=True)
-    rows = [drop_properties(times, stress, displacement, *of) for of in each]
+    rows = [measure_drop(times, stress, displacement, *of) for of in each]
     is_slip = (
         displacement is None
         or not check_slip
         or displacement_follows_drops(times, displacement, places)
     )
-    return DropReadings(rows, detection, is_slip)
+    return DropMeasurements(rows, detection, is_slip)
 
 
 def displacement_follows_drops(
-    times: np.ndarray, displacement: np.ndarray, locations: Sequence[DropIndices]
+    times: np.ndarray, displacement: np.ndarray, drop_sample_indices: Sequence[DropSampleIndices]
 ) -> bool:
     """Return True if displacement is faster during drops than around them.
 
@@ -131,12 +131,12 @@ def displacement_follows_drops(
         True if the excess displacement during the drops is significant.
     """
     excess = usual = variance = 0.0
-    quantum = find_resolution(displacement)
+    quantum = find_smallest_value_step(displacement)
     noises = {
         n: max(robust_sd(window_mean_decreases(displacement, n)), quantum)
-        for n in {place.window for place in locations}
+        for n in {place.window_sample_count for place in drop_sample_indices}
     }
-    for begin, end, window in locations:
+    for begin, end, window in drop_sample_indices:
         far = end + window - begin
         places = (begin - window - far, begin - window, end, end + far)
         starts = np.clip(places, 0, len(displacement) - window)
@@ -149,13 +149,14 @@ def displacement_follows_drops(
         excess, usual = excess + float(slips[1]) - moved, usual + abs(moved)
         variance += 0.5 * noises[window] ** 2 * (1.0 + (1.0 + ratio) ** 2 + ratio**2)
     return bool(
-        excess > max(_MIN_EXCESS_SIGMAS * math.sqrt(variance), _MIN_EXCESS_FRACTION * usual)
+        excess
+        > max(_MIN_EXCESS_SLIP_SIGMAS * math.sqrt(variance), _MIN_EXCESS_SLIP_FRACTION * usual)
     )
 
 
 def locate_drop(
-    times: np.ndarray, found: FittedCandidate, limits: tuple[float, float]
-) -> DropIndices:
+    times: np.ndarray, fitted_candidate: FittedDropCandidate, neighbour_limits: tuple[float, float]
+) -> DropSampleIndices:
     """Locate a drop among the samples.
 
     The window is shortened if it would overlap a neighbouring drop or extend beyond the record.
@@ -174,23 +175,23 @@ def locate_drop(
     DropIndices
         Indices of the drop, and length of the window.
     """
-    drop, candidate = found
-    begin = int(np.searchsorted(times, drop.start, "right"))
-    end = max(int(np.searchsorted(times, drop.end, "left")), begin)
-    before = int(np.searchsorted(times, drop.start - candidate.window))
-    first, last = (int(np.searchsorted(times, at)) for at in limits)
+    drop, candidate = fitted_candidate
+    begin = int(np.searchsorted(times, drop.start_time, "right"))
+    end = max(int(np.searchsorted(times, drop.end_time, "left")), begin)
+    before = int(np.searchsorted(times, drop.start_time - candidate.window_duration))
+    first, last = (int(np.searchsorted(times, at)) for at in neighbour_limits)
     window = min(begin - before, begin - first, last - end, len(times) - end)
     window = max(min(window, len(times) // 4), 1)
-    return DropIndices(max(begin, window), min(end, len(times) - window), window)
+    return DropSampleIndices(max(begin, window), min(end, len(times) - window), window)
 
 
-def drop_properties(
+def measure_drop(
     times: np.ndarray,
     stress: np.ndarray,
     displacement: np.ndarray | None,
-    found: FittedCandidate,
-    location: DropIndices,
-    limits: tuple[float, float],
+    fitted_candidate: FittedDropCandidate,
+    sample_indices: DropSampleIndices,
+    neighbour_limits: tuple[float, float],
 ) -> EventNumbers:
     """Compute the properties of a drop and their errors.
 
@@ -215,11 +216,11 @@ def drop_properties(
         0 if the record contains the stress before and after the drop. Otherwise, the sum of 1 if
         the record begins during the drop, and 2 if the record ends during the drop.
     """
-    drop = found.drop
+    drop = fitted_candidate.drop
     row = {
-        "time": (drop.start, drop.start_error),
+        "time": (drop.start_time, drop.start_error),
         "duration": (
-            max(drop.end - drop.start, 0.0) or drop.end_error,
+            max(drop.end_time - drop.start_time, 0.0) or drop.end_error,
             math.hypot(drop.start_error, drop.end_error),
         ),
         "stress_before": (drop.stress_before, drop.stress_before_error),
@@ -228,17 +229,19 @@ def drop_properties(
     }
     cut = int(drop.starts_before_record) + 2 * int(drop.ends_after_record)
     if displacement is not None:
-        row |= _slip_properties(times, stress, displacement, found, location, limits)
+        row |= _measure_slip_of_drop(
+            times, stress, displacement, fitted_candidate, sample_indices, neighbour_limits
+        )
     return row, cut
 
 
-def _slip_properties(
+def _measure_slip_of_drop(
     times: np.ndarray,
     stress: np.ndarray,
     displacement: np.ndarray,
-    found: FittedCandidate,
-    location: DropIndices,
-    limits: tuple[float, float],
+    fitted_candidate: FittedDropCandidate,
+    sample_indices: DropSampleIndices,
+    neighbour_limits: tuple[float, float],
 ) -> dict[str, tuple[float, float]]:
     """Compute slip, peak slip rate and dynamic stress drop of an event.
 
@@ -248,13 +251,17 @@ def _slip_properties(
         Pairs of a value and its error. The peak slip rate and the dynamic stress drop are NaN if
         the slip rate does not exceed its noise.
     """
-    (drop, candidate), (begin, end, window) = found, location
+    (drop, candidate), (begin, end, window) = fitted_candidate, sample_indices
     size = drop.stress_before - drop.stress_after
-    first, last = (int(np.searchsorted(times, at)) for at in limits)
+    first, last = (int(np.searchsorted(times, at)) for at in neighbour_limits)
     # If the window is shifted by m samples, the difference of means decreases by m drop/window.
     # The standard deviation of this change is sqrt(3 m/window) times the standard error. The
     # probability that noise shifts the drop further than this limit is 0.001.
-    off = math.ceil(3.0 * window * (DETECTION_MARGIN * candidate.difference_stderr / size) ** 2)
+    off = math.ceil(
+        3.0
+        * window
+        * (DETECTION_MARGIN_IN_STANDARD_DEVIATIONS * candidate.mean_difference_stderr / size) ** 2
+    )
     off = max(0, min(off, window, begin - window - first, last - end - window))
     begin, end = begin - off, end + off
     slips, rates = (
@@ -265,13 +272,15 @@ def _slip_properties(
     noise = robust_sd(rates)
     slip = displacement[end : end + window].mean() - displacement[begin - window : begin].mean()
     crept = abs(float(np.median(slips))) * (1.0 + 2.0 * off / window)
-    row = {"slip": (slip, CI_STDERR_FACTOR * robust_sd(slips) + crept)}
+    row = {"slip": (slip, STDERRS_PER_95_PERCENT_HALF_WIDTH * robust_sd(slips) + crept)}
     row["peak_slip_rate"] = row["dynamic_stress_drop"] = math.nan, math.nan
     if rates[fastest] > noise * norm.isf(FALSE_DETECTION_PROBABILITY / len(rates)):
-        row["peak_slip_rate"] = rates[fastest], CI_STDERR_FACTOR * noise
+        row["peak_slip_rate"] = rates[fastest], STDERRS_PER_95_PERCENT_HALF_WIDTH * noise
         # The stress at the peak slip rate is between the stresses of the two samples.
         ends = stress[fastest : fastest + 2]
-        reading = 0.5 * float(np.ptp(ends)) + CI_STDERR_FACTOR * robust_sd(np.diff(stress))
+        reading = 0.5 * float(np.ptp(ends)) + STDERRS_PER_95_PERCENT_HALF_WIDTH * robust_sd(
+            np.diff(stress)
+        )
         row["dynamic_stress_drop"] = (
             drop.stress_before - ends.mean(),
             drop.stress_before_error + reading,

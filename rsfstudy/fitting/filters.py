@@ -24,7 +24,12 @@ FILTER_KINDS = (MEAN, TRAILING_MEAN, *LOW_PASS_ORDERS)
 #: Smallest number of points in a running mean, points per period of the corner frequency, number of
 #: periods after which a low-pass filter has settled, and largest number of points in the time grid
 #: of a low-pass filter.
-_MIN_MEAN_POINTS, _POINTS_PER_PERIOD, _SETTLING_PERIODS, _MAX_GRID_POINTS = 8, 60, 3.0, 400_000
+(
+    _MIN_POINTS_OF_RUNNING_MEAN,
+    _GRID_POINTS_PER_CORNER_PERIOD,
+    _FILTER_SETTLING_PERIODS,
+    _MAX_FILTER_GRID_POINTS,
+) = 8, 60, 3.0, 400_000
 
 
 @dataclass(frozen=True)
@@ -110,8 +115,8 @@ class Filter:
             Times in s, in increasing order.
         """
         if self.kind in LOW_PASS_ORDERS:
-            return self._time_grid(time)
-        return np.unique(time[:, None] + self._offsets(time))
+            return self._low_pass_time_grid(time)
+        return np.unique(time[:, None] + self._running_mean_time_offsets(time))
 
     def apply(self, time: np.ndarray, samples: np.ndarray) -> np.ndarray:
         """Apply the filter to samples of friction.
@@ -130,7 +135,7 @@ class Filter:
         """
         at = self.sample_times(time)
         if self.kind not in LOW_PASS_ORDERS:
-            places = np.searchsorted(at, time[:, None] + self._offsets(time))
+            places = np.searchsorted(at, time[:, None] + self._running_mean_time_offsets(time))
             return np.asarray(samples[places].mean(axis=1))
         rate = 1.0 / float(at[1] - at[0])
         sections = butter(LOW_PASS_ORDERS[self.kind], self.size, fs=rate, output="sos")
@@ -138,19 +143,26 @@ class Filter:
         begin = sosfilt_zi(sections) * samples[0]
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
 
-    def _offsets(self, time: np.ndarray) -> np.ndarray:
+    def _running_mean_time_offsets(self, time: np.ndarray) -> np.ndarray:
         """Return the offsets of the points in a running mean.
 
         Each offset is a time in s relative to the time of a row. If the averaging time is at least
         four sampling intervals, the points are one sampling interval apart.
         """
         count = max(round(self.size / float(np.median(np.diff(time)))), 1)
-        count *= max(math.ceil(_MIN_MEAN_POINTS / count), 1) if count < _MIN_MEAN_POINTS // 2 else 1
+        count *= (
+            max(math.ceil(_MIN_POINTS_OF_RUNNING_MEAN / count), 1)
+            if count < _MIN_POINTS_OF_RUNNING_MEAN // 2
+            else 1
+        )
         middle = 0.5 if self.kind == MEAN else 1.0
         return np.asarray(self.size * ((np.arange(count) + 0.5) / count - middle))
 
-    def _time_grid(self, time: np.ndarray) -> np.ndarray:
+    def _low_pass_time_grid(self, time: np.ndarray) -> np.ndarray:
         """Return the evenly spaced times for evaluating a low-pass filter."""
-        first = float(time[0]) - _SETTLING_PERIODS / self.size
-        finest = max(1.0 / (_POINTS_PER_PERIOD * self.size), (time[-1] - first) / _MAX_GRID_POINTS)
+        first = float(time[0]) - _FILTER_SETTLING_PERIODS / self.size
+        finest = max(
+            1.0 / (_GRID_POINTS_PER_CORNER_PERIOD * self.size),
+            (time[-1] - first) / _MAX_FILTER_GRID_POINTS,
+        )
         return np.arange(first, float(time[-1]) + 2.0 * finest, finest)

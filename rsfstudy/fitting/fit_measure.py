@@ -17,34 +17,39 @@ import numpy as np
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import posterior
-from rsfstudy.fitting.averaging_detection import find_filter
+from rsfstudy.fitting.averaging_detection import detect_unspecified_filter
 from rsfstudy.fitting.filters import Filter
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
 from rsfstudy.fitting.intervals import confidence_interval
 from rsfstudy.fitting.joint_model import (
     JointModel,
-    is_window_parameter,
-    number_parameters,
+    add_window_numbers,
+    is_per_window_parameter,
     strip_window_number,
 )
-from rsfstudy.fitting.noise import WHITE, check_noise_name, ljung_box_p_value
+from rsfstudy.fitting.noise import WHITE_NOISE_NAME, check_noise_name, ljung_box_p_value
 from rsfstudy.fitting.outputs import fit_outputs
 from rsfstudy.fitting.record import RECORD_COLUMNS, Record
 from rsfstudy.fitting.validity import (
-    MIN_NOISE_SD,
-    describe_asymmetry,
+    MIN_STATISTICAL_NOISE_SD,
+    describe_asymmetric_intervals,
     describe_load_point_noise,
     describe_outliers,
-    describe_unidentified,
-    find_unidentified,
+    describe_unidentified_parameters,
+    find_unidentified_parameters,
     find_validity_problems,
     is_rounding_too_coarse,
 )
-from rsfstudy.fitting.window import LOADING_KINDS, FitWindow, guess_parameters, stiffness_factors
+from rsfstudy.fitting.window import (
+    LOADING_KINDS,
+    FitWindow,
+    compute_stiffness_factors,
+    guess_parameters,
+)
 from rsfstudy.fitting.window_model import (
-    LAW_SPECIFIC_PARAMETERS,
+    PARAMETERS_OF_SOME_LAWS_ONLY,
+    check_fields_positive,
     check_free_parameters,
-    check_positive,
     parameters_of_law,
 )
 from rsfstudy.measure_base import Measure, Outcome, OutputValue
@@ -54,17 +59,17 @@ from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 #: Largest relative tolerance of a motion for which finite differences of motions are accurate.
-_DERIVATIVE_RTOL = 1e-9
+_RTOL_FOR_FINITE_DIFFERENCES = 1e-9
 #: Weight of the standard error in the scale of numerical errors. At the default accuracy of 1e-7, a
 #: numerical error of more than 1 % of the standard error is then reported as too large.
-_STDERR_SCALE = 1000.0
+_NUMERICAL_ERROR_SCALE_PER_STDERR = 1000.0
 #: Fields of a scene that every fit determines.
-_SOLVED_FIELDS = (
+_SCENE_FIELDS_SET_BY_FIT = (
     *("a", "b_over_a", "b1_over_a", "b2_over_a", "length_ratio", "mu_star", "stiffness"),
     *("stiffness_ratio", "reference_rate", "load_velocity_ratio"),
 )
 #: Ratio of the direct effect to its lower bound below which the direct effect is at the bound.
-_LOWER_BOUND_FACTOR = 1.001
+_AT_LOWER_BOUND_FACTOR = 1.001
 
 
 @guard_methods
@@ -207,7 +212,7 @@ class Fit(Measure):
         if len(set(names)) < len(names):
             raise InvalidValue("records", names, "must have names that differ")
         check_free_parameters(self.free)
-        for name, step in self._selected_steps:
+        for name, step in self._fitted_record_names_and_steps:
             if name not in names:
                 raise InvalidValue("record", name, "is unknown", choices=names)
             if step < 1:
@@ -217,7 +222,7 @@ class Fit(Measure):
                 raise InvalidValue(name, getattr(self, name), "must be 0 or more, in um")
         if not 0.0 < self.part <= 1.0:
             raise InvalidValue("part", self.part, "must be above 0, and 1 at most")
-        check_positive(self, "slip_distance_guess", "slip_distance_2_guess")
+        check_fields_positive(self, "slip_distance_guess", "slip_distance_2_guess")
         if self.loading not in LOADING_KINDS:
             raise InvalidValue("loading", self.loading, "is unknown", choices=LOADING_KINDS)
         if "step_time" in self.free and self.loading == "recorded":
@@ -225,27 +230,31 @@ class Fit(Measure):
             raise InvalidValue("free", "step_time", rule, remedy="Leave it out.")
         check_noise_name(self.noise)
         Filter.parse(self.filter)
-        posterior.check_sampling(self.posterior)
+        posterior.check_sampling_is_possible(self.posterior)
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
         """Fields of the scene that the fit determines."""
-        return (*_SOLVED_FIELDS, *(name for name in ("alpha", "law_exponent") if name in self.free))
+        return (
+            *_SCENE_FIELDS_SET_BY_FIT,
+            *(name for name in ("alpha", "law_exponent") if name in self.free),
+        )
 
     @property
     def primary_output(self) -> str:
         """Name of the first free parameter that all laws have."""
         return next(
-            (n for n in self.parameters if n not in LAW_SPECIFIC_PARAMETERS), self.parameters[0]
+            (n for n in self.parameters if n not in PARAMETERS_OF_SOME_LAWS_ONLY),
+            self.parameters[0],
         )
 
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the free parameters, with window numbers in joint fits."""
-        return number_parameters(self.free, len(self._selected_steps))
+        return add_window_numbers(self.free, len(self._fitted_record_names_and_steps))
 
     @property
-    def _selected_steps(self) -> tuple[tuple[str, int], ...]:
+    def _fitted_record_names_and_steps(self) -> tuple[tuple[str, int], ...]:
         """Record names and step numbers of the steps to fit."""
         return self.together or ((self.record or self.records[0].name, self.step),)
 
@@ -256,13 +265,16 @@ class Fit(Measure):
         others = {name: {n for other, n in self.together if other == name} for name in by_name}
         ends = self.before, self.after, self.part
         return tuple(
-            FitWindow(by_name[name], n, *ends, others[name]) for name, n in self._selected_steps
+            FitWindow(by_name[name], n, *ends, others[name])
+            for name, n in self._fitted_record_names_and_steps
         )
 
     @property
     def outputs(self) -> Sequence[Output]:
         """Outputs of the fit, including the parameters and their errors."""
-        return fit_outputs(self.parameters, self.posterior > 0, len(self._selected_steps))
+        return fit_outputs(
+            self.parameters, self.posterior > 0, len(self._fitted_record_names_and_steps)
+        )
 
     @property
     def quantities(self) -> Sequence[Quantity]:
@@ -274,7 +286,7 @@ class Fit(Measure):
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         """Names of the parameters, and indices of the rows and draws."""
         names = np.array(self.parameters, dtype=object)
-        together = sum(map(len, self._first_rows))
+        together = sum(map(len, self._records_with_first_rows))
         rows = np.arange(together if self.together else max(map(len, self.records)))
         draws = {"draw": np.arange(self.posterior)} if self.posterior else {}
         return {"parameter": names, "other_parameter": names, "row": rows, **draws}
@@ -305,7 +317,7 @@ class Fit(Measure):
         sizes |= {f"trend{n}": scene.mu_star / extent**n for n in range(1, 6)}
         return {
             name: abs(values[name])
-            + _STDERR_SCALE * values[f"{name}_stderr"]
+            + _NUMERICAL_ERROR_SCALE_PER_STDERR * values[f"{name}_stderr"]
             + sizes.get(strip_window_number(name), 0.0)
             for name in self.parameters
             if name in values
@@ -344,7 +356,7 @@ class Fit(Measure):
         raise InvalidValue("records", [*described["records"]], rule, remedy=remedy)
 
     @cached_property
-    def _first_rows(self) -> dict[Record, int]:
+    def _records_with_first_rows(self) -> dict[Record, int]:
         """Index of the first row in the outputs for each fitted record."""
         records = [*dict.fromkeys(window.record for window in self._windows)]
         return {record: sum(map(len, records[:n])) for n, record in enumerate(records)}
@@ -375,22 +387,27 @@ class Fit(Measure):
         """
         own = parameters_of_law(scene, self.free)
         if own != self.free:
-            return self._insert_missing_parameters(
+            return self._insert_nan_for_absent_parameters(
                 replace(self, free=own).compute(scene, accuracy, meter)
             )
         windows = self._windows
         search, found = self.solve(scene, accuracy, meter)
-        model, place = search.model, windows[0].properties
+        model, place = search.model, windows[0].window_properties
         part = model.models[0]
         apart = float(np.median(np.diff(part.displacement[part.time >= windows[0].step.start])))
-        unidentified = find_unidentified(found, apart)
-        rows = [window.rows + self._first_rows[window.record] for window in windows]
-        values = self._collect_values(found, np.concatenate(rows), model)
+        unidentified = find_unidentified_parameters(found, apart)
+        rows = [
+            window.record_row_indices + self._records_with_first_rows[window.record]
+            for window in windows
+        ]
+        values = self._collect_output_values(found, np.concatenate(rows), model)
         values |= place
-        values["window_stiffness"] = found.values["stiffness"]
+        values["window_stiffness"] = found.parameter_values["stiffness"]
         if len(windows) > 1:
             stresses = enumerate(windows, start=1)
-            values |= {f"normal_stress_before_{n}": w.normal_stress for n, w in stresses}
+            values |= {
+                f"normal_stress_before_{n}": w.mean_normal_stress_before_step for n, w in stresses
+            }
         ends = {
             name: search.parameter_bounds(name)
             if name in unidentified
@@ -400,19 +417,25 @@ class Fit(Measure):
         for name, (low, high) in ends.items():
             values[f"{name}_low"], values[f"{name}_high"] = low, high
         if self.posterior:
-            values |= posterior.draw_parameters(search, found, self.posterior)
+            values |= posterior.sample_posterior_parameters(search, found, self.posterior)
         if unidentified:
             is_least = (
-                "a" in found.free
-                and found.values["a"] < _LOWER_BOUND_FACTOR * search.parameter_bounds("a")[0]
+                "a" in found.free_parameters
+                and found.parameter_values["a"]
+                < _AT_LOWER_BOUND_FACTOR * search.parameter_bounds("a")[0]
             )
-            text = describe_unidentified(found, unidentified, apart, is_a_at_bound=is_least)
+            text = describe_unidentified_parameters(
+                found, unidentified, apart, is_a_at_bound=is_least
+            )
             return Outcome(Status.NOT_IDENTIFIED, values, text)
         remarks = (
-            describe_outliers(found.outliers),
+            describe_outliers(found.outlier_rows),
             describe_load_point_noise(found, self.loading, place["load_point_noise"]),
         )
-        reasons = (*self.find_validity_problems(search, found), *describe_asymmetry(found, ends))
+        reasons = (
+            *self.find_validity_problems(search, found),
+            *describe_asymmetric_intervals(found, ends),
+        )
         status = Status.ERRORS_NOT_VALID if reasons else Status.OK
         cuts = [cut for window in windows for cut in window.truncation_remarks]
         return Outcome(status, values, "; ".join(filter(None, (*reasons, *cuts, *remarks))))
@@ -443,24 +466,26 @@ class Fit(Measure):
         MotionStopped
             If the fit fails.
         """
-        smooth = accuracy.with_rtol(min(accuracy.rtol, _DERIVATIVE_RTOL))
+        smooth = accuracy.with_rtol(min(accuracy.rtol, _RTOL_FOR_FINITE_DIFFERENCES))
         windows = self._windows
         per_um = self.machine_stiffness * self.slip_distance_guess
         scenes = [w.with_machine_stiffness(scene, per_um) for w in windows]
         of_each = zip(windows, scenes, strict=True)
         parts = [w.create_model(one, self.free, self.loading, smooth, meter) for w, one in of_each]
         parts = [replace(part, filter=Filter.parse(self.filter)) for part in parts]
-        if self.noise == WHITE:  # The usual formula ignores the noise of the load point.
-            parts = [replace(part, shifted_loadings=()) for part in parts]
+        if self.noise == WHITE_NOISE_NAME:  # The usual formula ignores the noise of the load point.
+            parts = [replace(part, loadings_with_shifted_steps=()) for part in parts]
         distances = self.slip_distance_guess, self.slip_distance_2_guess
         first: dict[str, float] = {}
         for number, (part, window) in enumerate(zip(parts, windows, strict=True), start=1):
             guess = guess_parameters(part, window.step, self.free, distances)
             first = guess | first
             if len(windows) > 1:
-                first |= {f"{n}_{number}": v for n, v in guess.items() if is_window_parameter(n)}
+                first |= {
+                    f"{n}_{number}": v for n, v in guess.items() if is_per_window_parameter(n)
+                }
         one_machine = self.machine_stiffness > 0.0 or "stiffness" in self.free
-        model = JointModel(tuple(parts), stiffness_factors(windows) if one_machine else ())
+        model = JointModel(tuple(parts), compute_stiffness_factors(windows) if one_machine else ())
         search = FitProblem(model, first, self.parameters, self.noise)
         return search, search.solve()
 
@@ -483,71 +508,78 @@ class Fit(Measure):
         # With recorded loading, any filter would reduce the noise of the load point, so the test
         # for a filter would be misleading.
         is_recorded = self.loading == "recorded"
-        is_exact = solution.noise_sd < MIN_NOISE_SD
+        is_exact = solution.noise_sd < MIN_STATISTICAL_NOISE_SD
         if (
             self.filter
             or is_recorded
             or is_exact
-            or self.noise == WHITE
+            or self.noise == WHITE_NOISE_NAME
             or is_rounding_too_coarse(solution)
         ):
             return reasons
-        return (*find_filter(solution, problem.model.time, self.noise), *reasons)
+        return (*detect_unspecified_filter(solution, problem.model.time, self.noise), *reasons)
 
-    def _insert_missing_parameters(self, outcome: Outcome) -> Outcome:
+    def _insert_nan_for_absent_parameters(self, output_values: Outcome) -> Outcome:
         """Insert NaN for parameters that the friction law does not have."""
-        values = dict(outcome.values)
+        values = dict(output_values.values)
         has = np.array([name in values for name in self.parameters])
         before = np.cumsum(has)[~has]
         for name, axes in (("covariance", (0, 1)), ("correlation", (0, 1)), ("posterior", (1,))):
             for axis in axes if name in values else ():
                 values[name] = np.insert(values[name], before, math.nan, axis=axis)
-        return replace(outcome, values=values)
+        return replace(output_values, values=values)
 
-    def _collect_values(
-        self, found: FitSolution, rows: np.ndarray, model: JointModel
+    def _collect_output_values(
+        self, fit_solution: FitSolution, rows: np.ndarray, joint_model: JointModel
     ) -> dict[str, OutputValue]:
         """Return the outputs of a fit except for confidence intervals."""
         values: dict[str, OutputValue] = {}
-        for name in found.free:
-            values[name], values[f"{name}_error"] = found.values[name], found.numerical_errors[name]
-            values[f"{name}_stderr"] = found.stderr(name)
-        covariance = found.covariance * np.outer(
-            found.coordinate_derivatives, found.coordinate_derivatives
+        for name in fit_solution.free_parameters:
+            values[name], values[f"{name}_error"] = (
+                fit_solution.parameter_values[name],
+                fit_solution.numerical_errors[name],
+            )
+            values[f"{name}_stderr"] = fit_solution.parameter_stderr(name)
+        covariance = fit_solution.coordinate_covariance * np.outer(
+            fit_solution.coordinate_derivatives, fit_solution.coordinate_derivatives
         )
         spread = np.sqrt(np.diag(covariance))
-        signs = np.array([float(n == "a") - (n in ("b", "b1", "b2")) for n in found.free])
+        signs = np.array(
+            [float(n == "a") - (n in ("b", "b1", "b2")) for n in fit_solution.free_parameters]
+        )
         with np.errstate(invalid="ignore"):
             correlation = covariance / np.outer(spread, spread)
             variance_of_rate = float(signs @ covariance @ signs)
-        b = sum(found.values.get(name, 0.0) for name in ("b", "b1", "b2"))
-        trend = model.trend(found.values)
-        variance = float(np.var(model.friction)) or math.nan
+        b = sum(fit_solution.parameter_values.get(name, 0.0) for name in ("b", "b1", "b2"))
+        trend = joint_model.compute_friction_trend(fit_solution.parameter_values)
+        variance = float(np.var(joint_model.friction)) or math.nan
         values |= {
-            "a_minus_b": found.values["a"] - b,
+            "a_minus_b": fit_solution.parameter_values["a"] - b,
             "a_minus_b_stderr": math.sqrt(max(variance_of_rate, 0.0)),
-            "noise_size": found.noise_sd,
-            "outliers": len(found.outliers),
-            "friction_quantum": found.quantum,
-            "noise_order": found.noise.order,
-            "effective_samples": found.noise.effective_sample_size,
-            "degrees_of_freedom": found.degrees_of_freedom,
-            "whiteness": ljung_box_p_value(found.whitened_residuals, found.noise.order),
-            "r_squared": 1.0 - float(np.var(found.residuals)) / variance,
+            "noise_size": fit_solution.noise_sd,
+            "outliers": len(fit_solution.outlier_rows),
+            "friction_quantum": fit_solution.friction_rounding_quantum,
+            "noise_order": fit_solution.noise_model.order,
+            "effective_samples": fit_solution.noise_model.effective_sample_size,
+            "degrees_of_freedom": fit_solution.degrees_of_freedom,
+            "whiteness": ljung_box_p_value(
+                fit_solution.whitened_residuals, fit_solution.noise_model.order
+            ),
+            "r_squared": 1.0 - float(np.var(fit_solution.residuals)) / variance,
             "rows_fitted": len(rows),
-            "criterion": found.aic,
+            "criterion": fit_solution.aic,
             "covariance": covariance,
             "correlation": correlation,
         }
         along = {
-            "fitted_friction": found.model_friction + trend,
-            "fitted_friction_stderr": found.curve_stderr,
-            "detrended_friction": found.model_friction,
-            "residual": found.residuals,
-            "innovation": found.all_whitened_residuals,
+            "fitted_friction": fit_solution.model_friction + trend,
+            "fitted_friction_stderr": fit_solution.curve_stderr,
+            "detrended_friction": fit_solution.model_friction,
+            "residual": fit_solution.residuals,
+            "innovation": fit_solution.all_whitened_residuals,
         }
         for name in (about.name for about in RECORD_COLUMNS[:3]):
-            whole = [record.columns[name] for record in self._first_rows]
+            whole = [record.columns[name] for record in self._records_with_first_rows]
             along[f"record_{name}"] = np.concatenate(whole)
         for name, column in along.items():
             values[name] = along_rows = np.full(len(self.inner_coordinates["row"]), math.nan)

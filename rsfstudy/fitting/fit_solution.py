@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsfstudy.fitting.noise import NoiseModel
-from rsfstudy.fitting.window_model import coordinate_derivative
+from rsfstudy.fitting.window_model import parameter_derivative_by_coordinate
 
 
 @dataclass(frozen=True)
@@ -58,46 +58,51 @@ class FitSolution:
         Quantum to which friction is rounded, or 0 if friction is not rounded.
     """
 
-    values: dict[str, float]
-    free: tuple[str, ...]
-    covariance: np.ndarray
-    noise_covariance: np.ndarray
+    parameter_values: dict[str, float]
+    free_parameters: tuple[str, ...]
+    coordinate_covariance: np.ndarray
+    noise_caused_covariance: np.ndarray
     numerical_errors: dict[str, float]
-    noise: NoiseModel
+    noise_model: NoiseModel
     noise_sd: float
     degrees_of_freedom: float
     model_friction: np.ndarray
     residuals: np.ndarray
     whitened_residuals: np.ndarray
     jacobian: np.ndarray
-    by_loading: np.ndarray
+    loading_error_sensitivity: np.ndarray
     aic: float
-    unidentified: tuple[str, ...]
+    unidentified_parameters: tuple[str, ...]
     ols_residual_rms: float
-    quantum: float
+    friction_rounding_quantum: float
 
     @property
-    def outliers(self) -> np.ndarray:
+    def outlier_rows(self) -> np.ndarray:
         """Indices of the rows that were excluded as outliers."""
-        kept = self.noise.kept_mask
+        kept = self.noise_model.non_outlier_mask
         return np.zeros(0, dtype=int) if kept is None else np.flatnonzero(~kept)
 
     @property
     def all_whitened_residuals(self) -> np.ndarray:
         """Whitened residuals of all rows, with NaN for outliers."""
         return np.insert(
-            self.whitened_residuals, self.outliers - np.arange(len(self.outliers)), np.nan
+            self.whitened_residuals, self.outlier_rows - np.arange(len(self.outlier_rows)), np.nan
         )
 
     @property
     def coordinate_derivatives(self) -> np.ndarray:
         """Derivatives of parameters with respect to their coordinates."""
-        return np.array([coordinate_derivative(name, self.values[name]) for name in self.free])
+        return np.array(
+            [
+                parameter_derivative_by_coordinate(name, self.parameter_values[name])
+                for name in self.free_parameters
+            ]
+        )
 
     @property
     def coordinate_stderr(self) -> np.ndarray:
         """Standard errors of the coordinates of the free parameters."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
+        return np.asarray(np.sqrt(np.diag(self.coordinate_covariance)))
 
     @property
     def curve_stderr(self) -> np.ndarray:
@@ -106,11 +111,13 @@ class FitSolution:
         The standard error is the square root of the diagonal of :math:`J C J^T`, where :math:`J` is
         the Jacobian and :math:`C` is the covariance matrix.
         """
-        variances = np.einsum("ij,jk,ik->i", self.jacobian, self.covariance, self.jacobian)
+        variances = np.einsum(
+            "ij,jk,ik->i", self.jacobian, self.coordinate_covariance, self.jacobian
+        )
         # Rounding errors may cause negative variances if a parameter is not constrained.
         return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
-    def stderr(self, name: str) -> float:
+    def parameter_stderr(self, parameter_name: str) -> float:
         """Return the standard error of a parameter.
 
         Parameters
@@ -123,11 +130,15 @@ class FitSolution:
         float
             Standard error in the unit of the parameter.
         """
-        return float((self.coordinate_stderr * self.coordinate_derivatives)[self.free.index(name)])
+        return float(
+            (self.coordinate_stderr * self.coordinate_derivatives)[
+                self.free_parameters.index(parameter_name)
+            ]
+        )
 
 
 def compute_aic(
-    whitened_residuals: np.ndarray, noise: NoiseModel, parameters: int, count: int
+    whitened_residuals: np.ndarray, noise: NoiseModel, parameter_count: int, row_count: int
 ) -> float:
     r"""Compute the corrected Akaike information criterion.
 
@@ -161,10 +172,16 @@ def compute_aic(
     ----------
     .. [1] Hurvich and Tsai (1989), Biometrika 76, 297-307.
     """
-    parameters, size = (
-        parameters + count - len(whitened_residuals),
+    parameter_count, size = (
+        parameter_count + row_count - len(whitened_residuals),
         float(whitened_residuals @ whitened_residuals),
     )
-    every = parameters + noise.partial_autocorrelations.size + len(noise.level_sds)
-    likelihood = count * (math.log(2.0 * math.pi * size / count) + 1.0) + noise.log_determinant
-    return likelihood + 2.0 * every * count / max(count - every - 1.0, 1.0)
+    every = (
+        parameter_count
+        + noise.partial_autocorrelations.size
+        + len(noise.noise_level_standard_deviations)
+    )
+    likelihood = (
+        row_count * (math.log(2.0 * math.pi * size / row_count) + 1.0) + noise.log_determinant
+    )
+    return likelihood + 2.0 * every * row_count / max(row_count - every - 1.0, 1.0)

@@ -17,9 +17,9 @@ from scipy.linalg import block_diag
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.filters import LOW_PASS_ORDERS
 from rsfstudy.fitting.window_model import (
-    FINE_DIFFERENCES,
+    ACCURATE_DIFFERENCE_SCHEME,
     DifferenceScheme,
-    Values,
+    ParameterValues,
     WindowModel,
     parameters_to_fields,
     scene_to_parameters,
@@ -30,10 +30,10 @@ from rsfstudy.status import Status
 
 T = TypeVar("T")
 #: Prefixes of the parameters that have a separate value in each window.
-_WINDOW_PREFIXES = ("mu_star", "step_time", "trend")
+_PER_WINDOW_PARAMETER_PREFIXES = ("mu_star", "step_time", "trend")
 
 
-def is_window_parameter(name: str) -> bool:
+def is_per_window_parameter(parameter_name: str) -> bool:
     """Return True if each window has its own value of a parameter.
 
     Parameters
@@ -46,10 +46,10 @@ def is_window_parameter(name: str) -> bool:
     bool
         True for friction before the step, step time and trend.
     """
-    return name.startswith(_WINDOW_PREFIXES)
+    return parameter_name.startswith(_PER_WINDOW_PARAMETER_PREFIXES)
 
 
-def number_parameters(names: Sequence[str], windows: int) -> tuple[str, ...]:
+def add_window_numbers(parameter_names: Sequence[str], window_count: int) -> tuple[str, ...]:
     """Return the names of the parameters of a joint fit.
 
     Parameters
@@ -65,11 +65,11 @@ def number_parameters(names: Sequence[str], windows: int) -> tuple[str, ...]:
         Names of the shared parameters, followed by the numbered names for each window, such as
         ``mu_star_1`` and ``mu_star_2``. If there is a single window, the names are not numbered.
     """
-    if windows == 1:
-        return tuple(names)
-    own = [name for name in names if is_window_parameter(name)]
-    each = [f"{name}_{number}" for number in range(1, windows + 1) for name in own]
-    return (*(name for name in names if not is_window_parameter(name)), *each)
+    if window_count == 1:
+        return tuple(parameter_names)
+    own = [name for name in parameter_names if is_per_window_parameter(name)]
+    each = [f"{name}_{number}" for number in range(1, window_count + 1) for name in own]
+    return (*(name for name in parameter_names if not is_per_window_parameter(name)), *each)
 
 
 def split_window_number(name: str) -> tuple[str, int]:
@@ -96,7 +96,9 @@ def split_window_number(name: str) -> tuple[str, int]:
     ('slip_distance_2', 0)
     """
     before, _, number = name.rpartition("_")
-    return (before, int(number)) if number.isdecimal() and is_window_parameter(name) else (name, 0)
+    return (
+        (before, int(number)) if number.isdecimal() and is_per_window_parameter(name) else (name, 0)
+    )
 
 
 def strip_window_number(name: str) -> str:
@@ -191,7 +193,7 @@ class JointModel:
         """Displacements of all rows in um, relative to the step."""
         return np.concatenate([part.displacement for part in self.models])
 
-    def is_linear(self, name: str) -> bool:
+    def is_linear_in_parameter(self, parameter_name: str) -> bool:
         """Return True if friction is a linear function of a parameter.
 
         Friction must be linear in the parameter for all values of the other parameters.
@@ -206,9 +208,11 @@ class JointModel:
         bool
             True if friction is linear in all windows.
         """
-        return all(part.is_linear(strip_window_number(name)) for part in self.models)
+        return all(
+            part.is_linear_in_parameter(strip_window_number(parameter_name)) for part in self.models
+        )
 
-    def max_delay(self, name: str) -> float:
+    def max_loading_delay(self, parameter_name: str) -> float:
         """Return the largest delay of the loading that the model supports.
 
         Parameters
@@ -221,9 +225,9 @@ class JointModel:
         float
             Largest delay in s for the window of the step time.
         """
-        return self.models[max(split_window_number(name)[1] - 1, 0)].max_delay
+        return self.models[max(split_window_number(parameter_name)[1] - 1, 0)].max_loading_delay
 
-    def check_parameters(self, values: Values) -> None:
+    def check_parameters(self, values: ParameterValues) -> None:
         """Raise ``MotionStopped`` if the parameters are invalid for the scene.
 
         Parameters
@@ -244,7 +248,7 @@ class JointModel:
             raise MotionStopped(Status.NOT_APPLICABLE, text) from wrong
 
     def model_friction(
-        self, values: Values, *, refined: bool = False, require_stable: bool = False
+        self, values: ParameterValues, *, refined: bool = False, require_stable: bool = False
     ) -> np.ndarray:
         """Compute the friction of the model at each row of all windows.
 
@@ -269,7 +273,7 @@ class JointModel:
             [part.model_friction(own, **told) for part, own in self._iterate_windows(values)]
         )
 
-    def trend(self, values: Values) -> np.ndarray:
+    def compute_friction_trend(self, values: ParameterValues) -> np.ndarray:
         """Compute the trend at each row of all windows.
 
         Parameters
@@ -282,13 +286,15 @@ class JointModel:
         ndarray, shape (rows,)
             Trend of each row.
         """
-        return np.concatenate([part.trend(own) for part, own in self._iterate_windows(values)])
+        return np.concatenate(
+            [part.compute_friction_trend(own) for part, own in self._iterate_windows(values)]
+        )
 
     def jacobian(
         self,
-        values: Values,
-        free: Sequence[str],
-        difference_scheme: DifferenceScheme = FINE_DIFFERENCES,
+        values: ParameterValues,
+        free_parameters: Sequence[str],
+        difference_scheme: DifferenceScheme = ACCURATE_DIFFERENCE_SCHEME,
     ) -> np.ndarray:
         """Compute the derivatives of friction with respect to parameters.
 
@@ -310,15 +316,15 @@ class JointModel:
             windows.
         """
         blocks = []
-        places = {name: place for place, name in enumerate(free)}
+        places = {name: place for place, name in enumerate(free_parameters)}
         for number, (part, own) in enumerate(self._iterate_windows(values), start=1):
             acting = window_values(places, number)
-            block = np.zeros((len(part.time), len(free)))
+            block = np.zeros((len(part.time), len(free_parameters)))
             block[:, [*acting.values()]] = part.jacobian(own, [*acting], difference_scheme)
             blocks.append(block)
         return np.concatenate(blocks)
 
-    def loading_sensitivity(self, values: Values) -> np.ndarray:
+    def compute_loading_error_sensitivity(self, values: ParameterValues) -> np.ndarray:
         """Compute the changes of friction due to errors of the loading.
 
         Parameters
@@ -334,11 +340,16 @@ class JointModel:
         """
         return np.asarray(
             block_diag(
-                *(part.loading_sensitivity(own) for part, own in self._iterate_windows(values))
+                *(
+                    part.compute_loading_error_sensitivity(own)
+                    for part, own in self._iterate_windows(values)
+                )
             )
         )
 
-    def _iterate_windows(self, values: Values) -> Iterator[tuple[WindowModel, dict[str, float]]]:
+    def _iterate_windows(
+        self, values: ParameterValues
+    ) -> Iterator[tuple[WindowModel, dict[str, float]]]:
         """Iterate over the models and parameters of the windows."""
         factors = self.stiffness_factors or (1.0,) * len(self.models)
         for number, (part, factor) in enumerate(zip(self.models, factors, strict=True), start=1):

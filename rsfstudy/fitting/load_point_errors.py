@@ -13,22 +13,24 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from rsfstudy.fitting import noise
-from rsfstudy.fitting.outliers import find_quantum
+from rsfstudy.fitting.outliers import find_rounding_quantum
 from rsfstudy.fitting.record import Record
 from rsfstudy.fitting.velocity_steps import LoadingStep
-from rsfstudy.fitting.window_model import STEP_SHIFT_FRACTION
+from rsfstudy.fitting.window_model import STEP_SHIFT_IN_STANDARD_DEVIATIONS
 
 #: Largest number of block averages from which the noise is estimated. An autoregressive process of
 #: block averages also describes slow fluctuations of the load point around its set point.
-_MAX_MEANS = 1000
+_MAX_ROW_MEANS_FOR_NOISE = 1000
 #: Smallest noise relative to the displacement of the record. Smaller noise is neglected.
-_MIN_RELATIVE_NOISE = 1e-7
+_MIN_NOISE_OVER_DISPLACEMENT = 1e-7
 #: Ratio of the noise to the quantum of displacement below which rounding errors are not random, and
 #: number of random phases in the simulation of rounding errors.
-_MIN_NOISE_PER_QUANTUM, _PHASE_DRAW_COUNT = 0.4, 200
+_MIN_DISPLACEMENT_NOISE_PER_QUANTUM, _ROUNDING_PHASE_DRAW_COUNT = 0.4, 200
 
 
-def shift_steps(record: Record, steps: Sequence[LoadingStep]) -> list[list[LoadingStep]]:
+def shift_steps_by_their_errors(
+    record: Record, steps: Sequence[LoadingStep]
+) -> list[list[LoadingStep]]:
     """Return copies of the steps that are shifted by their errors.
 
     In each copy, the times and velocities are shifted by 1 % of one error. The errors are
@@ -53,8 +55,8 @@ def shift_steps(record: Record, steps: Sequence[LoadingStep]) -> list[list[Loadi
     speeds = np.array([steps[0].velocity_before, *(step.velocity_after for step in steps)])
     moved = []
     for late, faster in _step_errors(record, steps, speeds):
-        v = speeds + STEP_SHIFT_FRACTION * faster
-        shifts = zip(steps, STEP_SHIFT_FRACTION * late, v[:-1], v[1:], strict=True)
+        v = speeds + STEP_SHIFT_IN_STANDARD_DEVIATIONS * faster
+        shifts = zip(steps, STEP_SHIFT_IN_STANDARD_DEVIATIONS * late, v[:-1], v[1:], strict=True)
         moved.append(
             [
                 s._replace(
@@ -66,7 +68,9 @@ def shift_steps(record: Record, steps: Sequence[LoadingStep]) -> list[list[Loadi
     return moved
 
 
-def integrate_displacement(loading: np.ndarray, time: np.ndarray, origin: float) -> np.ndarray:
+def integrate_displacement(
+    loading: np.ndarray, time: np.ndarray, zero_displacement_time: float
+) -> np.ndarray:
     """Integrate the load point velocity to obtain the displacement.
 
     In contrast to the recorded displacement, the result has no noise. Noise of the recorded
@@ -95,7 +99,7 @@ def integrate_displacement(loading: np.ndarray, time: np.ndarray, origin: float)
         piece = np.maximum(np.searchsorted(begins, at, side="right") - 1, 0)
         return np.asarray(knots[piece] + speeds[piece] * (at - begins[piece]))
 
-    return np.asarray(moved(time) - moved(np.array([origin])))
+    return np.asarray(moved(time) - moved(np.array([zero_displacement_time])))
 
 
 def _step_errors(
@@ -124,16 +128,18 @@ def _step_errors(
     best = np.linalg.lstsq(columns[:, :-1], columns[:, -1])[0]
     columns[:, -1] -= columns[:, :-1] @ best
     if (
-        not np.std(columns[:, -1]) > _MIN_RELATIVE_NOISE * np.ptp(x)
+        not np.std(columns[:, -1]) > _MIN_NOISE_OVER_DISPLACEMENT * np.ptp(x)
         or len(t) < 4 * columns.shape[1]
     ):
         return []
-    quantum = find_quantum(record.columns["displacement"])
-    if np.std(columns[:, -1]) < _MIN_NOISE_PER_QUANTUM * quantum:
+    quantum = find_rounding_quantum(record.columns["displacement"])
+    if np.std(columns[:, -1]) < _MIN_DISPLACEMENT_NOISE_PER_QUANTUM * quantum:
         exact = columns[:, :-1] @ best + x[0]
-        root = _rounding_covariance_root(columns[:, :-1], exact, np.searchsorted(at, t), quantum)
+        root = _covariance_root_from_rounding(
+            columns[:, :-1], exact, np.searchsorted(at, t), quantum
+        )
     else:
-        root = _noise_covariance_root(t, columns)
+        root = _covariance_root_from_noise(t, columns)
     # The detected steps differ from the least-squares solution for all rows.
     missed = best[:-1] - np.concatenate([np.zeros(len(at)), velocities[moves]])
     root = np.column_stack([root, missed])
@@ -142,7 +148,7 @@ def _step_errors(
     return [*zip(root[: len(at)].T, faster.T, strict=True)]
 
 
-def _noise_covariance_root(t: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def _covariance_root_from_noise(time: np.ndarray, displacement_columns: np.ndarray) -> np.ndarray:
     """Compute a root of the covariance matrix for random noise.
 
     Parameters
@@ -159,21 +165,24 @@ def _noise_covariance_root(t: np.ndarray, columns: np.ndarray) -> np.ndarray:
         A matrix :math:`A` such that :math:`A A^T` is the covariance matrix of the times and
         velocities.
     """
-    every = -(-len(t) // _MAX_MEANS)
-    table = np.column_stack([t, columns])[: len(t) // every * every]
-    t, *rest = table.reshape(-1, every, table.shape[1]).mean(axis=1).T
+    every = -(-len(time) // _MAX_ROW_MEANS_FOR_NOISE)
+    table = np.column_stack([time, displacement_columns])[: len(time) // every * every]
+    time, *rest = table.reshape(-1, every, table.shape[1]).mean(axis=1).T
     jacobian, left = np.array(rest[:-1]).T, rest[-1]
-    told = noise.fit_noise(noise.AUTOREGRESSIVE, t, left, jacobian)
-    white = told.whiten(np.eye(len(t)))
-    size = np.linalg.norm(white @ left) / np.sqrt(len(t) - jacobian.shape[1])
+    told = noise.fit_noise(noise.AUTOREGRESSIVE_NOISE_NAME, time, left, jacobian)
+    white = told.whiten_columns(np.eye(len(time)))
+    size = np.linalg.norm(white @ left) / np.sqrt(len(time) - jacobian.shape[1])
     # The steps are ordinary least-squares estimates, so their covariance matrix is J^+ R J^+'
     # with the pseudoinverse J^+ = (J'J)^-1 J' and the correlation matrix R of the noise.
     acting = solve_triangular(white, np.linalg.pinv(jacobian).T, trans="T", lower=True)
     return np.asarray(size * np.linalg.qr(acting)[1].T[:-1, :-1])
 
 
-def _rounding_covariance_root(
-    jacobian: np.ndarray, exact: np.ndarray, pieces: np.ndarray, quantum: float
+def _covariance_root_from_rounding(
+    jacobian: np.ndarray,
+    unrounded_displacement: np.ndarray,
+    row_segments: np.ndarray,
+    rounding_quantum: float,
 ) -> np.ndarray:
     """Compute a root of the covariance matrix for rounded displacement.
 
@@ -188,7 +197,14 @@ def _rounding_covariance_root(
         velocities.
     """
     rng = np.random.default_rng(0)
-    phases = quantum * rng.random((_PHASE_DRAW_COUNT, pieces.max() + 1))[:, pieces]
-    errors = quantum * np.rint((exact + phases) / quantum) - exact - phases
+    phases = (
+        rounding_quantum
+        * rng.random((_ROUNDING_PHASE_DRAW_COUNT, row_segments.max() + 1))[:, row_segments]
+    )
+    errors = (
+        rounding_quantum * np.rint((unrounded_displacement + phases) / rounding_quantum)
+        - unrounded_displacement
+        - phases
+    )
     moved = errors @ np.linalg.pinv(jacobian).T
-    return np.asarray(np.linalg.qr(moved / np.sqrt(_PHASE_DRAW_COUNT))[1].T[:-1])
+    return np.asarray(np.linalg.qr(moved / np.sqrt(_ROUNDING_PHASE_DRAW_COUNT))[1].T[:-1])

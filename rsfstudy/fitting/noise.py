@@ -42,28 +42,28 @@ from rsfstudy.fitting.sampling_runs import (
     SamplingRun,
     count_processes,
     find_level_changes,
-    find_runs,
-    index_rows,
-    split_runs,
+    find_sampling_runs,
+    repeat_run_field_per_row,
+    split_runs_at_level_changes,
 )
 from rsfstudy.fitting.whiteness_test import LAG_COUNT as LAG_COUNT
 from rsfstudy.fitting.whiteness_test import ljung_box_p_value as ljung_box_p_value
 
 #: Names of the noise models: white noise, and an autoregressive process with an automatic order.
-WHITE, AUTOREGRESSIVE = "white", "ar"
+WHITE_NOISE_NAME, AUTOREGRESSIVE_NOISE_NAME = "white", "ar"
 #: Highest order of the autoregressive process, and fewest rows per coefficient.
-MAX_ORDER, _SAMPLES_PER_COEFFICIENT = 12, 10
+MAX_AUTOREGRESSIVE_ORDER, _MIN_SAMPLES_PER_COEFFICIENT = 12, 10
 #: Largest partial autocorrelation, and gradient of the REML objective at which the search ends.
-_MAX_PARTIAL_AUTOCORRELATION, _GRADIENT_TOLERANCE = 0.999, 0.02
+_MAX_PARTIAL_AUTOCORRELATION, _REML_GRADIENT_TOLERANCE = 0.999, 0.02
 #: Largest number of passes that refine the noise levels and the autoregressive process in turn.
-_LEVEL_PASSES = 2
+_NOISE_LEVEL_PASSES = 2
 #: Smallest standard deviation of a noise level, relative to the root mean square of the residuals.
-_MIN_RELATIVE_SD = 1e-3
+_MIN_LEVEL_SD_OVER_TOTAL_SD = 1e-3
 #: Largest logarithm of the ratio of a noise level to the first noise level.
-_MAX_LOG_LEVEL_RATIO = 30.0
+_MAX_LOG_NOISE_LEVEL_RATIO = 30.0
 
 
-def check_noise_name(name: str) -> None:
+def check_noise_name(noise_name: str) -> None:
     """Raise ``InvalidValue`` if the name of a noise model is unknown.
 
     Parameters
@@ -76,9 +76,17 @@ def check_noise_name(name: str) -> None:
     InvalidValue
         If the name is unknown.
     """
-    if name not in (WHITE, AUTOREGRESSIVE, *(f"ar{order}" for order in range(1, MAX_ORDER + 1))):
-        choices = (WHITE, AUTOREGRESSIVE, f"ar1 to ar{MAX_ORDER}")
-        raise InvalidValue("noise", name, "is unknown", choices=choices)
+    if noise_name not in (
+        WHITE_NOISE_NAME,
+        AUTOREGRESSIVE_NOISE_NAME,
+        *(f"ar{order}" for order in range(1, MAX_AUTOREGRESSIVE_ORDER + 1)),
+    ):
+        choices = (
+            WHITE_NOISE_NAME,
+            AUTOREGRESSIVE_NOISE_NAME,
+            f"ar1 to ar{MAX_AUTOREGRESSIVE_ORDER}",
+        )
+        raise InvalidValue("noise", noise_name, "is unknown", choices=choices)
 
 
 @dataclass(frozen=True)
@@ -101,10 +109,10 @@ class NoiseModel:
         Correlation due to averaging, which is removed before the correlation of the process.
     """
 
-    runs: tuple[SamplingRun, ...]
+    sampling_runs: tuple[SamplingRun, ...]
     partial_autocorrelations: np.ndarray
-    level_sds: np.ndarray
-    kept_mask: np.ndarray | None = None
+    noise_level_standard_deviations: np.ndarray
+    non_outlier_mask: np.ndarray | None = None
     averaging_correlation: AveragingCorrelation | None = None
 
     @property
@@ -112,7 +120,7 @@ class NoiseModel:
         """Order of the autoregressive processes."""
         return int(self.partial_autocorrelations.shape[1])
 
-    def whiten(self, columns: np.ndarray) -> np.ndarray:
+    def whiten_columns(self, columns: np.ndarray) -> np.ndarray:
         """Remove the correlation of the noise from columns.
 
         Each row is replaced by its prediction error, divided by the standard error of the
@@ -132,16 +140,21 @@ class NoiseModel:
         columns = (
             columns
             if self.averaging_correlation is None
-            else self.averaging_correlation.whiten(columns)
+            else self.averaging_correlation.whiten_columns(columns)
         )
-        scaled = columns / self.level_sds[index_rows(self.runs, "level")][:, None]
+        scaled = (
+            columns
+            / self.noise_level_standard_deviations[
+                repeat_run_field_per_row(self.sampling_runs, "noise_level_index")
+            ][:, None]
+        )
         found = np.empty_like(columns)
-        for run in self.runs:
+        for run in self.sampling_runs:
             known = min(run.preceding_rows, self.order)
-            part = scaled[run.start - known : run.stop]
-            found[run.start : run.stop] = _prediction_errors(part, *self.predictors[run.process])[
-                known:
-            ]
+            part = scaled[run.start_row - known : run.stop_row]
+            found[run.start_row : run.stop_row] = _prediction_errors(
+                part, *self.prediction_coefficients_and_variances[run.noise_process_index]
+            )[known:]
         return found
 
     def drop_outliers(self, columns: np.ndarray) -> np.ndarray:
@@ -157,10 +170,10 @@ class NoiseModel:
         ndarray, shape (kept rows, ...)
             Array without the rows of outliers.
         """
-        return columns if self.kept_mask is None else columns[self.kept_mask]
+        return columns if self.non_outlier_mask is None else columns[self.non_outlier_mask]
 
     @cached_property
-    def predictors(self) -> list[tuple[list[list[float]], list[float]]]:
+    def prediction_coefficients_and_variances(self) -> list[tuple[list[list[float]], list[float]]]:
         """Coefficients and variances of each process.
 
         Each item is a result of ``_levinson_durbin``.
@@ -175,12 +188,12 @@ class NoiseModel:
             if self.averaging_correlation is None
             else self.averaging_correlation.log_determinant
         )
-        for first, last, number, before, level in self.runs:
-            variances = self.predictors[number][1]
+        for first, last, number, before, level in self.sampling_runs:
+            variances = self.prediction_coefficients_and_variances[number][1]
             early = variances[min(before, self.order) : min(before + last - first, self.order)]
             total += math.fsum(map(math.log, early))
             total += (last - first - len(early)) * math.log(variances[-1])
-            total += 2.0 * (last - first) * math.log(self.level_sds[level])
+            total += 2.0 * (last - first) * math.log(self.noise_level_standard_deviations[level])
         return total
 
     @property
@@ -196,23 +209,25 @@ class NoiseModel:
         an AR(1) process with correlation :math:`\rho`, the effective sample size is
         :math:`n (1 - \rho)/(1 + \rho)`.
         """
-        power = self._power_at_zero
-        lasts = ((run.stop - run.start, run.process) for run in self.runs)
+        power = self._power_at_zero_frequency
+        lasts = (
+            (run.stop_row - run.start_row, run.noise_process_index) for run in self.sampling_runs
+        )
         each = (
             1.0
             if self.averaging_correlation is None
-            else self.averaging_correlation.rows_per_independent_row
+            else self.averaging_correlation.row_count_per_independent_sample
         )
         return sum(max(1.0, rows / max(power[n], 1.0) / each) for rows, n in lasts)
 
     @property
-    def _power_at_zero(self) -> list[float]:
+    def _power_at_zero_frequency(self) -> list[float]:
         """Power at zero frequency of each process, in units of variance."""
-        told = ((c[-1], v[-1]) for c, v in self.predictors)
+        told = ((c[-1], v[-1]) for c, v in self.prediction_coefficients_and_variances)
         return [left / (1.0 - math.fsum(last)) ** 2 for last, left in told]
 
     @property
-    def degrees_of_freedom(self) -> float:
+    def degrees_of_freedom_of_slow_noise(self) -> float:
         """Degrees of freedom of the estimated power at zero frequency.
 
         The power at zero frequency determines the standard errors of slow trends. The degrees of
@@ -220,8 +235,15 @@ class NoiseModel:
         the uncertainty of the estimated coefficients.
         """
         total = 0.0
-        rows = np.bincount(index_rows(self.runs, "process")).tolist()
-        for count, told, power in zip(rows, self.predictors, self._power_at_zero, strict=True):
+        rows = np.bincount(
+            repeat_run_field_per_row(self.sampling_runs, "noise_process_index")
+        ).tolist()
+        for count, told, power in zip(
+            rows,
+            self.prediction_coefficients_and_variances,
+            self._power_at_zero_frequency,
+            strict=True,
+        ):
             # The coefficients have the covariance matrix (innovation variance) R^-1/rows.
             ones = _prediction_errors(np.ones((self.order, 1)), *told)
             total += count / (1.0 + 2.0 * power * float(np.square(ones).sum()))
@@ -241,17 +263,17 @@ def white_noise(time: np.ndarray) -> NoiseModel:
     NoiseModel
         White noise, with the same standard deviation for all levels.
     """
-    runs = find_runs(time)
+    runs = find_sampling_runs(time)
     return NoiseModel(runs, np.zeros((count_processes(runs), 0)), np.ones(count_processes(runs)))
 
 
 def fit_noise(
-    name: str,
+    noise_name: str,
     time: np.ndarray,
     residuals: np.ndarray,
     jacobian: np.ndarray,
-    kept_mask: np.ndarray | None = None,
-    min_sd: float = 0.0,
+    non_outlier_mask: np.ndarray | None = None,
+    min_noise_sd: float = 0.0,
     averaging_time: float = 0.0,
 ) -> NoiseModel:
     """Estimate the noise from the residuals of a fit by REML.
@@ -280,9 +302,11 @@ def fit_noise(
         Noise with one process for each sampling interval, and one noise level for each segment of
         the record.
     """
-    begin, min_sd = guess_noise(name, time, residuals, kept_mask, min_sd, averaging_time)
+    begin, min_noise_sd = guess_noise_by_moments(
+        noise_name, time, residuals, non_outlier_mask, min_noise_sd, averaging_time
+    )
     shape, order = begin.partial_autocorrelations.shape, begin.order
-    if not order and len(begin.level_sds) == 1:
+    if not order and len(begin.noise_level_standard_deviations) == 1:
         return begin
 
     def noise(x: np.ndarray) -> NoiseModel:
@@ -290,42 +314,48 @@ def fit_noise(
             x[: begin.partial_autocorrelations.size]
         ).reshape(shape)
         logs = np.clip(
-            x[begin.partial_autocorrelations.size :], -_MAX_LOG_LEVEL_RATIO, _MAX_LOG_LEVEL_RATIO
+            x[begin.partial_autocorrelations.size :],
+            -_MAX_LOG_NOISE_LEVEL_RATIO,
+            _MAX_LOG_NOISE_LEVEL_RATIO,
         )
         sizes = np.exp(np.append(0.0, logs))
         return NoiseModel(
-            begin.runs, partial, np.maximum(sizes, min_sd), kept_mask, begin.averaging_correlation
+            begin.sampling_runs,
+            partial,
+            np.maximum(sizes, min_noise_sd),
+            non_outlier_mask,
+            begin.averaging_correlation,
         )
 
     columns = begin.drop_outliers(np.column_stack([jacobian, residuals]))
     columns = (
         columns
         if begin.averaging_correlation is None
-        else begin.averaging_correlation.whiten(columns)
+        else begin.averaging_correlation.whiten_columns(columns)
     )
-    products = _LaggedProducts(begin.runs, columns, order)
+    products = _LaggedProducts(begin.sampling_runs, columns, order)
 
     def misfit(x: np.ndarray) -> float:
         return products.reml_objective(noise(x))
 
     x = np.append(
         np.arctanh(begin.partial_autocorrelations.ravel() / _MAX_PARTIAL_AUTOCORRELATION),
-        np.log(begin.level_sds[1:]),
+        np.log(begin.noise_level_standard_deviations[1:]),
     )
     if not math.isfinite(misfit(x)):  # All residuals are zero.
         return noise(x)
     # The objective may be infinite at some points that the search evaluates.
     with np.errstate(invalid="ignore", over="ignore"):
-        found = minimize(misfit, x, method="BFGS", options={"gtol": _GRADIENT_TOLERANCE})
+        found = minimize(misfit, x, method="BFGS", options={"gtol": _REML_GRADIENT_TOLERANCE})
     return noise(found.x if found.fun <= misfit(x) else x)
 
 
-def guess_noise(
-    name: str,
+def guess_noise_by_moments(
+    noise_name: str,
     time: np.ndarray,
     residuals: np.ndarray,
-    kept_mask: np.ndarray | None = None,
-    min_sd: float = 0.0,
+    non_outlier_mask: np.ndarray | None = None,
+    min_noise_sd: float = 0.0,
     averaging_time: float = 0.0,
 ) -> tuple[NoiseModel, float]:
     """Estimate the noise from the residuals of a fit by the method of moments.
@@ -352,18 +382,29 @@ def guess_noise(
     min_sd : float
         Lower bound of the standard deviation of a noise level, relative to the first level.
     """
-    if kept_mask is not None:
-        time, residuals = time[kept_mask], residuals[kept_mask]
+    if non_outlier_mask is not None:
+        time, residuals = time[non_outlier_mask], residuals[non_outlier_mask]
     overlap = AveragingCorrelation(time, averaging_time) if averaging_time else None
     if overlap is not None:
-        residuals = overlap.whiten(residuals)
-    min_sd = max(min_sd, _MIN_RELATIVE_SD * math.sqrt(float(np.mean(np.square(residuals)))), 1e-300)
-    found, first = _estimate_by_moments(name, find_runs(time), residuals, min_sd)
-    return replace(found, kept_mask=kept_mask, averaging_correlation=overlap), min_sd / first
+        residuals = overlap.whiten_columns(residuals)
+    min_noise_sd = max(
+        min_noise_sd,
+        _MIN_LEVEL_SD_OVER_TOTAL_SD * math.sqrt(float(np.mean(np.square(residuals)))),
+        1e-300,
+    )
+    found, first = _estimate_noise_by_moments(
+        noise_name, find_sampling_runs(time), residuals, min_noise_sd
+    )
+    return replace(
+        found, non_outlier_mask=non_outlier_mask, averaging_correlation=overlap
+    ), min_noise_sd / first
 
 
-def _estimate_by_moments(
-    name: str, sampling_runs: tuple[SamplingRun, ...], residuals: np.ndarray, min_sd: float
+def _estimate_noise_by_moments(
+    noise_name: str,
+    sampling_runs: tuple[SamplingRun, ...],
+    residuals: np.ndarray,
+    min_noise_sd: float,
 ) -> tuple[NoiseModel, float]:
     """Estimate the noise and its levels by the method of moments.
 
@@ -374,31 +415,44 @@ def _estimate_by_moments(
     first : float
         Standard deviation of the first level.
     """
-    stated, count = name.removeprefix(AUTOREGRESSIVE), count_processes(sampling_runs)
+    stated, count = (
+        noise_name.removeprefix(AUTOREGRESSIVE_NOISE_NAME),
+        count_processes(sampling_runs),
+    )
     runs, knots, innovations = sampling_runs, list[int](), residuals
     scale = np.ones(len(residuals))
-    for _ in range(1 + _LEVEL_PASSES):
-        levels = index_rows(runs, "level")
+    for _ in range(1 + _NOISE_LEVEL_PASSES):
+        levels = repeat_run_field_per_row(runs, "noise_level_index")
         squares = np.bincount(levels, np.square(innovations)) / np.bincount(levels)
-        scale = np.maximum(scale * np.sqrt(squares)[levels], min_sd)
+        scale = np.maximum(scale * np.sqrt(squares)[levels], min_noise_sd)
         scaled = residuals / scale
         parts = [
-            [scaled[r.start : r.stop] for r in sampling_runs if r.process == n]
+            [scaled[r.start_row : r.stop_row] for r in sampling_runs if r.noise_process_index == n]
             for n in range(count)
         ]
-        order = 0 if name == WHITE else int(stated) if stated else _select_order(parts)
+        order = (
+            0
+            if noise_name == WHITE_NOISE_NAME
+            else int(stated)
+            if stated
+            else _select_autoregressive_order(parts)
+        )
         partial = np.array([_burg_coefficients(part, order) for part in parts]).reshape(
             count, order
         )
         sizes = scale[np.unique(levels, return_index=True)[1]]
         found = NoiseModel(runs, partial, sizes)
-        innovations = found.whiten(residuals[:, None])[:, 0]
-        before, knots = knots, find_level_changes(innovations * scale, min_sd)
+        innovations = found.whiten_columns(residuals[:, None])[:, 0]
+        before, knots = knots, find_level_changes(innovations * scale, min_noise_sd)
         if knots == before:
             break
-        runs = split_runs(sampling_runs, knots)
-    first = float(found.level_sds[0])
-    return NoiseModel(found.runs, found.partial_autocorrelations, found.level_sds / first), first
+        runs = split_runs_at_level_changes(sampling_runs, knots)
+    first = float(found.noise_level_standard_deviations[0])
+    return NoiseModel(
+        found.sampling_runs,
+        found.partial_autocorrelations,
+        found.noise_level_standard_deviations / first,
+    ), first
 
 
 class _LaggedProducts:
@@ -417,7 +471,9 @@ class _LaggedProducts:
         Order of the autoregressive processes.
     """
 
-    def __init__(self, runs: Sequence[SamplingRun], columns: np.ndarray, order: int) -> None:
+    def __init__(
+        self, sampling_runs: Sequence[SamplingRun], columns: np.ndarray, autoregressive_order: int
+    ) -> None:
         self.row_count, self.parameter_count = len(columns), columns.shape[1] - 1
         # The derivatives may be almost linearly dependent. With an orthonormal basis of the same
         # space, the objective function changes by a constant only.
@@ -425,21 +481,42 @@ class _LaggedProducts:
         left = left - base @ (base.T @ left)
         columns = np.column_stack([base, left / (np.linalg.norm(left) or 1.0)])
         width = columns.shape[1]
-        self.process_levels = sorted({(run.process, run.level) for run in runs})
-        self.sums = np.zeros((len(self.process_levels), order + 1, order + 1, width, width))
+        self.noise_levels_of_processes = sorted(
+            {(run.noise_process_index, run.noise_level_index) for run in sampling_runs}
+        )
+        self.lagged_product_sums = np.zeros(
+            (
+                len(self.noise_levels_of_processes),
+                autoregressive_order + 1,
+                autoregressive_order + 1,
+                width,
+                width,
+            )
+        )
         #: For each run, the first rows together with the earlier rows that predict them, the number
         #: of earlier rows, the process of the run, and the noise levels of all these rows.
-        self.initial_blocks: list[tuple[np.ndarray, int, int, np.ndarray]] = []
-        levels = index_rows(runs, "level")
-        for run in runs:
-            known = min(run.preceding_rows, order)
-            rows = slice(run.start - known, min(run.start + order, run.stop))
-            if order:
-                self.initial_blocks.append((columns[rows], known, run.process, levels[rows]))
-            part = columns[run.start : run.stop]
-            later = [part[order - lag : len(part) - lag] for lag in range(order + 1)]
-            sums = self.sums[self.process_levels.index((run.process, run.level))]
-            for i in range(order + 1 if len(part) > order else 0):
+        self.initial_row_blocks: list[tuple[np.ndarray, int, int, np.ndarray]] = []
+        levels = repeat_run_field_per_row(sampling_runs, "noise_level_index")
+        for run in sampling_runs:
+            known = min(run.preceding_rows, autoregressive_order)
+            rows = slice(
+                run.start_row - known, min(run.start_row + autoregressive_order, run.stop_row)
+            )
+            if autoregressive_order:
+                self.initial_row_blocks.append(
+                    (columns[rows], known, run.noise_process_index, levels[rows])
+                )
+            part = columns[run.start_row : run.stop_row]
+            later = [
+                part[autoregressive_order - lag : len(part) - lag]
+                for lag in range(autoregressive_order + 1)
+            ]
+            sums = self.lagged_product_sums[
+                self.noise_levels_of_processes.index(
+                    (run.noise_process_index, run.noise_level_index)
+                )
+            ]
+            for i in range(autoregressive_order + 1 if len(part) > autoregressive_order else 0):
                 for j in range(i + 1):
                     found = later[i].T @ later[j]
                     sums[i, j] += found
@@ -459,15 +536,19 @@ class _LaggedProducts:
         float
             Value of the objective function, or infinity if all residuals are zero.
         """
-        total = np.zeros(self.sums.shape[-2:])
-        for (number, level), sums in zip(self.process_levels, self.sums, strict=True):
-            coefficients, variances = noise.predictors[number]
+        total = np.zeros(self.lagged_product_sums.shape[-2:])
+        for (number, level), sums in zip(
+            self.noise_levels_of_processes, self.lagged_product_sums, strict=True
+        ):
+            coefficients, variances = noise.prediction_coefficients_and_variances[number]
             full = np.append(1.0, -np.array(coefficients[-1]))
-            scale = variances[-1] * noise.level_sds[level] ** 2
+            scale = variances[-1] * noise.noise_level_standard_deviations[level] ** 2
             total += np.einsum("i,j,ijab->ab", full, full, sums) / scale
-        for early, known, number, levels in self.initial_blocks:
-            scaled = early / noise.level_sds[levels][:, None]
-            begun = _prediction_errors(scaled, *noise.predictors[number])[known:]
+        for early, known, number, levels in self.initial_row_blocks:
+            scaled = early / noise.noise_level_standard_deviations[levels][:, None]
+            begun = _prediction_errors(
+                scaled, *noise.prediction_coefficients_and_variances[number]
+            )[known:]
             total += begun.T @ begun
         try:
             triangle = np.diag(np.linalg.cholesky(total))
@@ -478,21 +559,21 @@ class _LaggedProducts:
         return float(2.0 * free * math.log(triangle[-1]) + noise.log_determinant + told)
 
 
-def _select_order(parts: Sequence[Sequence[np.ndarray]]) -> int:
+def _select_autoregressive_order(residual_runs_per_process: Sequence[Sequence[np.ndarray]]) -> int:
     """Return the autoregressive order that minimises the AIC."""
-    shortest = min(max(map(len, part)) for part in parts)
-    highest = min(MAX_ORDER, shortest // _SAMPLES_PER_COEFFICIENT)
+    shortest = min(max(map(len, part)) for part in residual_runs_per_process)
+    highest = min(MAX_AUTOREGRESSIVE_ORDER, shortest // _MIN_SAMPLES_PER_COEFFICIENT)
     criterion = np.zeros(highest + 1)
-    for part in parts:
+    for part in residual_runs_per_process:
         samples = sum(map(len, part))
         left = np.cumsum(np.log1p(-(np.array(_burg_coefficients(part, highest)) ** 2)))
         criterion[1:] += samples * left + 2.0 * np.arange(1, highest + 1)
     return int(np.argmin(criterion))
 
 
-def _burg_coefficients(part: Sequence[np.ndarray], order: int) -> list[float]:
+def _burg_coefficients(residual_runs: Sequence[np.ndarray], order: int) -> list[float]:
     """Estimate partial autocorrelations by the Burg method."""
-    forward, backward = [[p - p.mean() for p in part] for _ in range(2)]
+    forward, backward = [[p - p.mean() for p in residual_runs] for _ in range(2)]
     found = []
     for _ in range(order):
         ahead = [f[1:] for f in forward if len(f) > 1]
@@ -509,7 +590,7 @@ def _burg_coefficients(part: Sequence[np.ndarray], order: int) -> list[float]:
 
 
 def _levinson_durbin(
-    partial: Sequence[float] | np.ndarray,
+    partial_autocorrelations: Sequence[float] | np.ndarray,
 ) -> tuple[list[list[float]], list[float]]:
     """Compute prediction coefficients by the Levinson-Durbin recursion.
 
@@ -523,7 +604,7 @@ def _levinson_durbin(
     """
     coefficients: list[list[float]] = [[]]
     variances = [1.0]
-    for k in map(float, partial):
+    for k in map(float, partial_autocorrelations):
         last = coefficients[-1]
         turned = [c - k * d for c, d in zip(last, reversed(last), strict=True)]
         coefficients.append([*turned, k])

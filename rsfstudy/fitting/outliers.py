@@ -7,17 +7,17 @@ from scipy.ndimage import maximum_filter, rank_filter
 
 #: Number of neighbours on each side in the median that is compared with a row, and number of rows
 #: in a block with its own standard deviation.
-_NEIGHBOUR_COUNT, _BLOCK_ROWS = 3, 100
+_NEIGHBOURS_PER_SIDE_FOR_MEDIAN, _ROWS_PER_RESIDUAL_SCALE_BLOCK = 3, 100
 #: Smallest deviation of an outlier in standard deviations, and relative to the same deviation of
 #: the model. The second condition excludes misfits at a peak of the model.
-_OUTLIER_SIGMAS, _MAX_MODEL_DEPARTURE_RATIO = 6.0, 2.0
+_OUTLIER_SIGMAS, _MIN_OUTLIER_OVER_MODEL_DEPARTURE = 6.0, 2.0
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
-_SD_PER_MAD = 1.4826
+_STANDARD_DEVIATION_PER_MAD = 1.4826
 #: Largest deviation of rounded values from multiples of the quantum, relative to the quantum.
-_QUANTUM_TOLERANCE = 0.02
+_MAX_GRID_MISFIT_OVER_QUANTUM = 0.02
 
 
-def find_quantum(values: np.ndarray) -> float:
+def find_rounding_quantum(values: np.ndarray) -> float:
     """Find the quantum to which values are rounded.
 
     Values are rounded if they are multiples of a quantum, up to a constant offset.
@@ -40,11 +40,15 @@ def find_quantum(values: np.ndarray) -> float:
     multiples = (distinct - distinct[0]) / gaps.min()
     quantum = float(gaps.min() * multiples[-1] / max(np.rint(multiples[-1]), 1.0))
     multiples = (distinct - distinct[0]) / quantum
-    return quantum if np.abs(multiples - np.rint(multiples)).max() < _QUANTUM_TOLERANCE else 0.0
+    return (
+        quantum
+        if np.abs(multiples - np.rint(multiples)).max() < _MAX_GRID_MISFIT_OVER_QUANTUM
+        else 0.0
+    )
 
 
-def find_kept_mask(
-    residuals: np.ndarray, model_friction: np.ndarray, quantum: float
+def find_non_outlier_mask(
+    residuals: np.ndarray, model_friction: np.ndarray, rounding_quantum: float
 ) -> np.ndarray | None:
     """Find the rows that are not outliers.
 
@@ -67,24 +71,29 @@ def find_kept_mask(
         Mask that is False for outliers. The result is None if there are no outliers.
     """
     off = residuals - _median_of_neighbours(residuals)
-    blocks = np.array_split(np.abs(off), max(len(off) // _BLOCK_ROWS, 1))
-    least = max(0.5 * quantum, 0.1 * _SD_PER_MAD * float(np.median(np.abs(off))))
-    scales = [max(_SD_PER_MAD * float(np.median(block)), least) for block in blocks]
+    blocks = np.array_split(np.abs(off), max(len(off) // _ROWS_PER_RESIDUAL_SCALE_BLOCK, 1))
+    least = max(
+        0.5 * rounding_quantum, 0.1 * _STANDARD_DEVIATION_PER_MAD * float(np.median(np.abs(off)))
+    )
+    scales = [max(_STANDARD_DEVIATION_PER_MAD * float(np.median(block)), least) for block in blocks]
     # If the noise level changes within a block, a neighbouring block has the higher level.
     scale = np.repeat(maximum_filter(scales, 3), [len(block) for block in blocks])
     peaked = maximum_filter(
-        np.abs(model_friction - _median_of_neighbours(model_friction)), 2 * _NEIGHBOUR_COUNT + 1
+        np.abs(model_friction - _median_of_neighbours(model_friction)),
+        2 * _NEIGHBOURS_PER_SIDE_FOR_MEDIAN + 1,
     )
-    found = np.abs(off) > np.maximum(_OUTLIER_SIGMAS * scale, _MAX_MODEL_DEPARTURE_RATIO * peaked)
+    found = np.abs(off) > np.maximum(
+        _OUTLIER_SIGMAS * scale, _MIN_OUTLIER_OVER_MODEL_DEPARTURE * peaked
+    )
     return ~found if found.any() and scale.min() > 0.0 else None
 
 
 def _median_of_neighbours(values: np.ndarray) -> np.ndarray:
     """Compute the median of the neighbours of each row, excluding the row."""
-    around = np.ones(2 * _NEIGHBOUR_COUNT + 1, dtype=bool)
-    around[_NEIGHBOUR_COUNT] = False
+    around = np.ones(2 * _NEIGHBOURS_PER_SIDE_FOR_MEDIAN + 1, dtype=bool)
+    around[_NEIGHBOURS_PER_SIDE_FOR_MEDIAN] = False
     lower, upper = (
         rank_filter(values, rank, footprint=around, mode="mirror")
-        for rank in (_NEIGHBOUR_COUNT - 1, _NEIGHBOUR_COUNT)
+        for rank in (_NEIGHBOURS_PER_SIDE_FOR_MEDIAN - 1, _NEIGHBOURS_PER_SIDE_FOR_MEDIAN)
     )
     return np.asarray(0.5 * (lower + upper))

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from rsfstudy.fitting.joint_model import strip_window_number
 from rsfstudy.fitting.record import RECORD_COLUMNS
-from rsfstudy.fitting.window_model import LAW_SPECIFIC_PARAMETERS, PARAMETERS
+from rsfstudy.fitting.window_model import PARAMETERS, PARAMETERS_OF_SOME_LAWS_ONLY
 from rsfstudy.quantities import Output
 
 #: Outputs of every fit that do not depend on the rows.
@@ -36,7 +36,7 @@ _SCALAR_OUTPUTS = (
     ),
 )
 #: Outputs with one value per row.
-_ROW_OUTPUTS = tuple(
+_OUTPUTS_PER_RECORD_ROW = tuple(
     Output(*about, dims=("row",))
     for about in (
         *((f"record_{q.name}", q.symbol, q.units, q.long_name) for q in RECORD_COLUMNS[:3]),
@@ -48,7 +48,7 @@ _ROW_OUTPUTS = tuple(
     )
 )
 #: Suffixes of the outputs that each parameter has in addition to its value.
-_SUFFIX_MEANINGS = {
+_DESCRIPTIONS_BY_NAME_SUFFIX = {
     "stderr": "standard error",
     "low": "lower end of the 95 % interval",
     "high": "upper end of the 95 % interval",
@@ -67,7 +67,7 @@ _POSTERIOR_OUTPUTS = (
 
 
 def fit_outputs(
-    parameters: Sequence[str], with_posterior: bool, window_count: int
+    parameter_names: Sequence[str], with_posterior: bool, window_count: int
 ) -> tuple[Output, ...]:
     """Return the outputs of a fit.
 
@@ -86,7 +86,7 @@ def fit_outputs(
     tuple of Output
         Outputs of the parameters, of the fit and of the rows.
     """
-    found = [output for name in parameters for output in _parameter_outputs(name)]
+    found = [output for name in parameter_names for output in _parameter_outputs(name)]
     stresses = [
         Output(f"normal_stress_before_{n}", "", "Pa", f"mean normal stress before step {n}")
         for n in range(1, window_count + 1 if window_count > 1 else 1)
@@ -96,14 +96,18 @@ def fit_outputs(
         *(_POSTERIOR_OUTPUTS if with_posterior else ()),
         *_SCALAR_OUTPUTS,
         *stresses,
-        *_ROW_OUTPUTS,
+        *_OUTPUTS_PER_RECORD_ROW,
     )
 
 
-def _parameter_outputs(name: str) -> Iterator[Output]:
+def _parameter_outputs(parameter_name: str) -> Iterator[Output]:
     """Yield the outputs of a parameter and of its errors."""
-    about = PARAMETERS[strip_window_number(name)]
-    optional = strip_window_number(name) in LAW_SPECIFIC_PARAMETERS
-    yield Output(name, about.symbol, about.units, about.long_name, error=True, optional=optional)
-    for suffix, words in _SUFFIX_MEANINGS.items():
-        yield Output(f"{name}_{suffix}", "", about.units, f"{words} of the {about.long_name}")
+    about = PARAMETERS[strip_window_number(parameter_name)]
+    optional = strip_window_number(parameter_name) in PARAMETERS_OF_SOME_LAWS_ONLY
+    yield Output(
+        parameter_name, about.symbol, about.units, about.long_name, error=True, optional=optional
+    )
+    for suffix, words in _DESCRIPTIONS_BY_NAME_SUFFIX.items():
+        yield Output(
+            f"{parameter_name}_{suffix}", "", about.units, f"{words} of the {about.long_name}"
+        )

@@ -29,13 +29,17 @@ if TYPE_CHECKING:
 _MAX_DRAWS = 1_000_000
 #: Number of steps between two convergence checks, smallest length of a chain in autocorrelation
 #: times, and length of the burn-in in autocorrelation times.
-_STEPS_PER_CHECK, _MIN_AUTOCORRELATION_TIMES, _BURN_IN_AUTOCORRELATION_TIMES = 100, 50.0, 5.0
+(
+    _CHAIN_STEPS_PER_CONVERGENCE_CHECK,
+    _MIN_CHAIN_AUTOCORRELATION_TIMES,
+    _BURN_IN_AUTOCORRELATION_TIMES,
+) = 100, 50.0, 5.0
 #: Degrees of freedom of the proposal distribution. The distribution has longer tails than the
 #: likelihood.
 _PROPOSAL_DEGREES_OF_FREEDOM = 5.0
 
 
-def check_sampling(draws: int) -> None:
+def check_sampling_is_possible(draw_count: int) -> None:
     """Raise ``InvalidValue`` if posterior sampling is impossible.
 
     Parameters
@@ -48,15 +52,17 @@ def check_sampling(draws: int) -> None:
     InvalidValue
         If the number of draws is invalid, or if emcee is not installed.
     """
-    if not isinstance(draws, int) or not 0 <= draws <= _MAX_DRAWS:
-        raise InvalidValue("posterior", draws, f"must be a whole number from 0 to {_MAX_DRAWS:,}")
-    if draws and importlib.util.find_spec("emcee") is None:
+    if not isinstance(draw_count, int) or not 0 <= draw_count <= _MAX_DRAWS:
+        raise InvalidValue(
+            "posterior", draw_count, f"must be a whole number from 0 to {_MAX_DRAWS:,}"
+        )
+    if draw_count and importlib.util.find_spec("emcee") is None:
         remedy = "pip install 'rsfstudy[posterior]'."
-        raise InvalidValue("posterior", draws, "needs emcee, which is missing", remedy=remedy)
+        raise InvalidValue("posterior", draw_count, "needs emcee, which is missing", remedy=remedy)
 
 
-def sample_coordinates(
-    problem: FitProblem, solution: FitSolution, draws: int, seed: int = 0
+def sample_posterior_coordinates(
+    problem: FitProblem, solution: FitSolution, draw_count: int, seed: int = 0
 ) -> tuple[np.ndarray, float]:
     """Sample the posterior distribution of the free parameters.
 
@@ -92,8 +98,8 @@ def sample_coordinates(
 
     halts: list[MotionStopped] = []
     errors = multivariate_t(
-        problem.coordinates(solution.values),
-        solution.covariance,
+        problem.values_to_coordinates(solution.parameter_values),
+        solution.coordinate_covariance,
         _PROPOSAL_DEGREES_OF_FREEDOM,
         allow_singular=True,
     )
@@ -102,14 +108,14 @@ def sample_coordinates(
         if halts or not ((problem.lower_bounds <= x) & (x <= problem.upper_bounds)).all():
             return -math.inf
         try:
-            left = problem.residuals(problem.values(x), require_stable=True)
+            left = problem.residuals(problem.coordinates_to_values(x), require_stable=True)
         except MotionStopped as halt:
             halts.append(halt)
             return -math.inf
         if not np.isfinite(left).all():
             return -math.inf
         return -0.5 * float(
-            np.square(solution.noise.whiten(left[:, None]) / solution.noise_sd).sum()
+            np.square(solution.noise_model.whiten_columns(left[:, None]) / solution.noise_sd).sum()
         )
 
     def proposed(x: np.ndarray, rng: np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:
@@ -118,14 +124,16 @@ def sample_coordinates(
 
     rng = np.random.RandomState(seed)
     moves = [(emcee.moves.StretchMove(), 0.5), (emcee.moves.MHMove(proposed), 0.5)]
-    walkers = 2 * len(solution.free) + 2
-    sampler = emcee.EnsembleSampler(walkers, len(solution.free), log_likelihood, moves=moves)
+    walkers = 2 * len(solution.free_parameters) + 2
+    sampler = emcee.EnsembleSampler(
+        walkers, len(solution.free_parameters), log_likelihood, moves=moves
+    )
     begin = errors.rvs(walkers, rng).reshape(walkers, -1)
     state = emcee.State(
         np.clip(begin, problem.lower_bounds, problem.upper_bounds), random_state=rng.get_state()
     )
     while True:
-        state = sampler.run_mcmc(state, _STEPS_PER_CHECK)
+        state = sampler.run_mcmc(state, _CHAIN_STEPS_PER_CONVERGENCE_CHECK)
         if halts:
             raise halts[0]
         time = float(np.max(sampler.get_autocorr_time(tol=0)))
@@ -134,12 +142,14 @@ def sample_coordinates(
             if math.isfinite(time)
             else 0
         )
-        if kept >= _MIN_AUTOCORRELATION_TIMES * time and kept * walkers >= draws * time:
+        if kept >= _MIN_CHAIN_AUTOCORRELATION_TIMES * time and kept * walkers >= draw_count * time:
             chain = sampler.get_chain(discard=sampler.iteration - kept, flat=True)
-            return chain[np.linspace(0, len(chain) - 1, draws).round().astype(int)], time
+            return chain[np.linspace(0, len(chain) - 1, draw_count).round().astype(int)], time
 
 
-def draw_parameters(problem: FitProblem, solution: FitSolution, draws: int) -> dict[str, Any]:
+def sample_posterior_parameters(
+    problem: FitProblem, solution: FitSolution, draw_count: int
+) -> dict[str, Any]:
     """Sample the posterior distribution, and return values of the parameters.
 
     Parameters
@@ -162,9 +172,9 @@ def draw_parameters(problem: FitProblem, solution: FitSolution, draws: int) -> d
     MotionStopped
         If the work budget is exhausted before the chain is long enough.
     """
-    drawn, time = np.full((draws, len(solution.free)), math.nan), math.nan
-    if np.isfinite(solution.covariance).all():
-        drawn, time = sample_coordinates(problem, solution, draws)
-    logs = [name in LOGARITHMIC_PARAMETERS for name in solution.free]
+    drawn, time = np.full((draw_count, len(solution.free_parameters)), math.nan), math.nan
+    if np.isfinite(solution.coordinate_covariance).all():
+        drawn, time = sample_posterior_coordinates(problem, solution, draw_count)
+    logs = [name in LOGARITHMIC_PARAMETERS for name in solution.free_parameters]
     drawn[:, logs] = np.exp(drawn[:, logs])
     return {"posterior": drawn, "autocorrelation_time": time}

@@ -20,9 +20,13 @@ from scipy.optimize import isotonic_regression
 from rsfstudy._deprecation import renamed_keywords, renamed_members
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.fitting.stress_steps import find_stress_steps, merge_stress_steps, set_stress_levels
+from rsfstudy.fitting.stress_steps import (
+    find_stress_steps,
+    merge_stress_into_velocity_steps,
+    set_stress_levels,
+)
 from rsfstudy.fitting.velocity_steps import LoadingStep, detect_velocity_steps
-from rsfstudy.netcdf import with_cf_encoding
+from rsfstudy.netcdf import copy_with_cf_encoding
 from rsfstudy.quantities import Quantity, is_variable_name
 
 #: Columns of a record with their symbols, units and meanings. The normal stress is optional.
@@ -45,7 +49,7 @@ _STEP_COLUMNS = (
 
 #: Number of segments of constant velocity that approximate a ramp of the load point velocity. The
 #: displacement is exact at the end of each segment.
-_RAMP_SEGMENTS = 16
+_CONSTANT_VELOCITY_SEGMENTS_PER_RAMP = 16
 
 
 @renamed_keywords
@@ -196,7 +200,7 @@ class Record:
             If a step does not consist of four or six finite numbers, if a step ends before it
             begins, if a velocity is negative, or if a normal stress is not positive.
         """
-        return replace(self, specified_steps=tuple(map(_parse_step, steps)))
+        return replace(self, specified_steps=tuple(map(_parse_loading_step, steps)))
 
     @cached_property
     def loading_steps(self) -> tuple[LoadingStep, ...]:
@@ -217,7 +221,7 @@ class Record:
         changes = find_stress_steps(self.time, stress)
         if self.specified_steps is None:
             velocity = float(np.polyfit(self.time - self.time[0], moved, 1)[0])
-            steps = merge_stress_steps(steps, changes, velocity)
+            steps = merge_stress_into_velocity_steps(steps, changes, velocity)
         return set_stress_levels(steps, changes, self.time, stress)
 
     def steps(self) -> xr.Dataset:
@@ -237,7 +241,9 @@ class Record:
         data = {about.name: ("step", rows[:, n], about.attributes) for n, about in enumerate(shown)}
         number = {"long_name": "number of the step", "units": "1"}
         steps = {"step": ("step", np.arange(1, len(rows) + 1), number)}
-        return with_cf_encoding(xr.Dataset(data, steps, self._attributes("Detected steps")))
+        return copy_with_cf_encoding(
+            xr.Dataset(data, steps, self._build_dataset_attributes("Detected steps"))
+        )
 
     def to_dataset(self) -> xr.Dataset:
         """Convert the record to a dataset.
@@ -252,25 +258,27 @@ class Record:
             name: ("time", values, {"long_name": about[name].long_name, "units": about[name].units})
             for name, values in self.columns.items()
         }
-        return with_cf_encoding(xr.Dataset(data, attrs=self._attributes("Laboratory record")))
+        return copy_with_cf_encoding(
+            xr.Dataset(data, attrs=self._build_dataset_attributes("Laboratory record"))
+        )
 
-    def _attributes(self, title: str) -> dict[str, str]:
+    def _build_dataset_attributes(self, title: str) -> dict[str, str]:
         """Return the global attributes for a dataset."""
         return {"title": f"{title}: {self.name}", "Conventions": "CF-1.11"}
 
 
-def _parse_step(fields: Sequence[float]) -> LoadingStep:
+def _parse_loading_step(step_fields: Sequence[float]) -> LoadingStep:
     """Validate the numbers of a step, and create a ``LoadingStep``."""
-    if isinstance(fields, LoadingStep):  # Steps of another record are valid.
-        return fields
+    if isinstance(step_fields, LoadingStep):  # Steps of another record are valid.
+        return step_fields
     rule = "is no step: begins, ends, velocity before and after, and, if it changes, "
     rule += "normal stress before and after"
     try:
-        numbers = [float(number) for number in fields]
+        numbers = [float(number) for number in step_fields]
     except (TypeError, ValueError) as error:
-        raise InvalidValue("step", fields, rule) from error
+        raise InvalidValue("step", step_fields, rule) from error
     if len(numbers) not in (4, 6) or not np.isfinite(numbers).all():
-        raise InvalidValue("step", fields, rule)
+        raise InvalidValue("step", step_fields, rule)
     begins, ends, before, after, *stresses = numbers
     first, second = stresses or (math.nan, math.nan)
     step = LoadingStep(begins, ends, before, after, first, second)
@@ -279,7 +287,9 @@ def _parse_step(fields: Sequence[float]) -> LoadingStep:
     return step
 
 
-def loading_history(record: Record, start: float, end: float, *, from_rows: bool) -> np.ndarray:
+def loading_history(
+    record: Record, start_time: float, end_time: float, *, use_recorded_rows: bool
+) -> np.ndarray:
     """Return the loading history between two times.
 
     Before the first segment, the slider slides steadily at the load point velocity before the first
@@ -307,20 +317,20 @@ def loading_history(record: Record, start: float, end: float, *, from_rows: bool
     InvalidValue
         If ``from_rows`` is True and the record has no rows between the two times.
     """
-    steps = steps_between(record, start, end)
-    if from_rows:
-        part, first = record.window(start, end), steps[0] if steps else None
+    steps = find_steps_between(record, start_time, end_time)
+    if use_recorded_rows:
+        part, first = record.window(start_time, end_time), steps[0] if steps else None
         if first is None:
-            return _rowwise_loading(part, 0.0, math.nan)
+            return _build_loading_from_rows(part, 0.0, math.nan)
         sliding = part.time < first.start
         stress = part.columns.get("normal_stress", np.array([]))[: int(sliding.sum())]
-        return _rowwise_loading(
+        return _build_loading_from_rows(
             part, first.velocity_before, float(stress.mean()) if stress.size else math.nan
         )
-    return stepwise_loading(start, steps)
+    return stepwise_loading(start_time, steps)
 
 
-def steps_between(record: Record, start: float, end: float) -> list[LoadingStep]:
+def find_steps_between(record: Record, start_time: float, end_time: float) -> list[LoadingStep]:
     """Return the steps of a record between two times.
 
     Parameters
@@ -335,10 +345,12 @@ def steps_between(record: Record, start: float, end: float) -> list[LoadingStep]
     list of LoadingStep
         Steps that begin after ``start`` and end before ``end``.
     """
-    return [step for step in record.loading_steps if start < step.start and step.end < end]
+    return [
+        step for step in record.loading_steps if start_time < step.start and step.end < end_time
+    ]
 
 
-def stepwise_loading(start: float, steps: Sequence[LoadingStep]) -> np.ndarray:
+def stepwise_loading(start_time: float, steps: Sequence[LoadingStep]) -> np.ndarray:
     """Return a loading history with constant loading between steps.
 
     Parameters
@@ -353,7 +365,7 @@ def stepwise_loading(start: float, steps: Sequence[LoadingStep]) -> np.ndarray:
     ndarray, shape (segments, 4)
         Segments in the format of ``loading_history``.
     """
-    pieces, level = [(start, steps[0].velocity_before if steps else 0.0, 1.0, 0.0)], 1.0
+    pieces, level = [(start_time, steps[0].velocity_before if steps else 0.0, 1.0, 0.0)], 1.0
     for step in steps:
         lasts, rises = step.end - step.start, level * (step.stress_ratio - 1.0)
         for part, speed in _velocity_profile(step):
@@ -378,19 +390,22 @@ def _velocity_profile(step: LoadingStep) -> list[tuple[float, float]]:
         return []
     if step.velocity_profile:
         return [(begins / lasts, speed) for begins, speed in step.velocity_profile]
-    count = _RAMP_SEGMENTS if step.changes_velocity else 1
+    count = _CONSTANT_VELOCITY_SEGMENTS_PER_RAMP if step.changes_velocity else 1
     parts = (np.arange(count) / count).tolist()
     return [
         (
             p,
             step.velocity_before
-            + (p + 0.5 / _RAMP_SEGMENTS) * (step.velocity_after - step.velocity_before),
+            + (p + 0.5 / _CONSTANT_VELOCITY_SEGMENTS_PER_RAMP)
+            * (step.velocity_after - step.velocity_before),
         )
         for p in parts
     ]
 
 
-def _rowwise_loading(record: Record, first_velocity: float, stress_before: float) -> np.ndarray:
+def _build_loading_from_rows(
+    record: Record, initial_velocity: float, initial_normal_stress: float
+) -> np.ndarray:
     """Return a loading history with one segment per row.
 
     Parameters
@@ -413,10 +428,10 @@ def _rowwise_loading(record: Record, first_velocity: float, stress_before: float
     table = np.zeros((len(record), 4))
     table[:, 0], table[:, 2] = record.time, 1.0
     table[:-1, 1] = np.diff(moved) / lasts
-    table[-1, 1], table[0, 1] = table[-2, 1], first_velocity
+    table[-1, 1], table[0, 1] = table[-2, 1], initial_velocity
     if "normal_stress" in record.columns:
         stress = record.columns["normal_stress"]
-        table[:, 2] = stress / (stress_before if stress_before > 0.0 else stress[0])
+        table[:, 2] = stress / (initial_normal_stress if initial_normal_stress > 0.0 else stress[0])
         table[0, 2] = 1.0  # The motion starts from steady sliding.
         table[:-1, 3] = np.diff(table[:, 2]) / lasts
     return table

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.fitting.drop_detection import Candidate, Detection, detect_drops
-from rsfstudy.fitting.drop_fit import Drop, fit_drop
+from rsfstudy.fitting.drop_detection import Detection, DropCandidate, detect_drops
+from rsfstudy.fitting.drop_fit import FittedStressDrop, fit_drop
 
 #: Scale, table heading and description of each property of an event.
 EVENT_QUANTITIES = {
@@ -30,10 +30,10 @@ EVENT_QUANTITIES = {
 #: events.
 EventNumbers = tuple[dict[str, tuple[float, float]], int]
 #: Smallest drop, relative to half of the width of its 95 % confidence interval.
-_MIN_RELATIVE_SIZE = 1.0
+_MIN_DROP_OVER_ITS_ERROR = 1.0
 
 
-class FittedCandidate(NamedTuple):
+class FittedDropCandidate(NamedTuple):
     """Fitted drop, and the candidate from which it was fitted.
 
     Parameters
@@ -44,11 +44,11 @@ class FittedCandidate(NamedTuple):
         Detected drop.
     """
 
-    drop: Drop
-    candidate: Candidate
+    drop: FittedStressDrop
+    candidate: DropCandidate
 
 
-def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedCandidate], Detection]:
+def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedDropCandidate], Detection]:
     """Find and fit the drops of stress in a record.
 
     If two fitted drops overlap, their candidates are merged and fitted again as a single drop.
@@ -68,48 +68,52 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedCandida
     detection = detect_drops(time, stress)
     candidates = detection.candidates
     while True:
-        found = _fit_candidates(time, stress, candidates, detection)
+        found = _fit_drop_candidates(time, stress, candidates, detection)
         merged = _merge_overlapping(found)
         if len(merged) == len(candidates):
             break
         candidates = merged
-    sure = [of for of in found if _drop_size(of.drop) > _MIN_RELATIVE_SIZE * of.drop.drop_error]
+    sure = [
+        of
+        for of in found
+        if _compute_drop_size(of.drop) > _MIN_DROP_OVER_ITS_ERROR * of.drop.drop_error
+    ]
     if sure:  # Slow drops increase the noise estimate of long windows.
         residual = float(np.median([of.drop.residual_sd for of in sure]))
         detection = detection._replace(noise_sd=min(detection.noise_sd, residual))
     return sure, detection
 
 
-def _drop_size(drop: Drop) -> float:
+def _compute_drop_size(drop: FittedStressDrop) -> float:
     """Return the size of a drop."""
     return drop.stress_before - drop.stress_after
 
 
-def _fit_candidates(
-    time: np.ndarray, stress: np.ndarray, candidates: list[Candidate], detection: Detection
-) -> list[FittedCandidate]:
+def _fit_drop_candidates(
+    time: np.ndarray, stress: np.ndarray, candidates: list[DropCandidate], detection: Detection
+) -> list[FittedDropCandidate]:
     """Fit each candidate within the interval between its neighbours."""
-    ends = [float(time[0]), *(one.end for one in candidates)]
-    begins = [*(one.start for one in candidates[1:]), float(time[-1])]
+    ends = [float(time[0]), *(one.end_time for one in candidates)]
+    begins = [*(one.start_time for one in candidates[1:]), float(time[-1])]
     return [
-        FittedCandidate(fit_drop(time, stress, one, room, detection.noise_sd), one)
+        FittedDropCandidate(fit_drop(time, stress, one, room, detection.noise_sd), one)
         for one, room in zip(candidates, zip(ends, begins, strict=False), strict=False)
     ]
 
 
-def _merge_overlapping(found: list[FittedCandidate]) -> list[Candidate]:
+def _merge_overlapping(fitted_candidates: list[FittedDropCandidate]) -> list[DropCandidate]:
     """Merge the candidates of overlapping drops."""
-    merged: list[Candidate] = []
+    merged: list[DropCandidate] = []
     reached = -np.inf
-    for drop, candidate in found:
-        if merged and drop.start < reached:
+    for drop, candidate in fitted_candidates:
+        if merged and drop.start_time < reached:
             last = merged[-1]
-            window = max(last.window, candidate.window)
-            error = min(last.difference_stderr, candidate.difference_stderr)
+            window = max(last.window_duration, candidate.window_duration)
+            error = min(last.mean_difference_stderr, candidate.mean_difference_stderr)
             correlation = max(last.correlation_factor, candidate.correlation_factor)
-            ends = max(last.end, candidate.end)
-            merged[-1] = Candidate(last.start, ends, window, error, correlation)
+            ends = max(last.end_time, candidate.end_time)
+            merged[-1] = DropCandidate(last.start_time, ends, window, error, correlation)
         else:
             merged.append(candidate)
-        reached = max(reached, drop.end)
+        reached = max(reached, drop.end_time)
     return merged

@@ -22,20 +22,24 @@ from rsfstudy.fitting.velocity_steps import LoadingStep
 
 #: Smallest change of normal stress that is a step, relative to the normal stress and relative to
 #: the robust standard deviation of the differences.
-MIN_RELATIVE_CHANGE, _MIN_CHANGE_SIGMAS = 0.02, 6.0
+MIN_RELATIVE_NORMAL_STRESS_CHANGE, _MIN_NORMAL_STRESS_CHANGE_SIGMAS = 0.02, 6.0
 #: Largest difference between the levels in short and long windows, as a fraction of the change. If
 #: the difference is larger, the change is part of a longer ramp.
-_MAX_LEVEL_DRIFT_FRACTION = 0.25
+_MAX_STRESS_LEVEL_DRIFT_OVER_CHANGE = 0.25
 #: Fraction of the smallest detectable change above which a difference belongs to a step.
-_EXTENT_FRACTION = 0.4
+_CHANGE_EXTENT_FRACTION = 0.4
 #: Largest number of rows that are searched, numbers of windows in a record, and fewest rows of a
 #: window. A longer record is averaged over blocks of rows first.
-_MAX_ROWS, _PARTITION_COUNTS, _MIN_PART_ROWS = 20_000, (400, 100, 25), 8
+_MAX_ROWS_FOR_STEP_DETECTION, _RECORD_PARTITION_COUNTS, _MIN_ROWS_PER_RECORD_PART = (
+    20_000,
+    (400, 100, 25),
+    8,
+)
 #: Fractions of the change of level between which rows are used to fit a ramp, and fewest rows for
 #: the fit.
-_RAMP_FRACTIONS, _MIN_RAMP_ROWS = (0.1, 0.9), 3
+_RAMP_FIT_CHANGE_FRACTIONS, _MIN_RAMP_ROWS = (0.1, 0.9), 3
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
-_SD_PER_MAD = 1.4826
+_STANDARD_DEVIATION_PER_MAD = 1.4826
 
 
 class StressStep(NamedTuple):
@@ -49,13 +53,13 @@ class StressStep(NamedTuple):
         Normal stresses in Pa before and after the change.
     """
 
-    start: float
-    end: float
+    start_time: float
+    end_time: float
     stress_before: float
     stress_after: float
 
 
-def find_stress_steps(time: np.ndarray, stress: np.ndarray) -> list[StressStep]:
+def find_stress_steps(time: np.ndarray, normal_stress: np.ndarray) -> list[StressStep]:
     """Detect the steps of normal stress in a record.
 
     Parameters
@@ -68,38 +72,49 @@ def find_stress_steps(time: np.ndarray, stress: np.ndarray) -> list[StressStep]:
     list of StressStep
         Steps in order of time. Changes of less than 2 % are ignored.
     """
-    every = max(1, math.ceil(len(time) / _MAX_ROWS))
+    every = max(1, math.ceil(len(time) / _MAX_ROWS_FOR_STEP_DETECTION))
     count = len(time) // every * every
-    t, s = (v[:count].reshape(-1, every).mean(axis=1) for v in (time, stress))
+    t, s = (v[:count].reshape(-1, every).mean(axis=1) for v in (time, normal_stress))
     found: list[tuple[slice, StressStep]] = []
-    windows = sorted({max(len(t) // parts, _MIN_PART_ROWS) for parts in _PARTITION_COUNTS})
+    windows = sorted(
+        {max(len(t) // parts, _MIN_ROWS_PER_RECORD_PART) for parts in _RECORD_PARTITION_COUNTS}
+    )
     for window, longer in itertools.pairwise([*windows, 0]):
-        for rows in _find_changes(s, window):
+        for rows in _find_stress_level_changes(s, window):
             if any(rows.start < other.stop and other.start < rows.stop for other, _ in found):
                 continue
-            before, after = _median_levels(s, rows, window, window)
-            lasting = _median_levels(s, rows, window, longer) if longer else (before, after)
+            before, after = _median_stress_before_and_after(s, rows, window, window)
+            lasting = (
+                _median_stress_before_and_after(s, rows, window, longer)
+                if longer
+                else (before, after)
+            )
             change = abs(after - before)
             goes_on = (
                 max(abs(before - lasting[0]), abs(after - lasting[1]))
-                > _MAX_LEVEL_DRIFT_FRACTION * change
+                > _MAX_STRESS_LEVEL_DRIFT_OVER_CHANGE * change
             )
-            if change > MIN_RELATIVE_CHANGE * abs(before) and not goes_on:
-                found.append((rows, _fit_ramp(t[rows], s[rows], before, after)))
+            if change > MIN_RELATIVE_NORMAL_STRESS_CHANGE * abs(before) and not goes_on:
+                found.append((rows, _fit_linear_stress_ramp(t[rows], s[rows], before, after)))
     return sorted(step for _rows, step in found)
 
 
-def _median_levels(stress: np.ndarray, rows: slice, window: int, reach: int) -> tuple[float, float]:
+def _median_stress_before_and_after(
+    stress: np.ndarray, change_rows: slice, window_rows: int, median_row_count: int
+) -> tuple[float, float]:
     """Compute the median normal stress before and after a change.
 
     The argument ``reach`` is the number of rows in each median.
     """
-    first, last = rows.start + window, rows.stop - window
-    before, after = stress[max(first - reach, 0) : first], stress[last : last + reach]
+    first, last = change_rows.start + window_rows, change_rows.stop - window_rows
+    before, after = (
+        stress[max(first - median_row_count, 0) : first],
+        stress[last : last + median_row_count],
+    )
     return float(np.median(before)), float(np.median(after))
 
 
-def _find_changes(stress: np.ndarray, window: int) -> list[slice]:
+def _find_stress_level_changes(stress: np.ndarray, window_rows: int) -> list[slice]:
     """Find the changes of mean normal stress for one window length.
 
     Returns
@@ -107,30 +122,37 @@ def _find_changes(stress: np.ndarray, window: int) -> list[slice]:
     list of slice
         Rows of each change, including one window of nearly constant stress on each side.
     """
-    if len(stress) < 4 * window:
+    if len(stress) < 4 * window_rows:
         return []
     sums = np.concatenate([[0.0], np.cumsum(stress - stress.mean())])
-    change = sums[2 * window :] - 2.0 * sums[window:-window] + sums[: -2 * window]
-    change = change / window - np.median(change) / window
-    spread = _SD_PER_MAD * float(np.median(np.abs(change)))
-    least = max(MIN_RELATIVE_CHANGE * abs(float(np.mean(stress))), _MIN_CHANGE_SIGMAS * spread)
+    change = (
+        sums[2 * window_rows :] - 2.0 * sums[window_rows:-window_rows] + sums[: -2 * window_rows]
+    )
+    change = change / window_rows - np.median(change) / window_rows
+    spread = _STANDARD_DEVIATION_PER_MAD * float(np.median(np.abs(change)))
+    least = max(
+        MIN_RELATIVE_NORMAL_STRESS_CHANGE * abs(float(np.mean(stress))),
+        _MIN_NORMAL_STRESS_CHANGE_SIGMAS * spread,
+    )
     found: list[slice] = []
     for signed in (change, -change):
         joined: list[slice] = []
-        for (rows,) in find_objects(label(signed > _EXTENT_FRACTION * least)[0]):
+        for (rows,) in find_objects(label(signed > _CHANGE_EXTENT_FRACTION * least)[0]):
             # Noise may interrupt a ramp.
-            if joined and rows.start < joined[-1].stop + window:
+            if joined and rows.start < joined[-1].stop + window_rows:
                 joined[-1] = slice(joined[-1].start, rows.stop)
             elif signed[rows].max() > least:
                 joined.append(rows)
         found += joined
     # A change at the beginning or the end of the record has only one constant level.
     inside = [rows for rows in found if rows.start > 0 and rows.stop < len(change)]
-    return [slice(rows.start, rows.stop - 1 + 2 * window) for rows in inside]
+    return [slice(rows.start, rows.stop - 1 + 2 * window_rows) for rows in inside]
 
 
-def merge_stress_steps(
-    steps: Sequence[LoadingStep], stress_steps: Sequence[StressStep], velocity: float
+def merge_stress_into_velocity_steps(
+    velocity_steps: Sequence[LoadingStep],
+    stress_steps: Sequence[StressStep],
+    default_velocity: float,
 ) -> tuple[LoadingStep, ...]:
     """Merge steps of normal stress with steps of load point velocity.
 
@@ -152,16 +174,22 @@ def merge_stress_steps(
         Steps in order of time. The normal stresses of the steps are not set.
     """
     found = []
-    for step in steps:
-        during = [change for change in stress_steps if _steps_overlap(step, change)]
-        begins = min([step.start, *(change.start for change in during)])
-        ends = max([step.end, *(change.end for change in during)])
+    for step in velocity_steps:
+        during = [change for change in stress_steps if _step_overlaps_stress_change(step, change)]
+        begins = min([step.start, *(change.start_time for change in during)])
+        ends = max([step.end, *(change.end_time for change in during)])
         found.append(step._replace(start=begins, end=ends))
     for change in stress_steps:
-        if not any(_steps_overlap(step, change) for step in steps):
-            earlier = [step.velocity_after for step in steps if step.end <= change.start]
-            speed = (earlier or [step.velocity_before for step in steps[:1]] or [velocity])[-1]
-            found.append(LoadingStep(change.start, change.end, speed, speed))
+        if not any(_step_overlaps_stress_change(step, change) for step in velocity_steps):
+            earlier = [
+                step.velocity_after for step in velocity_steps if step.end <= change.start_time
+            ]
+            speed = (
+                earlier
+                or [step.velocity_before for step in velocity_steps[:1]]
+                or [default_velocity]
+            )[-1]
+            found.append(LoadingStep(change.start_time, change.end_time, speed, speed))
     return tuple(sorted(found, key=lambda step: step.start))
 
 
@@ -195,7 +223,7 @@ def set_stress_levels(
     begins = [*(step.start for step in steps[1:]), math.inf]
     found = []
     for step, earlier, later in zip(steps, ends, begins, strict=False):
-        during = [change for change in stress_steps if _steps_overlap(step, change)]
+        during = [change for change in stress_steps if _step_overlaps_stress_change(step, change)]
         if math.isnan(step.stress_before):
             rows = stress[(time >= earlier) & (time <= later)]
             level = float(np.median(rows)) if rows.size else math.nan
@@ -211,23 +239,27 @@ def set_stress_levels(
     return tuple(found)
 
 
-def _steps_overlap(step: LoadingStep, change: StressStep) -> bool:
+def _step_overlaps_stress_change(step: LoadingStep, stress_step: StressStep) -> bool:
     """Return True if the normal stress changes during or close to a step."""
-    near = change.end - change.start
-    return step.start - near <= change.end and change.start <= step.end + near
+    near = stress_step.end_time - stress_step.start_time
+    return step.start - near <= stress_step.end_time and stress_step.start_time <= step.end + near
 
 
-def _fit_ramp(time: np.ndarray, stress: np.ndarray, before: float, after: float) -> StressStep:
+def _fit_linear_stress_ramp(
+    time: np.ndarray, stress: np.ndarray, stress_before: float, stress_after: float
+) -> StressStep:
     """Fit a ramp between two levels of normal stress."""
-    share = (stress - before) / (after - before)
+    share = (stress - stress_before) / (stress_after - stress_before)
     # This row is the best boundary between rows below and above half of the change.
     middle = int(np.argmax(np.cumsum(0.5 - share)))
-    first = int(np.flatnonzero(share[: middle + 1] <= _RAMP_FRACTIONS[0]).max(initial=0))
-    reached = np.flatnonzero(share[middle:] >= _RAMP_FRACTIONS[1])
+    first = int(np.flatnonzero(share[: middle + 1] <= _RAMP_FIT_CHANGE_FRACTIONS[0]).max(initial=0))
+    reached = np.flatnonzero(share[middle:] >= _RAMP_FIT_CHANGE_FRACTIONS[1])
     last = middle + int(reached[0]) if len(reached) else len(share) - 1
     on_way = np.arange(first + 1, last)
     if len(on_way) < _MIN_RAMP_ROWS:
-        return StressStep(float(time[first]), float(time[last]), before, after)
+        return StressStep(float(time[first]), float(time[last]), stress_before, stress_after)
     slope, offset = np.polyfit(time[on_way] - time[first], share[on_way], 1)
     begins, ends = (time[first] + (x - offset) / slope for x in (0.0, 1.0))
-    return StressStep(float(max(begins, time[0])), float(min(ends, time[-1])), before, after)
+    return StressStep(
+        float(max(begins, time[0])), float(min(ends, time[-1])), stress_before, stress_after
+    )

@@ -26,32 +26,32 @@ from scipy.ndimage import maximum_filter1d, median_filter
 from rsfstudy.error_boundary import guard_methods
 
 #: Largest number of rows that are segmented. A longer record is averaged over blocks of rows first.
-_MAX_ROWS = 20_000
+_MAX_ROWS_FOR_STEP_DETECTION = 20_000
 #: Criteria for separate segments: the fewest rows of a segment, the smallest change of velocity
 #: relative to the faster velocity, and the smallest displacement that the change causes, relative
 #: to the standard deviation of the residuals. The displacement criterion is necessary because a
 #: controlled load point fluctuates around its set point.
-_MIN_SEGMENT_ROWS, _MIN_RELATIVE_VELOCITY_CHANGE, _MIN_DISPLACEMENT_SIGMAS = 5, 0.2, 10.0
+_MIN_SEGMENT_ROWS, _MIN_RELATIVE_VELOCITY_CHANGE, _MIN_DISPLACEMENT_CHANGE_SIGMAS = 5, 0.2, 10.0
 #: Smallest reduction of the sum of squares by a split, divided by the noise variance and by ln n
 #: for n rows.
-_MIN_SPLIT_GAIN = 12.0
+_MIN_SQUARES_GAIN_OF_SEGMENT_SPLIT = 12.0
 #: Fraction of the highest velocity below which the load point is considered to be held.
-_HOLD_VELOCITY_FRACTION = 0.01
+_MAX_HOLD_OVER_FASTER_VELOCITY = 0.01
 #: Limits for combining changes of velocity into a step: the longest duration relative to the
 #: segment before the step and to the rest of the record, and the number of rows below which a
 #: segment is too short for a fit.
-_MAX_RAMP_SEGMENT_FRACTION, _MAX_RAMP_SEGMENT_ROWS = 0.05, 15
+_MAX_RAMP_SEGMENT_OVER_NEIGHBOURS, _MAX_RAMP_SEGMENT_ROWS = 0.05, 15
 #: Number of rows from which the local noise is estimated, and ratio of the local noise to the
 #: typical noise above which the local noise is used.
-_LOCAL_NOISE_ROWS, _LOCAL_NOISE_FACTOR = 31, 2.0
+_LOCAL_NOISE_ROWS, _MIN_LOCAL_OVER_GLOBAL_NOISE = 31, 2.0
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
-_SD_PER_MAD = 1.4826
+_STANDARD_DEVIATION_PER_MAD = 1.4826
 
 
 #: Function that returns the sum of squared residuals of the rows i to j.
-SquaresFunction = Callable[[np.ndarray | int, np.ndarray | int], np.ndarray]
+ResidualSquaresFunction = Callable[[np.ndarray | int, np.ndarray | int], np.ndarray]
 #: Line of displacement against time: displacement at time 0, and velocity.
-_Line = tuple[float, float]
+_InterceptAndSlope = tuple[float, float]
 
 
 @guard_methods
@@ -122,34 +122,38 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
     tuple of LoadingStep
         Steps in order of time.
     """
-    every = max(1, math.ceil(len(time) / _MAX_ROWS))
+    every = max(1, math.ceil(len(time) / _MAX_ROWS_FOR_STEP_DETECTION))
     count = len(time) // every * every
     t, x = (v[:count].reshape(-1, every).mean(axis=1) for v in (time, displacement))
     if len(t) < 2 * _MIN_SEGMENT_ROWS:
         return ()
     t0, x0 = t[0], x[0]
-    variance, louder = noise_variance(t, x), _relative_noise(t, x)
-    sums = RunningSums(t - t0, x - x0, 1.0 / louder**2)
-    knots = sorted(segment_rows(sums.residual_squares, 0, len(t), variance))
+    variance, louder = noise_variance(t, x), _local_noise_over_global_noise(t, x)
+    sums = RunningLineFitSums(t - t0, x - x0, 1.0 / louder**2)
+    knots = sorted(split_rows_into_segments(sums.line_residual_squares, 0, len(t), variance))
     knots = _merge_similar_segments(sums, knots, t, variance, louder)
     lines = [sums.fit_line(i, j) for i, j in itertools.pairwise(knots)]
     meets = [
-        _intersection_time(lines[n], lines[n + 1], (t[k - 1] - t0, t[k] - t0), variance)
+        _line_intersection_time(lines[n], lines[n + 1], (t[k - 1] - t0, t[k] - t0), variance)
         for n, k in enumerate(knots[1:-1])
     ]
     if every > 1:
         moved, variance = displacement - x0, noise_variance(time, displacement)
-        meets = [_refine_intersection(time - t0, moved, at, 2 * every, variance) for at in meets]
+        meets = [
+            _refine_line_intersection_time(time - t0, moved, at, 2 * every, variance)
+            for at in meets
+        ]
     fastest = max(abs(line[1]) for line in lines)
     speeds = [
-        line[1] if abs(line[1]) > _HOLD_VELOCITY_FRACTION * fastest else 0.0 for line in lines
+        line[1] if abs(line[1]) > _MAX_HOLD_OVER_FASTER_VELOCITY * fastest else 0.0
+        for line in lines
     ]
     found = []
     for first, last in _group_velocity_changes(
         meets, speeds, np.diff(knots).tolist(), (0.0, t[-1] - t0)
     ):
         begins, ends = meets[first], meets[last]
-        if _overshoots(speeds[first : last + 2]):
+        if _has_velocity_overshoot(speeds[first : last + 2]):
             through = [(meets[n] - begins, speeds[n + 1]) for n in range(first, last)]
             step = LoadingStep(t0 + begins, t0 + ends, speeds[first], speeds[last + 1])
             found.append(step._replace(velocity_profile=tuple(through)))
@@ -164,7 +168,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
     return tuple(found)
 
 
-class RunningSums:
+class RunningLineFitSums:
     """Cumulative sums for fitting lines to ranges of rows in constant time.
 
     In all methods, the range from ``i`` to ``j`` includes row ``i`` and excludes row ``j``. If
@@ -178,11 +182,22 @@ class RunningSums:
         Weights of the squared residuals.
     """
 
-    def __init__(self, t: np.ndarray, x: np.ndarray, weights: np.ndarray) -> None:
-        columns = weights * np.array([np.ones(len(t)), t, x, t * t, t * x, x * x])
-        self.sums = np.concatenate([np.zeros((1, 6)), np.cumsum(columns.T, axis=0)])
+    def __init__(self, time: np.ndarray, displacement: np.ndarray, weights: np.ndarray) -> None:
+        columns = weights * np.array(
+            [
+                np.ones(len(time)),
+                time,
+                displacement,
+                time * time,
+                time * displacement,
+                displacement * displacement,
+            ]
+        )
+        self.cumulative_sums = np.concatenate([np.zeros((1, 6)), np.cumsum(columns.T, axis=0)])
 
-    def moments(self, i: np.ndarray | int, j: np.ndarray | int) -> tuple[np.ndarray, ...]:
+    def compute_moments(
+        self, start_row: np.ndarray | int, stop_row: np.ndarray | int
+    ) -> tuple[np.ndarray, ...]:
         """Compute the weighted moments of a range of rows.
 
         Parameters
@@ -196,11 +211,15 @@ class RunningSums:
             Mean of t, mean of x, and the sums of squares and products about the means: tt, tx and
             xx.
         """
-        n, st, sx, stt, stx, sxx = (self.sums[j] - self.sums[i]).T
+        n, st, sx, stt, stx, sxx = (
+            self.cumulative_sums[stop_row] - self.cumulative_sums[start_row]
+        ).T
         mt, mx = st / n, sx / n
         return mt, mx, stt - st * mt, stx - st * mx, sxx - sx * mx
 
-    def residual_squares(self, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
+    def line_residual_squares(
+        self, start_row: np.ndarray | int, stop_row: np.ndarray | int
+    ) -> np.ndarray:
         """Compute the sum of squared residuals of a line fit.
 
         Parameters
@@ -213,10 +232,12 @@ class RunningSums:
         ndarray
             Weighted sum of squared residuals of each range.
         """
-        _mt, _mx, tt, tx, xx = self.moments(i, j)
+        _mt, _mx, tt, tx, xx = self.compute_moments(start_row, stop_row)
         return np.asarray(np.maximum(xx - tx * tx / tt, 0.0))
 
-    def squares_about_mean(self, i: np.ndarray | int, j: np.ndarray | int) -> np.ndarray:
+    def squares_about_mean(
+        self, start_row: np.ndarray | int, stop_row: np.ndarray | int
+    ) -> np.ndarray:
         """Compute the sum of squared deviations from the mean.
 
         Parameters
@@ -229,9 +250,9 @@ class RunningSums:
         ndarray
             Weighted sum of squared deviations of each range.
         """
-        return np.asarray(np.maximum(self.moments(i, j)[4], 0.0))
+        return np.asarray(np.maximum(self.compute_moments(start_row, stop_row)[4], 0.0))
 
-    def fit_line(self, i: int, j: int) -> _Line:
+    def fit_line(self, start_row: int, stop_row: int) -> _InterceptAndSlope:
         """Fit a line to a range of rows.
 
         Parameters
@@ -246,23 +267,23 @@ class RunningSums:
         slope : float
             Slope of the line.
         """
-        mt, mx, tt, tx, _xx = self.moments(i, j)
+        mt, mx, tt, tx, _xx = self.compute_moments(start_row, stop_row)
         return float(mx - tx / tt * mt), float(tx / tt)
 
 
-def _deviations_from_neighbours(t: np.ndarray, x: np.ndarray) -> np.ndarray:
+def _deviations_from_neighbours(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     """Compute the deviation of each sample from a line through its neighbours.
 
     For white noise, the standard deviation of the deviations equals the standard deviation of the
     noise.
     """
-    share = (t[1:-1] - t[:-2]) / (t[2:] - t[:-2])
-    off = x[1:-1] - (1.0 - share) * x[:-2] - share * x[2:]
+    share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
+    off = displacement[1:-1] - (1.0 - share) * displacement[:-2] - share * displacement[2:]
     off /= np.sqrt(1.0 + (1.0 - share) ** 2 + share**2)
     return np.asarray(off)
 
 
-def _relative_noise(t: np.ndarray, x: np.ndarray) -> np.ndarray:
+def _local_noise_over_global_noise(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     """Estimate the local noise of displacement relative to the typical noise.
 
     Returns
@@ -270,20 +291,20 @@ def _relative_noise(t: np.ndarray, x: np.ndarray) -> np.ndarray:
     ndarray, shape (rows,)
         Ratio of the local noise to the typical noise, or 1 if the ratio is less than 2.
     """
-    off = np.abs(_deviations_from_neighbours(t, x))
+    off = np.abs(_deviations_from_neighbours(time, displacement))
     typical = float(np.median(off))
     if len(off) < 4 * _LOCAL_NOISE_ROWS or not typical > 0.0:
-        return np.ones(len(t))
+        return np.ones(len(time))
     local = maximum_filter1d(
         median_filter(off, _LOCAL_NOISE_ROWS, mode="nearest"), _LOCAL_NOISE_ROWS
     )
     local = np.pad(local / typical, 1, mode="edge")
-    return np.asarray(np.where(local > _LOCAL_NOISE_FACTOR, local, 1.0))
+    return np.asarray(np.where(local > _MIN_LOCAL_OVER_GLOBAL_NOISE, local, 1.0))
 
 
-def _overshoots(speeds: Sequence[float]) -> bool:
+def _has_velocity_overshoot(velocities: Sequence[float]) -> bool:
     """Return True if the velocity increases and decreases during a step."""
-    changes = np.diff(speeds)
+    changes = np.diff(velocities)
     return bool((changes > 0.0).any() and (changes < 0.0).any())
 
 
@@ -316,13 +337,18 @@ def noise_variance(t: np.ndarray, x: np.ndarray) -> float:
     >>> round(noise_variance(t, x), 2)
     0.01
     """
-    spread = _SD_PER_MAD * float(np.median(np.abs(_deviations_from_neighbours(t, x))))
+    spread = _STANDARD_DEVIATION_PER_MAD * float(
+        np.median(np.abs(_deviations_from_neighbours(t, x)))
+    )
     least = 1e-9 * float(np.ptp(x))  # A synthetic record may have no noise.
     return max(spread, least) ** 2
 
 
-def segment_rows(
-    residual_squares: SquaresFunction, first: int, last: int, variance: float
+def split_rows_into_segments(
+    residual_squares: ResidualSquaresFunction,
+    first_row: int,
+    last_row: int,
+    variance_of_noise: float,
 ) -> set[int]:
     """Split rows into segments by binary segmentation.
 
@@ -343,7 +369,7 @@ def segment_rows(
     set of int
         First row of each segment, and ``last``.
     """
-    open_parts, found = [(first, last)], {first, last}
+    open_parts, found = [(first_row, last_row)], {first_row, last_row}
     while open_parts:
         i, j = open_parts.pop()
         at = np.arange(i + _MIN_SEGMENT_ROWS, j - _MIN_SEGMENT_ROWS + 1)
@@ -351,45 +377,58 @@ def segment_rows(
             continue
         both = residual_squares(i, at) + residual_squares(at, j)
         best = int(at[np.argmin(both)])
-        if residual_squares(i, j) - both.min() > _MIN_SPLIT_GAIN * math.log(j - i) * variance:
+        if (
+            residual_squares(i, j) - both.min()
+            > _MIN_SQUARES_GAIN_OF_SEGMENT_SPLIT * math.log(j - i) * variance_of_noise
+        ):
             found.add(best)
             open_parts += [(i, best), (best, j)]
     return found
 
 
 def _merge_similar_segments(
-    sums: RunningSums,
-    boundaries: list[int],
-    t: np.ndarray,
-    variance: float,
+    line_fit_sums: RunningLineFitSums,
+    segment_boundaries: list[int],
+    time: np.ndarray,
+    variance_of_noise: float,
     relative_noise: np.ndarray,
 ) -> list[int]:
     """Remove boundaries between segments with similar velocities.
 
     The boundary with the smallest change of velocity is removed first.
     """
-    while len(boundaries) > 2:
-        pieces = [*itertools.pairwise(boundaries)]
-        speeds = np.array([sums.fit_line(i, j)[1] for i, j in pieces])
-        squares = sum(float(sums.residual_squares(i, j)) for i, j in pieces) / boundaries[-1]
-        left = math.sqrt(max(squares, variance)) * _noise_at_boundaries(pieces, relative_noise)
-        change, lasts = np.abs(np.diff(speeds)), np.diff(t[[*boundaries[:-1], -1]])
+    while len(segment_boundaries) > 2:
+        pieces = [*itertools.pairwise(segment_boundaries)]
+        speeds = np.array([line_fit_sums.fit_line(i, j)[1] for i, j in pieces])
+        squares = (
+            sum(float(line_fit_sums.line_residual_squares(i, j)) for i, j in pieces)
+            / segment_boundaries[-1]
+        )
+        left = math.sqrt(max(squares, variance_of_noise)) * _noise_at_boundaries(
+            pieces, relative_noise
+        )
+        change, lasts = np.abs(np.diff(speeds)), np.diff(time[[*segment_boundaries[:-1], -1]])
         faster = np.maximum(np.abs(speeds[1:]), np.abs(speeds[:-1]))
         differs = change / (
             _MIN_RELATIVE_VELOCITY_CHANGE
-            * np.maximum(faster, _HOLD_VELOCITY_FRACTION * np.abs(speeds).max())
+            * np.maximum(faster, _MAX_HOLD_OVER_FASTER_VELOCITY * np.abs(speeds).max())
         )
-        moves = change * np.minimum(lasts[1:], lasts[:-1]) / (_MIN_DISPLACEMENT_SIGMAS * left)
+        moves = (
+            change * np.minimum(lasts[1:], lasts[:-1]) / (_MIN_DISPLACEMENT_CHANGE_SIGMAS * left)
+        )
         tells = np.minimum(differs, moves)
         least = int(np.argmin(tells))
         if tells[least] > 1.0:
             break
-        del boundaries[least + 1]
-    return boundaries
+        del segment_boundaries[least + 1]
+    return segment_boundaries
 
 
-def _intersection_time(
-    one: _Line, other: _Line, between: tuple[float, float], variance: float
+def _line_intersection_time(
+    first_line: _InterceptAndSlope,
+    second_line: _InterceptAndSlope,
+    boundary_times: tuple[float, float],
+    variance_of_noise: float,
 ) -> float:
     r"""Compute the time at which two lines intersect.
 
@@ -398,33 +437,40 @@ def _intersection_time(
     is the noise variance, :math:`h` is the sampling interval, and :math:`\Delta V` is the change of
     velocity.
     """
-    (last, first), change = between, other[1] - one[1]
+    (last, first), change = boundary_times, second_line[1] - first_line[1]
     middle, gap = 0.5 * (last + first), first - last
-    reach = max(3.0 * gap, 5.0 * math.cbrt(variance * gap / change**2))
-    meet = (one[0] - other[0]) / change
+    reach = max(3.0 * gap, 5.0 * math.cbrt(variance_of_noise * gap / change**2))
+    meet = (first_line[0] - second_line[0]) / change
     return float(min(max(meet, middle - reach), middle + reach))
 
 
-def _refine_intersection(
-    time: np.ndarray, displacement: np.ndarray, at: float, reach: int, variance: float
+def _refine_line_intersection_time(
+    time: np.ndarray,
+    displacement: np.ndarray,
+    initial_time: float,
+    row_reach: int,
+    variance_of_noise: float,
 ) -> float:
     """Refine the intersection of two lines with all rows of the record.
 
     The refinement is necessary if rows were averaged for the segmentation.
     """
-    middle = int(np.searchsorted(time, at))
-    i, j = max(middle - 20 * reach, 0), min(middle + 20 * reach, len(time))
-    t, x = time[i:j] - at, displacement[i:j]
-    sums = RunningSums(t, x - x[0], np.ones(j - i))
+    middle = int(np.searchsorted(time, initial_time))
+    i, j = max(middle - 20 * row_reach, 0), min(middle + 20 * row_reach, len(time))
+    t, x = time[i:j] - initial_time, displacement[i:j]
+    sums = RunningLineFitSums(t, x - x[0], np.ones(j - i))
     places = np.arange(_MIN_SEGMENT_ROWS, j - i - _MIN_SEGMENT_ROWS)
-    both = sums.residual_squares(0, places) + sums.residual_squares(places, j - i)
+    both = sums.line_residual_squares(0, places) + sums.line_residual_squares(places, j - i)
     best = int(places[np.argmin(both)])
     lines = sums.fit_line(0, best), sums.fit_line(best, j - i)
-    return at + _intersection_time(*lines, (t[best - 1], t[best]), variance)
+    return initial_time + _line_intersection_time(*lines, (t[best - 1], t[best]), variance_of_noise)
 
 
 def _group_velocity_changes(
-    times: list[float], speeds: list[float], rows: list[int], ends: tuple[float, float]
+    times: list[float],
+    velocities: list[float],
+    boundary_rows: list[int],
+    end_times: tuple[float, float],
 ) -> Iterator[tuple[int, int]]:
     """Group changes of velocity into steps.
 
@@ -437,13 +483,15 @@ def _group_velocity_changes(
     first, last : int
         Indices of the first and the last change of velocity of a step.
     """
-    changes, n = np.sign(np.diff(speeds)), 0
+    changes, n = np.sign(np.diff(velocities)), 0
 
     def is_short(first: int, last: int) -> bool:
-        before = times[first] - (times[first - 1] if first else ends[0])
+        before = times[first] - (times[first - 1] if first else end_times[0])
         lasts = times[last] - times[first]
-        return rows[last] < _MAX_RAMP_SEGMENT_ROWS or lasts < _MAX_RAMP_SEGMENT_FRACTION * min(
-            before, ends[1] - times[last]
+        return boundary_rows[
+            last
+        ] < _MAX_RAMP_SEGMENT_ROWS or lasts < _MAX_RAMP_SEGMENT_OVER_NEIGHBOURS * min(
+            before, end_times[1] - times[last]
         )
 
     while n < len(times):
@@ -455,7 +503,7 @@ def _group_velocity_changes(
         while (
             back < len(times)
             and changes[back] != changes[n]
-            and _returns_after_overshoot(speeds, n, last, back)
+            and _velocity_returns_after_overshoot(velocities, n, last, back)
         ):
             if not is_short(n, back):
                 break
@@ -464,9 +512,15 @@ def _group_velocity_changes(
         n = last + 1
 
 
-def _returns_after_overshoot(speeds: list[float], first: int, last: int, back: int) -> bool:
+def _velocity_returns_after_overshoot(
+    velocities: list[float], first_change: int, last_change: int, return_change: int
+) -> bool:
     """Return True if the velocity returns partially after an overshoot."""
-    before, peak, after = speeds[first], speeds[last + 1], speeds[back + 1]
+    before, peak, after = (
+        velocities[first_change],
+        velocities[last_change + 1],
+        velocities[return_change + 1],
+    )
     change = abs(after - before)
     returns = min(before, peak) < after < max(before, peak)
     return (
@@ -476,10 +530,12 @@ def _returns_after_overshoot(speeds: list[float], first: int, last: int, back: i
     )
 
 
-def _noise_at_boundaries(pieces: list[tuple[int, int]], relative_noise: np.ndarray) -> np.ndarray:
+def _noise_at_boundaries(
+    row_segments: list[tuple[int, int]], relative_noise: np.ndarray
+) -> np.ndarray:
     """Compute the relative noise at each boundary between segments.
 
     The result is the larger of the mean relative noise levels of the two adjacent segments.
     """
-    local = np.array([relative_noise[i:j].mean() for i, j in pieces])
+    local = np.array([relative_noise[i:j].mean() for i, j in row_segments])
     return np.asarray(np.maximum(local[1:], local[:-1]))

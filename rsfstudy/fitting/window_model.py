@@ -21,15 +21,15 @@ from rsfstudy.motion import (
     MotionStopped,
     Recording,
     WorkMeter,
-    friction_coefficient,
     integrate_events,
+    recorded_friction_coefficient,
 )
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider import Scene, history_from_table, replace_field_values
+from rsfstudy.slider import Scene, build_sampled_history_from_table, replace_field_values
 from rsfstudy.status import Status
 
 #: Values of parameters by name.
-Values = Mapping[str, float]
+ParameterValues = Mapping[str, float]
 #: Step size of a finite difference relative to the scale of the parameter, and order of the
 #: difference (2 or 4).
 DifferenceScheme = tuple[float, int]
@@ -68,30 +68,34 @@ PARAMETER_SYNONYMS = {
     **dict.fromkeys(("t0", "step"), "step_time"),
 }
 #: Parameters that only some friction laws have.
-LAW_SPECIFIC_PARAMETERS = frozenset({"b", "b1", "b2", "slip_distance_2", "law_exponent"})
+PARAMETERS_OF_SOME_LAWS_ONLY = frozenset({"b", "b1", "b2", "slip_distance_2", "law_exponent"})
 #: Parameters for which the search varies the logarithm.
 LOGARITHMIC_PARAMETERS = frozenset({"slip_distance", "slip_distance_2", "stiffness"})
 #: Finite differences for the search and for the final solution. Simulated friction is reproducible
 #: to 1e-11. The relative error of second-order differences is then 1e-5 if the motion is far from
 #: unstable, and the relative error of fourth-order differences is always less than 1e-6.
-QUICK_DIFFERENCES, FINE_DIFFERENCES = (3e-4, 2), (5e-3, 4)
+QUICK_DIFFERENCE_SCHEME, ACCURATE_DIFFERENCE_SCHEME = (3e-4, 2), (5e-3, 4)
 #: Largest relative difference between central differences with a single and a double step size, and
 #: largest number of step sizes that are tested. The relative error of the fourth-order difference
 #: is about the square of this tolerance.
-_DIFFERENCE_TOLERANCE, _MAX_STEP_REDUCTIONS = 2e-4, 4
+_DIFFERENCE_AGREEMENT_TOLERANCE, _MAX_DIFFERENCE_STEP_REDUCTIONS = 2e-4, 4
 #: Shift of a load point step in a finite difference, as a fraction of the standard error of the
 #: step.
-STEP_SHIFT_FRACTION = 0.01
+STEP_SHIFT_IN_STANDARD_DEVIATIONS = 0.01
 #: Domains of bounded parameters. Near the end of a domain, the finite differences are one-sided.
 _PARAMETER_DOMAINS = {"law_exponent": (0.0, 1.0), "alpha": (0.0, math.inf)}
 #: Scales of parameters for the step sizes of finite differences. The method
 #: ``WindowModel._parameter_scale`` computes the scales of the other parameters.
-_PARAMETER_SCALES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
+_TYPICAL_PARAMETER_SIZES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
 #: Limits for the number of right-hand-side evaluations of a motion: a constant, an addition for
 #: each loading segment, and the largest addition for a stiff spring. A motion that fits a record
 #: needs a few thousand evaluations, and about 20 for each segment. A stiff spring needs about 2 k
 #: x/a evaluations for a displacement x of the window, and the limit is twice this number.
-_MAX_EVALUATIONS, _MAX_EVALUATIONS_PER_SEGMENT, _MAX_STIFFNESS_EVALUATIONS = 50_000, 60, 100_000
+_MAX_EVALUATIONS, _MAX_EVALUATIONS_PER_SEGMENT, _MAX_EVALUATIONS_FOR_STIFF_SPRING = (
+    50_000,
+    60,
+    100_000,
+)
 
 
 def check_free_parameters(free: Sequence[str]) -> None:
@@ -151,7 +155,7 @@ def parameters_of_law(scene: Scene, free: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in free if name in own or name.startswith(("trend", "step_time")))
 
 
-def check_positive(instance: object, *names: str) -> None:
+def check_fields_positive(instance: object, *field_names: str) -> None:
     """Raise ``InvalidValue`` if attributes of an object are not positive.
 
     Parameters
@@ -166,7 +170,7 @@ def check_positive(instance: object, *names: str) -> None:
     InvalidValue
         If an attribute is not positive and finite.
     """
-    for name in names:
+    for name in field_names:
         if not 0.0 < getattr(instance, name) < math.inf:
             raise InvalidValue(name, getattr(instance, name), "must be positive and finite")
 
@@ -199,23 +203,23 @@ class WindowModel:
     time: np.ndarray
     displacement: np.ndarray
     friction: np.ndarray
-    loading: np.ndarray
+    loading_segments: np.ndarray
     accuracy: Accuracy
     meter: WorkMeter
-    shifted_loadings: Sequence[np.ndarray] = ()
+    loadings_with_shifted_steps: Sequence[np.ndarray] = ()
     filter: Filter | None = None
 
     @property
     def initial_velocity(self) -> float:
         """Load point velocity in um/s at the beginning of the window."""
-        return float(self.loading[0, 1])
+        return float(self.loading_segments[0, 1])
 
     @cached_property
     def has_normal_stress_change(self) -> bool:
         """True if the normal stress changes."""
-        return bool(np.ptp(self.loading[:, 2]) > 0.0 or self.loading[:, 3].any())
+        return bool(np.ptp(self.loading_segments[:, 2]) > 0.0 or self.loading_segments[:, 3].any())
 
-    def is_linear(self, name: str) -> bool:
+    def is_linear_in_parameter(self, parameter_name: str) -> bool:
         """Return True if friction is a linear function of a parameter.
 
         Friction must be linear in the parameter for all values of the other parameters.
@@ -230,14 +234,16 @@ class WindowModel:
         bool
             True for trends, and for ``mu_star`` if the normal stress is constant.
         """
-        return name.startswith("trend") or (name == "mu_star" and not self.has_normal_stress_change)
+        return parameter_name.startswith("trend") or (
+            parameter_name == "mu_star" and not self.has_normal_stress_change
+        )
 
     @property
-    def max_delay(self) -> float:
+    def max_loading_delay(self) -> float:
         """Largest delay of the loading in s that the model supports."""
-        return float(self.time[0] - self.loading[0, 0])
+        return float(self.time[0] - self.loading_segments[0, 0])
 
-    def build_scene(self, values: Values) -> Scene:
+    def build_scene(self, values: ParameterValues) -> Scene:
         """Build a scene from parameters of a record.
 
         Parameters
@@ -256,17 +262,19 @@ class WindowModel:
             If a parameter is outside its domain.
         """
         distance, velocity = values["slip_distance"], self.initial_velocity
-        columns = np.empty((len(self.loading), 4))
-        columns[:, 0] = (self.loading[:, 0] - self.loading[0, 0]) * velocity / distance
-        columns[:, 1] = self.loading[:, 1] / velocity
-        columns[:, 2] = 1.0 - self.loading[:, 2]
-        columns[:, 3] = self.loading[:, 3] * distance / velocity
-        history = history_from_table(columns, self.has_normal_stress_change, "record")
+        columns = np.empty((len(self.loading_segments), 4))
+        columns[:, 0] = (
+            (self.loading_segments[:, 0] - self.loading_segments[0, 0]) * velocity / distance
+        )
+        columns[:, 1] = self.loading_segments[:, 1] / velocity
+        columns[:, 2] = 1.0 - self.loading_segments[:, 2]
+        columns[:, 3] = self.loading_segments[:, 3] * distance / velocity
+        history = build_sampled_history_from_table(columns, self.has_normal_stress_change, "record")
         parts = self.scene.parts._replace(loading=history)
         return Scene(replace_field_values(parts, parameters_to_fields(values, velocity)))
 
     def model_friction(
-        self, values: Values, *, refined: bool = False, require_stable: bool = False
+        self, values: ParameterValues, *, refined: bool = False, require_stable: bool = False
     ) -> np.ndarray:
         """Compute the friction of the model at each row, without the trend.
 
@@ -299,8 +307,8 @@ class WindowModel:
         stiff = 4.0 * values["stiffness"] * float(np.ptp(self.displacement)) / values["a"]
         most = (
             _MAX_EVALUATIONS
-            + _MAX_EVALUATIONS_PER_SEGMENT * len(self.loading)
-            + int(min(stiff, _MAX_STIFFNESS_EVALUATIONS))
+            + _MAX_EVALUATIONS_PER_SEGMENT * len(self.loading_segments)
+            + int(min(stiff, _MAX_EVALUATIONS_FOR_STIFF_SPRING))
         )
         try:
             scene = self.build_scene(values)
@@ -310,7 +318,7 @@ class WindowModel:
             late = values.get("step_time", 0.0)
             scale = self.initial_velocity / values["slip_distance"]
             times = self.filter.sample_times(self.time) if self.filter else self.time
-            at = np.maximum(times - late - self.loading[0, 0], 0.0) * scale
+            at = np.maximum(times - late - self.loading_segments[0, 0], 0.0) * scale
             accuracy = self.accuracy.refined() if refined else self.accuracy
             recording, end = Recording(sample_times=at), float(at[-1]) * (1.0 + 1e-12)
             self.meter.budget = min(budget, self.meter.evaluations + most)
@@ -326,12 +334,12 @@ class WindowModel:
             return nothing
         finally:
             self.meter.budget = budget
-        found = friction_coefficient(recording.table(scene))
+        found = recorded_friction_coefficient(recording.as_table(scene))
         if len(found) != len(times):
             return nothing
         return self.filter.apply(self.time, found) if self.filter else found
 
-    def trend(self, values: Values) -> np.ndarray:
+    def compute_friction_trend(self, values: ParameterValues) -> np.ndarray:
         r"""Compute the trend at each row.
 
         Parameters
@@ -348,7 +356,7 @@ class WindowModel:
         powers = [(int(name[5:]), c) for name, c in values.items() if name.startswith("trend")]
         return sum((c * self.displacement**n for n, c in powers), np.zeros(len(self.time)))
 
-    def loading_sensitivity(self, values: Values) -> np.ndarray:
+    def compute_loading_error_sensitivity(self, values: ParameterValues) -> np.ndarray:
         """Compute the changes of friction due to errors of the loading.
 
         Parameters
@@ -362,18 +370,22 @@ class WindowModel:
             Changes of friction by one standard error of each independent error of the steps. The
             values are NaN if a motion does not exist.
         """
-        if not self.shifted_loadings:
+        if not self.loadings_with_shifted_steps:
             return np.zeros((len(self.time), 0))
         curves = [
-            replace(self, loading=moved).model_friction(values) for moved in self.shifted_loadings
+            replace(self, loading_segments=moved).model_friction(values)
+            for moved in self.loadings_with_shifted_steps
         ]
-        return np.asarray(np.array(curves) - self.model_friction(values)).T / STEP_SHIFT_FRACTION
+        return (
+            np.asarray(np.array(curves) - self.model_friction(values)).T
+            / STEP_SHIFT_IN_STANDARD_DEVIATIONS
+        )
 
     def jacobian(
         self,
-        values: Values,
-        free: Sequence[str],
-        difference_scheme: DifferenceScheme = FINE_DIFFERENCES,
+        values: ParameterValues,
+        free_parameters: Sequence[str],
+        difference_scheme: DifferenceScheme = ACCURATE_DIFFERENCE_SCHEME,
     ) -> np.ndarray:
         r"""Compute the derivatives of friction with respect to parameters.
 
@@ -406,23 +418,29 @@ class WindowModel:
         or the fourth-order combination :math:`[4 d(h) - d(2 h)]/3`. The step size :math:`h` is
         reduced until :math:`d(h)` and :math:`d(2 h)` agree.
         """
-        return np.column_stack([self._derivative(values, name, difference_scheme) for name in free])
+        return np.column_stack(
+            [self._derivative(values, name, difference_scheme) for name in free_parameters]
+        )
 
     def _derivative(
-        self, values: Values, name: str, difference_scheme: DifferenceScheme
+        self, values: ParameterValues, parameter_name: str, difference_scheme: DifferenceScheme
     ) -> np.ndarray:
         """Compute the derivative of friction with respect to a parameter."""
-        if name.startswith("trend"):
-            return np.asarray(self.displacement ** int(name[5:]))
-        if self.is_linear(name):
+        if parameter_name.startswith("trend"):
+            return np.asarray(self.displacement ** int(parameter_name[5:]))
+        if self.is_linear_in_parameter(parameter_name):
             return np.ones(len(self.time))
-        (part, order), size = difference_scheme, self._parameter_scale(name, values)
+        (part, order), size = (
+            difference_scheme,
+            self._typical_parameter_size(parameter_name, values),
+        )
         if order == 2:
-            return self._central_difference(values, name, part * size, 2.0, refined=False)
+            return self._central_difference(values, parameter_name, part * size, 2.0, refined=False)
         best, least = np.full(len(self.time), math.nan), math.inf
-        for _ in range(_MAX_STEP_REDUCTIONS):
+        for _ in range(_MAX_DIFFERENCE_STEP_REDUCTIONS):
             near, far = (
-                self._central_difference(values, name, n * part * size, 4.0 / n) for n in (1.0, 2.0)
+                self._central_difference(values, parameter_name, n * part * size, 4.0 / n)
+                for n in (1.0, 2.0)
             )
             largest = float(np.abs(near).max()) or 1.0
             apart = float(np.abs(far - near).max()) / largest
@@ -430,43 +448,53 @@ class WindowModel:
                 break
             if math.isfinite(apart):
                 best, least = (4.0 * near - far) / 3.0, apart
-            if least < _DIFFERENCE_TOLERANCE:
+            if least < _DIFFERENCE_AGREEMENT_TOLERANCE:
                 break
             part *= (
-                max(0.8 * math.sqrt(_DIFFERENCE_TOLERANCE / least), 0.03)
+                max(0.8 * math.sqrt(_DIFFERENCE_AGREEMENT_TOLERANCE / least), 0.03)
                 if least < math.inf
                 else 0.1
             )
         return best
 
     def _central_difference(
-        self, values: Values, name: str, step: float, margin_steps: float, *, refined: bool = True
+        self,
+        values: ParameterValues,
+        parameter_name: str,
+        step: float,
+        steps_from_domain_end: float,
+        *,
+        refined: bool = True,
     ) -> np.ndarray:
         """Compute a second-order finite difference.
 
         The difference is one-sided if the parameter is within ``margin_steps`` steps of the end of
         its domain.
         """
-        low, high = _PARAMETER_DOMAINS.get(name, (-math.inf, math.inf))
+        low, high = _PARAMETER_DOMAINS.get(parameter_name, (-math.inf, math.inf))
         weights = {1.0: 0.5, -1.0: -0.5}
-        if not low + margin_steps * step <= values[name] <= high - margin_steps * step:
-            side = 1.0 if values[name] < low + margin_steps * step else -1.0
+        if (
+            not low + steps_from_domain_end * step
+            <= values[parameter_name]
+            <= high - steps_from_domain_end * step
+        ):
+            side = 1.0 if values[parameter_name] < low + steps_from_domain_end * step else -1.0
             weights = {0.0: -1.5 * side, side: 2.0 * side, 2.0 * side: -0.5 * side}
         found = np.zeros(len(self.time))
         for place, weight in weights.items():
-            moved = shift_parameter(values, name, place * step)
+            moved = shift_parameter(values, parameter_name, place * step)
             found += weight / step * self.model_friction(moved, refined=refined)
         return found
 
-    def _parameter_scale(self, name: str, values: Values) -> float:
+    def _typical_parameter_size(self, parameter_name: str, values: ParameterValues) -> float:
         """Return the scale of a parameter for finite differences."""
-        if name in LOGARITHMIC_PARAMETERS:
+        if parameter_name in LOGARITHMIC_PARAMETERS:
             return 1.0
-        if name == "a":
+        if parameter_name == "a":
             return values["a"]
-        if name.startswith("b"):
-            return max(values["a"], abs(values[name]))
-        return _PARAMETER_SCALES.get(name, 1.0 / self.initial_velocity)
+        if parameter_name.startswith("b"):
+            return max(values["a"], abs(values[parameter_name]))
+        return _TYPICAL_PARAMETER_SIZES.get(parameter_name, 1.0 / self.initial_velocity)
 
 
 def scene_to_parameters(scene: Scene, distance: float, distance_2: float) -> dict[str, float]:
@@ -511,7 +539,7 @@ def scene_to_parameters(scene: Scene, distance: float, distance_2: float) -> dic
     return found | {name: stated[name] for name in named if stated.get(name) is not None}
 
 
-def parameters_to_fields(values: Values, velocity: float) -> dict[str, float]:
+def parameters_to_fields(values: ParameterValues, velocity: float) -> dict[str, float]:
     """Convert parameters of a record to fields of a scene.
 
     Parameters
@@ -547,7 +575,9 @@ def parameters_to_fields(values: Values, velocity: float) -> dict[str, float]:
     return fields | {name: values[name] for name in ("alpha", "law_exponent") if name in values}
 
 
-def shift_parameter(values: Values, name: str, change: float) -> dict[str, float]:
+def shift_parameter(
+    values: ParameterValues, parameter_name: str, coordinate_change: float
+) -> dict[str, float]:
     """Shift the value of one parameter.
 
     Parameters
@@ -565,12 +595,14 @@ def shift_parameter(values: Values, name: str, change: float) -> dict[str, float
         Values of all parameters, including the shifted parameter.
     """
     moved = (
-        values[name] * math.exp(change) if name in LOGARITHMIC_PARAMETERS else values[name] + change
+        values[parameter_name] * math.exp(coordinate_change)
+        if parameter_name in LOGARITHMIC_PARAMETERS
+        else values[parameter_name] + coordinate_change
     )
-    return {**values, name: moved}
+    return {**values, parameter_name: moved}
 
 
-def to_coordinate(name: str, value: float) -> float:
+def parameter_to_coordinate(parameter_name: str, parameter_value: float) -> float:
     """Convert the value of a parameter to the coordinate of the search.
 
     Parameters
@@ -586,10 +618,12 @@ def to_coordinate(name: str, value: float) -> float:
         Logarithm of the value for parameters in ``LOGARITHMIC_PARAMETERS``, and the value itself
         for all other parameters.
     """
-    return math.log(value) if name in LOGARITHMIC_PARAMETERS else value
+    return (
+        math.log(parameter_value) if parameter_name in LOGARITHMIC_PARAMETERS else parameter_value
+    )
 
 
-def from_coordinate(name: str, coordinate: float) -> float:
+def coordinate_to_parameter(parameter_name: str, coordinate: float) -> float:
     """Convert a coordinate of the search to the value of a parameter.
 
     Parameters
@@ -604,10 +638,10 @@ def from_coordinate(name: str, coordinate: float) -> float:
     float
         Value of the parameter.
     """
-    return math.exp(coordinate) if name in LOGARITHMIC_PARAMETERS else coordinate
+    return math.exp(coordinate) if parameter_name in LOGARITHMIC_PARAMETERS else coordinate
 
 
-def coordinate_derivative(name: str, value: float) -> float:
+def parameter_derivative_by_coordinate(parameter_name: str, parameter_value: float) -> float:
     """Compute the derivative of a parameter with respect to its coordinate.
 
     Parameters
@@ -623,4 +657,4 @@ def coordinate_derivative(name: str, value: float) -> float:
         Value of the parameter for parameters in ``LOGARITHMIC_PARAMETERS``, and 1 for all other
         parameters.
     """
-    return value if name in LOGARITHMIC_PARAMETERS else 1.0
+    return parameter_value if parameter_name in LOGARITHMIC_PARAMETERS else 1.0

@@ -41,12 +41,17 @@ import numpy as np
 
 from rsfstudy.limit_cycles.cycles import (
     LN10,
-    PRIMARY_OUTPUT_COUNT,
+    PRIMARY_OUTPUTS_PER_CYCLE,
     Cycle,
     iterate_cycles,
     more_events_remedy,
 )
-from rsfstudy.limit_cycles.return_map import CLOSURE_TOLERANCE, Orbit, ReturnMap, section_at
+from rsfstudy.limit_cycles.return_map import (
+    ORBIT_CLOSURE_TOLERANCE_OVER_RTOL,
+    PeriodicOrbit,
+    ReturnMap,
+    section_vector_at,
+)
 from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
 from rsfstudy.slider import Scene, critical_stiffness
 from rsfstudy.status import Status
@@ -56,13 +61,13 @@ from rsfstudy.status import Status
 #: second limit.
 _MIN_CONTRACTION_TO_LEAP, _MAX_CONTRACTION = 0.03, 0.98
 #: Largest leap, as a fraction of the range of ln V.
-_MAX_LEAP_FRACTION = 0.1
+_MAX_LEAP_OVER_LOG_RATE_RANGE = 0.1
 #: Largest number of cycles in a period.
-MAX_PERIOD = 16
+MAX_PERIOD_IN_CYCLES = 16
 #: Largest relative accuracy with which orbits are closed, because finite differences lose digits.
-_MAX_CLOSING_RTOL = 1e-7
+_MAX_ORBIT_CLOSURE_RTOL = 1e-7
 #: Number of cycles after which a motion is first tested for a period.
-_MIN_CYCLES_TO_TEST = 8
+_MIN_CYCLES_BEFORE_RECURRENCE_TEST = 8
 #: Absolute value of a Floquet multiplier above which an orbit certainly repels, and largest
 #: difference between cycles that repeat, relative to a times the range of ln V.
 _REPELLING_MULTIPLIER, _MAX_RECURRENCE_MISFIT = 1.01, 0.02
@@ -71,7 +76,7 @@ _REPELLING_MULTIPLIER, _MAX_RECURRENCE_MISFIT = 1.01, 0.02
 _CRITICAL_STIFFNESS_TOLERANCE = 1e-5
 
 
-class CycleSearch:
+class LimitCycleSearch:
     """Search for the limit cycle of a scene with one state.
 
     Parameters
@@ -89,25 +94,28 @@ class CycleSearch:
         Cycles that were computed. If ``run`` has returned True, the last cycle is the limit cycle.
     """
 
-    def __init__(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> None:
-        self._scene, self._accuracy, self._meter = scene, accuracy, meter
-        self._return_map = ReturnMap(scene, accuracy, meter)
+    def __init__(self, scene: Scene, accuracy: Accuracy, work_meter: WorkMeter) -> None:
+        self._scene, self._accuracy, self._meter = scene, accuracy, work_meter
+        self._return_map = ReturnMap(scene, accuracy, work_meter)
         self._noise = accuracy.local_tolerance * scene.a
         self._work = 0
         self.cycles: list[Cycle] = []
         #: Columns b and c of P', the derivatives of the image with respect to spring stress and
         #: state, and True if the derivatives are known.
-        self._derivatives, self._has_derivatives = 2 * ([0.0] * (2 + PRIMARY_OUTPUT_COUNT),), False
+        self._derivatives, self._has_derivatives = (
+            2 * ([0.0] * (2 + PRIMARY_OUTPUTS_PER_CYCLE),),
+            False,
+        )
         #: Section s at which the last cycle begins, its image P(s), and the difference dP from the
         #: previous image.
-        self._section, self._image = (0.0, 0.0), [0.0] * (2 + PRIMARY_OUTPUT_COUNT)
+        self._section, self._image = (0.0, 0.0), [0.0] * (2 + PRIMARY_OUTPUTS_PER_CYCLE)
         self._image_change = self._image
         #: Vector from s to the fixed point, and the resulting change of the image.
         self._correction, self._image_correction = self._section, self._image
         #: Change of spring stress over the cycle before the last leap.
         self._distance_at_leap = np.inf
 
-    def run(self, max_events: int) -> bool:
+    def follow_until_converged(self, max_cycles: int) -> bool:
         """Compute cycles until the motion reaches the limit cycle.
 
         Parameters
@@ -134,19 +142,19 @@ class CycleSearch:
                     return False
                 self._work, spent = self._meter.evaluations - spent, self._meter.evaluations
                 self.cycles.append(cycle)
-                self._update_derivatives()
+                self._update_map_derivatives()
                 if self._has_converged():
                     return True
-                if len(self.cycles) >= max_events:
-                    remedy = self._critical_stiffness_text or more_events_remedy(max_events)
-                    text = f"no cycle repeats within {max_events} events; {remedy}"
+                if len(self.cycles) >= max_cycles:
+                    remedy = self._critical_stiffness_text or more_events_remedy(max_cycles)
+                    text = f"no cycle repeats within {max_cycles} events; {remedy}"
                     raise MotionStopped(Status.WORK_BUDGET_SPENT, text)
-                if self._should_leap():
+                if self._should_leap_to_fixed_point():
                     self._distance_at_leap = abs(
                         cycle.end_point.spring_stress - cycle.start_point.spring_stress
                     )
-                    start = self._return_map.point_at(
-                        section_at(cycle.start_point) + np.array(self._correction)
+                    start = self._return_map.point_at_section(
+                        section_vector_at(cycle.start_point) + np.array(self._correction)
                     )
                     break
 
@@ -163,13 +171,15 @@ class CycleSearch:
         return f"stiffness is critical to {off:.0e}: swings take for ever to grow or to die out"
 
     @property
-    def orbit(self) -> Orbit:
+    def orbit(self) -> PeriodicOrbit:
         """Last cycle, with its correction to the limit cycle."""
         last, slopes = self.cycles[-1:], np.array(self._derivatives).T
-        return Orbit(tuple(last), (slopes,), np.array(self._correction), self._accuracy, self._work)
+        return PeriodicOrbit(
+            tuple(last), (slopes,), np.array(self._correction), self._accuracy, self._work
+        )
 
     @property
-    def _contraction_ratio(self) -> float:
+    def _contraction_ratio_per_cycle(self) -> float:
         """Trace of the derivative A of the map.
 
         The trace is the ratio of successive distances to the limit cycle. The other eigenvalue of A
@@ -178,7 +188,7 @@ class CycleSearch:
         """
         return self._derivatives[0][0] + self._derivatives[1][1]
 
-    def _update_derivatives(self) -> None:
+    def _update_map_derivatives(self) -> None:
         """Update the derivatives and the vector to the fixed point.
 
         The derivatives follow from the last two cycles, unless numerical errors dominate the
@@ -187,29 +197,29 @@ class CycleSearch:
         last = self.cycles[-1]
         begin, end = last.start_point, last.end_point
         start = begin.spring_stress, begin.psi
-        image = [end.spring_stress, end.psi, *last.primary_outputs()]
+        image = [end.spring_stress, end.psi, *last.primary_output_values()]
         changes = list(map(sub, image, self._image))
         if len(self.cycles) > 1:
             by_stress, by_state = map(sub, start, self._section)
             if abs(by_stress) > (1000.0 if self._has_derivatives else 1.0) * self._noise:
                 self._has_derivatives = True
                 # Spring stress does not change when the motion passes a section.
-                (_none, way), passed = self._return_map.motion_direction(begin)
+                (_none, way), passed = self._return_map.motion_direction_and_effect(begin)
                 along = [change / way for change in passed]
                 pairs = zip(changes, along, strict=True)
                 self._derivatives = [(x - by_state * y) / by_stress for x, y in pairs], along
         self._section, self._image, self._image_change = start, image, changes
         off, kept = (
             list(map(sub, image, start)),
-            1.0 - min(self._contraction_ratio, _MAX_CONTRACTION),
+            1.0 - min(self._contraction_ratio_per_cycle, _MAX_CONTRACTION),
         )
         returned = self._predict_image_change(off)
         self._correction = off[0] + returned[0] / kept, off[1] + returned[1] / kept
         self._image_correction = self._predict_image_change(self._correction)
 
-    def _predict_image_change(self, move: Sequence[float]) -> list[float]:
+    def _predict_image_change(self, section_change: Sequence[float]) -> list[float]:
         """Compute the image change caused by a change of the section."""
-        by_stress, by_state = move
+        by_stress, by_state = section_change
         return [x * by_stress + y * by_state for x, y in zip(*self._derivatives, strict=True)]
 
     def _has_converged(self) -> bool:
@@ -221,19 +231,19 @@ class CycleSearch:
         allowed = [0.3 * self._accuracy.rtol * abs(number) for number in self._image[2:]]
         if (
             self._has_derivatives
-            and self._contraction_ratio < _MAX_CONTRACTION
+            and self._contraction_ratio_per_cycle < _MAX_CONTRACTION
             and _are_within_tolerance(self._image_correction[2:], allowed)
         ):
             return True
         if len(self.cycles) < 2 or self.cycles[-2].end_point != self.cycles[-1].start_point:
             return False
-        if self._alternates():
+        if self._last_cycles_alternate():
             return True
-        left = min(max(self._contraction_ratio, 0.0), _MAX_CONTRACTION)
+        left = min(max(self._contraction_ratio_per_cycle, 0.0), _MAX_CONTRACTION)
         left = max(1.0, left / (1.0 - left))
         return _are_within_tolerance([change * left for change in self._image_change[2:]], allowed)
 
-    def _alternates(self) -> bool:
+    def _last_cycles_alternate(self) -> bool:
         """Return True if the last two cycles alternate around the limit cycle.
 
         An alternation around the limit cycle is caused by numerical errors. Trajectories in a plane
@@ -244,14 +254,14 @@ class CycleSearch:
             for cycle in self.cycles[-2:]
         )
         near = (
-            CLOSURE_TOLERANCE
+            ORBIT_CLOSURE_TOLERANCE_OVER_RTOL
             * self._accuracy.rtol
             * self._scene.a
             * self.cycles[-1].log_slip_rate_range
         )
         return before * last <= 0.0 and abs(last) <= near
 
-    def _should_leap(self) -> bool:
+    def _should_leap_to_fixed_point(self) -> bool:
         """Return True if the motion should leap to the fixed point.
 
         A leap is useless if the next cycle would come equally close to the fixed point. A long leap
@@ -262,10 +272,13 @@ class CycleSearch:
         left = abs(cycle.end_point.spring_stress - cycle.start_point.spring_stress)
         if not 10.0 * self._noise <= left < 0.5 * self._distance_at_leap:
             return False
-        if not _MIN_CONTRACTION_TO_LEAP < self._contraction_ratio < _MAX_CONTRACTION:
+        if not _MIN_CONTRACTION_TO_LEAP < self._contraction_ratio_per_cycle < _MAX_CONTRACTION:
             return False
         slowest, fastest = self._image_correction[-2:]
-        return LN10 * abs(fastest - slowest) < _MAX_LEAP_FRACTION * cycle.log_slip_rate_range
+        return (
+            LN10 * abs(fastest - slowest)
+            < _MAX_LEAP_OVER_LOG_RATE_RANGE * cycle.log_slip_rate_range
+        )
 
 
 def _are_within_tolerance(changes: Sequence[float], tolerances: Sequence[float]) -> bool:
@@ -274,7 +287,7 @@ def _are_within_tolerance(changes: Sequence[float], tolerances: Sequence[float])
 
 
 @dataclass(frozen=True)
-class EventSequence:
+class StickSlipSequence:
     """Cycles of a motion, and the orbit that the motion approaches.
 
     Parameters
@@ -288,13 +301,18 @@ class EventSequence:
     """
 
     cycles: list[Cycle]
-    orbit: Orbit | None
+    orbit: PeriodicOrbit | None
     may_still_converge: bool
 
 
-def follow_to_orbit(
-    scene: Scene, accuracy: Accuracy, meter: WorkMeter, max_events: int, *, follow_all: bool = False
-) -> EventSequence | None:
+def follow_to_periodic_orbit(
+    scene: Scene,
+    accuracy: Accuracy,
+    work_meter: WorkMeter,
+    max_cycles: int,
+    *,
+    follow_all_cycles: bool = False,
+) -> StickSlipSequence | None:
     """Integrate a motion until it approaches an attracting periodic orbit.
 
     Parameters
@@ -316,30 +334,32 @@ def follow_to_orbit(
         Cycles and orbit, or None if the motion settles to steady sliding.
     """
     seen, orbit, repels = list[Cycle](), None, False
-    fine = accuracy.with_rtol(min(accuracy.rtol, _MAX_CLOSING_RTOL))
-    look = min(_MIN_CYCLES_TO_TEST, max_events)
-    for cycle in iterate_cycles(scene, accuracy, meter, None):
+    fine = accuracy.with_rtol(min(accuracy.rtol, _MAX_ORBIT_CLOSURE_RTOL))
+    look = min(_MIN_CYCLES_BEFORE_RECURRENCE_TEST, max_cycles)
+    for cycle in iterate_cycles(scene, accuracy, work_meter, None):
         if cycle is None:
             return None
         seen.append(cycle)
         if len(seen) == look and not orbit:
-            look = min(2 * look, max_events)
+            look = min(2 * look, max_cycles)
             found, off = None, math.inf
-            for counted in _compared_states(scene):
-                period, off = find_recurrence(scene, seen, counted)
+            for counted in _state_index_sets_to_compare(scene):
+                period, off = find_recurrence_period(scene, seen, counted)
                 if off < _MAX_RECURRENCE_MISFIT:
-                    by = ReturnMap(scene, fine, meter, counted=counted)
-                    found = by.find_orbit(
-                        section_at(cycle.end_point), period, cycle.log_slip_rate_range
+                    by = ReturnMap(scene, fine, work_meter, counted=counted)
+                    found = by.find_periodic_orbit(
+                        section_vector_at(cycle.end_point), period, cycle.log_slip_rate_range
                     )
                     break
             repels = off >= _MAX_RECURRENCE_MISFIT or (
-                found is not None and abs(found.multipliers[0]) > _REPELLING_MULTIPLIER
+                found is not None and abs(found.floquet_multipliers[0]) > _REPELLING_MULTIPLIER
             )
             orbit = found if found is not None and found.is_attracting else None
-        if len(seen) == max_events or (orbit and not follow_all):
+        if len(seen) == max_cycles or (orbit and not follow_all_cycles):
             break
-    return EventSequence(seen, orbit, may_still_converge=not repels or _may_still_converge(seen))
+    return StickSlipSequence(
+        seen, orbit, may_still_converge=not repels or _may_still_converge(seen)
+    )
 
 
 def _may_still_converge(cycles: Sequence[Cycle]) -> bool:
@@ -348,7 +368,7 @@ def _may_still_converge(cycles: Sequence[Cycle]) -> bool:
     The result is True for motions with few cycles. For longer motions, the result is True if the
     range of ln V, or a state, increases or decreases monotonically from cycle to cycle.
     """
-    if len(cycles) < _MIN_CYCLES_TO_TEST:
+    if len(cycles) < _MIN_CYCLES_BEFORE_RECURRENCE_TEST:
         return True
     latest = [
         (cycle.log_slip_rate_range, *cycle.end_point.psis) for cycle in cycles[len(cycles) // 2 :]
@@ -357,7 +377,7 @@ def _may_still_converge(cycles: Sequence[Cycle]) -> bool:
     return bool(((changes > 0.0).all(axis=0) | (changes < 0.0).all(axis=0)).any())
 
 
-def _compared_states(scene: Scene) -> tuple[tuple[int, ...], ...]:
+def _state_index_sets_to_compare(scene: Scene) -> tuple[tuple[int, ...], ...]:
     """Return the sets of states for the detection of a period.
 
     The first set contains the states used for the distance from steady sliding. The second set
@@ -365,11 +385,15 @@ def _compared_states(scene: Scene) -> tuple[tuple[int, ...], ...]:
     the states of the law.
     """
     of_law = tuple(range(scene.parts.law.state_count))
-    return tuple(dict.fromkeys((scene.functions.friction.distance_indices, of_law)))
+    return tuple(
+        dict.fromkeys(
+            (scene.equation_functions.friction_functions.indices_of_states_in_distance, of_law)
+        )
+    )
 
 
-def find_recurrence(
-    scene: Scene, cycles: Sequence[Cycle], compared_states: Sequence[int] | None = None
+def find_recurrence_period(
+    scene: Scene, cycles: Sequence[Cycle], compared_state_indices: Sequence[int] | None = None
 ) -> tuple[int, float]:
     r"""Find the number of cycles after which a motion nearly repeats itself.
 
@@ -400,11 +424,13 @@ def find_recurrence(
     if len(cycles) < 4:
         return 1, math.inf
     places = list(
-        scene.functions.friction.distance_indices if compared_states is None else compared_states
+        scene.equation_functions.friction_functions.indices_of_states_in_distance
+        if compared_state_indices is None
+        else compared_state_indices
     )
     states = np.array([cycle.end_point.psis for cycle in cycles])[:, places]
     latest, scale = states[len(states) // 2 :], scene.a * cycles[-1].log_slip_rate_range
-    longest = min(MAX_PERIOD, len(latest) // 2)
+    longest = min(MAX_PERIOD_IN_CYCLES, len(latest) // 2)
     off = np.array(
         [np.abs(latest[count:] - latest[:-count]).max() for count in range(1, longest + 1)]
     )

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.measure_base import settles_to_steady_sliding
+from rsfstudy.measure_base import steady_sliding_is_linearly_stable
 from rsfstudy.motion import (
     Accuracy,
     Event,
@@ -31,11 +31,11 @@ from rsfstudy.motion import (
     recorded_row,
     rise,
 )
-from rsfstudy.slider import RUPTURE_REGIME, Point, Scene
+from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, Scene
 
 LN10 = math.log(10.0)
 #: Number of main results of a cycle.
-PRIMARY_OUTPUT_COUNT = 5
+PRIMARY_OUTPUTS_PER_CYCLE = 5
 #: Kinds of events. Module variables avoid the attribute lookup, which would take as long as the
 #: rest of the work per event.
 _START, _RISE, _FALL = EventKind.START, EventKind.RISE, EventKind.FALL
@@ -46,7 +46,7 @@ _get_log_slip_rate, _get_spring_stress = attrgetter("log_slip_rate"), attrgetter
 #: with decreasing ranges after which a motion may be approaching steady sliding.
 MIN_LOG_SLIP_RATE_RANGE, _MIN_SHRINKING_CYCLES = 1e-3, 30
 #: Fraction of the largest distance from steady sliding below which a motion has settled.
-_STEADY_FRACTION = 1e-6
+_SETTLED_FRACTION_OF_MAX_DISTANCE = 1e-6
 
 
 class Cycle(NamedTuple):
@@ -88,17 +88,17 @@ class Cycle(NamedTuple):
     friction_at_peak: float
     min_log_slip_rate: float
     max_log_slip_rate: float
-    arrest_point: Point
-    slowest_point: Point
-    start_point: Point
-    end_point: Point
+    slip_arrest_point: MotionPoint
+    slowest_point: MotionPoint
+    start_point: MotionPoint
+    end_point: MotionPoint
 
     @property
     def log_slip_rate_range(self) -> float:
         """Range of ln V."""
         return self.max_log_slip_rate - self.min_log_slip_rate
 
-    def primary_outputs(self) -> tuple[float, ...]:
+    def primary_output_values(self) -> tuple[float, ...]:
         """Return the main results of the cycle.
 
         Stress drops are measured from the spring stress at the beginning of the cycle, because the
@@ -125,8 +125,8 @@ class Cycle(NamedTuple):
 def iterate_cycles(
     scene: Scene,
     accuracy: Accuracy,
-    meter: WorkMeter,
-    start: Point | None,
+    work_meter: WorkMeter,
+    start_point: MotionPoint | None,
     recording: Recording | None = None,
 ) -> Iterator[Cycle | None]:
     """Iterate over the cycles of a motion.
@@ -151,11 +151,11 @@ def iterate_cycles(
         The next cycle. None is the last item, and means that the motion has settled to steady
         sliding.
     """
-    begin, begun, fallen, seen = None, 0.0, start is None, list[Event]()
-    ahead = 0 if start else scene.parts.loading.reported_segment_count
-    swings, asked = list[float](), _event_specifications(scene.log_load_velocity)
+    begin, begun, fallen, seen = None, 0.0, start_point is None, list[Event]()
+    ahead = 0 if start_point else scene.parts.loading.reported_segment_count
+    swings, asked = list[float](), _cycle_event_specifications(scene.log_load_velocity)
     motion = integrate_events(
-        scene, accuracy, meter, asked, start=start, with_time=True, recording=recording
+        scene, accuracy, work_meter, asked, start=start_point, with_time=True, recording=recording
     )
     for event in motion:
         kind = event.kind
@@ -163,28 +163,28 @@ def iterate_cycles(
             begin, fallen, seen, ahead = None, True, [], ahead - 1
         if ahead:
             continue
-        if kind is _SETTLED and settles_to_steady_sliding(scene):
+        if kind is _SETTLED and steady_sliding_is_linearly_stable(scene):
             yield None
             return
-        if kind is _START and start is not None:
+        if kind is _START and start_point is not None:
             begin = event.point
         fallen = fallen or kind is _FALL
         seen.append(event)
         if kind is not _RISE or not fallen:
             continue
         if begin is not None:
-            cycle = _assemble_cycle(begin, begun, seen)
+            cycle = _cycle_from_events(begin, begun, seen)
             swings.append(cycle.log_slip_rate_range)
             if (
-                swings[-1] < MIN_LOG_SLIP_RATE_RANGE or _amplitudes_vanish(swings)
-            ) and settles_to_steady_sliding(scene):
+                swings[-1] < MIN_LOG_SLIP_RATE_RANGE or _log_rate_ranges_vanish(swings)
+            ) and steady_sliding_is_linearly_stable(scene):
                 yield None
                 return
             yield cycle
         begin, begun, fallen, seen = event.point, event.time, False, []
 
 
-def more_events_remedy(events: int, name: str = "events") -> str:
+def more_events_remedy(event_count: int, option_name: str = "events") -> str:
     """Return the advice to allow more events, for use in a message.
 
     Parameters
@@ -199,10 +199,12 @@ def more_events_remedy(events: int, name: str = "events") -> str:
     str
         Advice with the command-line option and the field.
     """
-    return f"--set {name}={2 * events} ({name}=) waits for more"
+    return f"--set {option_name}={2 * event_count} ({option_name}=) waits for more"
 
 
-def cycle_record(scene: Scene, cycles: Sequence[Cycle], recording: Recording | None) -> np.ndarray:
+def recorded_rows_of_cycles(
+    scene: Scene, cycles: Sequence[Cycle], recording: Recording | None
+) -> np.ndarray:
     """Return the record of successive cycles.
 
     Parameters
@@ -239,34 +241,39 @@ def cycle_record(scene: Scene, cycles: Sequence[Cycle], recording: Recording | N
 
 
 @lru_cache(maxsize=256)
-def _event_specifications(log_load_rate: float) -> tuple[EventSpecification, ...]:
+def _cycle_event_specifications(log_load_velocity: float) -> tuple[EventSpecification, ...]:
     """Return the events that delimit the cycles at ln(V_0/V_*)."""
     return (
         maximum("log_slip_rate", may_defer=True),
         minimum("log_slip_rate", may_defer=True),
-        rise("log_slip_rate", log_load_rate),
-        fall("log_slip_rate", log_load_rate, may_defer=True),
-        approach_to_steady_state(_STEADY_FRACTION),
+        rise("log_slip_rate", log_load_velocity),
+        fall("log_slip_rate", log_load_velocity, may_defer=True),
+        approach_to_steady_state(_SETTLED_FRACTION_OF_MAX_DISTANCE),
     )
 
 
-def _amplitudes_vanish(ranges: list[float]) -> bool:
+def _log_rate_ranges_vanish(log_slip_rate_ranges: list[float]) -> bool:
     """Return True if the decreasing ranges of ln V approach zero.
 
     The last three ranges, with differences d_1 and d_2, are extrapolated as a geometric series. The
     extrapolated decrease is d_2**2/(d_1 - d_2). Near the onset of stick-slip, the ranges decrease
     slowly towards a positive limit instead.
     """
-    if len(ranges) <= _MIN_SHRINKING_CYCLES or not all(
-        y < x for x, y in pairwise(ranges[-_MIN_SHRINKING_CYCLES:])
+    if len(log_slip_rate_ranges) <= _MIN_SHRINKING_CYCLES or not all(
+        y < x for x, y in pairwise(log_slip_rate_ranges[-_MIN_SHRINKING_CYCLES:])
     ):
         return False
-    previous, latest = ranges[-3] - ranges[-2], ranges[-2] - ranges[-1]
+    previous, latest = (
+        log_slip_rate_ranges[-3] - log_slip_rate_ranges[-2],
+        log_slip_rate_ranges[-2] - log_slip_rate_ranges[-1],
+    )
     still_to_come = latest * latest / (previous - latest) if previous > latest else math.inf
-    return ranges[-1] - still_to_come < 0.1 * ranges[-1]
+    return log_slip_rate_ranges[-1] - still_to_come < 0.1 * log_slip_rate_ranges[-1]
 
 
-def _assemble_cycle(start_point: Point, start_time: float, events: Sequence[Event]) -> Cycle:
+def _cycle_from_events(
+    start_point: MotionPoint, start_time: float, events: Sequence[Event]
+) -> Cycle:
     """Assemble the cycle that ends with the last event."""
     points, end = [event.point for event in events], events[-1]
     fastest, rested = max(points, key=_get_log_slip_rate), min(points, key=_get_log_slip_rate)
@@ -278,14 +285,14 @@ def _assemble_cycle(start_point: Point, start_time: float, events: Sequence[Even
         friction_at_peak=fastest.friction_coefficient,
         min_log_slip_rate=rested.log_slip_rate,
         max_log_slip_rate=fastest.log_slip_rate,
-        arrest_point=_find_arrest_point(events) or rested,
+        slip_arrest_point=_find_arrest_point(events) or rested,
         slowest_point=rested,
         start_point=start_point,
         end_point=end.point,
     )
 
 
-def _find_arrest_point(events: Sequence[Event]) -> Point | None:
+def _find_arrest_point(events: Sequence[Event]) -> MotionPoint | None:
     """Return the point at which friction balances the spring after rupture.
 
     The result is None if the cycle has no such point.

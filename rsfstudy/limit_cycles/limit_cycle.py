@@ -23,35 +23,44 @@ import numpy as np
 
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.limit_cycles.cycle_search import CycleSearch, EventSequence, follow_to_orbit
-from rsfstudy.limit_cycles.cycles import LN10, Cycle, cycle_record, more_events_remedy
-from rsfstudy.limit_cycles.return_map import Orbit, ReturnMap
-from rsfstudy.measure_base import Outcome, RecordingMeasure, check_steady_loading, phase_outputs
+from rsfstudy.limit_cycles.cycle_search import (
+    LimitCycleSearch,
+    StickSlipSequence,
+    follow_to_periodic_orbit,
+)
+from rsfstudy.limit_cycles.cycles import LN10, Cycle, more_events_remedy, recorded_rows_of_cycles
+from rsfstudy.limit_cycles.return_map import PeriodicOrbit, ReturnMap
+from rsfstudy.measure_base import (
+    Outcome,
+    RecordingMeasure,
+    check_loading_lets_motion_settle,
+    outputs_along_phase,
+)
 from rsfstudy.motion import (
-    MAX_ERROR_RATIO,
+    MAX_ERROR_OVER_RTOL,
     MOTION_VARIABLES,
     Accuracy,
     MotionStopped,
     WorkMeter,
     estimate_error,
-    sample_along_path,
+    resample_motion_along_path,
 )
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
-from rsfstudy.slider import Scene, growth_rates
+from rsfstudy.slider import Scene, linear_growth_rates
 from rsfstudy.status import Status
 
 #: Error that two runs may share by chance, as a fraction of the requested relative accuracy.
-_COINCIDENCE_FLOOR = 0.06
+_ERROR_FLOOR_OVER_RTOL = 0.06
 #: Displacement of the load point that starts a motion if the scene has no step, in units of D_c.
-PERTURBATION_DISPLACEMENT = 0.1
+INITIAL_PERTURBATION_DISPLACEMENT = 0.1
 #: Number of points of an orbit that consists only of its ends and needs no recording.
-_END_POINT_COUNT = 2
+_MAX_POINTS_WITHOUT_RECORDING = 2
 #: Relative accuracy of the search for the limit cycle. The orbit is then closed with the requested
 #: accuracy.
-_SEARCH_RTOL = 1e-4
+_CYCLE_SEARCH_RTOL = 1e-4
 
-_PRIMARY_OUTPUTS = (
+_PRIMARY_OUTPUT_NAMES = (
     "recurrence_interval",
     "static_stress_drop",
     "dynamic_stress_drop",
@@ -59,10 +68,10 @@ _PRIMARY_OUTPUTS = (
     "max_log10_slip_rate",
 )
 #: Index of the peak slip rate in the main results.
-PEAK_INDEX = 4
+INDEX_OF_PEAK_OUTPUT = 4
 
 #: Number of events after which a motion repeats itself.
-PERIOD_OUTPUT = Output(
+EVENTS_PER_PERIOD_OUTPUT = Output(
     "period_events", "", "1", "number of events after which a motion repeats itself"
 )
 #: Final behaviour of a slider: steady sliding that is approached without or with oscillations, or
@@ -72,7 +81,7 @@ _STEADY_CODE, _DAMPED_OSCILLATION_CODE, _SLOW_SLIP_CODE, _STICK_SLIP_CODE = map(
     float, range(len(SLIP_MODES))
 )
 _OUTPUTS = (
-    *(Output(name, error=True) for name in _PRIMARY_OUTPUTS),
+    *(Output(name, error=True) for name in _PRIMARY_OUTPUT_NAMES),
     Output("slip_per_event"),
     Output(
         "healing_exponent",
@@ -87,7 +96,7 @@ _OUTPUTS = (
         "1",
         "stress drop while slip accelerates over that while it decelerates",
     ),
-    PERIOD_OUTPUT,
+    EVENTS_PER_PERIOD_OUTPUT,
     Output("events_until_repeat", "", "1", "number of the cycle that repeated the one before"),
     Output("work_per_cycle", "", "1", "right-hand sides of the accepted cycle"),
     Output(
@@ -97,7 +106,7 @@ _OUTPUTS = (
         "what the slider does in the end, by its peak slip rate",
         flags=SLIP_MODES,
     ),
-    *phase_outputs(*MOTION_VARIABLES),
+    *outputs_along_phase(*MOTION_VARIABLES),
 )
 
 
@@ -186,90 +195,109 @@ class LimitCycle(RecordingMeasure):
         Outcome
             Status, results and message.
         """
-        check_steady_loading(scene)
+        check_loading_lets_motion_settle(scene)
         if scene.log_load_velocity == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
         if not scene.is_perturbed:
             # Without a step, the slider would remain in steady sliding, even if it is unstable.
-            scene = scene.with_segment(Segment(1.0, PERTURBATION_DISPLACEMENT))
+            scene = scene.with_segment(Segment(1.0, INITIAL_PERTURBATION_DISPLACEMENT))
         if scene.state_count > 1:
             return self._find_multi_state_cycle(scene, accuracy, meter)
-        loose = max(accuracy.rtol, _SEARCH_RTOL)
+        loose = max(accuracy.rtol, _CYCLE_SEARCH_RTOL)
         for rtol in dict.fromkeys((loose, accuracy.rtol)):
-            approach = CycleSearch(scene, accuracy.with_rtol(rtol), meter)
+            approach = LimitCycleSearch(scene, accuracy.with_rtol(rtol), meter)
             try:
-                found = approach.run(self.events)
+                found = approach.follow_until_converged(self.events)
             except MotionStopped:
                 # The search may fail with the low accuracy and succeed with the requested accuracy.
                 if rtol == accuracy.rtol or meter.evaluations > meter.budget:
                     raise
                 continue
             if found:
-                outcome = self._close_orbit(
+                outcome = self._close_known_orbit(
                     scene, accuracy, meter, approach.orbit, len(approach.cycles)
                 )
                 if outcome.status is not Status.UNVERIFIED:
                     return outcome
-        return outcome if found else no_cycle_outcome(scene)
+        return outcome if found else outcome_of_settling_motion(scene)
 
     def _find_multi_state_cycle(
-        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
+        self, scene: Scene, accuracy: Accuracy, work_meter: WorkMeter
     ) -> Outcome:
         """Compute the limit cycle of a scene with several states.
 
         The motion is integrated with a low accuracy until it approaches a periodic orbit. The orbit
         is then refined, starting from the event with the highest slip rate.
         """
-        motion = follow_to_orbit(
-            scene, accuracy.with_rtol(max(accuracy.rtol, _SEARCH_RTOL)), meter, self.events
+        motion = follow_to_periodic_orbit(
+            scene,
+            accuracy.with_rtol(max(accuracy.rtol, _CYCLE_SEARCH_RTOL)),
+            work_meter,
+            self.events,
         )
         if motion is None:
-            return no_cycle_outcome(scene)
+            return outcome_of_settling_motion(scene)
         if motion.orbit is None:
-            return aperiodic_outcome(scene, motion, more_events_remedy(self.events))
-        return self._close_orbit(
-            scene, accuracy, meter, motion.orbit.from_largest_event, len(motion.cycles)
+            return outcome_of_aperiodic_motion(scene, motion, more_events_remedy(self.events))
+        return self._close_known_orbit(
+            scene, accuracy, work_meter, motion.orbit.starting_at_largest_event, len(motion.cycles)
         )
 
-    def _close_orbit(
-        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter, orbit: Orbit, events: int
+    def _close_known_orbit(
+        self,
+        scene: Scene,
+        accuracy: Accuracy,
+        work_meter: WorkMeter,
+        orbit: PeriodicOrbit,
+        max_cycles: int,
     ) -> Outcome:
         """Refine a periodic orbit to the requested accuracy.
 
         The orbit is refined again with smaller tolerances, to estimate the errors and to record the
         orbit.
         """
-        one = ReturnMap(scene, accuracy, meter).refine(orbit)
-        fine = ReturnMap(scene, accuracy.refined(), meter, recorded=self.phases > _END_POINT_COUNT)
-        again = one and fine.refine(one)
+        one = ReturnMap(scene, accuracy, work_meter).refine_orbit(orbit)
+        fine = ReturnMap(
+            scene,
+            accuracy.refined(),
+            work_meter,
+            recorded=self.phases > _MAX_POINTS_WITHOUT_RECORDING,
+        )
+        again = one and fine.refine_orbit(one)
         if one is None or again is None:
             why = "with other tolerances the cycle does not close: ask for a smaller rtol"
             return Outcome(Status.UNVERIFIED, message=why)
-        errors = estimate_cycle_errors(accuracy, one, again)
-        values = dict(zip(_PRIMARY_OUTPUTS, one.primary_outputs.tolist(), strict=True))
-        values |= {f"{n}_error": e for n, e in zip(_PRIMARY_OUTPUTS, errors.tolist(), strict=True)}
+        errors = estimate_primary_output_errors(accuracy, one, again)
+        values = dict(
+            zip(_PRIMARY_OUTPUT_NAMES, one.corrected_primary_outputs.tolist(), strict=True)
+        )
+        values |= {
+            f"{n}_error": e for n, e in zip(_PRIMARY_OUTPUT_NAMES, errors.tolist(), strict=True)
+        }
         cycle = one.cycles[0]
         carried = (
             cycle.end_point.spring_stress - cycle.start_point.spring_stress
         ) / scene.stiffness
         values["slip_per_event"] = scene.load_velocity * values["recurrence_interval"]
         values["slip_per_event"] -= carried if one.period > 1 else 0.0
-        values |= _cycle_properties(scene, cycle)
+        values |= _additional_cycle_outputs(scene, cycle)
         values["slip_mode"] = _classify_slip_mode(
-            scene, LN10 * float(one.primary_outputs[PEAK_INDEX])
+            scene, LN10 * float(one.corrected_primary_outputs[INDEX_OF_PEAK_OUTPUT])
         )
         values["period_events"] = float(one.period)
-        values["events_until_repeat"] = float(events)
-        values["work_per_cycle"] = one.evaluations / one.period
-        status, why = check_errors(accuracy, one, errors)
-        why = why or _period_message(one)
-        path = cycle_record(scene, again.cycles, again.recording)
+        values["events_until_repeat"] = float(max_cycles)
+        values["work_per_cycle"] = one.evaluation_count / one.period
+        status, why = status_from_output_errors(accuracy, one, errors)
+        why = why or _period_of_several_events_message(one)
+        path = recorded_rows_of_cycles(scene, again.cycles, again.recording)
         return Outcome(
-            status, values | sample_along_path(path, self.phases, engine=accuracy.engine), why
+            status,
+            values | resample_motion_along_path(path, self.phases, engine=accuracy.engine),
+            why,
         )
 
 
-def _period_message(orbit: Orbit) -> str:
+def _period_of_several_events_message(orbit: PeriodicOrbit) -> str:
     """Return a message if a motion repeats only after several events."""
     if orbit.period == 1:
         return ""
@@ -286,7 +314,7 @@ STEADY_SLIDING_OUTCOME = Outcome(
 )
 
 
-def no_cycle_outcome(scene: Scene) -> Outcome:
+def outcome_of_settling_motion(scene: Scene) -> Outcome:
     """Return the outcome of a motion that settles to steady sliding.
 
     Parameters
@@ -300,7 +328,7 @@ def no_cycle_outcome(scene: Scene) -> Outcome:
         Outcome with the status ``no_limit_cycle`` and the slip mode.
     """
     try:
-        last = growth_rates(scene, scene.log_load_velocity)[0]
+        last = linear_growth_rates(scene, scene.log_load_velocity)[0]
     except ValueError:
         # The growth rates have no closed form.
         return STEADY_SLIDING_OUTCOME
@@ -310,14 +338,14 @@ def no_cycle_outcome(scene: Scene) -> Outcome:
     )
 
 
-def _classify_slip_mode(scene: Scene, log_peak: float) -> float:
+def _classify_slip_mode(scene: Scene, peak_log_slip_rate: float) -> float:
     """Return the code of slow slip or stick-slip for a peak of ln V."""
     damping = scene.parts.dynamics.radiated_stress_slope(0.0)
     limit = math.log(scene.a / damping) if damping else scene.log_instability_rate
-    return _STICK_SLIP_CODE if log_peak >= limit else _SLOW_SLIP_CODE
+    return _STICK_SLIP_CODE if peak_log_slip_rate >= limit else _SLOW_SLIP_CODE
 
 
-def aperiodic_outcome(scene: Scene, sequence: EventSequence, remedy: str) -> Outcome:
+def outcome_of_aperiodic_motion(scene: Scene, sequence: StickSlipSequence, remedy: str) -> Outcome:
     """Return the outcome of a motion that has not reached a periodic orbit.
 
     The status depends on whether the motion may still reach a periodic orbit.
@@ -350,8 +378,11 @@ def aperiodic_outcome(scene: Scene, sequence: EventSequence, remedy: str) -> Out
     return Outcome(Status.NOT_PERIODIC, message=text)
 
 
-def check_errors(
-    accuracy: Accuracy, orbit: Orbit, errors: np.ndarray, outputs: slice = slice(None)
+def status_from_output_errors(
+    accuracy: Accuracy,
+    orbit: PeriodicOrbit,
+    output_errors: np.ndarray,
+    outputs: slice = slice(None),
 ) -> tuple[Status, str]:
     """Return the status that follows from the errors of the main results.
 
@@ -373,25 +404,27 @@ def check_errors(
     message : str
         Largest relative error, or an empty string.
     """
-    worst = float((errors / _error_scales(orbit))[outputs].max())
-    if worst <= MAX_ERROR_RATIO * accuracy.rtol:
+    worst = float((output_errors / _primary_output_error_scales(orbit))[outputs].max())
+    if worst <= MAX_ERROR_OVER_RTOL * accuracy.rtol:
         return Status.OK, ""
     why = f"the cycle is known to {worst:.1e} only, where {accuracy.rtol:g} was asked for"
     return Status.UNVERIFIED, f"{why}: ask for another rtol"
 
 
-def _error_scales(orbit: Orbit) -> list[float]:
+def _primary_output_error_scales(orbit: PeriodicOrbit) -> list[float]:
     """Return the scales of the errors of the main results.
 
     The scale of a logarithm of slip rate is at least half of the range of the logarithms, because
     the logarithm is zero at V_*.
     """
-    *others, slowest, fastest = orbit.primary_outputs.tolist()
+    *others, slowest, fastest = orbit.corrected_primary_outputs.tolist()
     half = 0.5 * (fastest - slowest)
     return [*map(abs, others), max(abs(slowest), half), max(abs(fastest), half)]
 
 
-def estimate_cycle_errors(accuracy: Accuracy, orbit: Orbit, refined_orbit: Orbit) -> np.ndarray:
+def estimate_primary_output_errors(
+    accuracy: Accuracy, orbit: PeriodicOrbit, refined_orbit: PeriodicOrbit
+) -> np.ndarray:
     """Estimate the errors of the main results.
 
     The estimate includes the difference between two runs, and the corrections for the closure
@@ -411,15 +444,18 @@ def estimate_cycle_errors(accuracy: Accuracy, orbit: Orbit, refined_orbit: Orbit
     ndarray
         Error estimates in the order of the main results.
     """
-    chance, scales = _COINCIDENCE_FLOOR * accuracy.rtol, _error_scales(orbit)
+    chance, scales = _ERROR_FLOOR_OVER_RTOL * accuracy.rtol, _primary_output_error_scales(orbit)
     pairs = zip(
-        orbit.primary_outputs.tolist(), refined_orbit.primary_outputs.tolist(), scales, strict=True
+        orbit.corrected_primary_outputs.tolist(),
+        refined_orbit.corrected_primary_outputs.tolist(),
+        scales,
+        strict=True,
     )
     errors = [estimate_error(number, refined, chance, scale) for number, refined, scale in pairs]
-    return np.asarray(np.abs(orbit.output_corrections) + np.array(errors))
+    return np.asarray(np.abs(orbit.primary_output_corrections) + np.array(errors))
 
 
-def _cycle_properties(scene: Scene, cycle: Cycle) -> dict[str, float]:
+def _additional_cycle_outputs(scene: Scene, cycle: Cycle) -> dict[str, float]:
     """Return additional properties of a cycle."""
     return {
         "healing_exponent": _healing_exponent(scene, cycle),
@@ -434,8 +470,8 @@ def _healing_exponent(scene: Scene, cycle: Cycle) -> float:
 
     The result is NaN if the law has no state variable Theta = b ln(theta/theta_*).
     """
-    slowed = cycle.slowest_point.log_slip_rate - cycle.arrest_point.log_slip_rate
+    slowed = cycle.slowest_point.log_slip_rate - cycle.slip_arrest_point.log_slip_rate
     law = scene.parts.law
     if law.state_count > 1 or not law.has_logarithmic_state or not abs(slowed) > 1.0:
         return math.nan
-    return (cycle.slowest_point.state - cycle.arrest_point.state) / (scene.b * slowed)
+    return (cycle.slowest_point.state - cycle.slip_arrest_point.state) / (scene.b * slowed)

@@ -43,7 +43,7 @@ from scipy.linalg.lapack import dgesv
 
 from rsfstudy.limit_cycles.cycles import (
     MIN_LOG_SLIP_RATE_RANGE,
-    PRIMARY_OUTPUT_COUNT,
+    PRIMARY_OUTPUTS_PER_CYCLE,
     Cycle,
     iterate_cycles,
 )
@@ -53,26 +53,26 @@ from rsfstudy.motion import (
     Recording,
     WorkMeter,
     inertia_matters_at,
+    point_with_slip_rate,
     restart_point,
-    with_slip_rate,
 )
-from rsfstudy.slider import Numbers, Point, Scene, equations_without_mass
+from rsfstudy.slider import MotionPoint, Numbers, Scene, equations_without_mass
 from rsfstudy.status import Status
 
 #: Step of the finite differences of the map, relative to a times the range of ln V. The derivatives
 #: of the map change over a hundredth of this range.
-DIFFERENCE_STEP = 1e-4
+DIFFERENCE_STEP_OVER_LOG_RATE_RANGE = 1e-4
 _DIFFERENCE_WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
 #: Largest distance of an orbit from the starting point of the search, relative to a times the range
 #: of ln V, and largest number of Newton steps.
 _MAX_ORBIT_DISTANCE, _MAX_ITERATIONS = 0.1, 12
 #: Largest closure error of an orbit, relative to the requested accuracy. The results are corrected
 #: for the closure error to first order.
-CLOSURE_TOLERANCE = 0.3
+ORBIT_CLOSURE_TOLERANCE_OVER_RTOL = 0.3
 
 
 @dataclass(frozen=True)
-class Orbit:
+class PeriodicOrbit:
     """Closed orbit of one or several cycles.
 
     Parameters
@@ -94,10 +94,10 @@ class Orbit:
     """
 
     cycles: tuple[Cycle, ...]
-    derivatives: tuple[np.ndarray, ...]
-    section_correction: np.ndarray
+    cycle_derivatives: tuple[np.ndarray, ...]
+    start_section_correction: np.ndarray
     accuracy: Accuracy
-    evaluations: int
+    evaluation_count: int
     recording: Recording | None = None
 
     @property
@@ -108,33 +108,40 @@ class Orbit:
     @property
     def start_section(self) -> np.ndarray:
         """Section at which the closed orbit begins."""
-        return np.asarray(section_at(self.cycles[0].start_point) + self.section_correction)
-
-    @cached_property
-    def output_corrections(self) -> np.ndarray:
-        """Corrections of the main results for the closure error."""
         return np.asarray(
-            self.derivatives[0][len(self.section_correction) :] @ self.section_correction
+            section_vector_at(self.cycles[0].start_point) + self.start_section_correction
         )
 
     @cached_property
-    def primary_outputs(self) -> np.ndarray:
+    def primary_output_corrections(self) -> np.ndarray:
+        """Corrections of the main results for the closure error."""
+        return np.asarray(
+            self.cycle_derivatives[0][len(self.start_section_correction) :]
+            @ self.start_section_correction
+        )
+
+    @cached_property
+    def corrected_primary_outputs(self) -> np.ndarray:
         """Main results of the first cycle, corrected for the closure error."""
-        return np.asarray(np.array(self.cycles[0].primary_outputs()) + self.output_corrections)
+        return np.asarray(
+            np.array(self.cycles[0].primary_output_values()) + self.primary_output_corrections
+        )
 
     @property
-    def multipliers(self) -> np.ndarray:
+    def floquet_multipliers(self) -> np.ndarray:
         """Complex Floquet multipliers by decreasing absolute value."""
-        found = np.linalg.eigvals(chain_derivatives(self.derivatives)).astype(complex)
+        found = np.linalg.eigvals(multiply_cycle_derivatives(self.cycle_derivatives)).astype(
+            complex
+        )
         return np.asarray(found[np.argsort(-np.abs(found), kind="stable")])
 
     @property
     def is_attracting(self) -> bool:
         """True if the orbit attracts nearby motions."""
-        return bool(abs(self.multipliers[0]) < 1.0)
+        return bool(abs(self.floquet_multipliers[0]) < 1.0)
 
     @property
-    def from_largest_event(self) -> Orbit:
+    def starting_at_largest_event(self) -> PeriodicOrbit:
         """Orbit that starts with the cycle with the highest slip rate."""
         at = max(range(self.period), key=lambda place: self.cycles[place].max_log_slip_rate)
         if not at:
@@ -142,12 +149,13 @@ class Orbit:
         return replace(
             self,
             cycles=self.cycles[at:] + self.cycles[:at],
-            derivatives=self.derivatives[at:] + self.derivatives[:at],
-            section_correction=chain_derivatives(self.derivatives[:at]) @ self.section_correction,
+            cycle_derivatives=self.cycle_derivatives[at:] + self.cycle_derivatives[:at],
+            start_section_correction=multiply_cycle_derivatives(self.cycle_derivatives[:at])
+            @ self.start_section_correction,
         )
 
 
-def section_at(point: Point) -> np.ndarray:
+def section_vector_at(point: MotionPoint) -> np.ndarray:
     """Return the section at a point.
 
     Parameters
@@ -163,7 +171,7 @@ def section_at(point: Point) -> np.ndarray:
     return np.array((point.spring_stress, *point.psis))
 
 
-def cycle_image(cycle: Cycle) -> np.ndarray:
+def section_and_outputs_after(cycle: Cycle) -> np.ndarray:
     """Return the image of the section at which a cycle begins.
 
     Parameters
@@ -177,11 +185,11 @@ def cycle_image(cycle: Cycle) -> np.ndarray:
         Section at the end of the cycle, followed by the main results.
     """
     return np.array(
-        (cycle.end_point.spring_stress, *cycle.end_point.psis, *cycle.primary_outputs())
+        (cycle.end_point.spring_stress, *cycle.end_point.psis, *cycle.primary_output_values())
     )
 
 
-def chain_derivatives(slopes: Sequence[np.ndarray]) -> np.ndarray:
+def multiply_cycle_derivatives(cycle_derivatives: Sequence[np.ndarray]) -> np.ndarray:
     """Return the derivative of the section over several successive cycles.
 
     Parameters
@@ -194,9 +202,9 @@ def chain_derivatives(slopes: Sequence[np.ndarray]) -> np.ndarray:
     ndarray, shape (1 + states, 1 + states)
         Product of the derivatives.
     """
-    size = slopes[0].shape[1]
-    together = slopes[0][:size]
-    for each in slopes[1:]:
+    size = cycle_derivatives[0].shape[1]
+    together = cycle_derivatives[0][:size]
+    for each in cycle_derivatives[1:]:
         together = each[:size] @ together
     return together
 
@@ -229,18 +237,22 @@ class ReturnMap:
         self,
         scene: Scene,
         accuracy: Accuracy,
-        meter: WorkMeter,
+        work_meter: WorkMeter,
         *,
         recorded: bool = False,
         counted: Sequence[int] | None = None,
     ) -> None:
-        self.scene, self.accuracy, self._meter = scene, accuracy, meter
+        self.scene, self.accuracy, self._meter = scene, accuracy, work_meter
         self._with_recording = recorded
-        places = scene.functions.friction.distance_indices if counted is None else counted
+        places = (
+            scene.equation_functions.friction_functions.indices_of_states_in_distance
+            if counted is None
+            else counted
+        )
         #: Indices of the unknowns of a section that contribute to the distance.
         self._compared_unknowns = [0, *(1 + place for place in places)]
 
-    def point_at(self, section: np.ndarray) -> Point:
+    def point_at_section(self, section: np.ndarray) -> MotionPoint:
         """Return the point of the slider at a section.
 
         The point is on the slow manifold, unless inertia is important. If inertia is important, the
@@ -264,17 +276,17 @@ class ReturnMap:
         spring_stress, *psis = section.tolist()
         point = restart_point(self.scene, spring_stress, tuple(psis))
         return (
-            with_slip_rate(self.scene, point, self.scene.log_load_velocity)
+            point_with_slip_rate(self.scene, point, self.scene.log_load_velocity)
             if self._inertia_matters_at(point)
             else point
         )
 
-    def _inertia_matters_at(self, point: Point) -> bool:
+    def _inertia_matters_at(self, point: MotionPoint) -> bool:
         """Return True if inertia is too important for the slow manifold."""
         return inertia_matters_at(self.scene, self.accuracy, point)
 
     def follow_cycles(
-        self, start: np.ndarray, count: int, recording: Recording | None = None
+        self, start_section: np.ndarray, cycle_count: int, recording: Recording | None = None
     ) -> list[Cycle]:
         """Compute successive cycles from a section.
 
@@ -297,20 +309,24 @@ class ReturnMap:
         seen = list[Cycle]()
         try:
             moving = iterate_cycles(
-                self.scene, self.accuracy, self._meter, self.point_at(start), recording
+                self.scene,
+                self.accuracy,
+                self._meter,
+                self.point_at_section(start_section),
+                recording,
             )
             for cycle in moving:
                 if cycle is None or cycle.log_slip_rate_range < MIN_LOG_SLIP_RATE_RANGE:
                     break
                 seen.append(cycle)
-                if len(seen) == count:
+                if len(seen) == cycle_count:
                     break
         except MotionStopped as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
         return seen
 
-    def compute_image(self, start: np.ndarray) -> np.ndarray | None:
+    def follow_one_cycle(self, start_section: np.ndarray) -> np.ndarray | None:
         """Compute the section one cycle later, and the main results.
 
         Parameters
@@ -323,11 +339,11 @@ class ReturnMap:
         ndarray, shape (1 + states + results,), or None
             Image of the section, or None if the motion does not complete a cycle.
         """
-        seen = self.follow_cycles(start, 1)
-        return cycle_image(seen[0]) if seen else None
+        seen = self.follow_cycles(start_section, 1)
+        return section_and_outputs_after(seen[0]) if seen else None
 
-    def compute_derivatives(
-        self, start: np.ndarray, count: int, scale: float
+    def compute_cycle_derivatives(
+        self, start_section: np.ndarray, cycle_count: int, state_scale: float
     ) -> tuple[np.ndarray, ...]:
         """Compute the derivatives of successive cycles by finite differences.
 
@@ -348,19 +364,19 @@ class ReturnMap:
         """
         found, step = (
             list[np.ndarray](),
-            DIFFERENCE_STEP * math.sqrt(self.accuracy.refinement) * scale,
+            DIFFERENCE_STEP_OVER_LOG_RATE_RANGE * math.sqrt(self.accuracy.refinement) * state_scale,
         )
-        current: np.ndarray | None = start
-        for number in range(count):
+        current: np.ndarray | None = start_section
+        for number in range(cycle_count):
             slopes = None if current is None else self._differentiate_cycle(current, step)
             if current is None or slopes is None:
                 break
             found.append(slopes)
-            after = self.compute_image(current) if number < count - 1 else None
+            after = self.follow_one_cycle(current) if number < cycle_count - 1 else None
             current = None if after is None else after[: len(current)]
         return tuple(found)
 
-    def motion_direction(self, point: Point) -> tuple[Numbers, Numbers]:
+    def motion_direction_and_effect(self, point: MotionPoint) -> tuple[Numbers, Numbers]:
         """Return the direction of the motion at a section.
 
         The function also returns the effect of a displacement in this direction. If the effect of
@@ -382,43 +398,45 @@ class ReturnMap:
         spring_stress = point.frictional_stress + scene.dynamics.radiated_stress(
             scene.log_load_velocity
         )
-        rates = equations_without_mass(scene, clock=True).evaluate_rates(
+        rates = equations_without_mass(scene, with_time=True).evaluate_rates(
             (spring_stress, *point.psis, 0.0)
         )
-        rest = (0.0,) * (PRIMARY_OUTPUT_COUNT - 1)
+        rest = (0.0,) * (PRIMARY_OUTPUTS_PER_CYCLE - 1)
         return (0.0, *rates[1:-1]), (*(0.0,) * (1 + states), -rates[-1], *rest)
 
-    def _differentiate_cycle(self, start: np.ndarray, step: float) -> np.ndarray | None:
+    def _differentiate_cycle(
+        self, start_section: np.ndarray, difference_step: float
+    ) -> np.ndarray | None:
         """Compute the derivatives of one cycle by differences of order four.
 
         The derivative along the motion follows from the rates of the motion. The result is None if
         a motion does not complete the cycle.
         """
-        point = self.point_at(start)
-        way, passed = self.motion_direction(point)
-        directions = np.linalg.qr(np.column_stack([way, np.eye(len(start))]))[0]
+        point = self.point_at_section(start_section)
+        way, passed = self.motion_direction_and_effect(point)
+        directions = np.linalg.qr(np.column_stack([way, np.eye(len(start_section))]))[0]
         columns = list[np.ndarray]()
         for unit in directions.T:
             if not columns and not self._inertia_matters_at(point):
                 columns.append(np.array(passed) / (unit @ way))
                 continue
-            slope = np.zeros(len(start) + PRIMARY_OUTPUT_COUNT)
+            slope = np.zeros(len(start_section) + PRIMARY_OUTPUTS_PER_CYCLE)
             for number, weight in _DIFFERENCE_WEIGHTS:
-                ahead = self.compute_image(start + number * step * unit)
-                behind = self.compute_image(start - number * step * unit)
+                ahead = self.follow_one_cycle(start_section + number * difference_step * unit)
+                behind = self.follow_one_cycle(start_section - number * difference_step * unit)
                 if ahead is None or behind is None:
                     return None
-                slope += weight * (ahead - behind) / step
+                slope += weight * (ahead - behind) / difference_step
             columns.append(slope)
         return np.asarray(np.column_stack(columns) @ directions.T)
 
-    def find_orbit(
+    def find_periodic_orbit(
         self,
-        start: np.ndarray,
-        count: int,
+        start_section: np.ndarray,
+        cycle_count: int,
         log_slip_rate_range: float,
         max_distance: float = _MAX_ORBIT_DISTANCE,
-    ) -> Orbit | None:
+    ) -> PeriodicOrbit | None:
         """Find a periodic orbit close to a section.
 
         Parameters
@@ -439,20 +457,24 @@ class ReturnMap:
             The orbit, or None if no orbit is found.
         """
         scale = self.scene.a * log_slip_rate_range
-        slopes = self.compute_derivatives(start, count, scale)
+        slopes = self.compute_cycle_derivatives(start_section, cycle_count, scale)
         found = (
-            self._close_orbit(start, slopes, scale, max_distance) if len(slopes) == count else None
+            self._solve_for_closed_orbit(start_section, slopes, scale, max_distance)
+            if len(slopes) == cycle_count
+            else None
         )
         if found is None:
             return None
-        count = self._cycles_until_repeat(found.cycles, scale)
-        if np.abs(found.start_section - start).max() > 10.0 * self.accuracy.rtol * scale:
-            slopes = self.compute_derivatives(found.start_section, count, scale)
-        if len(slopes) < count:
+        cycle_count = self._cycles_until_repeat(found.cycles, scale)
+        if np.abs(found.start_section - start_section).max() > 10.0 * self.accuracy.rtol * scale:
+            slopes = self.compute_cycle_derivatives(found.start_section, cycle_count, scale)
+        if len(slopes) < cycle_count:
             return None
-        return replace(found, cycles=found.cycles[:count], derivatives=slopes[:count])
+        return replace(
+            found, cycles=found.cycles[:cycle_count], cycle_derivatives=slopes[:cycle_count]
+        )
 
-    def refine(self, orbit: Orbit) -> Orbit | None:
+    def refine_orbit(self, orbit: PeriodicOrbit) -> PeriodicOrbit | None:
         """Compute a known orbit with the accuracy of this map.
 
         Parameters
@@ -467,16 +489,20 @@ class ReturnMap:
         """
         if orbit.accuracy == self.accuracy:
             return orbit
-        return self._close_orbit(
+        return self._solve_for_closed_orbit(
             orbit.start_section,
-            orbit.derivatives,
+            orbit.cycle_derivatives,
             self.scene.a * orbit.cycles[0].log_slip_rate_range,
             _MAX_ORBIT_DISTANCE,
         )
 
-    def _close_orbit(
-        self, start: np.ndarray, slopes: Sequence[np.ndarray], scale: float, max_distance: float
-    ) -> Orbit | None:
+    def _solve_for_closed_orbit(
+        self,
+        start_section: np.ndarray,
+        cycle_derivatives: Sequence[np.ndarray],
+        state_scale: float,
+        max_distance: float,
+    ) -> PeriodicOrbit | None:
         r"""Solve for a periodic orbit with a given number of cycles.
 
         The number of cycles is the number of arrays in ``slopes``.
@@ -492,46 +518,62 @@ class ReturnMap:
         updates. If :math:`r` is the value of :math:`P(s) - s` after a step :math:`ds`, the update
         of :math:`J` is :math:`r\,ds^T/(ds^T ds)`.
         """
-        at, enough, last = start, CLOSURE_TOLERANCE * self.accuracy.rtol * scale, math.inf
-        jacobian, move = chain_derivatives(slopes) - _identity_matrix(len(start)), None
+        at, enough, last = (
+            start_section,
+            ORBIT_CLOSURE_TOLERANCE_OVER_RTOL * self.accuracy.rtol * state_scale,
+            math.inf,
+        )
+        jacobian, move = (
+            multiply_cycle_derivatives(cycle_derivatives) - _identity_matrix(len(start_section)),
+            None,
+        )
         for _ in range(_MAX_ITERATIONS):
             spent, recording = (
                 self._meter.evaluations,
                 Recording() if self._with_recording else None,
             )
-            seen = self.follow_cycles(at, len(slopes), recording)
-            if len(seen) < len(slopes):
+            seen = self.follow_cycles(at, len(cycle_derivatives), recording)
+            if len(seen) < len(cycle_derivatives):
                 return None
-            off = section_at(seen[-1].end_point) - at
+            off = section_vector_at(seen[-1].end_point) - at
             if move is not None:
                 jacobian += off[:, None] * move / (move @ move)
             move = -dgesv(jacobian, off)[2]
-            size = self._scaled_norm(move, at, scale)
+            size = self._largest_scaled_section_change(move, at, state_scale)
             # The iteration ends at the requested accuracy, or if numerical errors of the motion
             # prevent further progress.
             if size <= enough or 0.5 * last <= size <= 100.0 * enough:
                 work = self._meter.evaluations - spent
-                return Orbit(tuple(seen), tuple(slopes), move, self.accuracy, work, recording)
+                return PeriodicOrbit(
+                    tuple(seen), tuple(cycle_derivatives), move, self.accuracy, work, recording
+                )
             at, last = at + move, size
-            if not np.abs((at - start)[self._compared_unknowns]).max() <= max_distance * scale:
+            if (
+                not np.abs((at - start_section)[self._compared_unknowns]).max()
+                <= max_distance * state_scale
+            ):
                 return None
         return None
 
-    def _scaled_norm(self, move: np.ndarray, at: np.ndarray, scale: float) -> float:
+    def _largest_scaled_section_change(
+        self, section_change: np.ndarray, section: np.ndarray, state_scale: float
+    ) -> float:
         """Return the largest component of a change of a section.
 
         The unknowns of a fluid may have large values. If the value of a fluid unknown exceeds the
         scale of the states, its change is divided by the ratio of the value to the scale.
         """
-        changes, first = np.abs(move), 1 + self.scene.parts.law.state_count
-        changes[first:] /= np.maximum(1.0, np.abs(at[first:]) / scale)
+        changes, first = np.abs(section_change), 1 + self.scene.parts.law.state_count
+        changes[first:] /= np.maximum(1.0, np.abs(section[first:]) / state_scale)
         return float(changes.max())
 
-    def _cycles_until_repeat(self, cycles: Sequence[Cycle], scale: float) -> int:
+    def _cycles_until_repeat(self, cycles: Sequence[Cycle], state_scale: float) -> int:
         """Return the number of cycles after which an orbit repeats itself."""
-        begin = section_at(cycles[0].start_point)
+        begin = section_vector_at(cycles[0].start_point)
         for count in range(1, len(cycles)):
-            apart = self._scaled_norm(section_at(cycles[count - 1].end_point) - begin, begin, scale)
-            if len(cycles) % count == 0 and apart < 1e-4 * scale:
+            apart = self._largest_scaled_section_change(
+                section_vector_at(cycles[count - 1].end_point) - begin, begin, state_scale
+            )
+            if len(cycles) % count == 0 and apart < 1e-4 * state_scale:
                 return count
         return len(cycles)

@@ -14,21 +14,21 @@ from rsfstudy._lazy import lazy_exports
 
 if TYPE_CHECKING:
     from rsfstudy.measure_base._declaration_checks import OutputValue
-    from rsfstudy.measure_base._loading_checks import check_steady_loading
-    from rsfstudy.measure_base._recorded_motion import RecordingMeasure, phase_outputs
+    from rsfstudy.measure_base._loading_checks import check_loading_lets_motion_settle
+    from rsfstudy.measure_base._recorded_motion import RecordingMeasure, outputs_along_phase
     from rsfstudy.measure_base.elasticities import Elasticities
     from rsfstudy.measure_base.measure import Measure, Outcome
-    from rsfstudy.measure_base.settling_checks import settles_to_steady_sliding
+    from rsfstudy.measure_base.settling_checks import steady_sliding_is_linearly_stable
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
             "measure_base._declaration_checks": ("OutputValue",),
-            "measure_base._loading_checks": ("check_steady_loading",),
-            "measure_base._recorded_motion": ("RecordingMeasure", "phase_outputs"),
+            "measure_base._loading_checks": ("check_loading_lets_motion_settle",),
+            "measure_base._recorded_motion": ("RecordingMeasure", "outputs_along_phase"),
             "measure_base.elasticities": ("Elasticities",),
             "measure_base.measure": ("Measure", "Outcome"),
-            "measure_base.settling_checks": ("settles_to_steady_sliding",),
+            "measure_base.settling_checks": ("steady_sliding_is_linearly_stable",),
         },
     )
 
@@ -38,7 +38,7 @@ __all__ = [
     "Outcome",
     "OutputValue",
     "RecordingMeasure",
-    "check_steady_loading",
-    "phase_outputs",
-    "settles_to_steady_sliding",
+    "check_loading_lets_motion_settle",
+    "outputs_along_phase",
+    "steady_sliding_is_linearly_stable",
 ]

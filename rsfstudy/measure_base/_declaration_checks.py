@@ -21,7 +21,7 @@ OutputValue = float | np.ndarray
 PlainValue = int | float | str | bool
 
 
-def check_cost(work: object, expected_work: Callable[[Accuracy], float]) -> None:
+def check_declared_work(typical_work: object, expected_work: Callable[[Accuracy], float]) -> None:
     """Check that the typical and the expected work are positive numbers.
 
     Parameters
@@ -36,15 +36,15 @@ def check_cost(work: object, expected_work: Callable[[Accuracy], float]) -> None
     InvalidValue
         If a number is not positive and finite.
     """
-    if not isinstance(work, int | float) or not 0 < work < np.inf:
-        raise InvalidValue("typical_work", work, "must be a number greater than 0")
+    if not isinstance(typical_work, int | float) or not 0 < typical_work < np.inf:
+        raise InvalidValue("typical_work", typical_work, "must be a number greater than 0")
     for rtol in (MIN_RTOL, DEFAULT_RTOL, MAX_RTOL):
         expected = expected_work(Accuracy(rtol))
         if not 0 < expected < np.inf:
             raise InvalidValue("expected_work", expected, f"must exceed 0, at rtol {rtol:g}")
 
 
-def check_description(measure: str, describe: Callable[[], Mapping[str, Any]]) -> None:
+def check_measure_description(measure_name: str, describe: Callable[[], Mapping[str, Any]]) -> None:
     """Check that a file can store the description of a measure.
 
     Parameters
@@ -64,12 +64,12 @@ def check_description(measure: str, describe: Callable[[], Mapping[str, Any]]) -
     except (TypeError, ValueError) as error:
         remedy = "Use Python's own numbers and texts, and tuples of them."
         rule = f"is no plain data ({error})"
-        raise InvalidValue("measure", measure, rule, remedy=remedy) from error
+        raise InvalidValue("measure", measure_name, rule, remedy=remedy) from error
     if not isinstance(name, str):
         raise InvalidValue("name", name, "must be a text, in a measure")
 
 
-def check_coordinate(name: str, values: Any) -> None:
+def check_coordinate_values(name: str, values: Any) -> None:
     """Check the coordinate values of an inner dimension.
 
     Parameters
@@ -99,10 +99,10 @@ def check_coordinate(name: str, values: Any) -> None:
         raise InvalidValue(name, values, "has a value that stands twice on its inner dimension")
 
 
-def check_output(
-    declared: Mapping[str, tuple[str, ...]],
+def check_output_value(
+    dimensions_by_output: Mapping[str, tuple[str, ...]],
     coordinates: Mapping[str, np.ndarray],
-    name: str,
+    output_name: str,
     value: Any,
 ) -> OutputValue:
     """Check one result of a measure.
@@ -128,21 +128,23 @@ def check_output(
     InvalidValue
         If the result is undeclared, is not a real number, or has the wrong shape.
     """
-    if name not in declared:
-        raise InvalidValue("measured", name, "is not declared", choices=declared)
+    if output_name not in dimensions_by_output:
+        raise InvalidValue("measured", output_name, "is not declared", choices=dimensions_by_output)
     if isinstance(value, np.ma.MaskedArray):
-        raise InvalidValue(name, value, "is masked, and must be a real number")
+        raise InvalidValue(output_name, value, "is masked, and must be a real number")
     array = np.asarray(value)
     if array.dtype.kind not in "iufb":
-        raise InvalidValue(name, value, "must be a real number")
-    shape = tuple(len(coordinates[dim]) for dim in declared[name])
+        raise InvalidValue(output_name, value, "must be a real number")
+    shape = tuple(len(coordinates[dim]) for dim in dimensions_by_output[output_name])
     if array.shape != shape:
         rule = f"has the shape {array.shape} and must have {shape}"
-        raise InvalidValue("measured", name, rule)
+        raise InvalidValue("measured", output_name, rule)
     return array if shape else array.item()
 
 
-def check_field_value(name: str, value: Any, current: PlainValue, is_integer: bool) -> Any:
+def check_field_value(
+    field_name: str, value: Any, current_value: PlainValue, must_be_integer: bool
+) -> Any:
     """Check a new value of a field of a measure.
 
     Parameters
@@ -167,16 +169,20 @@ def check_field_value(name: str, value: Any, current: PlainValue, is_integer: bo
     InvalidValue
         If the new value has another type, is not finite, or is not an integer.
     """
-    if _describe_kind(value) != _describe_kind(current):
-        raise InvalidValue(name, value, f"must be {_describe_kind(current)}, as {current!r} is")
+    if _describe_value_type(value) != _describe_value_type(current_value):
+        raise InvalidValue(
+            field_name,
+            value,
+            f"must be {_describe_value_type(current_value)}, as {current_value!r} is",
+        )
     if isinstance(value, float) and not math.isfinite(value):
-        raise InvalidValue(name, value, "must be finite")
-    if is_integer and value != int(value):
-        raise InvalidValue(name, value, "must be a whole number")
-    return int(value) if is_integer else value
+        raise InvalidValue(field_name, value, "must be finite")
+    if must_be_integer and value != int(value):
+        raise InvalidValue(field_name, value, "must be a whole number")
+    return int(value) if must_be_integer else value
 
 
-def _describe_kind(value: object) -> str:
+def _describe_value_type(value: object) -> str:
     if isinstance(value, bool):
         return "a flag"
     if isinstance(value, str):
@@ -184,7 +190,7 @@ def _describe_kind(value: object) -> str:
     return "a number" if isinstance(value, int | float) else "something else"
 
 
-def check_evaluations(spent: Any) -> int:
+def check_evaluation_count(evaluation_count: Any) -> int:
     """Check that a file can store a number of right-hand-side evaluations.
 
     Parameters
@@ -202,6 +208,8 @@ def check_evaluations(spent: Any) -> int:
     InvalidValue
         If the number is not an integer from 0 to 2**63 - 1.
     """
-    if not isinstance(spent, int | np.integer) or not 0 <= spent < 2**63:
-        raise InvalidValue("rhs_evaluations", spent, "must be a whole number from 0 to 2**63 - 1")
-    return int(spent)
+    if not isinstance(evaluation_count, int | np.integer) or not 0 <= evaluation_count < 2**63:
+        raise InvalidValue(
+            "rhs_evaluations", evaluation_count, "must be a whole number from 0 to 2**63 - 1"
+        )
+    return int(evaluation_count)

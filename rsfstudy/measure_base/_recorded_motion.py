@@ -26,7 +26,7 @@ PHASE_VARIABLES = (
 )
 
 
-def phase_outputs(*names: str) -> tuple[Output, ...]:
+def outputs_along_phase(*names: str) -> tuple[Output, ...]:
     """Return outputs along the dimension ``phase``.
 
     Parameters
@@ -52,18 +52,18 @@ class RecordingMeasure(Measure):
 
     def __post_init__(self) -> None:
         """Check the number of points of the record."""
-        if self.point_count < 2:
-            raise InvalidValue("phases", self.point_count, "must be at least 2")
+        if self.recorded_point_count < 2:
+            raise InvalidValue("phases", self.recorded_point_count, "must be at least 2")
 
     @property
-    def point_count(self) -> int:
+    def recorded_point_count(self) -> int:
         """Number of points of the record that are stored."""
         return int(self.plain_fields["phases"])
 
     @cached_attribute
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         """Coordinate values of ``phase``, from 0 to 1."""
-        return {"phase": np.linspace(0.0, 1.0, self.point_count)}
+        return {"phase": np.linspace(0.0, 1.0, self.recorded_point_count)}
 
 
 if not TYPE_CHECKING:

@@ -25,7 +25,13 @@ NUMERIC_SCENE_FIELDS = tuple(
 )
 #: Parameters of a rig that are not fields of a scene, and advice on computing elasticities with
 #: respect to these parameters.
-_RIG_QUANTITIES = ("b", "slip_distance", "normal_stress", "sigma_star", "reference_velocity")
+_RIG_QUANTITIES_WITHOUT_ELASTICITY = (
+    "b",
+    "slip_distance",
+    "normal_stress",
+    "sigma_star",
+    "reference_velocity",
+)
 _RIG_ELASTICITIES_REMEDY = (
     "b at constant a is b_over_a; of a time in s, D_c is 1 + stiffness - reference_rate, normal "
     "stress is -stiffness, and V_* is reference_rate - 1."
@@ -50,7 +56,7 @@ _STEP_FRACTIONS, _MAX_RELATIVE_ERROR, _MAX_EVALUATION_RATIO = (
 _TYPICAL_PARAMETER_COUNT = 8
 
 
-class _LogValue(NamedTuple):
+class _LogValueWithError(NamedTuple):
     """Value and error of ``ln|y|``.
 
     The error is the error of y divided by ``|y|``.
@@ -133,19 +139,21 @@ class Elasticities(Measure):
         ):
             rule = "must be a measure whose headline is one number"
             raise InvalidValue("measure", self.measure, rule)
-        object.__setattr__(self, "parameters", tuple(self.parameters) or self._available_parameters)
+        object.__setattr__(
+            self, "parameters", tuple(self.parameters) or self._changeable_parameters
+        )
         for name in self.parameters:
-            if name not in self._available_parameters:
+            if name not in self._changeable_parameters:
                 rule = f"is no number of a scene that {self.measure.name} leaves as it is"
                 choices, remedy = (
                     ((), _RIG_ELASTICITIES_REMEDY)
-                    if name in _RIG_QUANTITIES
-                    else (self._available_parameters, "")
+                    if name in _RIG_QUANTITIES_WITHOUT_ELASTICITY
+                    else (self._changeable_parameters, "")
                 )
                 raise InvalidValue("parameters", name, rule, choices=choices, remedy=remedy)
 
     @cached_property
-    def _available_parameters(self) -> tuple[str, ...]:
+    def _changeable_parameters(self) -> tuple[str, ...]:
         return tuple(
             name for name in NUMERIC_SCENE_FIELDS if name not in self.measure.solved_fields
         )
@@ -227,7 +235,7 @@ class Elasticities(Measure):
             return Outcome(outcome.status, message=outcome.message)
         names = self.primary_output, f"{self.primary_output}_error"
         values: dict[str, OutputValue] = {name: outcome.values.get(name, 0.0) for name in names}
-        here = self._log_value(outcome)
+        here = self._log_of_primary_output(outcome)
         if here is None:
             why = f"{self.primary_output} is zero, which has no logarithm"
             return Outcome(Status.NOT_APPLICABLE, values, why)
@@ -239,21 +247,23 @@ class Elasticities(Measure):
         for place, name in enumerate(self.parameters):
             if not stated.get(name):
                 continue
-            found[place] = self._differentiate(scene, name, here, step, accuracies, meter)
+            found[place] = self._differentiate_by_parameter(
+                scene, name, here, step, accuracies, meter
+            )
             if np.isnan(found[place, 0]):
                 lacking.append(name)
         values = {**values, "elasticity": found[:, 0], "elasticity_error": found[:, 1]}
         why = f"no number on either side of {', '.join(lacking)}" if lacking else ""
         return Outcome(Status.OK, values, why)
 
-    def _differentiate(
+    def _differentiate_by_parameter(
         self,
         scene: Scene,
-        name: str,
-        centre: _LogValue,
-        step: float,
+        parameter_name: str,
+        central_value: _LogValueWithError,
+        log_step: float,
         accuracies: Sequence[Accuracy],
-        meter: WorkMeter,
+        work_meter: WorkMeter,
     ) -> tuple[float, float]:
         """Compute the derivative with respect to one parameter, and its error.
 
@@ -282,16 +292,19 @@ class Elasticities(Measure):
         """
         found: list[tuple[bool, float, float]] = []
         for part, accuracy in zip(_STEP_FRACTIONS, accuracies, strict=True):
-            size = part * step
+            size = part * log_step
             try:
                 sides = [
-                    self._evaluate_at(scene, name, by * size, accuracy, meter) for by in _STENCIL
+                    self._evaluate_with_changed_parameter(
+                        scene, parameter_name, by * size, accuracy, work_meter
+                    )
+                    for by in _STENCIL
                 ]
             except MotionStopped:
                 if not found:
                     raise
                 break  # Near the end of the solution branch, some evaluations exceed the budget.
-            slope, error, of_levels = _central_difference(centre, sides, size)
+            slope, error, of_levels = _central_difference(central_value, sides, size)
             if found and not all(sides):
                 # The truncation error of the previous step is eight times as large.
                 error += 2.0 * abs(slope - found[-1][2])
@@ -302,9 +315,14 @@ class Elasticities(Measure):
         _one_sided, error, slope = found[-1] if found[-1][0] else min(found)
         return slope, error
 
-    def _evaluate_at(
-        self, scene: Scene, name: str, log_change: float, accuracy: Accuracy, meter: WorkMeter
-    ) -> _LogValue | None:
+    def _evaluate_with_changed_parameter(
+        self,
+        scene: Scene,
+        parameter_name: str,
+        log_change: float,
+        accuracy: Accuracy,
+        work_meter: WorkMeter,
+    ) -> _LogValueWithError | None:
         """Compute ``ln|y|`` after a change of ln p.
 
         Parameters
@@ -331,16 +349,18 @@ class Elasticities(Measure):
             If the computation fails.
         """
         try:
-            beside = scene.with_(**{name: getattr(scene, name) * math.exp(log_change)})
+            beside = scene.with_(
+                **{parameter_name: getattr(scene, parameter_name) * math.exp(log_change)}
+            )
         except InvalidValue:
             return None
-        outcome = self.measure.run_nested(beside, accuracy, meter)
+        outcome = self.measure.run_nested(beside, accuracy, work_meter)
         if not outcome.status.is_answer:
-            where = f"at {name} = {getattr(beside, name):.9g}"
+            where = f"at {parameter_name} = {getattr(beside, parameter_name):.9g}"
             raise MotionStopped(outcome.status, f"{where}: {outcome.message}")
-        return self._log_value(outcome)
+        return self._log_of_primary_output(outcome)
 
-    def _log_value(self, outcome: Outcome) -> _LogValue | None:
+    def _log_of_primary_output(self, outcome: Outcome) -> _LogValueWithError | None:
         """Return ``ln|y|`` of an outcome with an error that includes rounding.
 
         Returns
@@ -355,11 +375,15 @@ class Elasticities(Measure):
             math.log(abs(y)),
             float(outcome.values.get(f"{self.primary_output}_error", 0.0)),
         )
-        return _LogValue(value, error / abs(y) + 4.0 * sys.float_info.epsilon * (1.0 + abs(value)))
+        return _LogValueWithError(
+            value, error / abs(y) + 4.0 * sys.float_info.epsilon * (1.0 + abs(value))
+        )
 
 
 def _central_difference(
-    centre: _LogValue, neighbours: Sequence[_LogValue | None], step: float
+    central_value: _LogValueWithError,
+    neighbouring_values: Sequence[_LogValueWithError | None],
+    log_step: float,
 ) -> tuple[float, float, float]:
     """Compute the derivative of ``ln|y|`` with respect to ln p.
 
@@ -378,14 +402,14 @@ def _central_difference(
         The derivative, its error, and the contribution of the errors of y to this error. All three
         are NaN if the values on both sides are missing.
     """
-    far_below, below, above, far_above = neighbours
+    far_below, below, above, far_above = neighbouring_values
     if far_below and below and above and far_above:
-        near = (above.value - below.value) / (2.0 * step)
-        far = (far_above.value - far_below.value) / (4.0 * step)
+        near = (above.value - below.value) / (2.0 * log_step)
+        far = (far_above.value - far_below.value) / (4.0 * log_step)
         of_levels = (above.error + below.error) / 1.5 + (far_above.error + far_below.error) / 12.0
-        of_levels /= step
+        of_levels /= log_step
         correction = (near - far) / 3.0
-        levels = far_below, below, centre, above, far_above
+        levels = far_below, below, central_value, above, far_above
         fourth = abs(
             sum(
                 w * level.value for w, level in zip(_FOURTH_DIFFERENCE_WEIGHTS, levels, strict=True)
@@ -393,18 +417,18 @@ def _central_difference(
         )
         # The bound assumes that the fifth derivative is at most the fourth derivative divided by
         # the distance of the outer points.
-        left = _CORRECTION_ERROR_FRACTION * abs(correction) + fourth / (12.0 * step)
+        left = _CORRECTION_ERROR_FRACTION * abs(correction) + fourth / (12.0 * log_step)
         return near + correction, left + of_levels, of_levels
     if below and above:
-        slope = (above.value - below.value) / (2.0 * step)
-        bend = abs(above.value - 2.0 * centre.value + below.value) / step
-        of_levels = (above.error + below.error) / (2.0 * step)
-        return slope, max(step**2, bend) + of_levels, of_levels
+        slope = (above.value - below.value) / (2.0 * log_step)
+        bend = abs(above.value - 2.0 * central_value.value + below.value) / log_step
+        of_levels = (above.error + below.error) / (2.0 * log_step)
+        return slope, max(log_step**2, bend) + of_levels, of_levels
     for beside, sign in ((below, -1.0), (above, 1.0)):
         if beside:
-            slope = sign * (beside.value - centre.value) / step
+            slope = sign * (beside.value - central_value.value) / log_step
             # The curvature is unknown. The estimate assumes twice the curvature of a logarithm
             # with this slope.
-            of_levels = (beside.error + centre.error) / step
-            return slope, step * max(1.0, slope**2) + of_levels, of_levels
+            of_levels = (beside.error + central_value.error) / log_step
+            return slope, log_step * max(1.0, slope**2) + of_levels, of_levels
     return math.nan, math.nan, math.nan

@@ -26,7 +26,7 @@ from rsfstudy.measure_base import _declaration_checks
 from rsfstudy.measure_base._declaration_checks import OutputValue as OutputValue
 from rsfstudy.measure_base._declaration_checks import PlainValue
 from rsfstudy.motion import (
-    MAX_ERROR_RATIO,
+    MAX_ERROR_OVER_RTOL,
     Accuracy,
     MotionStopped,
     WorkMeter,
@@ -35,7 +35,7 @@ from rsfstudy.motion import (
 from rsfstudy.quantities import Output, Quantity, is_variable_name
 from rsfstudy.slider import FIELD_NAMES, Scene, cached_attribute
 from rsfstudy.status import Status
-from rsfstudy.vocabulary import DERIVED_COORDINATES
+from rsfstudy.vocabulary import FORMULAS_OF_DERIVED_COORDINATES
 
 
 @guard_methods
@@ -70,7 +70,14 @@ class Outcome:
 
 #: Variable names of every lattice, which are not available as names of results.
 RESERVED_NAMES = frozenset(
-    {"status", "message", "rhs_evaluations", "wall_time", *FIELD_NAMES, *DERIVED_COORDINATES}
+    {
+        "status",
+        "message",
+        "rhs_evaluations",
+        "wall_time",
+        *FIELD_NAMES,
+        *FORMULAS_OF_DERIVED_COORDINATES,
+    }
 )
 
 
@@ -232,7 +239,7 @@ class Measure(CheckedKeywords):
         float
             The typical work, scaled to the given accuracy.
         """
-        return self.typical_work * relative_work(accuracy.rtol, self.work_by_digits)
+        return self.typical_work * relative_work_at_rtol(accuracy.rtol, self.work_by_digits)
 
     @property
     def plain_fields(self) -> dict[str, PlainValue]:
@@ -338,11 +345,11 @@ class Measure(CheckedKeywords):
                     rule = f"has a {name} of its own"
                     remedy = "Write compute: what it gives is checked."
                     raise InvalidValue("measure", self.name, rule, remedy=remedy)
-            _check_names(self)
+            _check_declared_names(self)
             for name, values in self.inner_coordinates.items():
-                _declaration_checks.check_coordinate(name, values)
-            _declaration_checks.check_cost(self.typical_work, self.expected_work)
-            _declaration_checks.check_description(self.name, self.describe)
+                _declaration_checks.check_coordinate_values(name, values)
+            _declaration_checks.check_declared_work(self.typical_work, self.expected_work)
+            _declaration_checks.check_measure_description(self.name, self.describe)
         except InvalidValue:
             raise
         except Exception as error:
@@ -392,7 +399,7 @@ class Measure(CheckedKeywords):
         """
         outcome, own = self.run_metered(scene, accuracy)
         for regime, spent in own.evaluations_by_regime.items():
-            meter.add(regime, spent)
+            meter.add_evaluations(regime, spent)
         return outcome
 
     def run_metered(self, scene: Scene, accuracy: Accuracy) -> tuple[Outcome, WorkMeter]:
@@ -419,7 +426,7 @@ class Measure(CheckedKeywords):
                 outcome = self._flag_large_errors(accuracy.rtol, scene, outcome)
         except MotionStopped as halt:
             outcome = Outcome(halt.status, message=str(halt))
-        spent = _declaration_checks.check_evaluations(meter.evaluations)
+        spent = _declaration_checks.check_evaluation_count(meter.evaluations)
         return Outcome(outcome.status, outcome.values, outcome.message, spent), meter
 
     def _validate_outcome(self, outcome: Outcome) -> Outcome:
@@ -447,7 +454,7 @@ class Measure(CheckedKeywords):
             # Most results are plain floats, for which the full check would take too long.
             name: value
             if isinstance(value, float) and declared.get(name) == ()
-            else _declaration_checks.check_output(declared, inner, name, value)
+            else _declaration_checks.check_output_value(declared, inner, name, value)
             for name, value in given
         }
         lacking = self._find_missing_output(values) if outcome.status.has_values else None
@@ -456,17 +463,19 @@ class Measure(CheckedKeywords):
             return Outcome(Status.NOT_FINITE, values, why)
         return Outcome(outcome.status, values, outcome.message)
 
-    def _find_missing_output(self, values: Mapping[str, OutputValue]) -> str | None:
+    def _find_missing_output(self, output_values: Mapping[str, OutputValue]) -> str | None:
         """Return the name of the first required result that is not finite.
 
         The primary output is required, and so is each result with an error estimate, including the
         error. Optional results are required only if they are present.
         """
         known = [
-            n for n in self.outputs_with_error if n in values or n not in self.optional_outputs
+            n
+            for n in self.outputs_with_error
+            if n in output_values or n not in self.optional_outputs
         ]
         for name in (self.primary_output, *known, *(f"{name}_error" for name in known)):
-            value = values.get(name, math.nan)
+            value = output_values.get(name, math.nan)
             finite = math.isfinite(value) if isinstance(value, float) else np.isfinite(value).any()
             if not finite:
                 return name
@@ -477,7 +486,7 @@ class Measure(CheckedKeywords):
         values, doubts = outcome.values, []
         for name, scale in self.error_scales(scene, values).items():
             error, asked = values.get(f"{name}_error", 0.0), rtol * scale
-            if error > MAX_ERROR_RATIO * asked:
+            if error > MAX_ERROR_OVER_RTOL * asked:
                 text = f"{name} = {values[name]:.6g} is known to {error:.2g}, and {asked:.2g}"
                 doubts.append(f"{text} was asked for")
         if not doubts:
@@ -514,7 +523,7 @@ class Measure(CheckedKeywords):
         return {}
 
 
-def _check_names(measure: Measure) -> None:
+def _check_declared_names(measure: Measure) -> None:
     """Check the names of results, dimensions, quantities and solved fields.
 
     Raises
@@ -557,7 +566,7 @@ def _check_names(measure: Measure) -> None:
             )
 
 
-def relative_work(rtol: float, work_by_digits: Mapping[float, float]) -> float:
+def relative_work_at_rtol(rtol: float, work_by_digits: Mapping[float, float]) -> float:
     """Cost of an accuracy over that of the default one, from measured costs by digits."""
     known = sorted(work_by_digits)
     digits = min(-math.log10(rtol), known[-1] + 2.0)

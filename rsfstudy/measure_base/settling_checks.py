@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from rsfstudy.motion import MotionStopped
-from rsfstudy.slider import Scene, largest_growth_rate
+from rsfstudy.slider import Scene, largest_linear_growth_rate
 from rsfstudy.status import Status
 
 
-def settles_to_steady_sliding(scene: Scene) -> bool:
+def steady_sliding_is_linearly_stable(scene: Scene) -> bool:
     """Return True if steady sliding at the load point velocity is stable.
 
     Parameters
@@ -26,11 +26,11 @@ def settles_to_steady_sliding(scene: Scene) -> bool:
         With the status ``no_steady_state`` if steady sliding does not exist, and with the status
         ``unverified`` if the largest growth rate is zero within its error.
     """
-    growth = largest_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
+    growth = largest_linear_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
     if growth is None:
         text = f"no steady state exists at V_0/V_* = {scene.load_velocity:.3g}"
         raise MotionStopped(Status.NO_STEADY_STATE, text)
-    if growth.is_undecided:
+    if growth.is_zero_within_error:
         raise MotionStopped(
             Status.UNVERIFIED,
             "the motion comes close to steady sliding, but it is undecided if it settles: the "

@@ -14,26 +14,26 @@ from rsfstudy._lazy import lazy_exports
 
 if TYPE_CHECKING:
     from rsfstudy.motion.accuracy import (
-        DEFAULT_BUDGET,
+        DEFAULT_EVALUATION_BUDGET,
         DEFAULT_RTOL,
-        MAX_ERROR_RATIO,
+        MAX_ERROR_OVER_RTOL,
         MAX_RTOL,
         MIN_RTOL,
-        ROUNDING_ERROR,
+        RELATIVE_ROUNDING_ERROR,
         Accuracy,
         estimate_error,
     )
-    from rsfstudy.motion.driver import MotionDriver, events_along
-    from rsfstudy.motion.engine_factory import check_engine, compiled_engine
+    from rsfstudy.motion.driver import MotionDriver, iterate_events_of_equations
+    from rsfstudy.motion.engine_factory import check_engine_is_usable, import_compiled_engine
     from rsfstudy.motion.engines import (
         COMPILED,
         ENGINES,
         PYTHON,
         SCIPY,
         compilation_log,
-        is_installed,
-        register_steppers,
-        user_stepper,
+        find_user_stepper,
+        is_engine_installed,
+        register_user_steppers,
     )
     from rsfstudy.motion.events import (
         Event,
@@ -47,10 +47,10 @@ if TYPE_CHECKING:
     )
     from rsfstudy.motion.initial_points import (
         initial_point,
-        manifold_point,
         point_before_start,
+        point_with_slip_rate,
         restart_point,
-        with_slip_rate,
+        slow_manifold_point,
     )
     from rsfstudy.motion.integrate import integrate_events
     from rsfstudy.motion.meter import (
@@ -59,11 +59,11 @@ if TYPE_CHECKING:
         WorkMeter,
         larger_budget_remedy,
     )
-    from rsfstudy.motion.neglected_inertia import estimate_neglected_inertia
+    from rsfstudy.motion.neglected_inertia import estimate_neglected_inertia_error
     from rsfstudy.motion.readings import (
-        friction_coefficient,
-        load_point_displacement,
-        sample_along_path,
+        recorded_friction_coefficient,
+        recorded_load_point_displacement,
+        resample_motion_along_path,
     )
     from rsfstudy.motion.recording import (
         FIRST_STATE_COLUMN,
@@ -82,25 +82,25 @@ else:
         {
             "motion.accuracy": (
                 "Accuracy",
-                "DEFAULT_BUDGET",
+                "DEFAULT_EVALUATION_BUDGET",
                 "DEFAULT_RTOL",
-                "MAX_ERROR_RATIO",
+                "MAX_ERROR_OVER_RTOL",
                 "MAX_RTOL",
                 "MIN_RTOL",
-                "ROUNDING_ERROR",
+                "RELATIVE_ROUNDING_ERROR",
                 "estimate_error",
             ),
-            "motion.driver": ("MotionDriver", "events_along"),
-            "motion.engine_factory": ("check_engine", "compiled_engine"),
+            "motion.driver": ("MotionDriver", "iterate_events_of_equations"),
+            "motion.engine_factory": ("check_engine_is_usable", "import_compiled_engine"),
             "motion.engines": (
                 "COMPILED",
                 "ENGINES",
                 "PYTHON",
                 "SCIPY",
                 "compilation_log",
-                "is_installed",
-                "register_steppers",
-                "user_stepper",
+                "is_engine_installed",
+                "register_user_steppers",
+                "find_user_stepper",
             ),
             "motion.events": (
                 "Event",
@@ -114,10 +114,10 @@ else:
             ),
             "motion.initial_points": (
                 "initial_point",
-                "manifold_point",
+                "slow_manifold_point",
                 "point_before_start",
                 "restart_point",
-                "with_slip_rate",
+                "point_with_slip_rate",
             ),
             "motion.integrate": ("integrate_events",),
             "motion.meter": (
@@ -126,11 +126,11 @@ else:
                 "WorkMeter",
                 "larger_budget_remedy",
             ),
-            "motion.neglected_inertia": ("estimate_neglected_inertia",),
+            "motion.neglected_inertia": ("estimate_neglected_inertia_error",),
             "motion.readings": (
-                "friction_coefficient",
-                "load_point_displacement",
-                "sample_along_path",
+                "recorded_friction_coefficient",
+                "recorded_load_point_displacement",
+                "resample_motion_along_path",
             ),
             "motion.recording": (
                 "FIRST_STATE_COLUMN",
@@ -149,14 +149,14 @@ else:
 __all__ = [
     "Accuracy",
     "COMPILED",
-    "DEFAULT_BUDGET",
+    "DEFAULT_EVALUATION_BUDGET",
     "DEFAULT_RTOL",
     "ENGINES",
     "Event",
     "EventKind",
     "EventSpecification",
     "FIRST_STATE_COLUMN",
-    "MAX_ERROR_RATIO",
+    "MAX_ERROR_OVER_RTOL",
     "MAX_RTOL",
     "MIN_LOCAL_TOLERANCE",
     "MIN_RTOL",
@@ -166,36 +166,36 @@ __all__ = [
     "PYTHON",
     "RECORDED_VARIABLES",
     "REGIME_COLUMN",
-    "ROUNDING_ERROR",
+    "RELATIVE_ROUNDING_ERROR",
     "Recording",
     "SAMPLE_COLUMN",
     "SCIPY",
     "WorkMeter",
     "approach_to_steady_state",
     "build_root_finder",
-    "check_engine",
+    "check_engine_is_usable",
     "compilation_log",
-    "compiled_engine",
+    "import_compiled_engine",
     "estimate_error",
-    "estimate_neglected_inertia",
-    "events_along",
+    "estimate_neglected_inertia_error",
+    "iterate_events_of_equations",
     "fall",
-    "friction_coefficient",
+    "recorded_friction_coefficient",
     "inertia_matters_at",
     "initial_point",
     "integrate_events",
-    "is_installed",
+    "is_engine_installed",
     "larger_budget_remedy",
-    "load_point_displacement",
-    "manifold_point",
+    "recorded_load_point_displacement",
+    "slow_manifold_point",
     "maximum",
     "minimum",
     "point_before_start",
     "recorded_row",
-    "register_steppers",
+    "register_user_steppers",
     "restart_point",
     "rise",
-    "sample_along_path",
-    "user_stepper",
-    "with_slip_rate",
+    "resample_motion_along_path",
+    "find_user_stepper",
+    "point_with_slip_rate",
 ]

@@ -14,17 +14,17 @@ from rsfstudy.motion.engines import SCIPY, engine_name
 
 DEFAULT_RTOL = 1e-7
 MIN_RTOL, MAX_RTOL = 1e-11, 1e-2
-DEFAULT_BUDGET = 500_000
+DEFAULT_EVALUATION_BUDGET = 500_000
 #: More than any computer evaluates; files hold it.
-MAX_BUDGET = 10**15
+MAX_EVALUATION_BUDGET = 10**15
 #: The loosest accuracy that decides where to leave the slow manifold: its series in mass turns back
 #: at a change of ln V of 0.08, which a motion that is to leave it beyond would never reach.
-_MAX_SWITCHING_RTOL = 2e-5
+_MAX_REGIME_SWITCHING_RTOL = 2e-5
 #: How far above what was asked for an error estimate may stay: numbers are then still good to
 #: something near it, and two runs that agree less than that tell nothing of their errors.
-MAX_ERROR_RATIO = 100.0
+MAX_ERROR_OVER_RTOL = 100.0
 #: Relative error that rounding alone explains.
-ROUNDING_ERROR = 1e-13
+RELATIVE_ROUNDING_ERROR = 1e-13
 
 
 @renamed_members
@@ -56,7 +56,7 @@ class Accuracy:
     """
 
     rtol: float = DEFAULT_RTOL
-    budget: int = DEFAULT_BUDGET
+    budget: int = DEFAULT_EVALUATION_BUDGET
     methods: tuple[tuple[str, str], ...] = ()
     engine: str = SCIPY
     refinement: float = 1.0
@@ -72,8 +72,8 @@ class Accuracy:
                 f"must lie between {MIN_RTOL:g} and {MAX_RTOL:g}",
                 remedy="Below that, rounding decides; above it, nothing is resolved.",
             )
-        if not 1 <= self.budget <= MAX_BUDGET or self.budget % 1:
-            rule = f"must be a whole number from 1 to {MAX_BUDGET:,}"
+        if not 1 <= self.budget <= MAX_EVALUATION_BUDGET or self.budget % 1:
+            rule = f"must be a whole number from 1 to {MAX_EVALUATION_BUDGET:,}"
             raise InvalidValue("budget", self.budget, rule)
         object.__setattr__(self, "budget", int(self.budget))
         object.__setattr__(self, "engine", engine_name(self.engine))
@@ -88,11 +88,11 @@ class Accuracy:
         At order eight it costs a third more than the first. The errors of the two are far apart,
         and nothing is shared that could be wrong in both.
         """
-        return _replace_cached(self, self.rtol, 0.1 * self.refinement)
+        return _cached_copy_with_tolerances(self, self.rtol, 0.1 * self.refinement)
 
     def with_rtol(self, rtol: float) -> Accuracy:
         """The same with another `rtol`."""
-        return _replace_cached(self, rtol, self.refinement)
+        return _cached_copy_with_tolerances(self, rtol, self.refinement)
 
     @property
     def local_tolerance(self) -> float:
@@ -109,7 +109,7 @@ class Accuracy:
         times its third power, and over random scenes a stress drop by up to 0.4 times (the tests
         measure the first).
         """
-        return math.cbrt(0.75 * min(self.rtol, _MAX_SWITCHING_RTOL) * self.refinement)
+        return math.cbrt(0.75 * min(self.rtol, _MAX_REGIME_SWITCHING_RTOL) * self.refinement)
 
     @property
     def max_inertia_correction(self) -> float:
@@ -119,7 +119,7 @@ class Accuracy:
         Leaving it at d costs a cycle up to 0.07 d**3 over random scenes, and 0.0014 d**3 of the
         paper's slider (the tests measure it).
         """
-        return math.cbrt(15.0 * min(self.rtol, _MAX_SWITCHING_RTOL) * self.refinement)
+        return math.cbrt(15.0 * min(self.rtol, _MAX_REGIME_SWITCHING_RTOL) * self.refinement)
 
     @property
     def max_remaining_slip(self) -> float:
@@ -130,12 +130,17 @@ class Accuracy:
 
 
 @lru_cache(maxsize=256)
-def _replace_cached(accuracy: Accuracy, rtol: float, refinement: float) -> Accuracy:
+def _cached_copy_with_tolerances(accuracy: Accuracy, rtol: float, refinement: float) -> Accuracy:
     """A copy, the same for all cells of a study."""
     return replace(accuracy, rtol=rtol, refinement=refinement)
 
 
-def estimate_error(value: float, refined: float, floor: float, scale: float | None = None) -> float:
+def estimate_error(
+    value: float,
+    refined_value: float,
+    relative_error_floor: float,
+    error_scale: float | None = None,
+) -> float:
     """Error estimate of a number, from what `Accuracy.refined` makes of it.
 
     Three times the difference, which misses only where the second error is more than two thirds of
@@ -152,5 +157,7 @@ def estimate_error(value: float, refined: float, floor: float, scale: float | No
         What that error is relative to, where the number itself may come near zero.
     """
     value = float(value)
-    hidden = (floor + ROUNDING_ERROR) * abs(value if scale is None else scale)
-    return 3.0 * abs(value - float(refined)) + hidden
+    hidden = (relative_error_floor + RELATIVE_ROUNDING_ERROR) * abs(
+        value if error_scale is None else error_scale
+    )
+    return 3.0 * abs(value - float(refined_value)) + hidden

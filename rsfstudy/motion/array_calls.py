@@ -7,21 +7,21 @@ pointers and addresses in their place (`compiled.calls`).
 from __future__ import annotations
 
 
-def evaluate(function, y, rates, p, result):
+def evaluate_in_place(function, y, rates, parameters, result):
     """Have a function of the equations fill `result`."""
-    function(y, rates, p, result)
+    function(y, rates, parameters, result)
 
 
-def as_pointer(array):
+def array_as_pointer(array):
     """An array from its first number on."""
     return array
 
 
-def offset_by(array, count):
+def offset_pointer(array, item_count):
     """An array from so many numbers further on."""
-    return array[count:]
+    return array[item_count:]
 
 
-def copy_values(source, target, count):
+def copy_values(source, target, item_count):
     """Copy so many numbers."""
-    target[:count] = source[:count]
+    target[:item_count] = source[:item_count]

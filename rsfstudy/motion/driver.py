@@ -12,30 +12,34 @@ import numpy as np
 
 from rsfstudy._deprecation import renamed_members
 from rsfstudy.motion import layout, workspace
-from rsfstudy.motion.engine_factory import compiled_engine, create_stepper
+from rsfstudy.motion.engine_factory import create_stepper, import_compiled_engine
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.events import Event, EventKind, EventSpecification
-from rsfstudy.motion.inplace import in_place_functions
-from rsfstudy.motion.loop import advance
+from rsfstudy.motion.inplace import build_in_place_functions
+from rsfstudy.motion.loop import advance_motion
 from rsfstudy.motion.meter import (
     MIN_LOCAL_TOLERANCE,
-    STEP_LIMIT_TOLERANCE,
+    REFERENCE_TOLERANCE_OF_STEP_LIMIT,
     MotionStopped,
     WorkMeter,
 )
 from rsfstudy.motion.recording import (
     FIRST_STATE_COLUMN,
     SAMPLES_PER_STEP,
-    STRESS_COLUMNS,
+    SHEAR_STRESS_COLUMNS,
     Recording,
 )
-from rsfstudy.motion.regime_switching import NO_SWITCHING, SwitchThresholds, termination_error
+from rsfstudy.motion.regime_switching import (
+    NO_SWITCH_THRESHOLDS,
+    SwitchThresholds,
+    termination_error,
+)
 from rsfstudy.motion.step_events import BEFORE_JUMP, NO_EVENT, find_jump_side
 from rsfstudy.parts import SEGMENT_STRESS_FALL
 from rsfstudy.slider import (
     Equations,
+    MotionPoint,
     Numbers,
-    Point,
     Scene,
     cached_per_scene,
     equations_between_ruptures,
@@ -45,11 +49,13 @@ from rsfstudy.status import Status
 
 #: Rows of the tables of events and of recordings that one call may fill.
 _MIN_EVENT_ROWS, _RECORDING_ROWS = 64, 4096
-_KIND_CODES = {
+_EVENT_KIND_CODES = {
     kind: layout.__dict__[kind.name] for kind in EventKind if kind.name in layout.__dict__
 }
 #: Columns of a point, by the names of its numbers; what is asked of none reads the first.
-_QUANTITY_COLUMNS = {name: column for column, name in enumerate(Point._fields[:-1])} | {"": 0}
+_POINT_COLUMN_BY_QUANTITY = {
+    name: column for column, name in enumerate(MotionPoint._fields[:-1])
+} | {"": 0}
 #: What is told beside what was asked for: the codes of these count from the end.
 _UNREQUESTED_EVENTS = [
     (k, None)
@@ -62,9 +68,9 @@ _UNREQUESTED_EVENTS = [
     )
 ]
 #: Makes a named tuple of a tuple, in half the time that its name takes.
-_new_named_tuple = tuple.__new__
+_make_named_tuple_quickly = tuple.__new__
 _STEP_TOO_SHORT_TEXT = "a step would be shorter than the spacing of numbers around the clock"
-_NO_RECORDING = layout.RECORD_NEVER, np.empty(0), np.empty((0, FIRST_STATE_COLUMN))
+_NO_RECORDING_TABLES = layout.RECORD_NEVER, np.empty(0), np.empty((0, FIRST_STATE_COLUMN))
 _NO_KINKS = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
 
 
@@ -73,36 +79,36 @@ class PythonBackend:
     machine that runs it.
     """
 
-    def initial_values(self, fields: tuple[tuple[str, float], ...]) -> dict[str, float]:
+    def initial_state_values(self, field_values: tuple[tuple[str, float], ...]) -> dict[str, float]:
         """Initial state of motions that have these numbers in their state, and others 0."""
-        return {**dict.fromkeys(layout.MOTION.names or (), 0), **dict(fields)}
+        return {**dict.fromkeys(layout.MOTION_STATE_DTYPE.names or (), 0), **dict(field_values)}
 
-    def create_state(
-        self, initial: dict[str, float], called_with: tuple[float, ...]
+    def create_motion_state(
+        self, initial_state: dict[str, float], call_arguments: tuple[float, ...]
     ) -> PythonMotionState:
         """The state of a motion: its `memory`, and its `counters`."""
-        called = zip(layout.CALL_FIELDS, called_with, strict=True)
-        return PythonMotionState(**{**initial, **dict(called)})
+        called = zip(layout.CALL_ARGUMENT_FIELDS, call_arguments, strict=True)
+        return PythonMotionState(**{**initial_state, **dict(called)})
 
-    def function_table(self, systems: tuple[Equations, ...]) -> np.ndarray:
+    def build_function_table(self, equations_by_regime: tuple[Equations, ...]) -> np.ndarray:
         """The table of functions of the regimes."""
         rows = np.zeros((2, layout.FUNCTIONS_PER_REGIME), dtype=object)
-        for row, system in zip(rows, systems, strict=False):
-            row[:] = in_place_functions(system)
+        for row, system in zip(rows, equations_by_regime, strict=False):
+            row[:] = build_in_place_functions(system)
         rows[layout.FAST_REGIME, -1] = rows[layout.SLOW_REGIME, -1]
         return rows
 
-    def as_arguments(self, *arrays: np.ndarray) -> Sequence[memoryview]:
+    def as_loop_arguments(self, *arrays: np.ndarray) -> Sequence[memoryview]:
         """Arrays as the loop takes them."""
         return [memoryview(array) for array in arrays]  # type: ignore[arg-type]
 
-    def as_parameters(self, p: Sequence[float]) -> Any:
+    def as_loop_parameters(self, parameters: Sequence[float]) -> Any:
         """The numbers of a scene as the loop takes them."""
-        return list(p)
+        return list(parameters)
 
-    def loop_function(self) -> Any:
+    def get_loop_function(self) -> Any:
         """The loop."""
-        return advance
+        return advance_motion
 
 
 @partial(renamed_members, writable=True)
@@ -114,16 +120,16 @@ class PythonMotionState(SimpleNamespace):
         """The state as the loop takes it."""
         return [self]
 
-    def counters(self) -> tuple[int, ...]:
+    def work_and_row_counters(self) -> tuple[int, ...]:
         """Right-hand sides by regime, steps, events, rows, and Jacobians."""
         return (
             *(self.evaluations_slow, self.evaluations_fast, self.steps),
             *(self.event_rows, self.recorded_rows, self.jacobians),
         )
 
-    def get_field(self, name: str) -> float:
+    def get_state_field(self, field_name: str) -> float:
         """One of its fields."""
-        return float(getattr(self, name))
+        return float(getattr(self, field_name))
 
 
 class MotionDriver:
@@ -142,51 +148,55 @@ class MotionDriver:
 
     def __init__(
         self,
-        slow: Equations,
-        fast: Equations | None = None,
+        slow_equations: Equations,
+        fast_equations: Equations | None = None,
         *,
         engine: str,
         **fields: float,
     ) -> None:
-        self._equations: tuple[Equations, ...] = (slow,) if fast is None else (slow, fast)
-        self._backend = compiled_engine().NumbaBackend() if engine == COMPILED else PythonBackend()
+        self._equations: tuple[Equations, ...] = (
+            (slow_equations,) if fast_equations is None else (slow_equations, fast_equations)
+        )
+        self._backend = (
+            import_compiled_engine().NumbaBackend() if engine == COMPILED else PythonBackend()
+        )
         self._states, unknowns = (
-            slow.state_count,
-            [len(system.unknowns) for system in self._equations],
+            slow_equations.state_count,
+            [len(system.unknown_names) for system in self._equations],
         )
         self._unknowns = max(unknowns)
-        scales = np.array([scale for system in self._equations for scale in system.scales])
+        scales = np.array([scale for system in self._equations for scale in system.unknown_scales])
         self._scales_and_functions = (
-            *self._backend.as_arguments(scales),
-            self._backend.function_table(self._equations),
+            *self._backend.as_loop_arguments(scales),
+            self._backend.build_function_table(self._equations),
         )
-        self._p = self._backend.as_parameters(slow.parameters)
+        self._p = self._backend.as_loop_parameters(slow_equations.parameters)
         self._regimes = [system.regime for system in self._equations]
         fields |= {
             "pending_start": layout.START_CODE,
-            "clock_is_path_length": not slow.is_rigid,
-            "slip_is_clock": slow.is_rigid,
+            "clock_is_path_length": not slow_equations.is_rigid,
+            "slip_is_clock": slow_equations.is_rigid,
             "unknowns": unknowns[0],
-            "states": slow.state_count,
+            "states": slow_equations.state_count,
             "unknowns_fast": sum(unknowns[1:]),
-            "has_mass": fast is not None,
+            "has_mass": fast_equations is not None,
         }
-        self._initial_values = self._backend.initial_values(tuple(fields.items()))
+        self._initial_values = self._backend.initial_state_values(tuple(fields.items()))
 
-    def run(
+    def iterate_events(
         self,
-        start: Point | Numbers,
-        meter: WorkMeter,
-        specs: Sequence[EventSpecification],
+        start_point_or_unknowns: MotionPoint | Numbers,
+        work_meter: WorkMeter,
+        event_specs: Sequence[EventSpecification],
         tolerance: float,
         *,
-        start_times: tuple[float, float, float] = (math.inf, 0.0, 0.0),
+        duration_start_time_and_slip: tuple[float, float, float] = (math.inf, 0.0, 0.0),
         backward: bool = False,
-        p: Numbers | None = None,
-        thresholds: SwitchThresholds = NO_SWITCHING,
-        budget: float = math.inf,
+        parameters: Numbers | None = None,
+        switch_thresholds: SwitchThresholds = NO_SWITCH_THRESHOLDS,
+        evaluation_budget: float = math.inf,
         recording: Recording | None = None,
-        kinks: tuple[np.ndarray, int] = _NO_KINKS,
+        kinks_and_reported_count: tuple[np.ndarray, int] = _NO_KINKS,
         initial_imposed_stress: float | None = None,
     ) -> Iterator[Event]:
         """Events of a motion, a table of them by each call of the loop.
@@ -223,84 +233,102 @@ class MotionDriver:
             Where it cannot go on.
         """
         machine, states, systems, numbers = self._backend, self._states, self._equations, self._p
-        before, turns = numbers, len(kinks[0])
-        if isinstance(start, Point):
-            start = (
-                start
+        before, turns = numbers, len(kinks_and_reported_count[0])
+        if isinstance(start_point_or_unknowns, MotionPoint):
+            start_point_or_unknowns = (
+                start_point_or_unknowns
                 if initial_imposed_stress is None
-                else _shift_stresses(start, initial_imposed_stress - start.psis[-1])
+                else _add_to_stresses(
+                    start_point_or_unknowns,
+                    initial_imposed_stress - start_point_or_unknowns.psis[-1],
+                )
             )
-            y, last, stress = np.empty(2 * self._unknowns), _pack_point(start), start.spring_stress
+            y, last, stress = (
+                np.empty(2 * self._unknowns),
+                _pack_point(start_point_or_unknowns),
+                start_point_or_unknowns.spring_stress,
+            )
         else:  # behind the unknowns is room for as many
-            y, last, stress = np.array((*start, *start)), np.empty(layout.FIRST_STATE + states), 0.0
-        if p is not None or turns:  # numbers that are those of this motion alone
-            before = numbers = machine.as_parameters(systems[0].parameters if p is None else p)
+            y, last, stress = (
+                np.array((*start_point_or_unknowns, *start_point_or_unknowns)),
+                np.empty(layout.FIRST_STATE + states),
+                0.0,
+            )
+        if parameters is not None or turns:  # numbers that are those of this motion alone
+            before = numbers = machine.as_loop_parameters(
+                systems[0].parameters if parameters is None else parameters
+            )
             if turns:
-                before = machine.as_parameters(numbers)
+                before = machine.as_loop_parameters(numbers)
             systems = tuple(system._replace(parameters=numbers) for system in systems)
         tolerance = max(tolerance, MIN_LOCAL_TOLERANCE)
-        records, samples, rows = _recording_tables(recording, systems[0], states)
-        state = machine.create_state(
+        records, samples, rows = _prepare_recording_tables(recording, systems[0], states)
+        state = machine.create_motion_state(
             self._initial_values,
             (
-                *(*start_times, stress, tolerance),
+                *(*duration_start_time_and_slip, stress, tolerance),
                 # what limits a step must differ between two tolerances whose results tell errors
-                (tolerance / STEP_LIMIT_TOLERANCE) ** 0.125,
+                (tolerance / REFERENCE_TOLERANCE_OF_STEP_LIMIT) ** 0.125,
                 -1.0 if backward else 1.0,
-                int(min(budget, meter.budget - meter.evaluations)),
-                *(records, turns, kinks[1]),
+                int(min(evaluation_budget, work_meter.budget - work_meter.evaluations)),
+                *(records, turns, kinks_and_reported_count[1]),
             ),
         )
-        asked, meanings = _pack_specifications(tuple(specs))
-        stepper = create_stepper(meter.engine, systems, meter.methods)
+        asked, meanings = _pack_event_specifications(tuple(event_specs))
+        stepper = create_stepper(work_meter.engine, systems, work_meter.methods)
         columns = layout.EVENT_POINT + layout.FIRST_STATE + states
-        events = np.empty((max(_MIN_EVENT_ROWS, 2 * len(specs) + 4), columns))
-        block = np.empty(workspace.workspace_size(self._unknowns, states, len(specs)))
+        events = np.empty((max(_MIN_EVENT_ROWS, 2 * len(event_specs) + 4), columns))
+        block = np.empty(workspace.workspace_size(self._unknowns, states, len(event_specs)))
         arguments = (
-            *machine.as_arguments(y, last, block),
-            (*self._scales_and_functions, tuple(thresholds), numbers, before),
-            *machine.as_arguments(asked.copy(), kinks[0], samples, events, rows),
+            *machine.as_loop_arguments(y, last, block),
+            (*self._scales_and_functions, tuple(switch_thresholds), numbers, before),
+            *machine.as_loop_arguments(
+                asked.copy(), kinks_and_reported_count[0], samples, events, rows
+            ),
             stepper,
         )
         regimes, psis = self._regimes, layout.EVENT_POINT + layout.FIRST_STATE
-        run, end, known = machine.loop_function(), layout.PAUSED, (0, 0, 0, 0)
+        run, end, known = machine.get_loop_function(), layout.PAUSED, (0, 0, 0, 0)
         while end == layout.PAUSED:
             end = run(state.memory, *arguments)
-            slow, fast, steps, happened, recorded, jacobians = state.counters()
+            slow, fast, steps, happened, recorded, jacobians = state.work_and_row_counters()
             known, settled = (slow, fast, steps, jacobians), known
-            others = meter.charge_difference(regimes, settled, known)
+            others = work_meter.charge_new_work(regimes, settled, known)
             if recording is not None and recorded:
                 kept = rows[:recorded].copy(order="F")  # columns are what is asked for
                 if initial_imposed_stress is not None:
-                    kept[:, STRESS_COLUMNS] += kept[:, -1:] - initial_imposed_stress
-                recording.append(kept, regimes)
+                    kept[:, SHEAR_STRESS_COLUMNS] += kept[:, -1:] - initial_imposed_stress
+                recording.append_rows(kept, regimes)
             for line in events[:happened].tolist():
                 code, regime, clock, time, slip, spent = line[: layout.EVENT_POINT]
-                point = _new_named_tuple(
-                    Point, (*line[layout.EVENT_POINT : psis], tuple(line[psis:]))
+                point = _make_named_tuple_quickly(
+                    MotionPoint, (*line[layout.EVENT_POINT : psis], tuple(line[psis:]))
                 )
                 if initial_imposed_stress is not None:
-                    point = _shift_stresses(point, point.psis[-1] - initial_imposed_stress)
+                    point = _add_to_stresses(point, point.psis[-1] - initial_imposed_stress)
                 kind, spec = meanings[int(code)]
                 name, work = regimes[int(regime)], others + int(spent)
-                yield _new_named_tuple(Event, (kind, spec, time, slip, point, name, work, clock))
-            meter.check_budget()
+                yield _make_named_tuple_quickly(
+                    Event, (kind, spec, time, slip, point, name, work, clock)
+                )
+            work_meter.check_budget()
         if end != layout.MOTION_ENDED:
-            raise _stop_error(end, state, regimes, stepper)
+            raise _motion_stopped_error(end, state, regimes, stepper)
 
 
-def _shift_stresses(point: Point, by: float) -> Point:
+def _add_to_stresses(point: MotionPoint, stress_change: float) -> MotionPoint:
     return point._replace(
-        spring_stress=point.spring_stress + by, frictional_stress=point.frictional_stress + by
+        spring_stress=point.spring_stress + stress_change,
+        frictional_stress=point.frictional_stress + stress_change,
     )
 
 
-def events_along(
+def iterate_events_of_equations(
     equations: Equations,
-    state: Numbers,
+    initial_unknowns: Numbers,
     tolerance: float,
-    meter: WorkMeter,
-    specs: Sequence[EventSpecification] = (),
+    work_meter: WorkMeter,
+    event_specs: Sequence[EventSpecification] = (),
     *,
     backward: bool = False,
     recording: Recording | None = None,
@@ -309,16 +337,18 @@ def events_along(
 
     A rigid slider has slip for its clock: a recording that asks for values has them at slips.
     """
-    runner = MotionDriver(equations, engine=meter.engine)
-    return runner.run(state, meter, specs, tolerance, backward=backward, recording=recording)
+    runner = MotionDriver(equations, engine=work_meter.engine)
+    return runner.iterate_events(
+        initial_unknowns, work_meter, event_specs, tolerance, backward=backward, recording=recording
+    )
 
 
 @cached_per_scene
-def driver_of(scene: Scene, engine: str, *, with_time: bool) -> MotionDriver:
+def get_motion_driver(scene: Scene, engine: str, *, with_time: bool) -> MotionDriver:
     """What runs the motions of a scene."""
     return MotionDriver(
-        equations_between_ruptures(scene, clock=with_time),
-        equations_in_rupture(scene, clock=with_time) if scene.has_mass else None,
+        equations_between_ruptures(scene, with_time=with_time),
+        equations_in_rupture(scene, with_time=with_time) if scene.has_mass else None,
         engine=engine,
         unknowns_behind_fluid=len(scene.parts.fluid.unknowns)
         if scene.parts.loading.unknowns
@@ -330,78 +360,82 @@ def driver_of(scene: Scene, engine: str, *, with_time: bool) -> MotionDriver:
     )
 
 
-def _recording_tables(
-    recording: Recording | None, system: Equations, states: int
+def _prepare_recording_tables(
+    recording: Recording | None, equations: Equations, state_count: int
 ) -> tuple[int, np.ndarray, np.ndarray]:
     """Whether a chain of segments records, and when; the times or clocks at which to; and the table
     that the loop fills.
     """
     if recording is None:
-        return _NO_RECORDING
+        return _NO_RECORDING_TABLES
     if recording.sample_times is None:
         return (
             layout.RECORD_WITHIN_STEPS,
             np.empty(0),
-            np.empty((_RECORDING_ROWS, FIRST_STATE_COLUMN + states)),
+            np.empty((_RECORDING_ROWS, FIRST_STATE_COLUMN + state_count)),
         )
-    samples = recording.remaining_times()
-    rows = np.empty((len(samples) + 2 * SAMPLES_PER_STEP, FIRST_STATE_COLUMN + states))
-    return layout.RECORD_AT_CLOCKS if system.is_rigid else layout.RECORD_AT_TIMES, samples, rows
+    samples = recording.remaining_sample_times()
+    rows = np.empty((len(samples) + 2 * SAMPLES_PER_STEP, FIRST_STATE_COLUMN + state_count))
+    return layout.RECORD_AT_CLOCKS if equations.is_rigid else layout.RECORD_AT_TIMES, samples, rows
 
 
-def events_at_jump(
-    before: Point,
-    p_before: Numbers,
-    after: Point,
-    p_after: Numbers,
-    specs: Sequence[EventSpecification],
-) -> Iterator[tuple[EventSpecification, Point]]:
+def find_events_at_jump(
+    point_before: MotionPoint,
+    parameters_before: Numbers,
+    point_after: MotionPoint,
+    parameters_after: Numbers,
+    event_specs: Sequence[EventSpecification],
+) -> Iterator[tuple[EventSpecification, MotionPoint]]:
     """Events that are watched for and happen where a motion jumps from a point to another, with the
     numbers of the scene at both; and at which of them.
     """
-    last, first = _pack_point(before).tolist(), _pack_point(after).tolist()
+    last, first = _pack_point(point_before).tolist(), _pack_point(point_after).tolist()
     table = (
-        _pack_specifications(tuple(specs))[0]
+        _pack_event_specifications(tuple(event_specs))[0]
         .reshape(-1, len(layout.SPECIFICATION_COLUMNS))
         .tolist()
     )
-    for spec, row in zip(specs, table, strict=True):
-        where = find_jump_side(row, last, p_before, first, p_after)
+    for spec, row in zip(event_specs, table, strict=True):
+        where = find_jump_side(row, last, parameters_before, first, parameters_after)
         if where != NO_EVENT:
-            yield spec, before if where == BEFORE_JUMP else after
+            yield spec, point_before if where == BEFORE_JUMP else point_after
 
 
 @lru_cache(maxsize=256)
-def _pack_specifications(
-    specs: tuple[EventSpecification, ...],
+def _pack_event_specifications(
+    event_specs: tuple[EventSpecification, ...],
 ) -> tuple[np.ndarray, list[tuple[EventKind, EventSpecification | None]]]:
     """The table of event specifications, and what codes of events mean."""
-    meanings = [*((spec.kind, spec) for spec in specs), *_UNREQUESTED_EVENTS]
-    asked = np.zeros((len(specs), len(layout.SPECIFICATION_COLUMNS)))
-    for row, spec in zip(asked, specs, strict=True):
+    meanings = [*((spec.kind, spec) for spec in event_specs), *_UNREQUESTED_EVENTS]
+    asked = np.zeros((len(event_specs), len(layout.SPECIFICATION_COLUMNS)))
+    for row, spec in zip(asked, event_specs, strict=True):
         row[layout.SPEC_KIND], row[layout.SPEC_QUANTITY] = (
-            _KIND_CODES[spec.kind],
-            _QUANTITY_COLUMNS[spec.quantity],
+            _EVENT_KIND_CODES[spec.kind],
+            _POINT_COLUMN_BY_QUANTITY[spec.quantity],
         )
         row[layout.SPEC_LEVEL], row[layout.SPEC_TERMINAL] = spec.level, spec.terminal
         row[layout.SPEC_MAY_DEFER] = spec.may_defer
     return asked.ravel(), meanings
 
 
-def _pack_point(point: Point) -> np.ndarray:
+def _pack_point(point: MotionPoint) -> np.ndarray:
     """A point as the loop has it."""
     return np.array((*point[:-1], *point.psis))
 
 
-def _stop_error(end: int, state: Any, regimes: Sequence[str], stepper: Any) -> MotionStopped:
+def _motion_stopped_error(
+    return_code: int, motion_state: Any, regime_names: Sequence[str], stepper: Any
+) -> MotionStopped:
     """Why a motion cannot go on."""
-    if end == layout.TERMINATED:
+    if return_code == layout.TERMINATED:
         return termination_error(
-            int(state.get_field("termination")), state.get_field("final_normal_stress")
+            int(motion_state.get_state_field("termination")),
+            motion_state.get_state_field("final_normal_stress"),
         )
     why = "step without length, or a state that is not finite"
-    if end == layout.NO_STEP_POSSIBLE:
+    if return_code == layout.NO_STEP_POSSIBLE:
         why = stepper.failure if stepper else _STEP_TOO_SHORT_TEXT
     return MotionStopped(
-        Status.INTEGRATION_FAILED, f"{regimes[int(state.get_field('regime'))]}: {why}"
+        Status.INTEGRATION_FAILED,
+        f"{regime_names[int(motion_state.get_state_field('regime'))]}: {why}",
     )

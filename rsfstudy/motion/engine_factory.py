@@ -13,44 +13,48 @@ from rsfstudy.motion.engines import (
     ENGINES,
     PYTHON,
     SCIPY,
+    find_user_stepper,
     unknown_engine_error,
-    user_stepper,
 )
 
 if TYPE_CHECKING:
     import numpy as np
 
 
-def check_engine(name: str) -> None:
+def check_engine_is_usable(name: str) -> None:
     """Raise InvalidValue for an engine that is unknown, or not installed."""
-    if name not in ENGINES and not user_stepper(name):
+    if name not in ENGINES and not find_user_stepper(name):
         raise unknown_engine_error(name)
     if name == COMPILED:
-        compiled_engine()
+        import_compiled_engine()
 
 
-def create_stepper(name: str, systems: Any, methods: Mapping[str, str]) -> Any:
+def create_stepper(
+    engine_name: str, equations_by_regime: Any, method_by_regime: Mapping[str, str]
+) -> Any:
     """Stepper of a motion through regimes with these systems of equations; 0, which
     stands for it, where it is compiled.
     """
-    if name == COMPILED:
+    if engine_name == COMPILED:
         return 0
-    stepper = _python_steppers().get(name) or next(iter(user_stepper(name)), None)
+    stepper = _stepper_classes_by_engine().get(engine_name) or next(
+        iter(find_user_stepper(engine_name)), None
+    )
     if stepper is None:
-        raise unknown_engine_error(name)
-    return stepper(systems, methods)
+        raise unknown_engine_error(engine_name)
+    return stepper(equations_by_regime, method_by_regime)
 
 
 @cache
-def _python_steppers() -> dict[str, Any]:
+def _stepper_classes_by_engine() -> dict[str, Any]:
     """The steppers of plain Python, by the names of engines."""
     order_eight = importlib.import_module("rsfstudy.motion.steppers.order_eight")
     scipy = importlib.import_module("rsfstudy.motion.steppers.scipy")
-    return {PYTHON: order_eight.OrderEight, SCIPY: scipy.SciPyStepper}
+    return {PYTHON: order_eight.OrderEightStepper, SCIPY: scipy.SciPyStepper}
 
 
 @cache
-def compiled_engine() -> Any:
+def import_compiled_engine() -> Any:
     """The compiled engine.
 
     Raises
@@ -66,11 +70,13 @@ def compiled_engine() -> Any:
         raise InvalidValue("engine", COMPILED, rule, remedy=remedy) from error
 
 
-def call_with_arrays(function: Callable[..., None], name: str, *arrays: np.ndarray) -> None:
+def call_array_function_by_engine(
+    function: Callable[..., None], engine_name: str, *arrays: np.ndarray
+) -> None:
     """Call a function of arrays as an engine does: compiled, or on memoryviews."""
-    if name == COMPILED:
-        compiled_engine().compile_array_function(function, *(array.ndim for array in arrays))(
-            *arrays
-        )
+    if engine_name == COMPILED:
+        import_compiled_engine().compile_array_function(
+            function, *(array.ndim for array in arrays)
+        )(*arrays)
     else:
         function(*(memoryview(array) for array in arrays))  # type: ignore[arg-type]

@@ -44,25 +44,25 @@ def engine_name(engine: Any) -> str:
         rule = f"must be named by a Python identifier, not {name!r}"
         raise InvalidValue("engine", engine, rule, remedy='Write name = "..." in its class.')
     known = _USER_STEPPERS.get(name, engine)
-    if name in ENGINES or _qualified_name(known) != _qualified_name(engine):
+    if name in ENGINES or _qualified_name_of_stepper(known) != _qualified_name_of_stepper(engine):
         rule = f"takes the name {name!r}, which stands for another engine"
         raise InvalidValue("engine", engine, rule, remedy="Give it another name.")
     _USER_STEPPERS[name] = engine
     return name
 
 
-def user_stepper(name: str) -> tuple[type, ...]:
+def find_user_stepper(stepper_name: str) -> tuple[type, ...]:
     """The stepper of a user's own that a name stands for; none where it stands for none."""
-    return (_USER_STEPPERS[name],) if name in _USER_STEPPERS else ()
+    return (_USER_STEPPERS[stepper_name],) if stepper_name in _USER_STEPPERS else ()
 
 
-def register_steppers(steppers: Iterable[type]) -> None:
+def register_user_steppers(steppers: Iterable[type]) -> None:
     """Have the names of steppers that were checked stand for them, whatever they stood for."""
     for stepper in steppers:
         _USER_STEPPERS[stepper.name] = stepper  # type: ignore[attr-defined]
 
 
-def _qualified_name(stepper: type) -> tuple[str, str]:
+def _qualified_name_of_stepper(stepper: type) -> tuple[str, str]:
     """Module and name of a stepper, which an earlier definition of it shares."""
     return stepper.__module__, stepper.__qualname__
 
@@ -85,14 +85,14 @@ class CompilationLog:
         Gives the context in which to compile: whoever limits or measures time leaves it out.
     """
 
-    programs: int = 0
-    seconds: float = 0.0
-    context: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext
+    compiled_program_count: int = 0
+    total_compilation_seconds: float = 0.0
+    context_while_compiling: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext
 
 
 compilation_log = CompilationLog()
 
 
-def is_installed(name: str) -> bool:
+def is_engine_installed(engine: str) -> bool:
     """True if an engine can be used here, as far as one can tell without loading it."""
-    return name != COMPILED or importlib.util.find_spec("numba") is not None
+    return engine != COMPILED or importlib.util.find_spec("numba") is not None

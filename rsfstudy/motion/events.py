@@ -35,7 +35,7 @@ from rsfstudy._deprecation import (
     renamed_names,
     renamed_value,
 )
-from rsfstudy.slider import Point
+from rsfstudy.slider import MotionPoint
 
 
 class EventKind(StrEnum):
@@ -75,7 +75,9 @@ def maximum(
     quantity: str, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
     """A maximum of ``log_slip_rate``, ``spring_stress`` or ``apparent_friction``."""
-    return _on_quantity(EventKind.MAXIMUM, quantity, terminal=terminal, may_defer=may_defer)
+    return _specify_quantity_event(
+        EventKind.MAXIMUM, quantity, terminal=terminal, may_defer=may_defer
+    )
 
 
 @renamed_keywords
@@ -83,7 +85,9 @@ def minimum(
     quantity: str, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
     """A minimum of ``log_slip_rate``, ``spring_stress`` or ``apparent_friction``."""
-    return _on_quantity(EventKind.MINIMUM, quantity, terminal=terminal, may_defer=may_defer)
+    return _specify_quantity_event(
+        EventKind.MINIMUM, quantity, terminal=terminal, may_defer=may_defer
+    )
 
 
 @renamed_keywords
@@ -91,7 +95,9 @@ def rise(
     quantity: str, level: float, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
     """A quantity on its way up, at a level."""
-    return _on_quantity(EventKind.RISE, quantity, level, terminal=terminal, may_defer=may_defer)
+    return _specify_quantity_event(
+        EventKind.RISE, quantity, level, terminal=terminal, may_defer=may_defer
+    )
 
 
 @renamed_keywords
@@ -99,14 +105,18 @@ def fall(
     quantity: str, level: float, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
     """A quantity on its way down, at a level."""
-    return _on_quantity(EventKind.FALL, quantity, level, terminal=terminal, may_defer=may_defer)
+    return _specify_quantity_event(
+        EventKind.FALL, quantity, level, terminal=terminal, may_defer=may_defer
+    )
 
 
-def _on_quantity(
+def _specify_quantity_event(
     kind: EventKind, quantity: str, level: float = 0.0, *, terminal: bool, may_defer: bool
 ) -> EventSpecification:
     """Return an event specification. The quantity may have its former name."""
-    return EventSpecification(kind, renamed_value(Point, quantity), level, terminal, may_defer)
+    return EventSpecification(
+        kind, renamed_value(MotionPoint, quantity), level, terminal, may_defer
+    )
 
 
 @renamed_keywords
@@ -146,9 +156,9 @@ class Event(NamedTuple):
     specification: EventSpecification | None
     time: float
     slip: float
-    point: Point
+    point: MotionPoint
     regime: str
-    evaluations: int
+    evaluation_count: int
     clock: float
 
 

@@ -8,13 +8,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.driver import driver_of, events_at_jump
-from rsfstudy.motion.driver import events_along as events_along
+from rsfstudy.motion.driver import find_events_at_jump, get_motion_driver
+from rsfstudy.motion.driver import iterate_events_of_equations as iterate_events_of_equations
 from rsfstudy.motion.events import Event, EventKind, EventSpecification
-from rsfstudy.motion.initial_points import initial_point, point_after_jump
+from rsfstudy.motion.initial_points import initial_point, point_after_loading_jump
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.recording import Recording
-from rsfstudy.motion.regime_switching import switch_thresholds
+from rsfstudy.motion.regime_switching import compute_switch_thresholds
 from rsfstudy.parts import (
     LOADING,
     LOG_LOAD_VELOCITY,
@@ -22,16 +22,22 @@ from rsfstudy.parts import (
     SEGMENT_LOG_VELOCITY,
     SEGMENT_START,
 )
-from rsfstudy.slider import ENDLESS_SEGMENT_TABLE, Numbers, Point, Scene, largest_growth_rate
+from rsfstudy.slider import (
+    ENDLESS_SEGMENT_TABLE,
+    MotionPoint,
+    Numbers,
+    Scene,
+    largest_linear_growth_rate,
+)
 
 
 def integrate_events(
     scene: Scene,
     accuracy: Accuracy,
-    meter: WorkMeter,
-    specs: Sequence[EventSpecification] = (),
+    work_meter: WorkMeter,
+    event_specs: Sequence[EventSpecification] = (),
     *,
-    start: Point | None = None,
+    start: MotionPoint | None = None,
     with_time: bool = False,
     recording: Recording | None = None,
     until: float = math.inf,
@@ -78,31 +84,35 @@ def integrate_events(
     with_time = with_time or until < math.inf or len(chains) > 1 or len(chains[0][1]) > 1
     time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.reported_segment_count
     if resume_from is not None:
-        chains, start = _remaining_segments(scene, resume_from)
+        chains, start = _remaining_segment_chains(scene, resume_from)
         time, slip = resume_from.time, resume_from.slip
     for number, (acting, table) in enumerate(chains):
         if start is None:
             start = initial_point(acting)
         elif number:
-            start = point_after_jump(acting, start)
+            start = point_after_loading_jump(acting, start)
         goes_on = number == len(chains) - 1 and not acting.parts.loading.unknowns
-        asked = specs if goes_on and _may_settle(scene, specs) else _remove_settling(specs)
-        table = _segments_until(table, until)
+        asked = (
+            event_specs
+            if goes_on and _steady_sliding_may_be_stable(scene, event_specs)
+            else _without_settling_events(event_specs)
+        )
+        table = _truncate_segments_at(table, until)
         end = float(table[-1, SEGMENT_END])
-        motion = driver_of(acting, meter.engine, with_time=with_time).run(
+        motion = get_motion_driver(acting, work_meter.engine, with_time=with_time).iterate_events(
             start,
-            meter,
+            work_meter,
             asked,
             accuracy.local_tolerance,
-            start_times=(
+            duration_start_time_and_slip=(
                 float(table[0, SEGMENT_END]) - time if with_time else math.inf,
                 time,
                 slip,
             ),
-            thresholds=switch_thresholds(acting, accuracy),
+            switch_thresholds=compute_switch_thresholds(acting, accuracy),
             recording=recording,
-            kinks=(table[1:], told),
-            initial_imposed_stress=acting.numbers[LOADING + 2]
+            kinks_and_reported_count=(table[1:], told),
+            initial_imposed_stress=acting.parameter_values[LOADING + 2]
             if acting.parts.loading.has_load_point_unknown
             else None,
         )
@@ -123,19 +133,19 @@ def integrate_events(
             # it was located to the spacing of numbers around the clock
             last = last._replace(time=end)
             if recording is not None:
-                recording.clip_to(end)
+                recording.clip_times_to(end)
         if end >= until:
             yield last
             return
-        numbers = list(acting.numbers)  # of the first segment of the chain
+        numbers = list(acting.parameter_values)  # of the first segment of the chain
         numbers[LOG_LOAD_VELOCITY] = float(table[-1, SEGMENT_LOG_VELOCITY])
         start, before = last.point, (last.point, tuple(numbers))
         time, slip = last.time, last.slip
 
 
-def _remaining_segments(
+def _remaining_segment_chains(
     scene: Scene, resume_from: Event
-) -> tuple[Sequence[tuple[Scene, np.ndarray]], Point]:
+) -> tuple[Sequence[tuple[Scene, np.ndarray]], MotionPoint]:
     """The chains of segments that are left after the end of a motion, and the point to begin at:
     behind the jump, where it ended at one.
     """
@@ -145,7 +155,7 @@ def _remaining_segments(
         if number > 0:
             acting = scene.segment_scene(first + number)
         if first and number == 0 and table[0, SEGMENT_START] == resume_from.time:
-            point = point_after_jump(acting, point)
+            point = point_after_loading_jump(acting, point)
         rest = table[max(number, 0) :].copy()
         rest[0, SEGMENT_START] = max(rest[0, SEGMENT_START], resume_from.time)
         if rest[-1, SEGMENT_END] > resume_from.time:
@@ -154,43 +164,45 @@ def _remaining_segments(
     return left, point
 
 
-def _segments_until(table: np.ndarray, until: float) -> np.ndarray:
+def _truncate_segments_at(segment_table: np.ndarray, end_time: float) -> np.ndarray:
     """Those of the segments of a chain that begin before a time, the last of which ends then."""
-    if until == math.inf or table[-1, SEGMENT_END] <= until:
-        return table
-    count = max(int(np.searchsorted(table[:, SEGMENT_START], until)), 1)
-    cut = table[:count].copy()
-    cut[-1, SEGMENT_END] = min(until, cut[-1, SEGMENT_END])
+    if end_time == math.inf or segment_table[-1, SEGMENT_END] <= end_time:
+        return segment_table
+    count = max(int(np.searchsorted(segment_table[:, SEGMENT_START], end_time)), 1)
+    cut = segment_table[:count].copy()
+    cut[-1, SEGMENT_END] = min(end_time, cut[-1, SEGMENT_END])
     return cut
 
 
 def _segment_start_events(
     event: Event,
-    before: tuple[Point, Numbers],
-    acting: Scene,
-    specs: Sequence[EventSpecification],
+    point_and_parameters_before: tuple[MotionPoint, Numbers],
+    segment_scene: Scene,
+    event_specs: Sequence[EventSpecification],
 ) -> Iterator[Event]:
     """Events where a later segment begins: that it does, and what happens there, after a point with
     the numbers of the segment before.
     """
     yield event._replace(kind=EventKind.SEGMENT)
-    for spec, point in events_at_jump(*before, event.point, acting.numbers, specs):
+    for spec, point in find_events_at_jump(
+        *point_and_parameters_before, event.point, segment_scene.parameter_values, event_specs
+    ):
         # slip from the first point: the spring may have jumped with the load point
         yield event._replace(kind=spec.kind, specification=spec, point=point)
 
 
-def _may_settle(scene: Scene, specs: Sequence[EventSpecification]) -> bool:
+def _steady_sliding_may_be_stable(scene: Scene, event_specs: Sequence[EventSpecification]) -> bool:
     """Return False if steady sliding is unstable under the last segment of loading.
 
     The growth rate of small perturbations is computed only if a specification asks for settling.
     """
     if scene.log_load_velocity == -math.inf or all(
-        spec.kind is not EventKind.SETTLED for spec in specs
+        spec.kind is not EventKind.SETTLED for spec in event_specs
     ):
         return True
-    growth = largest_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
+    growth = largest_linear_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
     return growth is None or not growth.is_positive
 
 
-def _remove_settling(specs: Sequence[EventSpecification]) -> list[EventSpecification]:
-    return [spec for spec in specs if spec.kind is not EventKind.SETTLED]
+def _without_settling_events(event_specs: Sequence[EventSpecification]) -> list[EventSpecification]:
+    return [spec for spec in event_specs if spec.kind is not EventKind.SETTLED]

@@ -53,7 +53,7 @@ import numpy as np
 
 #: The state of a motion, which it keeps from one call to the next; first what it is called with,
 #: and what it has to say of itself.
-MOTION = np.dtype(
+MOTION_STATE_DTYPE = np.dtype(
     [
         ("end_time", "f8"),  # time at which to end
         ("time", "f8"),  # time, slip and spring stress at the start
@@ -102,7 +102,7 @@ MOTION = np.dtype(
 )
 #: The same as bytes: fields of records take much longer to write and to read.
 CALL_FORMAT, COUNTER_FORMAT = struct.Struct("=7d4q"), struct.Struct("=6q")
-CALL_FIELDS = (MOTION.names or ())[:11]
+CALL_ARGUMENT_FIELDS = (MOTION_STATE_DTYPE.names or ())[:11]
 #: Rows of the table of functions; and how many equations have there, of which the last may be
 #: missing (see `inplace.InPlaceFunctions`).
 SLOW_REGIME, FAST_REGIME = 0, 1

@@ -6,8 +6,8 @@ or not, with whatever stepper, events are found here. `driver` calls it.
 To follow a rupture with a debugger, simulate a scene with ``inertia=True``, because without mass
 there is one regime only; with ``engine="scipy"``, or ``engine="python"`` to see inside of steps.
 Each step passes `truncate_step` once: a breakpoint there with the condition ``motion.regime == 1``
-(`FAST_REGIME`) stops at each step of a rupture, of which ``space.point_at_begin`` and
-``space.point_at_end`` are the points at both ends (columns in the order of `layout.LOG_SLIP_RATE`
+(`FAST_REGIME`) stops at each step of a rupture, of which ``workspace.point_at_begin`` and
+``workspace.point_at_end`` are the points at both ends (columns in the order of `layout.LOG_SLIP_RATE`
 and so on). The line ``return REGIME_ENDED`` of `follow_regime` is its end with the same condition,
 and its beginning with ``motion.regime == 0`` (`SLOW_REGIME`). `layout` says who writes which field
 of ``motion``.
@@ -17,7 +17,12 @@ from __future__ import annotations
 
 import math
 
-from rsfstudy.motion.array_calls import as_pointer, copy_values, evaluate, offset_by
+from rsfstudy.motion.array_calls import (
+    array_as_pointer,
+    copy_values,
+    evaluate_in_place,
+    offset_pointer,
+)
 from rsfstudy.motion.layout import (
     END_CODE,
     FAST_REGIME,
@@ -47,35 +52,35 @@ from rsfstudy.motion.recording import SAMPLES_PER_STEP
 from rsfstudy.motion.regime_switching import (
     CONTINUES,
     SwitchThresholds,
-    find_termination,
-    may_switch_back,
-    should_switch_back,
-    starts_on_manifold,
-    termination_margin,
+    find_termination_status,
+    margin_to_termination,
+    may_switch_back_to_slow_manifold,
+    should_switch_back_to_slow_manifold,
+    starts_on_slow_manifold,
 )
 from rsfstudy.motion.step_events import (
     SWITCH_CONDITION,
     TERMINATION_CONDITION,
     TIME_CONDITION,
+    append_events_in_step,
+    append_start_events,
+    append_step_end_event,
     has_deferrable_event,
     is_step_recorded,
-    locate_crossing,
+    locate_sign_change,
     record_regime_start,
     record_step,
-    report_events,
-    report_start,
-    report_step_end,
+    regime_switch_excess,
     slip_since_start,
-    switch_excess,
 )
-from rsfstudy.motion.steppers import begin, retake
+from rsfstudy.motion.steppers import begin_regime, retake_step
 from rsfstudy.motion.steps import (
     halve_unresolved_step,
-    regime_time,
     take_step,
-    time_at_begin,
-    time_at_end,
-    truncate_at,
+    time_at_step_begin,
+    time_at_step_end,
+    time_since_regime_start,
+    truncate_step_at_clock,
 )
 from rsfstudy.motion.workspace import create_workspace
 from rsfstudy.parts import (
@@ -93,13 +98,25 @@ from rsfstudy.parts import (
 )
 
 #: How often the clock at which a step is to end is looked for.
-END_TIME_CORRECTIONS = 2
+END_TIME_CORRECTION_COUNT = 2
 #: Change of ln V_0 at a kink beyond which the length of steps is found anew: displacement along the
 #: path, V + V_0, is then another, and rejected steps would cost more than the first one does.
 MAX_LOG_LOAD_RATE_CHANGE = 3.0
 
 
-def advance(memory, y, last, block, plan, specs, kinks, samples, events, rows, stepper):
+def advance_motion(
+    motion_memory,
+    y,
+    last_point,
+    workspace_block,
+    loop_constants,
+    event_specs,
+    kinks,
+    requested_samples,
+    event_table,
+    recording_table,
+    stepper,
+):
     """Follow a motion from where `memory` and `y` are.
 
     Parameters
@@ -130,72 +147,90 @@ def advance(memory, y, last, block, plan, specs, kinks, samples, events, rows, s
     int
         Why it returns.
     """
-    motion = memory[0]
+    motion = motion_memory[0]
     motion.event_rows = motion.recorded_rows = 0
-    scales, functions, numbers, p, p_before = plan
-    y, scales, block = as_pointer(y), as_pointer(scales), as_pointer(block)
-    last, p, p_before = as_pointer(last), as_pointer(p), as_pointer(p_before)
+    scales, functions, numbers, p, p_before = loop_constants
+    y, scales, workspace_block = (
+        array_as_pointer(y),
+        array_as_pointer(scales),
+        array_as_pointer(workspace_block),
+    )
+    last_point, p, p_before = (
+        array_as_pointer(last_point),
+        array_as_pointer(p),
+        array_as_pointer(p_before),
+    )
     limits = SwitchThresholds(*numbers)
     given = (
-        as_pointer(specs),
-        len(specs) // len(SPECIFICATION_COLUMNS),
+        array_as_pointer(event_specs),
+        len(event_specs) // len(SPECIFICATION_COLUMNS),
         p,
         p_before,
         limits,
         stepper,
     )
     if motion.starts_at_point:
-        enter_initial_regime(motion, y, last, functions, block, limits, p)
+        enter_initial_regime(motion, y, last_point, functions, workspace_block, limits, p)
     end = REGIME_ENDED
     while end == REGIME_ENDED:
         unknowns, first = motion.unknowns, 0
         if motion.regime == FAST_REGIME:
             unknowns, first = motion.unknowns_fast, motion.unknowns
-        own, equations = offset_by(scales, first), functions[motion.regime]
-        space = create_workspace(block, y, unknowns, own, motion.states, equations, given)
-        end = follow_regime(motion, space, last, samples, events, rows)
+        own, equations = offset_pointer(scales, first), functions[motion.regime]
+        workspace = create_workspace(
+            workspace_block, y, unknowns, own, motion.states, equations, given
+        )
+        end = follow_regime(
+            motion, workspace, last_point, requested_samples, event_table, recording_table
+        )
         if end == REGIME_ENDED:
             motion.regime = SLOW_REGIME if motion.regime == FAST_REGIME else FAST_REGIME
             motion.pending_start, motion.next_step_length = REGIME_CODE, 0.0
-            enter_regime(motion, y, last)
+            set_unknowns_of_regime(motion, y, last_point)
         elif end == SEGMENT_ENDED:
             regime, end = motion.regime, REGIME_ENDED
-            enter_segment(motion, space, last, kinks, rows)
-            enter_initial_regime(motion, y, last, functions, block, limits, p)
+            start_next_segment(motion, workspace, last_point, kinks, recording_table)
+            enter_initial_regime(motion, y, last_point, functions, workspace_block, limits, p)
             if motion.regime != regime:
                 motion.next_step_length = 0.0
         if end == REGIME_ENDED and (
-            motion.must_report or tables_full(motion, space.spec_count, events, rows)
+            motion.must_report
+            or are_tables_full(motion, workspace.event_spec_count, event_table, recording_table)
         ):
             motion.must_report, end = 0, PAUSED
     return end
 
 
-def tables_full(motion, spec_count, events, rows):
+def are_tables_full(motion, event_spec_count, event_table, recording_table):
     """True if the tables have no room for all that one more step may add to them."""
-    full = len(events) - motion.event_rows < 2 * spec_count + 4
-    return full or (len(rows) > 0 and len(rows) - motion.recorded_rows < 2 * SAMPLES_PER_STEP)
+    full = len(event_table) - motion.event_rows < 2 * event_spec_count + 4
+    return full or (
+        len(recording_table) > 0
+        and len(recording_table) - motion.recorded_rows < 2 * SAMPLES_PER_STEP
+    )
 
 
-def enter_segment(motion, space, last, kinks, rows):
+def start_next_segment(motion, workspace, last_point, kinks, recording_table):
     """Go on to the next segment of loading, whose numbers take the place of those before it."""
     n, p, relief = (
         len(kinks) - motion.kinks_ahead,
-        space.parameters,
+        workspace.parameters,
         FIRST_STATE + motion.states - 1 - motion.unknowns_behind_fluid,
     )
-    copy_values(space.point_at_end, last, FIRST_STATE + motion.states)
-    motion.slip = slip_since_start(motion, motion.end, motion.end_time, last[SPRING_STRESS], p)
+    copy_values(workspace.point_at_end, last_point, FIRST_STATE + motion.states)
+    motion.slip = slip_since_start(
+        motion, motion.end, motion.end_time, last_point[SPRING_STRESS], p
+    )
     motion.spring_stress, motion.time, motion.regime_start_time = (
-        last[SPRING_STRESS],
+        last_point[SPRING_STRESS],
         kinks[n, SEGMENT_START],
         0.0,
     )
     motion.end_time = kinks[n, SEGMENT_END] - kinks[n, SEGMENT_START]
     motion.pending_start, motion.kinks_ahead = KINK_CODE, motion.kinks_ahead - 1
     if motion.recording_mode == RECORD_WITHIN_STEPS:  # to the last digit, too
-        rows[motion.recorded_rows - 1, 0] = motion.time
-    copy_values(p, space.parameters_before, LAW)
+        recording_table[motion.recorded_rows - 1, 0] = motion.time
+    copy_values(p, workspace.parameters_before, LAW)
     # the length of a step goes on with the motion, unless its path has become quite another
     if not abs(kinks[n, SEGMENT_LOG_VELOCITY] - p[LOG_LOAD_VELOCITY]) < MAX_LOG_LOAD_RATE_CHANGE:
         motion.next_step_length = 0.0
@@ -207,166 +242,221 @@ def enter_segment(motion, space, last, kinks, rows):
         p[BOUNDARY_PRESSURE_RATE if motion.unknowns_behind_fluid else LOADING] = kinks[
             n, SEGMENT_STRESS_RATE
         ]
-        last[relief] = kinks[n, SEGMENT_STRESS_FALL]
+        last_point[relief] = kinks[n, SEGMENT_STRESS_FALL]
 
 
-def enter_initial_regime(motion, y, last, functions, manifold, limits, p):
+def enter_initial_regime(
+    motion, y, last_point, functions, manifold_values, switch_thresholds, parameters
+):
     """Begin in the regime that a point is for; `below` takes in the slow manifold there."""
     motion.starts_at_point, motion.regime = 0, SLOW_REGIME
-    enter_regime(motion, y, last)
+    set_unknowns_of_regime(motion, y, last_point)
     if motion.has_mass:
-        evaluate(functions[SLOW_REGIME, FUNCTIONS_PER_REGIME - 1], y, y, p, manifold)
-        if not starts_on_manifold(
-            last[LOG_SLIP_RATE], manifold[0], last[SPRING_STRESS] - manifold[1], limits
+        evaluate_in_place(
+            functions[SLOW_REGIME, FUNCTIONS_PER_REGIME - 1], y, y, parameters, manifold_values
+        )
+        if not starts_on_slow_manifold(
+            last_point[LOG_SLIP_RATE],
+            manifold_values[0],
+            last_point[SPRING_STRESS] - manifold_values[1],
+            switch_thresholds,
         ):
             motion.regime = FAST_REGIME
-            enter_regime(motion, y, last)
+            set_unknowns_of_regime(motion, y, last_point)
 
 
-def enter_regime(motion, y, last):
+def set_unknowns_of_regime(motion, y, last_point):
     """Begin a regime at the last point of one before: spring stress, states and time carry over;
     between ruptures ln V and friction follow from these, and jump.
     """
-    y[0] = last[SPRING_STRESS]
+    y[0] = last_point[SPRING_STRESS]
     if motion.regime == FAST_REGIME:
-        y[1], y[2] = last[LOG_SLIP_RATE], last[FRICTIONAL_STRESS]
+        y[1], y[2] = last_point[LOG_SLIP_RATE], last_point[FRICTIONAL_STRESS]
         for i in range(1, motion.states):
-            y[2 + i] = last[FIRST_STATE + i]
+            y[2 + i] = last_point[FIRST_STATE + i]
         y[2 + motion.states] = 0.0
     else:
         for i in range(motion.states):
-            y[1 + i] = last[FIRST_STATE + i]
+            y[1 + i] = last_point[FIRST_STATE + i]
         y[1 + motion.states] = 0.0
 
 
-def follow_regime(motion, space, last, samples, events, rows):
+def follow_regime(motion, workspace, last_point, requested_samples, event_table, recording_table):
     """Follow one regime; returns why it ends, or why the call has to."""
     if motion.pending_start:
         motion.time_per_step = 0.0
-        begin(motion, space)
+        begin_regime(motion, workspace)
         if motion.pending_start != KINK_CODE:
             motion.dense_output_limit = math.inf
     else:
-        copy_values(offset_by(space.y, space.unknowns), space.rates, space.unknowns)
-    evaluate(space.point, space.y, space.rates, space.parameters, space.point_at_begin)
+        copy_values(
+            offset_pointer(workspace.y, workspace.unknown_count),
+            workspace.rates,
+            workspace.unknown_count,
+        )
+    evaluate_in_place(
+        workspace.fill_point,
+        workspace.y,
+        workspace.rates,
+        workspace.parameters,
+        workspace.point_at_begin,
+    )
     while True:
-        taken = take_step(motion, space)
+        taken = take_step(motion, workspace)
         if taken != STEP_TAKEN:
             return taken
-        if is_step_recorded(motion, space, samples):
-            halve_unresolved_step(motion, space)
-        evaluate(space.point, space.y_end, space.rates_at_end, space.parameters, space.point_at_end)
-        if math.isnan(space.point_at_end[LOG_SLIP_RATE]):
+        if is_step_recorded(motion, workspace, requested_samples):
+            halve_unresolved_step(motion, workspace)
+        evaluate_in_place(
+            workspace.fill_point,
+            workspace.y_end,
+            workspace.rates_at_end,
+            workspace.parameters,
+            workspace.point_at_end,
+        )
+        if math.isnan(workspace.point_at_end[LOG_SLIP_RATE]):
             return INVALID_STEP
-        if motion.may_terminate and not is_valid(motion, space):
+        if motion.may_terminate and not is_step_end_valid(motion, workspace):
             return TERMINATED
-        leaves, over = truncate_step(motion, space)
+        leaves, over = truncate_step_at_regime_or_time_end(motion, workspace)
         if motion.pending_start:
-            record_regime_start(motion, space, rows)
-            if report_start(motion, space, last, events):
+            record_regime_start(motion, workspace, recording_table)
+            if append_start_events(motion, workspace, last_point, event_table):
                 return MOTION_ENDED
-        complete = motion.recording_mode and record_step(motion, space, rows, samples, over)
-        urgent = report_events(motion, space, events)
-        if motion.pending_start == START_CODE and not has_deferrable_event(space):
+        complete = motion.recording_mode and record_step(
+            motion, workspace, recording_table, requested_samples, over
+        )
+        urgent = append_events_in_step(motion, workspace, event_table)
+        if motion.pending_start == START_CODE and not has_deferrable_event(workspace):
             urgent = max(urgent, 2)
         motion.pending_start = 0
         if urgent == 3:
             return MOTION_ENDED
         if complete:
             urgent = 2
-            report_step_end(motion, space, events, SAMPLED_CODE)
+            append_step_end_event(motion, workspace, event_table, SAMPLED_CODE)
         if over and motion.kinks_ahead > 0:
             motion.must_report = int(urgent == 2)
             return SEGMENT_ENDED
         if over:
-            report_step_end(motion, space, events, END_CODE)
+            append_step_end_event(motion, workspace, event_table, END_CODE)
             return MOTION_ENDED
-        if leaves or has_left_rupture(motion, space):
-            motion.regime_start_time = time_at_end(motion, space)
-            copy_values(space.point_at_end, last, FIRST_STATE + motion.states)
+        if leaves or has_left_rupture(motion, workspace):
+            motion.regime_start_time = time_at_step_end(motion, workspace)
+            copy_values(workspace.point_at_end, last_point, FIRST_STATE + motion.states)
             return REGIME_ENDED
         if motion.may_terminate and motion.termination != CONTINUES:
             return TERMINATED
-        accept_step(motion, space)
-        if urgent == 2 or tables_full(motion, space.spec_count, events, rows):
-            copy_values(space.rates, offset_by(space.y, space.unknowns), space.unknowns)
+        advance_to_step_end(motion, workspace)
+        if urgent == 2 or are_tables_full(
+            motion, workspace.event_spec_count, event_table, recording_table
+        ):
+            copy_values(
+                workspace.rates,
+                offset_pointer(workspace.y, workspace.unknown_count),
+                workspace.unknown_count,
+            )
             return PAUSED
 
 
-def is_valid(motion, space):
+def is_step_end_valid(motion, workspace):
     """True if a motion does, if only through this step: that then ends where the motion does."""
-    columns, velocity = space.point_at_end, space.parameters[LOAD_VELOCITY]
+    columns, velocity = workspace.point_at_end, workspace.parameters[LOAD_VELOCITY]
     motion.final_normal_stress = columns[NORMAL_STRESS_RATIO]
-    motion.termination = find_termination(
+    motion.termination = find_termination_status(
         columns[LOG_SLIP_RATE], motion.final_normal_stress, velocity
     )
     if motion.termination == CONTINUES:
         return True
-    at_begin = termination_margin(
-        space.point_at_begin[LOG_SLIP_RATE], space.point_at_begin[NORMAL_STRESS_RATIO], velocity
+    at_begin = margin_to_termination(
+        workspace.point_at_begin[LOG_SLIP_RATE],
+        workspace.point_at_begin[NORMAL_STRESS_RATIO],
+        velocity,
     )
-    at_end = termination_margin(columns[LOG_SLIP_RATE], columns[NORMAL_STRESS_RATIO], velocity)
+    at_end = margin_to_termination(columns[LOG_SLIP_RATE], columns[NORMAL_STRESS_RATIO], velocity)
     if at_begin <= 0.0:
         return False
-    truncate_at(
-        motion, space, locate_crossing(TERMINATION_CONDITION, at_begin, at_end, motion, space)
+    truncate_step_at_clock(
+        motion,
+        workspace,
+        locate_sign_change(TERMINATION_CONDITION, at_begin, at_end, motion, workspace),
     )
     return True
 
 
-def truncate_step(motion, space):
+def truncate_step_at_regime_or_time_end(motion, workspace):
     """Let the step end where the regime has to be left, and where time is over; whether it is."""
     before, after = (
-        switch_excess(motion, space, space.point_at_begin),
-        switch_excess(motion, space, space.point_at_end),
+        regime_switch_excess(motion, workspace, workspace.point_at_begin),
+        regime_switch_excess(motion, workspace, workspace.point_at_end),
     )
     leaves = after >= 0.0 > before
     if leaves:
-        truncate_at(motion, space, locate_crossing(SWITCH_CONDITION, before, after, motion, space))
+        truncate_step_at_clock(
+            motion,
+            workspace,
+            locate_sign_change(SWITCH_CONDITION, before, after, motion, workspace),
+        )
     if motion.time_per_step > 0.0 and motion.end == motion.clock + motion.step_length:
         return leaves, True
-    over = time_at_end(motion, space) >= motion.end_time
+    over = time_at_step_end(motion, workspace) >= motion.end_time
     if over:
         motion.target_time = motion.end_time
-        at_begin = time_at_begin(motion, space) - motion.end_time
-        at_end = time_at_end(motion, space) - motion.end_time
-        end_at_time(motion, space, locate_crossing(TIME_CONDITION, at_begin, at_end, motion, space))
+        at_begin = time_at_step_begin(motion, workspace) - motion.end_time
+        at_end = time_at_step_end(motion, workspace) - motion.end_time
+        end_step_at_end_time(
+            motion,
+            workspace,
+            locate_sign_change(TIME_CONDITION, at_begin, at_end, motion, workspace),
+        )
     return leaves, over
 
 
-def end_at_time(motion, space, clock):
+def end_step_at_end_time(motion, workspace, clock):
     """Let the step end where time is over.
 
     Dense output tells the clock. Where stability limits steps it is far less accurate than their
     ends: the step is taken anew to that clock, and again with what time it was missing.
     """
-    for _ in range(END_TIME_CORRECTIONS):
-        retake(motion, space, clock)
-        late = time_at_end(motion, space) - motion.end_time
-        clock -= late / regime_time(motion, space, space.rates_at_end)
-    evaluate(space.point, space.y_end, space.rates_at_end, space.parameters, space.point_at_end)
-
-
-def has_left_rupture(motion, space):
-    """True if the full equations have done their work."""
-    if motion.regime == SLOW_REGIME or not may_switch_back(
-        space.point_at_end[LOG_SLIP_RATE], space.limits
-    ):
-        return False
-    columns, below = space.point_at_end, space.point_within
-    space.y_within[0] = columns[SPRING_STRESS]
-    for i in range(motion.states):
-        space.y_within[1 + i] = columns[FIRST_STATE + i]
-    evaluate(space.balance, space.y_within, space.y_within, space.parameters, below)
-    missing = columns[SPRING_STRESS] - below[1]
-    return should_switch_back(
-        columns[LOG_SLIP_RATE], columns[LOG_SLIP_RATE_GROWTH], below[0], missing, space.limits
+    for _ in range(END_TIME_CORRECTION_COUNT):
+        retake_step(motion, workspace, clock)
+        late = time_at_step_end(motion, workspace) - motion.end_time
+        clock -= late / time_since_regime_start(motion, workspace, workspace.rates_at_end)
+    evaluate_in_place(
+        workspace.fill_point,
+        workspace.y_end,
+        workspace.rates_at_end,
+        workspace.parameters,
+        workspace.point_at_end,
     )
 
 
-def accept_step(motion, space):
+def has_left_rupture(motion, workspace):
+    """True if the full equations have done their work."""
+    if motion.regime == SLOW_REGIME or not may_switch_back_to_slow_manifold(
+        workspace.point_at_end[LOG_SLIP_RATE], workspace.switch_thresholds
+    ):
+        return False
+    columns, below = workspace.point_at_end, workspace.point_within
+    workspace.y_within[0] = columns[SPRING_STRESS]
+    for i in range(motion.states):
+        workspace.y_within[1 + i] = columns[FIRST_STATE + i]
+    evaluate_in_place(
+        workspace.fill_balance, workspace.y_within, workspace.y_within, workspace.parameters, below
+    )
+    missing = columns[SPRING_STRESS] - below[1]
+    return should_switch_back_to_slow_manifold(
+        columns[LOG_SLIP_RATE],
+        columns[LOG_SLIP_RATE_GROWTH],
+        below[0],
+        missing,
+        workspace.switch_thresholds,
+    )
+
+
+def advance_to_step_end(motion, workspace):
     """The end of a step is the beginning of the next."""
     motion.clock = motion.end
-    copy_values(space.y_end, space.y, space.unknowns)
-    copy_values(space.rates_at_end, space.rates, space.unknowns)
-    copy_values(space.point_at_end, space.point_at_begin, FIRST_STATE + motion.states)
+    copy_values(workspace.y_end, workspace.y, workspace.unknown_count)
+    copy_values(workspace.rates_at_end, workspace.rates, workspace.unknown_count)
+    copy_values(workspace.point_at_end, workspace.point_at_begin, FIRST_STATE + motion.states)

@@ -13,7 +13,7 @@ from rsfstudy.status import Status
 
 #: Local tolerance at which the longest steps of equations hold as they are; at others they change
 #: as steps of order eight do.
-STEP_LIMIT_TOLERANCE = 1e-7
+REFERENCE_TOLERANCE_OF_STEP_LIMIT = 1e-7
 #: Local tolerance below which rounding decides, and SciPy warns.
 MIN_LOCAL_TOLERANCE = 5e-14
 
@@ -59,14 +59,16 @@ class WorkMeter:
     steps: int = 0
     jacobians: int = 0
 
-    def charge(self, regime: str, evaluations: int) -> None:
+    def charge(self, regime_name: str, evaluations: int) -> None:
         """Add evaluations; raises `MotionStopped` once more than the budget is spent."""
-        self.add(regime, evaluations)
+        self.add_evaluations(regime_name, evaluations)
         self.check_budget()
 
-    def add(self, regime: str, evaluations: int) -> None:
+    def add_evaluations(self, regime_name: str, evaluations: int) -> None:
         """Add evaluations."""
-        self.evaluations_by_regime[regime] = self.evaluations_by_regime.get(regime, 0) + evaluations
+        self.evaluations_by_regime[regime_name] = (
+            self.evaluations_by_regime.get(regime_name, 0) + evaluations
+        )
         self.evaluations += evaluations
 
     def check_budget(self) -> None:
@@ -77,8 +79,8 @@ class WorkMeter:
                 f"more than {self.budget} right-hand sides without an answer",
             )
 
-    def charge_difference(
-        self, regimes: Sequence[str], spent_before: Sequence[int], spent: Sequence[int]
+    def charge_new_work(
+        self, regime_names: Sequence[str], work_before: Sequence[int], work_now: Sequence[int]
     ) -> int:
         """Add what a motion has spent since what is known of it; returns what else is on the meter.
 
@@ -89,13 +91,13 @@ class WorkMeter:
         spent_before, spent : sequence of int
             Right-hand sides in one and in the other, steps, and Jacobians: before, and now.
         """
-        others = self.evaluations - spent_before[0] - spent_before[1]
-        if spent[0] > spent_before[0]:
-            self.add(regimes[0], spent[0] - spent_before[0])
-        if spent[1] > spent_before[1]:
-            self.add(regimes[1], spent[1] - spent_before[1])
-        self.steps += spent[2] - spent_before[2]
-        self.jacobians += spent[3] - spent_before[3]
+        others = self.evaluations - work_before[0] - work_before[1]
+        if work_now[0] > work_before[0]:
+            self.add_evaluations(regime_names[0], work_now[0] - work_before[0])
+        if work_now[1] > work_before[1]:
+            self.add_evaluations(regime_names[1], work_now[1] - work_before[1])
+        self.steps += work_now[2] - work_before[2]
+        self.jacobians += work_now[3] - work_before[3]
         return others
 
 

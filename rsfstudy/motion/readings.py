@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rsfstudy.motion.engine_factory import call_with_arrays
+from rsfstudy.motion.engine_factory import call_array_function_by_engine
 from rsfstudy.motion.engines import SCIPY
 from rsfstudy.motion.recording import (
     MOTION_VARIABLES,
@@ -18,26 +18,31 @@ from rsfstudy.motion.recording import (
 from rsfstudy.slider import Scene
 
 #: Columns of a recorded motion that the length of its path depends on.
-_PATH_COLUMNS = tuple(
+_PATH_LENGTH_COLUMNS = tuple(
     MOTION_VARIABLES.index(name) for name in ("time", "log10_slip_rate", "shear_stress")
 )
 
 
-def friction_coefficient(table: np.ndarray) -> np.ndarray:
+def recorded_friction_coefficient(motion_table: np.ndarray) -> np.ndarray:
     """The friction coefficient along a recorded motion."""
-    return table[:, RECORDED_VARIABLES.index("friction_coefficient")]
+    return motion_table[:, RECORDED_VARIABLES.index("friction_coefficient")]
 
 
-def load_point_displacement(scene: Scene, table: np.ndarray) -> np.ndarray:
+def recorded_load_point_displacement(scene: Scene, motion_table: np.ndarray) -> np.ndarray:
     """Load point displacement along a recorded motion, since before its first step: slip, and by
     how much the spring is longer.
     """
-    longer = (table[:, MOTION_VARIABLES.index("shear_stress")] - scene.mu_star) / scene.stiffness
-    return np.asarray(table[:, MOTION_VARIABLES.index("slip")] + longer)
+    longer = (
+        motion_table[:, MOTION_VARIABLES.index("shear_stress")] - scene.mu_star
+    ) / scene.stiffness
+    return np.asarray(motion_table[:, MOTION_VARIABLES.index("slip")] + longer)
 
 
-def sample_along_path(
-    table: np.ndarray, count: int, names: Sequence[str] = MOTION_VARIABLES, engine: str = SCIPY
+def resample_motion_along_path(
+    motion_table: np.ndarray,
+    point_count: int,
+    variable_names: Sequence[str] = MOTION_VARIABLES,
+    engine: str = SCIPY,
 ) -> dict[str, np.ndarray]:
     """Resample a recorded motion at points that are spread along its path.
 
@@ -61,12 +66,21 @@ def sample_along_path(
     dict of str to ndarray
         Values of each column at the points. The values are NaN if the table is empty.
     """
-    if not len(table):
-        return {name: np.full(count, np.nan) for name in names}
-    columns, found = np.ascontiguousarray(table.T), np.empty((len(names), count))
-    path, at, room = np.zeros(len(table)), np.empty(count), np.empty(SAMPLES_PER_STEP + 1)
-    seen = [columns[place] for place in (*_PATH_COLUMNS, SAMPLE_COLUMN)]
-    call_with_arrays(resample_along_path, engine, columns, *seen, path, at, room, found)
+    if not len(motion_table):
+        return {name: np.full(point_count, np.nan) for name in variable_names}
+    columns, found = (
+        np.ascontiguousarray(motion_table.T),
+        np.empty((len(variable_names), point_count)),
+    )
+    path, at, room = (
+        np.zeros(len(motion_table)),
+        np.empty(point_count),
+        np.empty(SAMPLES_PER_STEP + 1),
+    )
+    seen = [columns[place] for place in (*_PATH_LENGTH_COLUMNS, SAMPLE_COLUMN)]
+    call_array_function_by_engine(
+        resample_along_path, engine, columns, *seen, path, at, room, found
+    )
     # times of a rupture may differ by less than rounding
     np.maximum.accumulate(found[0], out=found[0])
-    return dict(zip(names, found, strict=True))
+    return dict(zip(variable_names, found, strict=True))

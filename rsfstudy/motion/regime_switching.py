@@ -13,7 +13,7 @@ from rsfstudy.motion.meter import MotionStopped
 from rsfstudy.slider import (
     LARGEST_LOG_SLIP_RATE,
     STOPPED_LOG_SLIP_RATE,
-    Point,
+    MotionPoint,
     Scene,
     cached_per_scene,
 )
@@ -22,7 +22,7 @@ from rsfstudy.status import Status
 #: Normal stress over sigma_* at which the fault counts as open, and as locked.
 MIN_NORMAL_STRESS, MAX_NORMAL_STRESS = 1e-9, 1e6
 #: Normal stress that stands for none, in logarithms.
-SMALLEST_POSITIVE_STRESS = 1e-300
+MIN_POSITIVE_NORMAL_STRESS = 1e-300
 #: ln(V/V_*) beyond which slip without mass counts as unbounded: 10^120 V_*.
 MAX_LOG_SLIP_RATE_WITHOUT_INERTIA = 120.0 * math.log(10.0)
 #: How a motion goes on, or why it cannot.
@@ -50,8 +50,8 @@ class SwitchThresholds(NamedTuple):
         T V_*/(2 pi D_c).
     """
 
-    max_norm: float
-    max_correction: float
+    max_slip_rate_norm: float
+    max_inertia_correction: float
     max_remaining_slip: float
     stiffness_over_a: float
     a: float
@@ -59,14 +59,14 @@ class SwitchThresholds(NamedTuple):
 
 
 #: The limits of a motion without mass, which reads none.
-NO_SWITCHING = SwitchThresholds(*[math.nan] * len(SwitchThresholds._fields))
+NO_SWITCH_THRESHOLDS = SwitchThresholds(*[math.nan] * len(SwitchThresholds._fields))
 
 
 @cached_per_scene
-def switch_thresholds(scene: Scene, accuracy: Accuracy) -> SwitchThresholds:
+def compute_switch_thresholds(scene: Scene, accuracy: Accuracy) -> SwitchThresholds:
     """The limits of a scene at an accuracy."""
     if not scene.has_mass:
-        return NO_SWITCHING
+        return NO_SWITCH_THRESHOLDS
     softness = scene.stiffness / scene.a
     return SwitchThresholds(
         math.sqrt(accuracy.max_inertia_weight / softness),
@@ -78,73 +78,100 @@ def switch_thresholds(scene: Scene, accuracy: Accuracy) -> SwitchThresholds:
     )
 
 
-def slip_rate_norm(log_slip_rate: float, thresholds: SwitchThresholds) -> float:
+def compute_slip_rate_norm(log_slip_rate: float, switch_thresholds: SwitchThresholds) -> float:
     """w = V T/(2 pi D_c)."""
-    return thresholds.inertial_time * math.exp(min(log_slip_rate, LARGEST_LOG_SLIP_RATE))
+    return switch_thresholds.inertial_time * math.exp(min(log_slip_rate, LARGEST_LOG_SLIP_RATE))
 
 
-def inertia_weight(
-    log_slip_rate: float, inertial_stress: float, thresholds: SwitchThresholds
+def compute_inertia_weight_at_mismatch(
+    log_slip_rate: float, inertial_stress: float, switch_thresholds: SwitchThresholds
 ) -> float:
     """Weight of mass where friction differs from spring stress by `inertial_stress`: 1 where
     the slow manifold has to be left.
     """
-    correction = abs(inertial_stress) / thresholds.a / thresholds.max_correction
-    return max(slip_rate_norm(log_slip_rate, thresholds) / thresholds.max_norm, correction)
+    correction = (
+        abs(inertial_stress) / switch_thresholds.a / switch_thresholds.max_inertia_correction
+    )
+    return max(
+        compute_slip_rate_norm(log_slip_rate, switch_thresholds)
+        / switch_thresholds.max_slip_rate_norm,
+        correction,
+    )
 
 
-def inertia_matters_at(scene: Scene, accuracy: Accuracy, point: Point) -> bool:
+def inertia_matters_at(scene: Scene, accuracy: Accuracy, point: MotionPoint) -> bool:
     """Return True if the effect of inertia at a point exceeds that on the slow manifold."""
     if not scene.has_mass:
         return False
     inertial_stress = point.spring_stress - point.frictional_stress
-    given = switch_thresholds(scene, accuracy)
-    return inertia_weight(point.log_slip_rate, inertial_stress, given) >= 1.0
+    given = compute_switch_thresholds(scene, accuracy)
+    return compute_inertia_weight_at_mismatch(point.log_slip_rate, inertial_stress, given) >= 1.0
 
 
 def slip_during_transition(
-    log_slip_rate: float, log_slip_rate_after: float, thresholds: SwitchThresholds
+    initial_log_slip_rate: float, final_log_slip_rate: float, switch_thresholds: SwitchThresholds
 ) -> float:
     """Slip in D_c, times the change of ln V, while slip rate goes to its value
     `log_slip_rate_after` a step; left out, the state would miss the evolution of that slip.
     """
     norm = max(
-        slip_rate_norm(log_slip_rate, thresholds), slip_rate_norm(log_slip_rate_after, thresholds)
+        compute_slip_rate_norm(initial_log_slip_rate, switch_thresholds),
+        compute_slip_rate_norm(final_log_slip_rate, switch_thresholds),
     )
-    return thresholds.stiffness_over_a * norm**2 * abs(log_slip_rate_after - log_slip_rate)
+    return (
+        switch_thresholds.stiffness_over_a
+        * norm**2
+        * abs(final_log_slip_rate - initial_log_slip_rate)
+    )
 
 
-def starts_on_manifold(
+def starts_on_slow_manifold(
     log_slip_rate: float,
     manifold_log_slip_rate: float,
     inertial_stress: float,
-    thresholds: SwitchThresholds,
+    switch_thresholds: SwitchThresholds,
 ) -> bool:
     """True if a motion begins on the slow manifold, from ln(V/V_*), where that has ln(V/V_*)
     `manifold_log_slip_rate`, and friction differs from spring stress by `inertial_stress` there.
     """
-    rate = slip_rate_norm(log_slip_rate, thresholds) / thresholds.max_norm
-    slow = max(inertia_weight(manifold_log_slip_rate, inertial_stress, thresholds), rate) < 1.0
+    rate = (
+        compute_slip_rate_norm(log_slip_rate, switch_thresholds)
+        / switch_thresholds.max_slip_rate_norm
+    )
+    slow = (
+        max(
+            compute_inertia_weight_at_mismatch(
+                manifold_log_slip_rate, inertial_stress, switch_thresholds
+            ),
+            rate,
+        )
+        < 1.0
+    )
     return (
         slow
-        and slip_during_transition(log_slip_rate, manifold_log_slip_rate, thresholds)
-        <= thresholds.max_remaining_slip
+        and slip_during_transition(log_slip_rate, manifold_log_slip_rate, switch_thresholds)
+        <= switch_thresholds.max_remaining_slip
     )
 
 
-def may_switch_back(log_slip_rate: float, thresholds: SwitchThresholds) -> bool:
+def may_switch_back_to_slow_manifold(
+    log_slip_rate: float, switch_thresholds: SwitchThresholds
+) -> bool:
     """True if ln(V/V_*) alone lets the full equations hand back: the slow manifold must not hand
     straight back in its turn.
     """
-    return slip_rate_norm(log_slip_rate, thresholds) < 0.5 * thresholds.max_norm
+    return (
+        compute_slip_rate_norm(log_slip_rate, switch_thresholds)
+        < 0.5 * switch_thresholds.max_slip_rate_norm
+    )
 
 
-def should_switch_back(
+def should_switch_back_to_slow_manifold(
     log_slip_rate: float,
-    growth: float,
+    log_slip_rate_growth: float,
     manifold_log_slip_rate: float,
     inertial_stress: float,
-    thresholds: SwitchThresholds,
+    switch_thresholds: SwitchThresholds,
 ) -> bool:
     """True if the full equations have done their work at ln(V/V_*) and its growth, where the slow
     manifold has ln(V/V_*) `manifold_log_slip_rate`, and friction differs from spring stress by
@@ -160,35 +187,39 @@ def should_switch_back(
     ln V by which that trails, which is what is missing over a.
     """
     norm = max(
-        slip_rate_norm(log_slip_rate, thresholds),
-        slip_rate_norm(manifold_log_slip_rate, thresholds),
+        compute_slip_rate_norm(log_slip_rate, switch_thresholds),
+        compute_slip_rate_norm(manifold_log_slip_rate, switch_thresholds),
     )
     has_peak = (
         inertial_stress < 0.0
-        and thresholds.stiffness_over_a * norm**2 > thresholds.max_remaining_slip
+        and switch_thresholds.stiffness_over_a * norm**2 > switch_thresholds.max_remaining_slip
     )
-    has_trough = inertial_stress > 0.1 * thresholds.max_remaining_slip * thresholds.a
-    if (growth > 0.0 and (log_slip_rate > manifold_log_slip_rate + 1.0 or has_peak)) or (
-        growth < 0.0 and has_trough
-    ):
+    has_trough = inertial_stress > 0.1 * switch_thresholds.max_remaining_slip * switch_thresholds.a
+    if (
+        log_slip_rate_growth > 0.0 and (log_slip_rate > manifold_log_slip_rate + 1.0 or has_peak)
+    ) or (log_slip_rate_growth < 0.0 and has_trough):
         return False
     remaining = (
         0.5
-        * thresholds.stiffness_over_a
+        * switch_thresholds.stiffness_over_a
         * norm**2
         * min(1.0, abs(log_slip_rate - manifold_log_slip_rate))
     )
     settled = (
         max(
-            norm / thresholds.max_norm,
-            inertia_weight(manifold_log_slip_rate, inertial_stress, thresholds),
+            norm / switch_thresholds.max_slip_rate_norm,
+            compute_inertia_weight_at_mismatch(
+                manifold_log_slip_rate, inertial_stress, switch_thresholds
+            ),
         )
         < 0.5
     )
-    return settled and remaining < thresholds.max_remaining_slip
+    return settled and remaining < switch_thresholds.max_remaining_slip
 
 
-def find_termination(log_slip_rate: float, normal_stress: float, load_velocity: float) -> int:
+def find_termination_status(
+    log_slip_rate: float, normal_stress: float, load_velocity: float
+) -> int:
     """Termination status of a motion: `CONTINUES`, unless normal stress vanishes, normal stress or
     slip rate grow without bound, or slip stops.
 
@@ -205,11 +236,13 @@ def find_termination(log_slip_rate: float, normal_stress: float, load_velocity: 
     return CONTINUES
 
 
-def termination_margin(log_slip_rate: float, normal_stress: float, load_velocity: float) -> float:
+def margin_to_termination(
+    log_slip_rate: float, normal_stress: float, load_velocity: float
+) -> float:
     """Margin of ln V and of the logarithm of normal stress to where a motion ends: positive where
     it goes on.
     """
-    stress = math.log(max(normal_stress, SMALLEST_POSITIVE_STRESS))
+    stress = math.log(max(normal_stress, MIN_POSITIVE_NORMAL_STRESS))
     left = min(
         stress - math.log(MIN_NORMAL_STRESS),
         math.log(MAX_NORMAL_STRESS) - stress,
@@ -218,14 +251,14 @@ def termination_margin(log_slip_rate: float, normal_stress: float, load_velocity
     return min(left, log_slip_rate - STOPPED_LOG_SLIP_RATE) if load_velocity == 0.0 else left
 
 
-def termination_error(termination: int, normal_stress: float) -> MotionStopped:
+def termination_error(termination_status: int, normal_stress: float) -> MotionStopped:
     """The end of a motion, by its termination status (see `find_termination`)."""
-    if termination == NORMAL_STRESS_VANISHED:
+    if termination_status == NORMAL_STRESS_VANISHED:
         return MotionStopped(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
-    if termination == NORMAL_STRESS_UNBOUNDED:
+    if termination_status == NORMAL_STRESS_UNBOUNDED:
         text = f"normal stress grew to {normal_stress:.3g} sigma_* and goes on"
         return MotionStopped(Status.LOCKED, text)
-    if termination == SLIP_STOPPED:
+    if termination_status == SLIP_STOPPED:
         return MotionStopped(Status.SLIP_STOPPED, "the slip rate fell below 10^-290 V_*")
     bound = "inertia=True (a rig's period=, mass=) or radiation_damping= (shear_modulus=) bounds it"
     text = f"slip rate grew beyond 10^120 V_* without mass: {bound}"

@@ -6,7 +6,7 @@ import math
 
 from rsfstudy.slider import Function
 
-_MAX_ITERATIONS = 100
+_MAX_BRENT_ITERATIONS = 100
 
 
 def build_root_finder(function: Function) -> Function:
@@ -24,7 +24,7 @@ def build_root_finder(function: Function) -> Function:
         latest, best, other = low, high, low
         at_latest, at_best, at_other = at_low, at_high, at_low
         move = earlier = best - latest
-        for _ in range(_MAX_ITERATIONS):
+        for _ in range(_MAX_BRENT_ITERATIONS):
             if at_latest != 0.0 and at_best != 0.0 and (at_latest < 0.0) != (at_best < 0.0):
                 other, at_other = latest, at_latest
                 move = earlier = best - latest
@@ -37,7 +37,7 @@ def build_root_finder(function: Function) -> Function:
                 return best
             tried = half
             if abs(earlier) > enough and abs(at_best) < abs(at_latest):
-                tried = interpolation_step(latest, best, other, at_latest, at_best, at_other)
+                tried = root_interpolation_step(latest, best, other, at_latest, at_best, at_other)
                 if not 2.0 * abs(tried) < min(abs(earlier), 3.0 * abs(half) - enough):
                     tried = move = half
             else:
@@ -51,7 +51,7 @@ def build_root_finder(function: Function) -> Function:
     return root
 
 
-def interpolation_step(
+def root_interpolation_step(
     previous: float, best: float, other: float, at_previous: float, at_best: float, at_other: float
 ) -> float:
     """Distance of the root from the best point, by a line or inverse quadratic interpolation."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from rsfstudy.motion.array_calls import offset_by
+from rsfstudy.motion.array_calls import offset_pointer
 from rsfstudy.motion.layout import (
     APPARENT_FRICTION,
     APPARENT_FRICTION_RATE,
@@ -53,10 +53,18 @@ from rsfstudy.motion.recording import (
     SAMPLE_COLUMN,
     SAMPLES_PER_STEP,
 )
-from rsfstudy.motion.regime_switching import inertia_weight, termination_margin
+from rsfstudy.motion.regime_switching import (
+    compute_inertia_weight_at_mismatch,
+    margin_to_termination,
+)
 from rsfstudy.motion.roots import build_root_finder
-from rsfstudy.motion.steppers import unknowns_at
-from rsfstudy.motion.steps import evaluate_point_at, regime_time, time_at_begin, time_at_end
+from rsfstudy.motion.steppers import interpolate_unknowns
+from rsfstudy.motion.steps import (
+    evaluate_point_at_clock,
+    time_at_step_begin,
+    time_at_step_end,
+    time_since_regime_start,
+)
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS, B
 
 #: What is read off a step beside event specifications: how far the regime is from being left, time
@@ -65,84 +73,91 @@ from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS, B
 SWITCH_CONDITION, TIME_CONDITION, TERMINATION_CONDITION = -1.0, -2.0, -3.0
 #: Level of settling for slip rate and the sum of the states of the law, relative to the level for
 #: all unknowns. One huge unknown cannot end a motion whose slip rate still changes.
-FRICTION_DISTANCE_FACTOR = 10.0
+FRICTION_SETTLING_LEVEL_FACTOR = 10.0
 #: Where something happens between two points.
 NO_EVENT, BEFORE_JUMP, AFTER_JUMP = range(3)
 
 
-def evaluate_quantity(spec, columns, p):
+def evaluate_event_quantity(event_spec, point_columns, parameters):
     """Quantity that changes sign where it happens: a slope, or the distance from a level."""
-    if spec[SPEC_KIND] == MAXIMUM or spec[SPEC_KIND] == MINIMUM:
-        if spec[SPEC_QUANTITY] == LOG_SLIP_RATE:
-            return columns[LOG_SLIP_RATE_GROWTH]
-        if spec[SPEC_QUANTITY] == APPARENT_FRICTION:
-            return columns[APPARENT_FRICTION_RATE]
-        return p[LOG_LOAD_VELOCITY] - columns[LOG_SLIP_RATE]
-    return columns[int(spec[SPEC_QUANTITY])] - spec[SPEC_LEVEL]
+    if event_spec[SPEC_KIND] == MAXIMUM or event_spec[SPEC_KIND] == MINIMUM:
+        if event_spec[SPEC_QUANTITY] == LOG_SLIP_RATE:
+            return point_columns[LOG_SLIP_RATE_GROWTH]
+        if event_spec[SPEC_QUANTITY] == APPARENT_FRICTION:
+            return point_columns[APPARENT_FRICTION_RATE]
+        return parameters[LOG_LOAD_VELOCITY] - point_columns[LOG_SLIP_RATE]
+    return point_columns[int(event_spec[SPEC_QUANTITY])] - event_spec[SPEC_LEVEL]
 
 
-def get_specification(space, number):
+def get_event_specification(workspace, spec_index):
     """One of the event specifications."""
-    return offset_by(space.specs, len(SPECIFICATION_COLUMNS) * number)
+    return offset_pointer(workspace.event_specs, len(SPECIFICATION_COLUMNS) * spec_index)
 
 
-def has_deferrable_event(space):
+def has_deferrable_event(workspace):
     """True if the asker can wait for anything; for the beginning then, too."""
     found = False
-    for w in range(space.spec_count):
-        found = found or get_specification(space, w)[SPEC_MAY_DEFER] != 0.0
+    for w in range(workspace.event_spec_count):
+        found = found or get_event_specification(workspace, w)[SPEC_MAY_DEFER] != 0.0
     return found
 
 
-def switch_excess(motion, space, columns):
+def regime_switch_excess(motion, workspace, point_columns):
     """Not negative where the slow manifold has to be left; always negative elsewhere."""
     if motion.regime != SLOW_REGIME or not motion.has_mass:
         return -1.0
-    missing = columns[SPRING_STRESS] - columns[FRICTIONAL_STRESS]
-    return inertia_weight(columns[LOG_SLIP_RATE], missing, space.limits) - 1.0
-
-
-def has_crossed(spec, before, after, direction):
-    """True if a quantity that changes so has done what is watched for."""
-    upwards = spec[SPEC_KIND] == RISE or spec[SPEC_KIND] == MINIMUM
-    # against the clock, slopes change sign the other way round
-    if direction < 0.0 and (spec[SPEC_KIND] == MAXIMUM or spec[SPEC_KIND] == MINIMUM):
-        upwards = not upwards
-    if upwards:
-        return before < 0.0 <= after
-    return before > 0.0 >= after
-
-
-def evaluate_condition(clock, given):
-    """Quantity of a specification, `SWITCH_CONDITION`, `TIME_CONDITION` or `TERMINATION_CONDITION`,
-    at a clock within the step.
-    """
-    what, motion, space = given
-    if what == TIME_CONDITION:
-        unknowns_at(motion, space, clock)
-        return (
-            motion.regime_start_time
-            + regime_time(motion, space, space.y_within)
-            - motion.target_time
+    missing = point_columns[SPRING_STRESS] - point_columns[FRICTIONAL_STRESS]
+    return (
+        compute_inertia_weight_at_mismatch(
+            point_columns[LOG_SLIP_RATE], missing, workspace.switch_thresholds
         )
-    evaluate_point_at(motion, space, clock)
-    if what == SWITCH_CONDITION:
-        return switch_excess(motion, space, space.point_within)
-    if what == TERMINATION_CONDITION:
-        return termination_margin(
-            space.point_within[LOG_SLIP_RATE],
-            space.point_within[NORMAL_STRESS_RATIO],
-            space.parameters[LOAD_VELOCITY],
-        )
-    return evaluate_quantity(
-        get_specification(space, int(what)), space.point_within, space.parameters
+        - 1.0
     )
 
 
-_find_root = build_root_finder(evaluate_condition)
+def has_event_occurred(event_spec, quantity_before, quantity_after, clock_direction):
+    """True if a quantity that changes so has done what is watched for."""
+    upwards = event_spec[SPEC_KIND] == RISE or event_spec[SPEC_KIND] == MINIMUM
+    # against the clock, slopes change sign the other way round
+    if clock_direction < 0.0 and (
+        event_spec[SPEC_KIND] == MAXIMUM or event_spec[SPEC_KIND] == MINIMUM
+    ):
+        upwards = not upwards
+    if upwards:
+        return quantity_before < 0.0 <= quantity_after
+    return quantity_before > 0.0 >= quantity_after
 
 
-def locate_crossing(condition, at_begin, at_end, motion, space):
+def evaluate_root_condition(clock, condition_context):
+    """Quantity of a specification, `SWITCH_CONDITION`, `TIME_CONDITION` or `TERMINATION_CONDITION`,
+    at a clock within the step.
+    """
+    what, motion, workspace = condition_context
+    if what == TIME_CONDITION:
+        interpolate_unknowns(motion, workspace, clock)
+        return (
+            motion.regime_start_time
+            + time_since_regime_start(motion, workspace, workspace.y_within)
+            - motion.target_time
+        )
+    evaluate_point_at_clock(motion, workspace, clock)
+    if what == SWITCH_CONDITION:
+        return regime_switch_excess(motion, workspace, workspace.point_within)
+    if what == TERMINATION_CONDITION:
+        return margin_to_termination(
+            workspace.point_within[LOG_SLIP_RATE],
+            workspace.point_within[NORMAL_STRESS_RATIO],
+            workspace.parameters[LOAD_VELOCITY],
+        )
+    return evaluate_event_quantity(
+        get_event_specification(workspace, int(what)), workspace.point_within, workspace.parameters
+    )
+
+
+_find_condition_root = build_root_finder(evaluate_root_condition)
+
+
+def locate_sign_change(condition, value_at_begin, value_at_end, motion, workspace):
     """Clock within the step at which a reading, given at both ends, changes sign, to 1e-13 of the
     step.
     """
@@ -150,153 +165,188 @@ def locate_crossing(condition, at_begin, at_end, motion, space):
     finest, relative = (
         (1e-15 * width, 1e-15) if condition == TIME_CONDITION else (1e-13 * width, 1e-14)
     )
-    given = condition, motion, space
-    return _find_root(motion.clock, motion.end, at_begin, at_end, finest, relative, given)
+    given = condition, motion, workspace
+    return _find_condition_root(
+        motion.clock, motion.end, value_at_begin, value_at_end, finest, relative, given
+    )
 
 
-def add_event(motion, events, code, clock, time, columns, p):
+def append_event_row(motion, event_table, event_code, clock, time, point_columns, parameters):
     """Add an event to the table."""
     n = motion.event_rows
-    events[n, EVENT_CODE], events[n, EVENT_REGIME], events[n, EVENT_CLOCK] = (
-        code,
+    event_table[n, EVENT_CODE], event_table[n, EVENT_REGIME], event_table[n, EVENT_CLOCK] = (
+        event_code,
         motion.regime,
         clock,
     )
-    events[n, EVENT_TIME] = motion.time + time
-    events[n, EVENT_SLIP] = slip_since_start(motion, clock, time, columns[SPRING_STRESS], p)
-    events[n, EVENT_EVALUATIONS] = motion.evaluations_slow + motion.evaluations_fast
-    for i in range(events.shape[1] - EVENT_POINT):
-        events[n, EVENT_POINT + i] = columns[i]
+    event_table[n, EVENT_TIME] = motion.time + time
+    event_table[n, EVENT_SLIP] = slip_since_start(
+        motion, clock, time, point_columns[SPRING_STRESS], parameters
+    )
+    event_table[n, EVENT_EVALUATIONS] = motion.evaluations_slow + motion.evaluations_fast
+    for i in range(event_table.shape[1] - EVENT_POINT):
+        event_table[n, EVENT_POINT + i] = point_columns[i]
     motion.event_rows = n + 1
 
 
-def report_step_end(motion, space, events, code):
+def append_step_end_event(motion, workspace, event_table, event_code):
     """Tell of the end of the step, by a code."""
-    passed = time_at_end(motion, space)
-    add_event(motion, events, float(code), motion.end, passed, space.point_at_end, space.parameters)
+    passed = time_at_step_end(motion, workspace)
+    append_event_row(
+        motion,
+        event_table,
+        float(event_code),
+        motion.end,
+        passed,
+        workspace.point_at_end,
+        workspace.parameters,
+    )
 
 
-def slip_since_start(motion, clock, time, spring_stress, p):
+def slip_since_start(motion, clock, time, spring_stress, parameters):
     """Slip since the start: the clock of a rigid slider; else from the spring, ``f = f_0 + K (V_0 t
     - slip)``.
     """
     if motion.slip_is_clock:
         return clock
     return motion.slip + (
-        p[LOAD_VELOCITY] * time - (spring_stress - motion.spring_stress) / p[STIFFNESS]
+        parameters[LOAD_VELOCITY] * time
+        - (spring_stress - motion.spring_stress) / parameters[STIFFNESS]
     )
 
 
-def report_start(motion, space, last, events):
+def append_start_events(motion, workspace, last_point, event_table):
     """Tell that a regime or segment has begun, and what happened on the way to it from the last
     point of the one before: at the more extreme of both, or at the first beyond a level. Returns
     whether that ends the motion.
     """
-    p, passed = space.parameters, time_at_begin(motion, space)
-    p_before = space.parameters_before if motion.pending_start == KINK_CODE else p
+    p, passed = workspace.parameters, time_at_step_begin(motion, workspace)
+    p_before = workspace.parameters_before if motion.pending_start == KINK_CODE else p
     if motion.pending_start != KINK_CODE or motion.kinks_ahead < motion.reported_kinks:
-        add_event(
+        append_event_row(
             motion,
-            events,
+            event_table,
             float(motion.pending_start),
             motion.clock,
             passed,
-            space.point_at_begin,
+            workspace.point_at_begin,
             p,
         )
     if motion.pending_start == START_CODE:
         return False
-    for w in range(space.spec_count):
-        spec = get_specification(space, w)
-        jumps = find_jump_side(spec, last, p_before, space.point_at_begin, p)
+    for w in range(workspace.event_spec_count):
+        spec = get_event_specification(workspace, w)
+        jumps = find_jump_side(spec, last_point, p_before, workspace.point_at_begin, p)
         if jumps != NO_EVENT:
-            columns = last if jumps == BEFORE_JUMP else space.point_at_begin
-            add_event(motion, events, float(w), motion.clock, passed, columns, p)
+            columns = last_point if jumps == BEFORE_JUMP else workspace.point_at_begin
+            append_event_row(motion, event_table, float(w), motion.clock, passed, columns, p)
             if spec[SPEC_TERMINAL]:
                 return True
     return False
 
 
-def find_jump_side(spec: Any, last: Any, p_last: Any, first: Any, p_first: Any) -> int:
+def find_jump_side(
+    event_spec: Any,
+    point_before: Any,
+    parameters_before: Any,
+    point_after: Any,
+    parameters_after: Any,
+) -> int:
     """Where what is watched for happens as a motion jumps from the last point of one regime or
     segment to the first of another: `NO_EVENT`; or at the more extreme one, or the first beyond the
     level, which is before (`BEFORE_JUMP`) or after (`AFTER_JUMP`) the jump.
     """
-    if spec[SPEC_KIND] == SETTLED:
+    if event_spec[SPEC_KIND] == SETTLED:
         return NO_EVENT
-    if not has_crossed(
-        spec, evaluate_quantity(spec, last, p_last), evaluate_quantity(spec, first, p_first), 1.0
+    if not has_event_occurred(
+        event_spec,
+        evaluate_event_quantity(event_spec, point_before, parameters_before),
+        evaluate_event_quantity(event_spec, point_after, parameters_after),
+        1.0,
     ):
         return NO_EVENT
-    x, y = last[LOG_SLIP_RATE], first[LOG_SLIP_RATE]
-    kept = (spec[SPEC_KIND] == MAXIMUM and x > y) or (spec[SPEC_KIND] == MINIMUM and x < y)
-    return BEFORE_JUMP if kept and spec[SPEC_QUANTITY] == LOG_SLIP_RATE else AFTER_JUMP
+    x, y = point_before[LOG_SLIP_RATE], point_after[LOG_SLIP_RATE]
+    kept = (event_spec[SPEC_KIND] == MAXIMUM and x > y) or (
+        event_spec[SPEC_KIND] == MINIMUM and x < y
+    )
+    return BEFORE_JUMP if kept and event_spec[SPEC_QUANTITY] == LOG_SLIP_RATE else AFTER_JUMP
 
 
-def detect_events(motion, space):
+def locate_events_in_step(motion, workspace):
     """Find when each thing watched for happens within the step; NaN where it does not. Returns how
     many do.
     """
-    count, p = 0, space.parameters
-    for w in range(space.spec_count):
-        spec = get_specification(space, w)
-        space.event_clocks[w] = math.nan
+    count, p = 0, workspace.parameters
+    for w in range(workspace.event_spec_count):
+        spec = get_event_specification(workspace, w)
+        workspace.event_clocks[w] = math.nan
         if spec[SPEC_KIND] == SETTLED:
             against = (
                 motion.may_reverse
-                and p[LOAD_VELOCITY] * space.point_at_end[FRICTION_COEFFICIENT] < 0.0
+                and p[LOAD_VELOCITY] * workspace.point_at_end[FRICTION_COEFFICIENT] < 0.0
             )
             if motion.kinks_ahead > 0 or against:
                 continue
-            apart = abs(space.point_at_end[LOG_SLIP_RATE] - p[LOG_LOAD_VELOCITY])
-            away = max(apart, space.point_at_end[STEADY_STATE_DISTANCE] / abs(p[B]))
-            friction = max(apart, abs(space.point_at_end[STEADY_STATE_OFFSET]) / abs(p[B]))
+            apart = abs(workspace.point_at_end[LOG_SLIP_RATE] - p[LOG_LOAD_VELOCITY])
+            away = max(apart, workspace.point_at_end[STEADY_STATE_DISTANCE] / abs(p[B]))
+            friction = max(apart, abs(workspace.point_at_end[STEADY_STATE_OFFSET]) / abs(p[B]))
             spec[SPEC_MAX_DISTANCE] = max(spec[SPEC_MAX_DISTANCE], away)
             spec[SPEC_MAX_FRICTION_DISTANCE] = max(spec[SPEC_MAX_FRICTION_DISTANCE], friction)
             near = away < spec[SPEC_LEVEL] * spec[SPEC_MAX_DISTANCE]
             if (
                 near
                 and friction
-                < FRICTION_DISTANCE_FACTOR * spec[SPEC_LEVEL] * spec[SPEC_MAX_FRICTION_DISTANCE]
+                < FRICTION_SETTLING_LEVEL_FACTOR
+                * spec[SPEC_LEVEL]
+                * spec[SPEC_MAX_FRICTION_DISTANCE]
             ):
-                space.event_clocks[w] = motion.end
+                workspace.event_clocks[w] = motion.end
         else:
             before, after = (
-                evaluate_quantity(spec, space.point_at_begin, p),
-                evaluate_quantity(spec, space.point_at_end, p),
+                evaluate_event_quantity(spec, workspace.point_at_begin, p),
+                evaluate_event_quantity(spec, workspace.point_at_end, p),
             )
             changes = before < 0.0 <= after or before > 0.0 >= after
-            if changes and has_crossed(spec, before, after, motion.direction):
-                space.event_clocks[w] = locate_crossing(float(w), before, after, motion, space)
-        if not math.isnan(space.event_clocks[w]):
+            if changes and has_event_occurred(spec, before, after, motion.direction):
+                workspace.event_clocks[w] = locate_sign_change(
+                    float(w), before, after, motion, workspace
+                )
+        if not math.isnan(workspace.event_clocks[w]):
             count += 1
     return count
 
 
-def report_events(motion, space, events):
+def append_events_in_step(motion, workspace, event_table):
     """Tell what happens within the step, in its order. Returns 0 where nothing does, 1 where the
     asker can wait for it, 2 where not, and 3 where it ends the motion.
     """
-    urgent, p = 0, space.parameters
-    for _ in range(detect_events(motion, space)):
+    urgent, p = 0, workspace.parameters
+    for _ in range(locate_events_in_step(motion, workspace)):
         first = -1
-        for w in range(space.spec_count):
+        for w in range(workspace.event_spec_count):
             later = (
                 first >= 0
-                and motion.direction * (space.event_clocks[w] - space.event_clocks[first]) >= 0.0
+                and motion.direction * (workspace.event_clocks[w] - workspace.event_clocks[first])
+                >= 0.0
             )
-            if not math.isnan(space.event_clocks[w]) and not later:
+            if not math.isnan(workspace.event_clocks[w]) and not later:
                 first = w
-        clock = space.event_clocks[first]
-        space.event_clocks[first] = math.nan
+        clock = workspace.event_clocks[first]
+        workspace.event_clocks[first] = math.nan
         if clock == motion.end:
-            passed = time_at_end(motion, space)
-            add_event(motion, events, float(first), clock, passed, space.point_at_end, p)
+            passed = time_at_step_end(motion, workspace)
+            append_event_row(
+                motion, event_table, float(first), clock, passed, workspace.point_at_end, p
+            )
         else:
-            evaluate_point_at(motion, space, clock)
-            passed = motion.regime_start_time + regime_time(motion, space, space.y_within)
-            add_event(motion, events, float(first), clock, passed, space.point_within, p)
-        spec = get_specification(space, first)
+            evaluate_point_at_clock(motion, workspace, clock)
+            passed = motion.regime_start_time + time_since_regime_start(
+                motion, workspace, workspace.y_within
+            )
+            append_event_row(
+                motion, event_table, float(first), clock, passed, workspace.point_within, p
+            )
+        spec = get_event_specification(workspace, first)
         urgent = max(urgent, 1 if spec[SPEC_MAY_DEFER] else 2)
         if spec[SPEC_TERMINAL]:
             return 3
@@ -306,102 +356,128 @@ def report_events(motion, space, events):
 # ---- samples -------------------------------------------------------------------------------------
 
 
-def record_regime_start(motion, space, rows):
+def record_regime_start(motion, workspace, recording_table):
     """Record where a regime begins."""
     if motion.recording_mode == RECORD_WITHIN_STEPS:
-        record_point(
+        append_recorded_row(
             motion,
-            rows,
+            recording_table,
             motion.clock,
             motion.regime_start_time,
-            space.point_at_begin,
-            space.parameters,
+            workspace.point_at_begin,
+            workspace.parameters,
         )
-        rows[motion.recorded_rows - 1, SAMPLE_COLUMN] = 0.0
+        recording_table[motion.recorded_rows - 1, SAMPLE_COLUMN] = 0.0
 
 
-def is_step_recorded(motion, space, samples):
+def is_step_recorded(motion, workspace, requested_samples):
     """True if the step is recorded between its ends."""
     if motion.recording_mode != RECORD_AT_TIMES:
         return motion.recording_mode != RECORD_NEVER
-    end = time_at_end(motion, space) + motion.time
-    return motion.samples_taken < len(samples) and samples[motion.samples_taken] < end
+    end = time_at_step_end(motion, workspace) + motion.time
+    return (
+        motion.samples_taken < len(requested_samples)
+        and requested_samples[motion.samples_taken] < end
+    )
 
 
-def record_step(motion, space, rows, samples, over):
+def record_step(motion, workspace, recording_table, requested_samples, is_motion_over):
     """Record the step; returns whether all that was asked for has been recorded with it. Where the
     motion is `over`, it ends when that was asked for, whatever the last digit.
     """
     if motion.recording_mode == RECORD_WITHIN_STEPS:
-        record_evenly_spaced(motion, space, rows)
+        record_step_evenly_spaced(motion, workspace, recording_table)
         return False
     before = motion.samples_taken
-    record_requested(motion, space, rows, samples, over)
-    return before < motion.samples_taken == len(samples)
+    record_requested_samples(motion, workspace, recording_table, requested_samples, is_motion_over)
+    return before < motion.samples_taken == len(requested_samples)
 
 
-def record_evenly_spaced(motion, space, rows):
+def record_step_evenly_spaced(motion, workspace, recording_table):
     """Record the step evenly along its clock, up to its end."""
     for sample in range(1, SAMPLES_PER_STEP):
         clock = motion.clock + (motion.end - motion.clock) * (sample / SAMPLES_PER_STEP)
-        record_at_clock(motion, space, rows, clock)
-        rows[motion.recorded_rows - 1, SAMPLE_COLUMN] = sample
-    passed = time_at_end(motion, space)
-    record_point(motion, rows, motion.end, passed, space.point_at_end, space.parameters)
-    rows[motion.recorded_rows - 1, SAMPLE_COLUMN] = SAMPLES_PER_STEP
+        record_at_clock(motion, workspace, recording_table, clock)
+        recording_table[motion.recorded_rows - 1, SAMPLE_COLUMN] = sample
+    passed = time_at_step_end(motion, workspace)
+    append_recorded_row(
+        motion, recording_table, motion.end, passed, workspace.point_at_end, workspace.parameters
+    )
+    recording_table[motion.recorded_rows - 1, SAMPLE_COLUMN] = SAMPLES_PER_STEP
 
 
-def record_requested(motion, space, rows, samples, over):
+def record_requested_samples(motion, workspace, recording_table, requested_samples, is_motion_over):
     """Record the step where that is asked for, at times or at clocks, which grow."""
     at_begin, at_end = motion.clock, motion.end
     if motion.recording_mode == RECORD_AT_TIMES:
-        at_begin = time_at_begin(motion, space)
-        at_end = time_at_end(motion, space)
-    last = motion.end_time if over else at_end
+        at_begin = time_at_step_begin(motion, workspace)
+        at_end = time_at_step_end(motion, workspace)
+    last = motion.end_time if is_motion_over else at_end
     while (
-        motion.samples_taken < len(samples) and samples[motion.samples_taken] - motion.time <= last
+        motion.samples_taken < len(requested_samples)
+        and requested_samples[motion.samples_taken] - motion.time <= last
     ):
-        asked = samples[motion.samples_taken] - motion.time
+        asked = requested_samples[motion.samples_taken] - motion.time
         motion.samples_taken += 1
         if asked <= at_begin:
-            passed = time_at_begin(motion, space)
-            record_point(motion, rows, motion.clock, passed, space.point_at_begin, space.parameters)
+            passed = time_at_step_begin(motion, workspace)
+            append_recorded_row(
+                motion,
+                recording_table,
+                motion.clock,
+                passed,
+                workspace.point_at_begin,
+                workspace.parameters,
+            )
         elif asked >= at_end:
-            passed = time_at_end(motion, space)
-            record_point(motion, rows, motion.end, passed, space.point_at_end, space.parameters)
+            passed = time_at_step_end(motion, workspace)
+            append_recorded_row(
+                motion,
+                recording_table,
+                motion.end,
+                passed,
+                workspace.point_at_end,
+                workspace.parameters,
+            )
         else:
             clock = asked
             if motion.recording_mode == RECORD_AT_TIMES:
                 motion.target_time = asked
-                clock = locate_crossing(
-                    TIME_CONDITION, at_begin - asked, at_end - asked, motion, space
+                clock = locate_sign_change(
+                    TIME_CONDITION, at_begin - asked, at_end - asked, motion, workspace
                 )
-            record_at_clock(motion, space, rows, clock)
+            record_at_clock(motion, workspace, recording_table, clock)
 
 
-def record_at_clock(motion, space, rows, clock):
+def record_at_clock(motion, workspace, recording_table, clock):
     """Record the slider at a clock within the step."""
-    evaluate_point_at(motion, space, clock)
-    passed = motion.regime_start_time + regime_time(motion, space, space.y_within)
-    record_point(motion, rows, clock, passed, space.point_within, space.parameters)
+    evaluate_point_at_clock(motion, workspace, clock)
+    passed = motion.regime_start_time + time_since_regime_start(
+        motion, workspace, workspace.y_within
+    )
+    append_recorded_row(
+        motion, recording_table, clock, passed, workspace.point_within, workspace.parameters
+    )
 
 
-def record_point(motion, rows, clock, time, columns, p):
+def append_recorded_row(motion, recording_table, clock, time, point_columns, parameters):
     """Add what is recorded of a point (see `recording.pack_row`)."""
     n = motion.recorded_rows
-    rows[n, 0] = motion.time + (motion.end_time if time > motion.end_time else time)
-    rows[n, 1] = slip_since_start(motion, clock, time, columns[SPRING_STRESS], p)
-    rows[n, 2], rows[n, 3], rows[n, 4] = (
-        columns[LOG_SLIP_RATE],
-        columns[SPRING_STRESS],
-        columns[FRICTIONAL_STRESS],
+    recording_table[n, 0] = motion.time + (motion.end_time if time > motion.end_time else time)
+    recording_table[n, 1] = slip_since_start(
+        motion, clock, time, point_columns[SPRING_STRESS], parameters
     )
-    rows[n, 5], rows[n, 6], rows[n, 7] = (
-        columns[NORMAL_STRESS_RATIO],
-        columns[STATE_VARIABLE],
-        columns[APPARENT_FRICTION],
+    recording_table[n, 2], recording_table[n, 3], recording_table[n, 4] = (
+        point_columns[LOG_SLIP_RATE],
+        point_columns[SPRING_STRESS],
+        point_columns[FRICTIONAL_STRESS],
     )
-    rows[n, REGIME_COLUMN], rows[n, SAMPLE_COLUMN] = motion.regime, 0.0
+    recording_table[n, 5], recording_table[n, 6], recording_table[n, 7] = (
+        point_columns[NORMAL_STRESS_RATIO],
+        point_columns[STATE_VARIABLE],
+        point_columns[APPARENT_FRICTION],
+    )
+    recording_table[n, REGIME_COLUMN], recording_table[n, SAMPLE_COLUMN] = motion.regime, 0.0
     for i in range(motion.states):
-        rows[n, FIRST_STATE_COLUMN + i] = columns[FIRST_STATE + i]
+        recording_table[n, FIRST_STATE_COLUMN + i] = point_columns[FIRST_STATE + i]
     motion.recorded_rows = n + 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from rsfstudy._deprecation import renamed_members
-from rsfstudy.motion.array_calls import copy_values, evaluate, offset_by
+from rsfstudy.motion.array_calls import copy_values, evaluate_in_place, offset_pointer
 from rsfstudy.motion.layout import FIRST_STATE, FUNCTIONS_PER_REGIME, SLOW_REGIME
 from rsfstudy.motion.regime_switching import SwitchThresholds
 from rsfstudy.motion.steppers.unrolled_step import (
@@ -17,7 +17,7 @@ from rsfstudy.motion.steppers.unrolled_step import (
 
 Array = Any
 #: Time by the clock of a step that stands for none.
-MIN_TIME_RATE = 1e-300
+MIN_TIME_PER_CLOCK = 1e-300
 
 
 @renamed_members
@@ -56,15 +56,15 @@ class Workspace(NamedTuple):
         What takes the steps.
     """
 
-    unknowns: int
+    unknown_count: int
     y: Array
     y_end: Array
     rates: Array
     rates_at_end: Array
-    stages: Array
-    step_block: Array
+    stage_rates: Array
+    order_eight_step_block: Array
     scales: Array
-    dense_rows: Array
+    dense_output_rows: Array
     y_within: Array
     rates_within: Array
     dense_slopes: Array
@@ -72,59 +72,77 @@ class Workspace(NamedTuple):
     point_at_end: Array
     point_within: Array
     event_clocks: Array
-    rate: Any
-    point: Any
-    attempt: Any
-    balance: Any
-    specs: Array
-    spec_count: int
+    fill_rates: Any
+    fill_point: Any
+    attempt_step: Any
+    fill_balance: Any
+    event_specs: Array
+    event_spec_count: int
     parameters: Array
     parameters_before: Array
-    limits: SwitchThresholds
+    switch_thresholds: SwitchThresholds
     stepper: Any
 
 
-def workspace_size(unknowns: int, states: int, specs: int) -> int:
+def workspace_size(unknown_count: int, state_count: int, event_spec_count: int) -> int:
     """Length of a workspace."""
     of_unknowns = 1 + DENSE_ROW_COUNT + 1 + TOTAL_STAGE_COUNT + 1 + 1 + 1
-    return HEADER_SIZE + of_unknowns * unknowns + 3 * (FIRST_STATE + states) + specs
+    return (
+        HEADER_SIZE
+        + of_unknowns * unknown_count
+        + 3 * (FIRST_STATE + state_count)
+        + event_spec_count
+    )
 
 
-def create_workspace(block, y, unknowns, scales, states, functions, shared_members):
+def create_workspace(
+    workspace_block, y, unknown_count, unknown_scales, state_count, functions, shared_members
+):
     """The workspace of a regime, in a block of that size; `shared_members` are its last six
     members.
     """
-    new, columns = offset_by(block, HEADER_SIZE), FIRST_STATE + states
-    own = offset_by(new, unknowns)
-    dense = offset_by(own, unknowns)
-    stages = offset_by(dense, DENSE_ROW_COUNT * unknowns)
-    within = offset_by(stages, TOTAL_STAGE_COUNT * unknowns)
-    before = offset_by(within, 3 * unknowns)
-    copy_values(scales, own, unknowns)
-    step = stages, offset_by(stages, STAGE_COUNT * unknowns), stages, block, own, dense
-    inside = within, offset_by(within, unknowns), offset_by(within, 2 * unknowns)
+    new, columns = offset_pointer(workspace_block, HEADER_SIZE), FIRST_STATE + state_count
+    own = offset_pointer(new, unknown_count)
+    dense = offset_pointer(own, unknown_count)
+    stages = offset_pointer(dense, DENSE_ROW_COUNT * unknown_count)
+    within = offset_pointer(stages, TOTAL_STAGE_COUNT * unknown_count)
+    before = offset_pointer(within, 3 * unknown_count)
+    copy_values(unknown_scales, own, unknown_count)
+    step = (
+        stages,
+        offset_pointer(stages, STAGE_COUNT * unknown_count),
+        stages,
+        workspace_block,
+        own,
+        dense,
+    )
+    inside = (
+        within,
+        offset_pointer(within, unknown_count),
+        offset_pointer(within, 2 * unknown_count),
+    )
     points = (
         before,
-        offset_by(before, columns),
-        offset_by(before, 2 * columns),
-        offset_by(before, 3 * columns),
+        offset_pointer(before, columns),
+        offset_pointer(before, 2 * columns),
+        offset_pointer(before, 3 * columns),
     )
     equations = functions[0], functions[1], functions[2], functions[FUNCTIONS_PER_REGIME - 1]
-    return Workspace(unknowns, y, new, *step, *inside, *points, *equations, *shared_members)
+    return Workspace(unknown_count, y, new, *step, *inside, *points, *equations, *shared_members)
 
 
-def step_rates(motion, space, y, result):
+def fill_rates_by_step_clock(motion, workspace, y, result):
     """Fill in the rates at some unknowns by the clock of the step."""
-    evaluate(space.rate, y, y, space.parameters, result)
+    evaluate_in_place(workspace.fill_rates, y, y, workspace.parameters, result)
     if motion.time_per_step > 0.0:
-        slower = motion.time_per_step / max(result[space.unknowns - 1], MIN_TIME_RATE)
-        for i in range(space.unknowns):
+        slower = motion.time_per_step / max(result[workspace.unknown_count - 1], MIN_TIME_PER_CLOCK)
+        for i in range(workspace.unknown_count):
             result[i] *= slower
 
 
-def count_evaluations(motion: Any, evaluations: int) -> None:
+def count_evaluations(motion: Any, evaluation_count: int) -> None:
     """Count right-hand sides."""
     if motion.regime == SLOW_REGIME:
-        motion.evaluations_slow += evaluations
+        motion.evaluations_slow += evaluation_count
     else:
-        motion.evaluations_fast += evaluations
+        motion.evaluations_fast += evaluation_count

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
 
+from rsfstudy._deprecation import renamed_keywords
 from rsfstudy.plots._figures import NotebookFigure
 from rsfstudy.plots._style import (
     add_legend,
@@ -16,10 +17,13 @@ from rsfstudy.plots._style import (
     finalize_layout,
 )
 
-Points = Sequence[tuple[float, float]]
+PointsOfCurve = Sequence[tuple[float, float]]
 
 
-def draw_agreement(digits: Mapping[str, Points], label: str, enough: float) -> Figure:
+@renamed_keywords
+def draw_agreement(
+    digits: Mapping[str, PointsOfCurve], label: str, required_digits: float
+) -> Figure:
     """Draw the number of digits that agree for each quantity.
 
     Parameters
@@ -51,7 +55,9 @@ def draw_agreement(digits: Mapping[str, Points], label: str, enough: float) -> F
         axes.plot(
             *zip(*points, strict=True), cycle_marker(number), label=name.replace("_", " "), **style
         )
-    axes.axhline(enough, color="0.5", linewidth=0.8, linestyle="--", label="enough to pass")
+    axes.axhline(
+        required_digits, color="0.5", linewidth=0.8, linestyle="--", label="enough to pass"
+    )
     axes.set(xlabel=label[0].upper() + label[1:], ylabel="Digits that agree")
     add_legend(axes, 5)
     enlarge_for_legends(figure, [[axes]])

@@ -20,8 +20,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from rsfstudy.formatting import read_flag_meanings
 from rsfstudy.plots._text import (
-    axis_label,
     format_number,
+    format_quantity_axis_label,
     format_stiffness_ratio,
     format_units,
     quantity_symbol,
@@ -29,19 +29,23 @@ from rsfstudy.plots._text import (
     visible_length,
     wrap_text,
 )
-from rsfstudy.study import read_quantities
+from rsfstudy.study import read_undocumented_quantities
 from rsfstudy.vocabulary import coverage_content_type, find_quantity
 
 #: Ratio of the largest value to the smallest value above which an axis has a log scale.
-_LOG_SCALE_RATIO = 100.0
+_MIN_RATIO_FOR_LOG_SCALE = 100.0
 #: Ratio of the axis limits below which a log axis has additional labels between decades.
 _MAX_RATIO_FOR_MINOR_LABELS = 50.0
 #: Maximum number of names along y, and maximum number of names along x.
-_MAX_NAMES_ALONG_Y, _MAX_NAMES_ALONG_X = 45, 30
+_MAX_POINT_NAMES_ALONG_Y, _MAX_POINT_NAMES_ALONG_X = 45, 30
 #: Maximum number of horizontal names along x. If there are more names, the names are vertical.
-_MAX_HORIZONTAL_NAMES = 12
+_MAX_HORIZONTAL_NAMES_ALONG_X = 12
 #: Phrases that describe the points of some axes.
-_POINT_PHRASES = {"law": "{} law", "normal_stress": "{} normal stress", "load": "load point {}"}
+_PHRASES_OF_AXIS_POINTS = {
+    "law": "{} law",
+    "normal_stress": "{} normal stress",
+    "load": "load point {}",
+}
 
 
 def has_numeric_points(dataset: xr.Dataset, dimension: str) -> bool:
@@ -63,7 +67,7 @@ def has_numeric_points(dataset: xr.Dataset, dimension: str) -> bool:
     return is_numeric_variable(dataset[dimension]) and dataset[dimension].dtype.kind != "b"
 
 
-def is_numeric_variable(values: xr.DataArray) -> bool:
+def is_numeric_variable(variable: xr.DataArray) -> bool:
     """Return True if a variable contains numbers that can be plotted.
 
     Parameters
@@ -76,10 +80,10 @@ def is_numeric_variable(values: xr.DataArray) -> bool:
     bool
         True for numbers and Boolean values. Variables with flags are not numeric.
     """
-    return values.dtype.kind in "fiub" and "flag_values" not in values.attrs
+    return variable.dtype.kind in "fiub" and "flag_values" not in variable.attrs
 
 
-def flag_meanings(values: xr.DataArray) -> dict[float, str]:
+def read_flag_words(variable: xr.DataArray) -> dict[float, str]:
     """Return the meanings of the flags of a variable.
 
     Parameters
@@ -94,7 +98,7 @@ def flag_meanings(values: xr.DataArray) -> dict[float, str]:
         Meaning of each flag. The dictionary is empty if the variable has no flags.
     """
     return {
-        value: word.replace("_", " ") for value, word in read_flag_meanings(values.attrs).items()
+        value: word.replace("_", " ") for value, word in read_flag_meanings(variable.attrs).items()
     }
 
 
@@ -147,7 +151,7 @@ def varying_variables(dataset: xr.Dataset) -> list[str]:
     return names[:1] + [n for n in names[1:] if float(dataset[n].max()) > float(dataset[n].min())]
 
 
-def is_log_spaced(points: np.ndarray) -> bool:
+def are_log_spaced(points: np.ndarray) -> bool:
     """Return True if points are spaced logarithmically.
 
     Parameters
@@ -168,7 +172,7 @@ def is_log_spaced(points: np.ndarray) -> bool:
     return bool(factors.max() / factors.min() < differences.max() / differences.min())
 
 
-def spans_decades(values: np.ndarray) -> bool:
+def are_positive_and_span_decades(values: np.ndarray) -> bool:
     """Return True if all values are positive and span two decades.
 
     Parameters
@@ -182,7 +186,9 @@ def spans_decades(values: np.ndarray) -> bool:
         True if the smallest value is positive and the largest value is more than 100 times larger.
     """
     known = values[np.isfinite(values)]
-    return bool(known.size and known.min() > 0.0 and known.max() > _LOG_SCALE_RATIO * known.min())
+    return bool(
+        known.size and known.min() > 0.0 and known.max() > _MIN_RATIO_FOR_LOG_SCALE * known.min()
+    )
 
 
 def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
@@ -213,9 +219,9 @@ def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
     '$b/a$ = 2'
     """
     value = cell[dimension].item()
-    about = find_quantity(dimension, read_quantities(cell.coords.to_dataset()))
+    about = find_quantity(dimension, read_undocumented_quantities(cell.coords.to_dataset()))
     if isinstance(value, str):
-        return _POINT_PHRASES.get(dimension, "{}").format(to_mathtext(value))
+        return _PHRASES_OF_AXIS_POINTS.get(dimension, "{}").format(to_mathtext(value))
     if dimension == "stiffness_ratio":
         return format_stiffness_ratio(value)
     if dimension == "inertia":
@@ -224,7 +230,7 @@ def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
     return f"{quantity_symbol(about)} = {format_number(value, 4)}{units}"
 
 
-def set_up_x_axis(axes: Axes, dataset: xr.Dataset, dimension: str) -> np.ndarray:
+def set_x_axis_of_dimension(axes: Axes, dataset: xr.Dataset, dimension: str) -> np.ndarray:
     """Set up the x axis for the points of a dimension.
 
     If the points are names, the names are written along the axis.
@@ -253,15 +259,17 @@ def set_up_x_axis(axes: Axes, dataset: xr.Dataset, dimension: str) -> np.ndarray
         for name in names
         for part in wrap_text(to_mathtext(name), width).split("\n")
     )
-    upright = points.size > _MAX_HORIZONTAL_NAMES or longest > 1.4 * width
-    label_points(axes.xaxis, names, 40 if upright else width, _MAX_NAMES_ALONG_X)
+    upright = points.size > _MAX_HORIZONTAL_NAMES_ALONG_X or longest > 1.4 * width
+    set_ticks_with_point_names(
+        axes.xaxis, names, 40 if upright else width, _MAX_POINT_NAMES_ALONG_X
+    )
     if upright:
         axes.tick_params(axis="x", labelrotation=90.0, labelsize=5.0)
     axes.set_xlim(-0.5, points.size - 0.5)
     return np.arange(points.size, dtype=float)
 
 
-def set_log_scale(axes: Axes, which: str) -> None:
+def set_log_scale(axes: Axes, axis_name: str) -> None:
     """Set a log scale with tick labels that do not overlap.
 
     Call this function after the limits of the axis are set, because the ticks depend on the limits.
@@ -273,8 +281,8 @@ def set_log_scale(axes: Axes, which: str) -> None:
     which : {"x", "y"}
         Axis that gets the log scale.
     """
-    axes.set(**{f"{which}scale": "log"})
-    axis: Axis = getattr(axes, f"{which}axis")
+    axes.set(**{f"{axis_name}scale": "log"})
+    axis: Axis = getattr(axes, f"{axis_name}axis")
     low, high = sorted(axis.get_view_interval())
     if high < 3.0 * low:
         axis.set_major_locator(MaxNLocator(3))
@@ -282,13 +290,18 @@ def set_log_scale(axes: Axes, which: str) -> None:
     elif high < _MAX_RATIO_FOR_MINOR_LABELS * low:
         between: tuple[float, ...] = (3.0,)
         if high < 10.0 * low:
-            between = (2.0, 5.0) if which == "x" else (2.0, 3.0, 4.0, 6.0, 8.0)
+            between = (2.0, 5.0) if axis_name == "x" else (2.0, 3.0, 4.0, 6.0, 8.0)
         axis.set_major_locator(LogLocator(subs=(1.0, *between)))
         axis.set_major_formatter(FuncFormatter(lambda value, _place: format_number(value)))
     axis.set_minor_formatter(NullFormatter())
 
 
-def label_points(axis: Axis, names: list[str], width: int, most: int = _MAX_NAMES_ALONG_Y) -> None:
+def set_ticks_with_point_names(
+    axis: Axis,
+    point_names: list[str],
+    max_line_characters: int,
+    max_ticks: int = _MAX_POINT_NAMES_ALONG_Y,
+) -> None:
     """Label the positions 0, 1, 2, ... of an axis with names.
 
     Parameters
@@ -303,9 +316,9 @@ def label_points(axis: Axis, names: list[str], width: int, most: int = _MAX_NAME
         Maximum number of labels. If there are more names, some names are omitted at regular
         intervals.
     """
-    some = slice(None, None, -(-len(names) // most))
-    texts = [wrap_text(to_mathtext(name), width) for name in names[some]]
-    axis.set_ticks(range(len(names))[some], texts)
+    some = slice(None, None, -(-len(point_names) // max_ticks))
+    texts = [wrap_text(to_mathtext(name), max_line_characters) for name in point_names[some]]
+    axis.set_ticks(range(len(point_names))[some], texts)
 
 
 def label_rows(axes: Axes, names: list[str], width: int = 60) -> None:
@@ -333,7 +346,7 @@ def label_rows(axes: Axes, names: list[str], width: int = 60) -> None:
     >>> [float(limit) for limit in axes.get_ylim()]
     [1.5, -0.5]
     """
-    label_points(axes.yaxis, names, width)
+    set_ticks_with_point_names(axes.yaxis, names, width)
     axes.set_ylim(len(names) - 0.5, -0.5)
 
 
@@ -376,11 +389,15 @@ def add_colour_bar(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
     """
     scale = _colour_scale(dataset, dimension)
     bar = cast(Figure, axes.figure).colorbar(scale, ax=axes, pad=0.02)
-    bar.set_label(axis_label(find_quantity(dimension, read_quantities(dataset)), 34))
+    bar.set_label(
+        format_quantity_axis_label(
+            find_quantity(dimension, read_undocumented_quantities(dataset)), 34
+        )
+    )
 
 
 def _colour_scale(dataset: xr.Dataset, dimension: str) -> ScalarMappable:
     """Return the colour scale of a numeric dimension."""
     points = dataset[dimension].values.astype(float)
-    kind = LogNorm if is_log_spaced(points) else Normalize
+    kind = LogNorm if are_log_spaced(points) else Normalize
     return ScalarMappable(kind(points.min(), points.max()), colormaps["viridis"])

@@ -21,6 +21,7 @@ import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Figure
 
+from rsfstudy._deprecation import renamed_keywords
 from rsfstudy.defaults import FIGURE_FORMATS
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.formatting import format_overrides, pluralize
@@ -33,8 +34,8 @@ from rsfstudy.plots._style import (
     enlarge_for_legends,
     figure_size,
     finalize_layout,
-    freeze_ticks,
-    share_legends,
+    freeze_tick_style,
+    merge_common_legends,
 )
 from rsfstudy.plots._style import cycle_marker as cycle_marker
 from rsfstudy.plots._style import cycle_style as cycle_style
@@ -42,31 +43,31 @@ from rsfstudy.plots._style import style_context as style_context
 from rsfstudy.plots._text import format_number as format_number
 from rsfstudy.plots._text import format_slope as format_slope
 from rsfstudy.plots._text import quantity_symbol, to_mathtext, wrap_text
-from rsfstudy.rig import convert_to_display_units, has_unexpected_units
+from rsfstudy.rig import convert_to_display_units, has_units_unlike_its_study
 from rsfstudy.status import Status
 from rsfstudy.storage import read_declaration
 from rsfstudy.study import Figure as Declared
-from rsfstudy.study import Panel, Study, load_study, read_quantities, study_names
-from rsfstudy.study import is_failed as is_failed
-from rsfstudy.vocabulary import DERIVED_COORDINATES, find_quantity
+from rsfstudy.study import Panel, Study, load_study, read_undocumented_quantities, study_names
+from rsfstudy.study import failed_cell_mask as failed_cell_mask
+from rsfstudy.vocabulary import FORMULAS_OF_DERIVED_COORDINATES, find_quantity
 
 #: Names of the figures that can display any lattice.
-_GENERIC_NAMES = ("lines", "maps")
+_NAMES_OF_GENERIC_FIGURES = ("lines", "maps")
 #: Name of the figure of fits of records.
-_FITS_NAME = "fits"
+_NAME_OF_FITS_FIGURE = "fits"
 #: Names of all figures, including the figures of the named studies.
-FIGURE_NAMES = (*_GENERIC_NAMES, _FITS_NAME, *study_names())
+FIGURE_NAMES = (*_NAMES_OF_GENERIC_FIGURES, _NAME_OF_FITS_FIGURE, *study_names())
 
 #: Resolution of figures in notebooks, in dots per inch.
 _SCREEN_DPI = 150
 #: Metadata that remove the date from a file, so that two files of the same figure are identical.
-_METADATA_WITHOUT_DATES: dict[str, dict[str, Any]] = {
+_IMAGE_METADATA_WITHOUT_DATES: dict[str, dict[str, Any]] = {
     "pdf": {"CreationDate": None},
     "svg": {"Date": None},
 }
 #: Maximum number of points of additional axes for which the panels of a figure are repeated, and
 #: maximum number of repeated panels.
-_MAX_REPEATS, _MAX_REPEATED_PANELS = 4, 12
+_MAX_POINTS_OF_REPEATED_AXES, _MAX_PANELS_AFTER_REPEATING = 4, 12
 #: Height of a panel of a scatter matrix in mm.
 _SCATTER_PANEL_HEIGHT = 44.0
 
@@ -103,8 +104,9 @@ class NotebookFigure(Figure):
         return image.getvalue()
 
 
+@renamed_keywords
 def draw_figure(
-    dataset: xr.Dataset, own: Any = None, *, variable: str | None = None, style: Any = None
+    dataset: xr.Dataset, user_figure: Any = None, *, variable: str | None = None, style: Any = None
 ) -> Figure:
     """Draw the figure of a study.
 
@@ -165,13 +167,17 @@ def draw_figure(
     >>> figure.axes[0].get_title()
     'Critical stiffness'
     """
-    draws = own is None or isinstance(own, str | Declared) or callable(getattr(own, "draw", own))
+    draws = (
+        user_figure is None
+        or isinstance(user_figure, str | Declared)
+        or callable(getattr(user_figure, "draw", user_figure))
+    )
     if not draws:
         rule = "must be a Figure, or a function or module of yours that draws"
-        raise InvalidValue("own", own, rule, remedy="Write def name(dataset, axes): ...")
+        raise InvalidValue("own", user_figure, rule, remedy="Write def name(dataset, axes): ...")
     dataset = convert_to_display_units(dataset)
     with style_context(style):
-        drawing, dataset = _choose_figure(dataset, own, variable)
+        drawing, dataset = _choose_figure(dataset, user_figure, variable)
         panels = drawing.panels
         columns = min(drawing.columns, len(panels))
         rows = -(-len(panels) // columns)
@@ -179,16 +185,16 @@ def draw_figure(
         figure = NotebookFigure(figsize=figure_size(columns, rows, height), layout="constrained")
         drawn = [figure.add_subplot(rows, columns, number + 1) for number in range(len(panels))]
         for axes, panel in zip(drawn, panels, strict=True):
-            freeze_ticks(axes)
+            freeze_tick_style(axes)
             _panel.draw_panel(panel, dataset, axes)
-        _panel.finalize_panels(panels, drawn)
+        _panel.finalize_scales_and_legends(panels, drawn)
         for scale in figure.axes:
             if scale not in drawn:
-                freeze_ticks(scale)
+                freeze_tick_style(scale)
         add_panel_letters(drawn)
-        share_legends(figure, drawn)
+        merge_common_legends(figure, drawn)
         lacking, overrides = _missing_cells_note(dataset), read_declaration(dataset).overrides
-        said = [_overrides_note(dataset, columns)] if overrides else []
+        said = [_format_overrides_note(dataset, columns)] if overrides else []
         if said or lacking:
             color = "tab:red" if lacking else "0.4"
             figure.suptitle("\n".join(filter(None, (*said, lacking))), color=color)
@@ -203,28 +209,30 @@ def _missing_cells_note(dataset: xr.Dataset) -> str:
     The note is empty if the results are complete.
     """
     completeness = dataset.attrs.get("completeness", "complete")
-    failed = int((is_failed(dataset["status"]) & (dataset["status"] != Status.PENDING)).sum())
+    failed = int(
+        (failed_cell_mask(dataset["status"]) & (dataset["status"] != Status.PENDING)).sum()
+    )
     parts = [completeness] * (completeness != "complete")
     parts += [f"{pluralize(failed, 'cell')} failed"] * (failed > 0)
     return f"[{', '.join(parts)}]" * bool(parts)
 
 
-def _overrides_note(dataset: xr.Dataset, columns: int) -> str:
+def _format_overrides_note(dataset: xr.Dataset, max_line_characters: int) -> str:
     """Return a note about the values that differ from the declaration."""
-    own = read_quantities(dataset)
+    own = read_undocumented_quantities(dataset)
     names = {n: quantity_symbol(find_quantity(n, own)) for n in read_declaration(dataset).overrides}
     values = {names[name]: value for name, value in read_declaration(dataset).overrides.items()}
     text = to_mathtext(
         format_overrides(values).replace("=", " = ").replace(",", ", ").replace(",  ", ", ")
     )
-    return wrap_text(f"not as declared: {text}", 55 if columns == 1 else 120)
+    return wrap_text(f"not as declared: {text}", 55 if max_line_characters == 1 else 120)
 
 
 # ---- choice of the figure -----------------------------------------------------------------------
 
 
 def _choose_figure(
-    dataset: xr.Dataset, own: Any = None, variable: str | None = None
+    dataset: xr.Dataset, user_figure: Any = None, variable: str | None = None
 ) -> tuple[Declared, xr.Dataset]:
     """Choose the figure of a dataset and create all its panels.
 
@@ -233,53 +241,69 @@ def _choose_figure(
     """
     name, sizes = read_declaration(dataset).plot, dataset["status"].sizes
     study = load_study(name) if name in study_names() else None
-    if name == _FITS_NAME and own is variable is None:
+    if name == _NAME_OF_FITS_FIGURE and user_figure is variable is None:
         return Declared(
-            importlib.import_module(f"{__package__}.{_FITS_NAME}").panels(dataset)
+            importlib.import_module(f"{__package__}.{_NAME_OF_FITS_FIGURE}").panels(dataset)
         ), dataset
-    if own is None and study is None and name not in (*_GENERIC_NAMES, _FITS_NAME):
+    if (
+        user_figure is None
+        and study is None
+        and name not in (*_NAMES_OF_GENERIC_FIGURES, _NAME_OF_FITS_FIGURE)
+    ):
         raise InvalidValue("plot", name, "is unknown", choices=FIGURE_NAMES)
     known = {str(dimension) for dimension in sizes}
-    if study is not None and own in (None, study.plot):
-        own, dataset = study.plot, _restore_axes(dataset, study)
-        if isinstance(own, Declared) and not own.allow_extra_dims:
+    if study is not None and user_figure in (None, study.plot):
+        user_figure, dataset = study.plot, _restore_selected_axes(dataset, study)
+        if isinstance(user_figure, Declared) and not user_figure.allow_extra_dims:
             known = set(study.dimensions)
-    elif isinstance(own, Declared):
-        known -= set(read_declaration(dataset).overrides) - own.dimensions
+    elif isinstance(user_figure, Declared):
+        known -= set(read_declaration(dataset).overrides) - user_figure.dimensions
     varied = {str(dimension) for dimension, points in sizes.items() if points > 1}
     further = sorted(varied - known)
-    many = math.prod(sizes[dimension] for dimension in further) > _MAX_REPEATS
-    plain = variable is not None or own is None or isinstance(own, str)
-    if plain or many or has_unexpected_units(dataset):
+    many = math.prod(sizes[dimension] for dimension in further) > _MAX_POINTS_OF_REPEATED_AXES
+    plain = variable is not None or user_figure is None or isinstance(user_figure, str)
+    if plain or many or has_units_unlike_its_study(dataset):
         return _generic_figure(dataset, variable), dataset
-    drawing = own if isinstance(own, Declared) else Declared([getattr(own, "draw", own)])
+    drawing = (
+        user_figure
+        if isinstance(user_figure, Declared)
+        else Declared([getattr(user_figure, "draw", user_figure)])
+    )
     dataset = dataset.squeeze(sorted(set(map(str, sizes)) - known - varied), drop=False)
-    panels = _expand_panels(drawing, dataset, further)
-    few = panels and (len(panels) <= _MAX_REPEATED_PANELS or not further)
+    panels = _expand_panels_of_figure(drawing, dataset, further)
+    few = panels and (len(panels) <= _MAX_PANELS_AFTER_REPEATING or not further)
     return (replace(drawing, panels=panels) if few else _generic_figure(dataset)), dataset
 
 
-def _expand_panels(drawing: Declared, dataset: xr.Dataset, further: Sequence[str]) -> list[Panel]:
+def _expand_panels_of_figure(
+    figure_declaration: Declared, dataset: xr.Dataset, extra_dimensions: Sequence[str]
+) -> list[Panel]:
     """Create the panels of a figure for all facets and additional axes.
 
     Additional axes are axes that the figure does not name. The panels are repeated for each point
     of the additional axes, and the titles describe the points.
     """
     found: list[Panel] = []
-    for at in np.ndindex(*(dataset.sizes[dimension] for dimension in further)):
-        where = dict(zip(further, at, strict=True))
+    for at in np.ndindex(*(dataset.sizes[dimension] for dimension in extra_dimensions)):
+        where = dict(zip(extra_dimensions, at, strict=True))
         part = dataset.isel(where)
-        said = ", ".join(describe_point(part, dimension) for dimension in further)
-        each = [one for panel in drawing.panels for one in _panel.expand_facets(panel, part)]
-        found += [_panel.at_extra_dims(panel, where, said) for panel in each] if further else each
-    named = [panel.y for panel in drawing.panels if isinstance(panel.y, str) and panel.y]
+        said = ", ".join(describe_point(part, dimension) for dimension in extra_dimensions)
+        each = [
+            one for panel in figure_declaration.panels for one in _panel.expand_facets(panel, part)
+        ]
+        found += (
+            [_panel.select_panel_at_extra_dims(panel, where, said) for panel in each]
+            if extra_dimensions
+            else each
+        )
+    named = [panel.y for panel in figure_declaration.panels if isinstance(panel.y, str) and panel.y]
     if not found and named and not any(name in dataset for name in named):
         rule = "does not fit these results (they have none of its variables)"
         raise InvalidValue("plot", read_declaration(dataset).plot, rule)
     return found
 
 
-def _restore_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
+def _restore_selected_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     """Restore the dimensions of axes that were reduced to a single point."""
     gone = [d for d in study.dimensions if d not in dataset.dims and d in dataset.coords]
     if not gone:
@@ -288,7 +312,7 @@ def _restore_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     cells = [name for name in dataset.data_vars if not str(name).startswith(reduced)]
     derived = {
         name: (axis, np.atleast_1d(dataset[name]), dataset[name].attrs)
-        for name, (axis, _formula) in DERIVED_COORDINATES.items()
+        for name, (axis, _formula) in FORMULAS_OF_DERIVED_COORDINATES.items()
         if axis in gone and name in dataset.coords
     }
     measured = dataset[cells].drop_vars(derived).expand_dims(gone)
@@ -306,7 +330,7 @@ def _generic_figure(dataset: xr.Dataset, variable: str | None = None) -> Declare
     logarithms = [n for n in map(str, dataset.data_vars) if "log10_" in n]
     dataset = dataset.drop_vars([n for n in logarithms if n.replace("log10_", "") in dataset])
     if square := samples.panels(dataset, variable):
-        return Declared(square, samples.square_side(square), _SCATTER_PANEL_HEIGHT)
+        return Declared(square, samples.count_panels_per_side(square), _SCATTER_PANEL_HEIGHT)
     for module in (maps, lines):
         if found := module.panels(dataset, variable):
             return Declared(found)
@@ -319,10 +343,11 @@ def _generic_figure(dataset: xr.Dataset, variable: str | None = None) -> Declare
 # ---- files --------------------------------------------------------------------------------------
 
 
+@renamed_keywords
 def save_figure(
     dataset: xr.Dataset,
     path: Path,
-    own: Any = None,
+    user_figure: Any = None,
     *,
     variable: str | None = None,
     style: Any = None,
@@ -379,7 +404,7 @@ def save_figure(
     if form not in FIGURE_FORMATS:
         raise InvalidValue("figure", path.name, "needs an ending we write", choices=FIGURE_FORMATS)
     try:
-        drawn = draw_figure(dataset, own, variable=variable, style=style)
+        drawn = draw_figure(dataset, user_figure, variable=variable, style=style)
         # The layout is final and must not be computed again when the figure is saved.
         drawn.set_layout_engine(None)
         with style_context(style):
@@ -392,7 +417,8 @@ def save_figure(
     write_image(image, path)
 
 
-def render_figure(drawn: Figure, form: str) -> bytes:
+@renamed_keywords
+def render_figure(figure: Figure, image_format: str) -> bytes:
     r"""Render a figure as an image.
 
     Parameters
@@ -415,7 +441,9 @@ def render_figure(drawn: Figure, form: str) -> bytes:
     b'\x89PNG'
     """
     image = io.BytesIO()
-    drawn.savefig(image, format=form, metadata=_METADATA_WITHOUT_DATES.get(form))
+    figure.savefig(
+        image, format=image_format, metadata=_IMAGE_METADATA_WITHOUT_DATES.get(image_format)
+    )
     return image.getvalue()
 
 

@@ -28,27 +28,27 @@ from rsfstudy.plots._style import (
     enlarge_for_legends,
     figure_size,
     finalize_layout,
-    freeze_ticks,
+    freeze_tick_style,
     style_context,
 )
 from rsfstudy.plots._text import to_mathtext, wrap_text
 from rsfstudy.rig import DISPLAY_BASE_UNITS, Rig
-from rsfstudy.slider import Scene, steady_friction_excess
+from rsfstudy.slider import Scene, steady_friction_minus_reference
 from rsfstudy.storage import read_scene_fields
 
 #: Height of a panel in mm.
-PANEL_HEIGHT = 48.0
-LN10 = math.log(10.0)
+PANEL_HEIGHT_MM = 48.0
+NATURAL_LOG_OF_10 = math.log(10.0)
 #: Names of the variables that may be drawn along x.
-ABSCISSAE = ("load_point_displacement", "slip", "time")
+ABSCISSA_VARIABLES = ("load_point_displacement", "slip", "time")
 #: Relative change below which the load point displacement or the slip rate is considered constant.
 #: Smaller changes are due to rounding errors.
-_RELATIVE_ROUNDING_ERROR = 1e-6
+_HELD_LOAD_POINT_RTOL = 1e-6
 _FRICTION_LABEL = r"Friction coefficient, $\mu$"
 
 
 @renamed_keywords
-@partial(error_boundary, is_inner=True)
+@partial(error_boundary, is_called_internally=True)
 def plot_motion(
     motion: xr.Dataset, rig: Rig | None = None, *, against: str | None = None
 ) -> Figure:
@@ -92,8 +92,8 @@ def plot_motion(
     >>> len(figure.axes)
     3
     """
-    if against not in (None, *ABSCISSAE):
-        raise InvalidValue("against", against, "is unknown", choices=ABSCISSAE)
+    if against not in (None, *ABSCISSA_VARIABLES):
+        raise InvalidValue("against", against, "is unknown", choices=ABSCISSA_VARIABLES)
     _check_motion(motion, against)
     if not motion["slip"].notnull().any():
         text = f"{motion.attrs.get('status', '')}: {motion.attrs.get('message', '')}"
@@ -101,13 +101,13 @@ def plot_motion(
     against = against or _choose_abscissa(motion)
     shown = motion if rig is None else rig.in_units(motion, **DISPLAY_BASE_UNITS)
     with style_context():
-        figure = NotebookFigure(figsize=figure_size(2, 2, PANEL_HEIGHT), layout="constrained")
+        figure = NotebookFigure(figsize=figure_size(2, 2, PANEL_HEIGHT_MM), layout="constrained")
         grid = figure.add_gridspec(2, 2)
         upper = figure.add_subplot(grid[0, 0])
         lower = figure.add_subplot(grid[1, 0], sharex=upper)
         plane = figure.add_subplot(grid[:, 1])
         for axes in figure.axes:
-            freeze_ticks(axes)
+            freeze_tick_style(axes)
         if "friction_coefficient" in shown:
             upper.plot(shown[against], shown["friction_coefficient"])
             upper.set_ylabel(_FRICTION_LABEL)
@@ -126,7 +126,7 @@ def plot_motion(
     return figure
 
 
-def _check_motion(motion: xr.Dataset, against: str | None) -> None:
+def _check_motion(motion: xr.Dataset, abscissa: str | None) -> None:
     """Check that a dataset has the variables of a motion or a limit cycle.
 
     Raises
@@ -136,9 +136,9 @@ def _check_motion(motion: xr.Dataset, against: str | None) -> None:
         exceeds the range of floating-point numbers.
     """
     stress = () if "friction_coefficient" in motion else ("shear_stress",)
-    needed = ("slip", against or "time", "frictional_stress", "log10_slip_rate", *stress)
-    known = [name for name in ABSCISSAE if name in motion]
-    for name in (*needed, _normal_stress_name(motion), *known):
+    needed = ("slip", abscissa or "time", "frictional_stress", "log10_slip_rate", *stress)
+    known = [name for name in ABSCISSA_VARIABLES if name in motion]
+    for name in (*needed, _find_normal_stress_name(motion), *known):
         if name not in motion:
             text = "is missing: it is no motion as simulate gives it, and no limit cycle"
             raise DataError(f"{name} {text}")
@@ -151,7 +151,7 @@ def _check_motion(motion: xr.Dataset, against: str | None) -> None:
         raise DataError(f"log10_slip_rate = {largest:g} {rule}: the file is damaged. Run it again.")
 
 
-def _normal_stress_name(motion: xr.Dataset) -> str:
+def _find_normal_stress_name(motion: xr.Dataset) -> str:
     """Return the name of the normal stress variable of a motion."""
     return "normal_stress_ratio" if "normal_stress_ratio" in motion else "effective_normal_stress"
 
@@ -166,7 +166,7 @@ def _choose_abscissa(motion: xr.Dataset) -> str:
     if "load_point_displacement" not in motion:
         return "time"
     pulled, slid = (np.asarray(motion[name]) for name in ("load_point_displacement", "slip"))
-    least = _RELATIVE_ROUNDING_ERROR * max(float(np.ptp(slid)), float(np.abs(pulled).max()))
+    least = _HELD_LOAD_POINT_RTOL * max(float(np.ptp(slid)), float(np.abs(pulled).max()))
     return "load_point_displacement" if np.ptp(pulled) > least else "slip"
 
 
@@ -178,35 +178,35 @@ def _motion_title(motion: xr.Dataset) -> str:
     return f"{title}{ending}"
 
 
-def _draw_slip_rate(shown: xr.Dataset, axes: Axes, against: str) -> None:
+def _draw_slip_rate(displayed_motion: xr.Dataset, axes: Axes, abscissa: str) -> None:
     """Draw the slip rate, or its logarithm if the dataset has no slip rate."""
-    if "slip_rate" in shown:
-        axes.plot(shown[against], shown["slip_rate"])
+    if "slip_rate" in displayed_motion:
+        axes.plot(displayed_motion[abscissa], displayed_motion["slip_rate"])
         # A constant slip rate needs explicit limits, because rounding errors would fill the panel.
-        if np.ptp(ends := axes.dataLim.intervaly) < _RELATIVE_ROUNDING_ERROR * ends[1]:
+        if np.ptp(ends := axes.dataLim.intervaly) < _HELD_LOAD_POINT_RTOL * ends[1]:
             axes.set_ylim(0.5 * ends[0], 2.0 * ends[1])
         set_log_scale(axes, "y")
         axes.set_ylabel(
-            f"Slip rate ({_format_units(str(shown['slip_rate'].attrs.get('units', '1')))})"
+            f"Slip rate ({_format_units(str(displayed_motion['slip_rate'].attrs.get('units', '1')))})"
         )
     else:
-        axes.plot(shown[against], shown["log10_slip_rate"])
+        axes.plot(displayed_motion[abscissa], displayed_motion["log10_slip_rate"])
         axes.set_ylabel(r"Slip rate, $\log_{10}(V/V_*)$")
 
 
-def _draw_phase_plane(motion: xr.Dataset, shown: xr.Dataset, axes: Axes) -> None:
+def _draw_phase_plane(motion: xr.Dataset, displayed_motion: xr.Dataset, axes: Axes) -> None:
     """Draw friction against slip rate, with the line of steady sliding."""
     logs = motion["log10_slip_rate"]
-    rates = shown.get("slip_rate", (10.0**logs).assign_attrs(units="$V_*$"))
+    rates = displayed_motion.get("slip_rate", (10.0**logs).assign_attrs(units="$V_*$"))
     scale = float(rates[0]) / 10.0 ** float(logs[0])
     # During ruptures, the spring stress also includes the stress that accelerates the mass.
-    friction = motion["frictional_stress"] / motion[_normal_stress_name(motion)]
+    friction = motion["frictional_stress"] / motion[_find_normal_stress_name(motion)]
     axes.plot(scale * 10.0**logs, friction, **cycle_style(0), label="motion")
     axes.plot(
         scale * 10.0 ** logs[0], friction[0], "o", color=cycle_style(0)["color"], label="its start"
     )
     beyond = np.linspace(float(logs.min()) - 0.3, float(logs.max()) + 0.3, 201)
-    steady = _steady_friction(read_scene_fields(motion), beyond)
+    steady = _compute_steady_friction(read_scene_fields(motion), beyond)
     if steady is not None:
         axes.plot(scale * 10.0**beyond, steady, "--", color="0.4", label="steady sliding")
     set_log_scale(axes, "x")
@@ -215,7 +215,9 @@ def _draw_phase_plane(motion: xr.Dataset, shown: xr.Dataset, axes: Axes) -> None
     add_legend(axes, 3)
 
 
-def _steady_friction(values: dict[str, Any], log10_rates: np.ndarray) -> np.ndarray | None:
+def _compute_steady_friction(
+    scene_fields: dict[str, Any], log10_rates: np.ndarray
+) -> np.ndarray | None:
     """Compute the friction coefficient of steady sliding.
 
     The loading of the scene is ignored, because steady sliding does not depend on the loading. The
@@ -223,12 +225,12 @@ def _steady_friction(values: dict[str, Any], log10_rates: np.ndarray) -> np.ndar
     """
     try:
         scene = Scene(
-            **{k: v for k, v in values.items() if k not in ("loading", "segments", "samples")}
+            **{k: v for k, v in scene_fields.items() if k not in ("loading", "segments", "samples")}
         )
     except InvalidValue:
         return None
-    rates = log10_rates * LN10
-    excess = [steady_friction_excess(scene, x) for x in rates.tolist()]
+    rates = log10_rates * NATURAL_LOG_OF_10
+    excess = [steady_friction_minus_reference(scene, x) for x in rates.tolist()]
     return np.asarray(scene.mu_star + np.array(excess))
 
 

@@ -19,38 +19,43 @@ from matplotlib.axes import Axes
 from rsfstudy.errors import DataError
 from rsfstudy.plots._axes import (
     add_colour_bar,
+    are_log_spaced,
+    are_positive_and_span_decades,
     describe_point,
     has_numeric_points,
-    is_log_spaced,
     label_rows,
     point_colours,
     set_log_scale,
-    set_up_x_axis,
-    spans_decades,
+    set_x_axis_of_dimension,
 )
 from rsfstudy.plots._style import (
     add_grey_legend_entry,
     add_legend,
     cycle_marker,
     cycle_style,
-    text_capacity,
+    text_capacity_in_characters,
 )
-from rsfstudy.plots._text import axis_label as labelled
+from rsfstudy.plots._text import format_quantity_axis_label as labelled
 from rsfstudy.plots._text import format_slope, to_mathtext, wrap_text
 from rsfstudy.status import Status
-from rsfstudy.study import Panel, read_quantities
+from rsfstudy.study import Panel, read_undocumented_quantities
 from rsfstudy.vocabulary import find_quantity
 
 #: Line styles and marker fill styles for the points of the second axis of ``hue``.
-_SECOND_HUE_STYLES = (("-", "full"), ("--", "none"), (":", "none"), ("-.", "full"))
+_DASHES_AND_MARKER_FILLS_OF_SECOND_HUE = (
+    ("-", "full"),
+    ("--", "none"),
+    (":", "none"),
+    ("-.", "full"),
+)
 #: Number of points of a numeric axis above which a colour bar replaces legend entries, and number
 #: of points of a curve above which markers are omitted.
 _MIN_POINTS_FOR_COLOUR_SCALE, _MAX_POINTS_WITH_MARKERS = 7, 60
 #: Maximum number of decimal places of a slope.
 _SLOPE_DIGITS = 6
 #: Width of the panel letter and of the y tick labels, in characters.
-_LETTER_WIDTH = 10
-_MISSING = xr.DataArray(np.nan)
+_CHARACTERS_LEFT_OF_TITLE = 10
+_MISSING_VALUE_ARRAY = xr.DataArray(np.nan)
 
 
 def expand_facets(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
@@ -69,7 +74,11 @@ def expand_facets(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
         Panels without facets. Panels without data are omitted. The list is empty if the condition
         of the panel is not met.
     """
-    if isinstance(panel.y, str) and panel.y and not dataset.get(panel.y, _MISSING).notnull().any():
+    if (
+        isinstance(panel.y, str)
+        and panel.y
+        and not dataset.get(panel.y, _MISSING_VALUE_ARRAY).notnull().any()
+    ):
         return []
     if panel.condition and not panel.condition(dataset):
         return []
@@ -83,20 +92,25 @@ def expand_facets(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
 
 def _has_data(panel: Panel, dataset: xr.Dataset) -> bool:
     """Return True if a panel has data to display."""
-    part = _select_part(panel, dataset)
+    part = _select_data_of_panel(panel, dataset)
     if isinstance(panel.y, str):
         return bool(part[panel.y].notnull().any() or (part["status"] == Status.OK).any())
-    found = (_evaluate(panel.y, row) for row, _style in iterate_curves(panel, part))
+    found = (
+        _evaluate_name_or_function(panel.y, row)
+        for row, _style in iterate_curves_and_styles(panel, part)
+    )
     return any(np.isfinite(values.astype(float)).any() for values in found)
 
 
-def _select_part(panel: Panel, dataset: xr.Dataset) -> xr.Dataset:
+def _select_data_of_panel(panel: Panel, dataset: xr.Dataset) -> xr.Dataset:
     """Select the part of a dataset that a panel displays."""
     at = {d: place for d, place in panel.isel.items() if d in dataset.dims}
-    return dataset.isel({d: _point_indices(dataset[d], place) for d, place in at.items()})
+    return dataset.isel({d: _resolve_point_indices(dataset[d], place) for d, place in at.items()})
 
 
-def at_extra_dims(panel: Panel, where: Mapping[str, int], said: str) -> Panel:
+def select_panel_at_extra_dims(
+    panel: Panel, point_indices: Mapping[str, int], title_suffix: str
+) -> Panel:
     """Restrict a panel to one point of additional dimensions.
 
     Parameters
@@ -113,13 +127,16 @@ def at_extra_dims(panel: Panel, where: Mapping[str, int], said: str) -> Panel:
     Panel
         Copy of the panel without a condition.
     """
-    own = {dimension: at for dimension, at in panel.isel.items() if dimension not in where}
+    own = {dimension: at for dimension, at in panel.isel.items() if dimension not in point_indices}
 
     def title(part: xr.Dataset) -> str:
         """Return the title of the panel with the description of the point."""
-        return _join_phrases(_resolve_text(panel.title, part, _describe_places(part, own)), said)
+        return _join_phrases(
+            _resolve_text_or_function(panel.title, part, _describe_selected_points(part, own)),
+            title_suffix,
+        )
 
-    return replace(panel, isel={**own, **where}, title=title, condition=None)
+    return replace(panel, isel={**own, **point_indices}, title=title, condition=None)
 
 
 def draw_panel(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
@@ -139,14 +156,15 @@ def draw_panel(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
     DataError
         If x and y of a curve are not one-dimensional arrays of the same size.
     """
-    part = _select_part(panel, dataset)
-    places = "" if panel.is_custom else _describe_places(part, panel.isel)
+    part = _select_data_of_panel(panel, dataset)
+    places = "" if panel.is_custom else _describe_selected_points(part, panel.isel)
     if panel.x and (panel.y in part if isinstance(panel.y, str) else panel.y):
         values = [
-            _draw_curve(panel, row, axes, style) for row, style in iterate_curves(panel, part)
+            _draw_curve(panel, row, axes, style)
+            for row, style in iterate_curves_and_styles(panel, part)
         ]
         _add_second_hue_legend(panel, part, axes)
-        _set_scales(panel, part, axes, np.concatenate(values))
+        _set_axis_scales(panel, part, axes, np.concatenate(values))
     for mark in panel.overlays:
         mark(part, axes)
     for which, limits in (("x", panel.x_limits), ("y", panel.y_limits)):
@@ -156,16 +174,18 @@ def draw_panel(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
             # A margin above the highest point keeps the marker of this point inside the panel.
             top = float(axes.dataLim.ymax)
             axes.set_ylim(top=max(axes.get_ylim()[1], top + 0.05 * (top - limits[0])))
-    across, up = text_capacity(axes)
-    if label := _axis_label(panel.x, panel.x_label, part, across - _LETTER_WIDTH):
+    across, up = text_capacity_in_characters(axes)
+    if label := _axis_label(panel.x, panel.x_label, part, across - _CHARACTERS_LEFT_OF_TITLE):
         axes.set_xlabel(label)
     if label := _axis_label(panel.y, panel.y_label, part, up):
         axes.set_ylabel(label)
-    title = ", ".join(filter(None, [axes.get_title(), _resolve_text(panel.title, part, places)]))
-    axes.set_title(wrap_text(title, across - _LETTER_WIDTH))
+    title = ", ".join(
+        filter(None, [axes.get_title(), _resolve_text_or_function(panel.title, part, places)])
+    )
+    axes.set_title(wrap_text(title, across - _CHARACTERS_LEFT_OF_TITLE))
 
 
-def finalize_panels(panels: Sequence[Panel], axes_of: Sequence[Axes]) -> None:
+def finalize_scales_and_legends(panels: Sequence[Panel], axes_of_panels: Sequence[Axes]) -> None:
     """Apply common scales to the panels and add legends.
 
     Panels with the same ``y_scale_group`` get the same y limits and the same colour limits. Custom
@@ -178,7 +198,7 @@ def finalize_panels(panels: Sequence[Panel], axes_of: Sequence[Axes]) -> None:
     axes_of : sequence of matplotlib.axes.Axes
         Axes of the panels, in the same order.
     """
-    pairs = [(p, axes) for p, axes in zip(panels, axes_of, strict=True) if not p.is_custom]
+    pairs = [(p, axes) for p, axes in zip(panels, axes_of_panels, strict=True) if not p.is_custom]
     for name in {panel.y_scale_group for panel, _axes in pairs if panel.y_scale_group}:
         group = [axes for panel, axes in pairs if panel.y_scale_group == name and axes.has_data()]
         ends = [end for axes in group for end in axes.get_ylim()]
@@ -194,7 +214,9 @@ def finalize_panels(panels: Sequence[Panel], axes_of: Sequence[Axes]) -> None:
         add_legend(axes, panel.legend_columns, panel.legend_title)
 
 
-def iterate_curves(panel: Panel, part: xr.Dataset) -> Iterator[tuple[xr.Dataset, dict[str, Any]]]:
+def iterate_curves_and_styles(
+    panel: Panel, panel_data: xr.Dataset
+) -> Iterator[tuple[xr.Dataset, dict[str, Any]]]:
     """Iterate over the curves of a panel.
 
     Parameters
@@ -211,71 +233,83 @@ def iterate_curves(panel: Panel, part: xr.Dataset) -> Iterator[tuple[xr.Dataset,
     style : dict of str to object
         Properties of the curve, as for ``matplotlib.axes.Axes.plot``.
     """
-    several = [d for d in panel.hue if part.sizes[d] > 1]
-    shades = None if callable(panel.style) or not panel.hue else _curve_colours(part, panel.hue[0])
+    several = [d for d in panel.hue if panel_data.sizes[d] > 1]
+    shades = (
+        None if callable(panel.style) or not panel.hue else _curve_colours(panel_data, panel.hue[0])
+    )
     named = [d for d in panel.hue if shades is None or d != panel.hue[0]]
-    for at in np.ndindex(*(part.sizes[d] for d in panel.hue)):
-        row = part.isel(dict(zip(panel.hue, at, strict=True)))
+    for at in np.ndindex(*(panel_data.sizes[d] for d in panel.hue)):
+        row = panel_data.isel(dict(zip(panel.hue, at, strict=True)))
         number = at[0] if at else 0
         style = cycle_style(number) | {"marker": cycle_marker(number)}
         if shades is not None:
             style |= {"color": shades[number], "linestyle": "-"}
         if panel.hue[1:] and panel.hue[1] in several:
             style |= _second_hue_style(at[1])
-        style["label"] = _curve_name(panel, row, named[:1] if len(several) > 1 else named)
+        style["label"] = _format_curve_name(panel, row, named[:1] if len(several) > 1 else named)
         own = panel.style
         yield row, style | dict(own(row) if callable(own) else own)
 
 
-def _second_hue_style(number: int) -> dict[str, str]:
+def _second_hue_style(point_number: int) -> dict[str, str]:
     """Return the line style and marker fill style for the second hue axis."""
-    line, fill = _SECOND_HUE_STYLES[number % len(_SECOND_HUE_STYLES)]
+    line, fill = _DASHES_AND_MARKER_FILLS_OF_SECOND_HUE[
+        point_number % len(_DASHES_AND_MARKER_FILLS_OF_SECOND_HUE)
+    ]
     return {"linestyle": line, "fillstyle": fill}
 
 
-def _add_second_hue_legend(panel: Panel, part: xr.Dataset, axes: Axes) -> None:
+def _add_second_hue_legend(panel: Panel, panel_data: xr.Dataset, axes: Axes) -> None:
     """Add the line styles of the second hue axis to the legend.
 
     The entries are grey. No entries are added if only one hue axis varies, if the first hue axis
     has a colour scale, or if the panel defines its own curve labels.
     """
-    if panel.curve_label is None and len([d for d in panel.hue if part.sizes[d] > 1]) > 1:
+    if panel.curve_label is None and len([d for d in panel.hue if panel_data.sizes[d] > 1]) > 1:
         second = panel.hue[1]
-        shades = not callable(panel.style) and _curve_colours(part, panel.hue[0]) is not None
+        shades = not callable(panel.style) and _curve_colours(panel_data, panel.hue[0]) is not None
         own = {} if callable(panel.style) else dict(panel.style)
         line = {"linestyle": "none"} if panel.markers_only else {}
-        for number in range(part.sizes[second] if not shades else 0):
+        for number in range(panel_data.sizes[second] if not shades else 0):
             style = {"marker": "o"} | _second_hue_style(number) | own | line
-            add_grey_legend_entry(axes, describe_point(part.isel({second: number}), second), style)
+            add_grey_legend_entry(
+                axes, describe_point(panel_data.isel({second: number}), second), style
+            )
 
 
-def _curve_colours(part: xr.Dataset, dimension: str) -> np.ndarray | None:
+def _curve_colours(panel_data: xr.Dataset, dimension: str) -> np.ndarray | None:
     """Return the colours of a long numeric axis.
 
     The result is None if the axis is short or not numeric.
     """
-    long = part.sizes[dimension] > _MIN_POINTS_FOR_COLOUR_SCALE and has_numeric_points(
-        part, dimension
+    long = panel_data.sizes[dimension] > _MIN_POINTS_FOR_COLOUR_SCALE and has_numeric_points(
+        panel_data, dimension
     )
-    return point_colours(part, dimension) if long else None
+    return point_colours(panel_data, dimension) if long else None
 
 
-def _curve_name(panel: Panel, row: xr.Dataset, by: Sequence[str]) -> str | None:
+def _format_curve_name(
+    panel: Panel, curve_data: xr.Dataset, dimensions: Sequence[str]
+) -> str | None:
     """Return the legend label of a curve, with its slope if there is one."""
     name = (
-        to_mathtext(panel.curve_label(row))
+        to_mathtext(panel.curve_label(curve_data))
         if panel.curve_label
-        else ", ".join(describe_point(row, d) for d in by) or None
+        else ", ".join(describe_point(curve_data, d) for d in dimensions) or None
     )
-    if name is None or not np.isfinite(row.get(f"{panel.annotation}_stderr", np.nan)):
+    if name is None or not np.isfinite(curve_data.get(f"{panel.annotation}_stderr", np.nan)):
         return name
-    symbol = find_quantity(panel.annotation, read_quantities(row)).symbol
-    slope = f"{symbol} = {format_slope(row, panel.annotation, _SLOPE_DIGITS)}".removeprefix(" = ")
+    symbol = find_quantity(panel.annotation, read_undocumented_quantities(curve_data)).symbol
+    slope = f"{symbol} = {format_slope(curve_data, panel.annotation, _SLOPE_DIGITS)}".removeprefix(
+        " = "
+    )
     # A single formula cannot be broken at the equals sign when the label is wrapped.
     return f"{name}: {slope.replace('$ = $', ' = ')}"
 
 
-def _draw_curve(panel: Panel, row: xr.Dataset, axes: Axes, style: dict[str, Any]) -> np.ndarray:
+def _draw_curve(
+    panel: Panel, curve_data: xr.Dataset, axes: Axes, style: dict[str, Any]
+) -> np.ndarray:
     """Draw one curve and return its y values.
 
     Raises
@@ -283,7 +317,10 @@ def _draw_curve(panel: Panel, row: xr.Dataset, axes: Axes, style: dict[str, Any]
     DataError
         If x and y are not one-dimensional arrays of the same size.
     """
-    values = _evaluate(panel.x, row), _evaluate(panel.y, row)
+    values = (
+        _evaluate_name_or_function(panel.x, curve_data),
+        _evaluate_name_or_function(panel.y, curve_data),
+    )
     if values[0].shape != values[1].shape or values[0].ndim != 1:
         shapes = " and ".join(f"shape {found.shape}" for found in values)
         remedy = "Assign each other axis to hue=, facet= or isel= of the panel."
@@ -303,82 +340,112 @@ def _draw_curve(panel: Panel, row: xr.Dataset, axes: Axes, style: dict[str, Any]
         style = style | {"marker": "o"}
     points = {"linestyle": "none"} if panel.markers_only or panel.fit_line else {}
     axes.plot(x, y, **style | points)
-    if panel.fit_line and np.isfinite(line := np.broadcast_arrays(*panel.fit_line(row))).any():
+    if (
+        panel.fit_line
+        and np.isfinite(line := np.broadcast_arrays(*panel.fit_line(curve_data))).any()
+    ):
         # The line has no markers, but its legend entry shows the marker of the points.
         axes.plot(*line, **style | {"linewidth": 0.9, "markevery": []})
     if panel.error_bars:
         bars = {"fmt": "none", "ecolor": style["color"], "elinewidth": 0.8, "capsize": 3}
-        axes.errorbar(x, y, _evaluate(panel.error_bars, row), **bars)
+        axes.errorbar(x, y, _evaluate_name_or_function(panel.error_bars, curve_data), **bars)
     return y
 
 
-def _evaluate(what: Any, row: xr.Dataset) -> np.ndarray:
+def _evaluate_name_or_function(name_or_function: Any, curve_data: xr.Dataset) -> np.ndarray:
     """Return the values of a variable or of a function of the dataset."""
-    return np.atleast_1d(np.asarray(what(row) if callable(what) else row[what]))
+    return np.atleast_1d(
+        np.asarray(
+            name_or_function(curve_data)
+            if callable(name_or_function)
+            else curve_data[name_or_function]
+        )
+    )
 
 
-def _point_indices(points: xr.DataArray, at: Any) -> Any:
+def _resolve_point_indices(points: xr.DataArray, index_or_function: Any) -> Any:
     """Convert a selection of points to indices without duplicates.
 
     If the selection is a function, such as ``min``, the function receives a list of all coordinate
     values, and returns one value or a list of values.
     """
-    if callable(at):
-        values, wanted = points.values.tolist(), at(points.values.tolist())
-        at = [values.index(v) for v in wanted] if isinstance(wanted, list) else values.index(wanted)
-    return list(dict.fromkeys(n % points.size for n in at)) if isinstance(at, list) else at
+    if callable(index_or_function):
+        values, wanted = points.values.tolist(), index_or_function(points.values.tolist())
+        index_or_function = (
+            [values.index(v) for v in wanted] if isinstance(wanted, list) else values.index(wanted)
+        )
+    return (
+        list(dict.fromkeys(n % points.size for n in index_or_function))
+        if isinstance(index_or_function, list)
+        else index_or_function
+    )
 
 
-def _set_scales(panel: Panel, part: xr.Dataset, axes: Axes, values: np.ndarray) -> None:
+def _set_axis_scales(panel: Panel, panel_data: xr.Dataset, axes: Axes, values: np.ndarray) -> None:
     """Set the scales of a panel, label named points and add a colour bar."""
-    named = isinstance(panel.x, str) and part[panel.x].dtype.kind not in "fiu"
+    named = isinstance(panel.x, str) and panel_data[panel.x].dtype.kind not in "fiu"
     if named:
-        set_up_x_axis(axes, part, str(panel.x))
-    if isinstance(panel.y, str) and part[panel.y].dtype.kind in "OU":
-        label_rows(axes, list(map(str, part[panel.y].values)))
+        set_x_axis_of_dimension(axes, panel_data, str(panel.x))
+    if isinstance(panel.y, str) and panel_data[panel.y].dtype.kind in "OU":
+        label_rows(axes, list(map(str, panel_data[panel.y].values)))
     log = panel.log
     if log is None:
-        along = isinstance(panel.x, str) and panel.x in part.coords and not named
-        log = "x" * (along and is_log_spaced(part[panel.x].values)) + "y" * spans_decades(values)
+        along = isinstance(panel.x, str) and panel.x in panel_data.coords and not named
+        log = "x" * (
+            along and are_log_spaced(panel_data[panel.x].values)
+        ) + "y" * are_positive_and_span_decades(values)
     positive = {"x": axes.dataLim.minposx, "y": axes.dataLim.minposy}
     axes.set(**{f"{which}scale": "log" for which in log if math.isfinite(positive[which])})
     first = next(iter(panel.hue), "")
-    if first and not callable(panel.style) and _curve_colours(part, first) is not None:
-        add_colour_bar(part, axes, first)
+    if first and not callable(panel.style) and _curve_colours(panel_data, first) is not None:
+        add_colour_bar(panel_data, axes, first)
 
 
-def _axis_label(what: Any, said: Any, part: xr.Dataset, width: int) -> str:
+def _axis_label(
+    name_or_function: Any, declared_label: Any, panel_data: xr.Dataset, max_line_characters: int
+) -> str:
     """Return the label of an axis, wrapped to a given width."""
-    if said is not None:
-        return wrap_text(_resolve_text(said, part, ""), width)
+    if declared_label is not None:
+        return wrap_text(
+            _resolve_text_or_function(declared_label, panel_data, ""), max_line_characters
+        )
     return (
-        labelled(find_quantity(what, read_quantities(part)), width)
-        if isinstance(what, str) and what
+        labelled(
+            find_quantity(name_or_function, read_undocumented_quantities(panel_data)),
+            max_line_characters,
+        )
+        if isinstance(name_or_function, str) and name_or_function
         else ""
     )
 
 
-def _resolve_text(said: Any, part: xr.Dataset, otherwise: str) -> str:
+def _resolve_text_or_function(
+    text_or_function: Any, panel_data: xr.Dataset, default_text: str
+) -> str:
     """Return the text of a panel, or a default text if the text is None.
 
     If the text of the panel is a function, the function is called with the dataset.
     """
-    if said is None:
-        return otherwise
-    return str(said(part) if callable(said) else said)
+    if text_or_function is None:
+        return default_text
+    return str(text_or_function(panel_data) if callable(text_or_function) else text_or_function)
 
 
-def _describe_places(part: xr.Dataset, at: Mapping[str, Any]) -> str:
+def _describe_selected_points(panel_data: xr.Dataset, selected_indices: Mapping[str, Any]) -> str:
     """Describe the selected points of a panel for its title."""
     return _join_phrases(
-        *(describe_point(part, dimension) for dimension in at if part[dimension].ndim == 0)
+        *(
+            describe_point(panel_data, dimension)
+            for dimension in selected_indices
+            if panel_data[dimension].ndim == 0
+        )
     )
 
 
-def _join_phrases(*parts: str) -> str:
+def _join_phrases(*phrases: str) -> str:
     """Join phrases with commas and capitalise the first letter.
 
     Empty phrases are omitted.
     """
-    text = ", ".join(filter(None, parts))
+    text = ", ".join(filter(None, phrases))
     return f"{text[:1].upper()}{text[1:]}"

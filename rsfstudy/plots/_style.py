@@ -26,8 +26,9 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.transforms import blended_transform_factory, offset_copy
 
+from rsfstudy._deprecation import renamed_keywords
 from rsfstudy.error_boundary import check_regular_file
-from rsfstudy.errors import InvalidValue, RsfStudyError, shorten
+from rsfstudy.errors import InvalidValue, RsfStudyError, shorten_text
 from rsfstudy.plots._text import visible_length, wrap_text
 
 #: Default style sheet of rsfstudy.
@@ -36,14 +37,15 @@ STYLE_SHEET = Path(__file__).with_name("rsfstudy.mplstyle")
 _STYLE_SHEET_SUFFIX = ".mplstyle"
 INCHES_PER_MM = 1.0 / 25.4
 #: Gap between the two columns of a journal page, in inches.
-_COLUMN_GAP = 6.0 * INCHES_PER_MM
-_MARKERS = "os^Dv<>P*X"
+_JOURNAL_COLUMN_GAP_INCHES = 6.0 * INCHES_PER_MM
+_MARKER_CYCLE = "os^Dv<>P*X"
 #: Fraction of the panel width that a colour bar and its label occupy.
-_COLOUR_BAR_SHARE = 0.24
+_COLOUR_BAR_FRACTION_OF_PANEL = 0.24
 
 
+@renamed_keywords
 @contextlib.contextmanager
-def style_context(over: Any = None) -> Iterator[None]:
+def style_context(user_styles: Any = None) -> Iterator[None]:
     """Apply the style sheet of rsfstudy and any additional styles.
 
     Parameters
@@ -74,7 +76,7 @@ def style_context(over: Any = None) -> Iterator[None]:
     ...     print(rcParams["font.size"], rcParams["axes.titlesize"])
     9.0 8.0
     """
-    others = over if isinstance(over, list | tuple) else [over]
+    others = user_styles if isinstance(user_styles, list | tuple) else [user_styles]
     settings = [_to_matplotlib_style(other) for other in others if other is not None]
     with style.context([STYLE_SHEET, *settings]):
         try:
@@ -85,31 +87,35 @@ def style_context(over: Any = None) -> Iterator[None]:
         except Exception as error:
             if not settings:
                 raise
-            rule = f"a figure cannot be drawn in it: {shorten(error).rstrip('.')}"
+            rule = f"a figure cannot be drawn in it: {shorten_text(error).rstrip('.')}"
             remedy = "Draw it without this style to find out if the style is the reason."
-            raise InvalidValue("style", _printable_style(over), rule, remedy=remedy) from error
+            raise InvalidValue(
+                "style", _printable_style(user_styles), rule, remedy=remedy
+            ) from error
 
 
-def _to_matplotlib_style(over: Any) -> str | dict[str, Any]:
+def _to_matplotlib_style(user_style: Any) -> str | dict[str, Any]:
     """Convert a style to an argument of ``matplotlib.style.use``.
 
     The result is the name of a style or a dictionary of checked settings. Other arguments are
     rejected, because matplotlib would import a package for a dotted name, download a style sheet
     from a URL, or parse any text file with one warning per line.
     """
-    if isinstance(over, Mapping):
-        return _validate_settings(over)
-    if isinstance(over, str) and over in ("default", *style.available):
-        return over
-    if isinstance(over, str | Path) and Path(over).suffix == _STYLE_SHEET_SUFFIX:
-        return _read_style_sheet(Path(over))
+    if isinstance(user_style, Mapping):
+        return _validate_settings(user_style)
+    if isinstance(user_style, str) and user_style in ("default", *style.available):
+        return user_style
+    if isinstance(user_style, str | Path) and Path(user_style).suffix == _STYLE_SHEET_SUFFIX:
+        return _read_style_sheet(Path(user_style))
     rule = f"is neither a style sheet, which ends in {_STYLE_SHEET_SUFFIX}, nor the name of a style"
-    raise InvalidValue("style", _printable_style(over), rule, choices=["default", *style.available])
+    raise InvalidValue(
+        "style", _printable_style(user_style), rule, choices=["default", *style.available]
+    )
 
 
-def _printable_style(over: Any) -> Any:
+def _printable_style(user_style: Any) -> Any:
     """Return a style in a form that is readable in an error message."""
-    return str(over) if isinstance(over, Path) else over
+    return str(user_style) if isinstance(user_style, Path) else user_style
 
 
 def _validate_settings(settings: Mapping[Any, Any]) -> dict[str, Any]:
@@ -129,7 +135,7 @@ def _validate_settings(settings: Mapping[Any, Any]) -> dict[str, Any]:
             checked[name] = value
         # The validators of matplotlib raise exceptions of any type.
         except Exception as error:
-            reason = shorten(error).removeprefix(f"Key {name}: ").rstrip(".")
+            reason = shorten_text(error).removeprefix(f"Key {name}: ").rstrip(".")
             rule = f"is not a valid value of {name}: {reason}"
             raise InvalidValue("style", value, rule) from error
     return dict(checked)
@@ -175,7 +181,9 @@ def _strip_quotes(value: str) -> str:
     return value[1:-1] if len(value) > 1 and value[0] == value[-1] == '"' else value
 
 
-def figure_size(columns: int, rows: int, height: float | None = None) -> tuple[float, float]:
+def figure_size(
+    panel_columns: int, panel_rows: int, panel_height_mm: float | None = None
+) -> tuple[float, float]:
     """Compute the size of a figure in inches.
 
     Parameters
@@ -196,8 +204,10 @@ def figure_size(columns: int, rows: int, height: float | None = None) -> tuple[f
         Height of the figure in inches.
     """
     width, usual = rcParams["figure.figsize"]
-    each = usual if height is None else height * INCHES_PER_MM
-    return (width if columns == 1 else 2.0 * width + _COLUMN_GAP), rows * each
+    each = usual if panel_height_mm is None else panel_height_mm * INCHES_PER_MM
+    return (
+        width if panel_columns == 1 else 2.0 * width + _JOURNAL_COLUMN_GAP_INCHES
+    ), panel_rows * each
 
 
 def cycle_style(number: int) -> dict[str, Any]:
@@ -244,10 +254,10 @@ def cycle_marker(number: int) -> str:
     >>> [cycle_marker(number) for number in range(3)]
     ['o', 's', '^']
     """
-    return _MARKERS[number % len(_MARKERS)]
+    return _MARKER_CYCLE[number % len(_MARKER_CYCLE)]
 
 
-def add_panel_letters(panels: Sequence[Axes]) -> None:
+def add_panel_letters(panel_axes: Sequence[Axes]) -> None:
     """Label the panels of a figure with (a), (b), and so on.
 
     The letters are placed to the left of the titles. If the figure has only one panel, no letter is
@@ -258,12 +268,12 @@ def add_panel_letters(panels: Sequence[Axes]) -> None:
     panels : sequence of matplotlib.axes.Axes
         Panels in the order of their letters.
     """
-    for panel, text in zip(panels, itertools.cycle(string.ascii_lowercase), strict=False):
-        if len(panels) > 1:
+    for panel, text in zip(panel_axes, itertools.cycle(string.ascii_lowercase), strict=False):
+        if len(panel_axes) > 1:
             panel.set_title(f"({text}) ", loc="left", fontweight="bold", ha="right")
 
 
-def text_capacity(axes: Axes) -> tuple[int, int]:
+def text_capacity_in_characters(axes: Axes) -> tuple[int, int]:
     """Estimate how many characters fit along the axes of a panel.
 
     The estimate uses the average width of a letter in the current font size.
@@ -280,7 +290,7 @@ def text_capacity(axes: Axes) -> tuple[int, int]:
     up : int
         Number of characters along y, at least 12.
     """
-    figure, (left, right) = cast(Figure, axes.figure), _horizontal_extent(axes)
+    figure, (left, right) = cast(Figure, axes.figure), _horizontal_extent_in_figure(axes)
     place = axes.get_subplotspec()
     rows = 1 if place is None else place.get_gridspec().nrows
     width, height = figure.get_size_inches()
@@ -292,7 +302,7 @@ def text_capacity(axes: Axes) -> tuple[int, int]:
 # ---- legends ------------------------------------------------------------------------------------
 
 
-def add_legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
+def add_legend(axes: Axes, legend_columns: int = 2, title: str | None = None) -> None:
     """Add a legend below the axes, outside the data area.
 
     Call this function after the x label is set, because the position of the legend depends on the
@@ -313,10 +323,10 @@ def add_legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
         return
     lines = axes.get_xlabel().count("\n") + _tick_label_lines(axes)
     drop = rcParams["font.size"] * (2.9 + 1.3 * lines)
-    figure, (left, right) = cast(Figure, axes.figure), _horizontal_extent(axes)
+    figure, (left, right) = cast(Figure, axes.figure), _horizontal_extent_in_figure(axes)
     # A legend that extends below the colour bar would make the layout engine narrow the panel.
     if getattr(axes, "_colorbars", ()):
-        right -= _COLOUR_BAR_SHARE * (right - left)
+        right -= _COLOUR_BAR_FRACTION_OF_PANEL * (right - left)
     below = offset_copy(axes.transAxes, figure, 0.0, -drop, "points")
     made = partial(
         axes.legend,
@@ -325,7 +335,7 @@ def add_legend(axes: Axes, columns: int = 2, title: str | None = None) -> None:
         bbox_transform=blended_transform_factory(figure.transFigure, below),
         title=title,
     )
-    _fit_legend(made, shown, columns, 0.97 * (right - left) * figure.bbox.width)
+    _fit_legend_to_width(made, shown, legend_columns, 0.97 * (right - left) * figure.bbox.width)
 
 
 def _tick_label_lines(axes: Axes) -> float:
@@ -347,18 +357,23 @@ def _legend_entries(axes: Axes) -> dict[str, Any]:
     return named
 
 
-def _fit_legend(
-    made: Callable[..., Legend], named: Mapping[str, Any], columns: int, width: float
+def _fit_legend_to_width(
+    make_legend: Callable[..., Legend],
+    handles_by_label: Mapping[str, Any],
+    max_columns: int,
+    max_width: float,
 ) -> None:
     """Create a legend with as many columns as fit into a given width.
 
     The width is in pixels. Matplotlib fills the columns of a legend one after another, so the
     entries are reordered to be read line by line.
     """
-    for beside in range(min(columns, len(named)), 0, -1):
-        texts = [text for column in range(beside) for text in list(named)[column::beside]]
-        legend = made([named[text] for text in texts], texts, ncols=beside)
-        if legend.get_window_extent().width <= width:
+    for beside in range(min(max_columns, len(handles_by_label)), 0, -1):
+        texts = [
+            text for column in range(beside) for text in list(handles_by_label)[column::beside]
+        ]
+        legend = make_legend([handles_by_label[text] for text in texts], texts, ncols=beside)
+        if legend.get_window_extent().width <= max_width:
             return
 
 
@@ -394,7 +409,7 @@ def add_grey_legend_entry(axes: Axes, name: str, style: Mapping[str, Any]) -> No
     axes.add_artist(Line2D([-1.0], [-1.0], transform=axes.transAxes, label=name, **line))
 
 
-def _horizontal_extent(axes: Axes) -> tuple[float, float]:
+def _horizontal_extent_in_figure(axes: Axes) -> tuple[float, float]:
     """Return the left and right limits of the space for a panel.
 
     The limits are fractions of the figure width.
@@ -418,7 +433,7 @@ def _is_visible(handle: Any) -> bool:
     return True
 
 
-def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
+def merge_common_legends(figure: Figure, panel_axes: Sequence[Axes]) -> None:
     """Replace the legends of similar panels by one legend of the figure.
 
     Panels are similar if one of their legends contains all entries of the other legends. The common
@@ -432,11 +447,11 @@ def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
     panels : sequence of matplotlib.axes.Axes
         Panels of the figure.
     """
-    named = {panel: _legend_entries(panel) for panel in panels if panel.get_legend()}
+    named = {panel: _legend_entries(panel) for panel in panel_axes if panel.get_legend()}
     alike: list[Axes] = []
     for fullest in named:
         within = [panel for panel, texts in named.items() if texts.keys() <= named[fullest].keys()]
-        if len(within) > max(1, len(alike), len(panels) // 2):
+        if len(within) > max(1, len(alike), len(panel_axes) // 2):
             alike, chosen = within, fullest
     if not alike:
         return
@@ -449,10 +464,10 @@ def share_legends(figure: Figure, panels: Sequence[Axes]) -> None:
         place: Any = "outside lower center"
         return figure.legend(shown, texts, loc=place, ncols=ncols, title=title)
 
-    _fit_legend(made, named[chosen], 5, figure.bbox.width)
+    _fit_legend_to_width(made, named[chosen], 5, figure.bbox.width)
 
 
-def enlarge_for_legends(figure: Figure, rows: Sequence[Sequence[Axes]]) -> None:
+def enlarge_for_legends(figure: Figure, panel_rows: Sequence[Sequence[Axes]]) -> None:
     """Increase the figure height by the height of legends and tick labels.
 
     As a result, legends and long tick labels do not reduce the height of the panels.
@@ -464,12 +479,12 @@ def enlarge_for_legends(figure: Figure, rows: Sequence[Sequence[Axes]]) -> None:
     rows : sequence of sequence of matplotlib.axes.Axes
         Panels in each row of the figure.
     """
-    beside = [[legend for panel in row if (legend := panel.get_legend())] for row in rows]
+    beside = [[legend for panel in row if (legend := panel.get_legend())] for row in panel_rows]
     heights = [
         max(map(_legend_height, legends), default=0.0) for legends in (*beside, figure.legends)
     ]
     line = 1.3 * float(rcParams["font.size"]) / 72.0
-    heights += [line * (max(map(_tick_label_lines, row)) - 1.0) for row in rows]
+    heights += [line * (max(map(_tick_label_lines, row)) - 1.0) for row in panel_rows]
     figure.set_figheight(figure.get_figheight() + sum(heights))
 
 
@@ -483,7 +498,7 @@ def _legend_height(legend: Legend) -> float:
     return height / figure.dpi + 1.5 * float(rcParams["font.size"]) / 72.0
 
 
-def freeze_ticks(axes: Axes) -> None:
+def freeze_tick_style(axes: Axes) -> None:
     """Set the size of the tick labels to the size in the current style.
 
     Matplotlib may create ticks after the style context has ended. The explicit size ensures that

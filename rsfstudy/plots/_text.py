@@ -9,12 +9,13 @@ from typing import Any
 import xarray as xr
 from matplotlib.mathtext import MathTextParser
 
+from rsfstudy._deprecation import renamed_keywords
 from rsfstudy.quantities import Quantity
 
 _MATH_PARSER = MathTextParser("path")
-_MATH_PATTERN = re.compile(r"((?<!\\)\$(?:[^$\\]|\\.)*\$)")
+_MATHTEXT_PATTERN = re.compile(r"((?<!\\)\$(?:[^$\\]|\\.)*\$)")
 _NUMBER_PATTERN = re.compile(r"-?[\d.,]*\d")
-_WORD_PATTERN = re.compile(rf"(?:{_MATH_PATTERN.pattern[1:-1]}|\\\$|[^\s$])+")
+_WORD_PATTERN = re.compile(rf"(?:{_MATHTEXT_PATTERN.pattern[1:-1]}|\\\$|[^\s$])+")
 #: Space at which a line is never broken.
 _UNBREAKABLE_SPACE = r"$\ $"
 
@@ -37,7 +38,7 @@ _SYMBOL_REPLACEMENTS: tuple[tuple[str, str], ...] = (
 
 
 #: Names for the labels of axes, which are shorter than the names in files.
-_SHORT_NAMES = {
+_SHORT_AXIS_NAMES_OF_QUANTITIES = {
     "a_over_b_minus_a": "",
     "critical_displacement": "critical displacement",
     "critical_velocity_ratio": "critical load point velocity",
@@ -81,24 +82,24 @@ def to_mathtext(text: Any) -> str:
         Text for a matplotlib label.
     """
     parts = (
-        _MATH_PATTERN.split(str(text))
+        _MATHTEXT_PATTERN.split(str(text))
         if _is_valid_mathtext(str(text))
         else [str(text).replace("$", r"\$")]
     )
     return "".join(
-        part if _MATH_PATTERN.fullmatch(part) else _replace_symbols(part) for part in parts
+        part if _MATHTEXT_PATTERN.fullmatch(part) else _replace_symbols(part) for part in parts
     )
 
 
 def _replace_symbols(text: str) -> str:
     """Replace symbols and underscores outside formulas."""
     for found, written in _SYMBOL_REPLACEMENTS:
-        pieces = _MATH_PATTERN.split(text)
+        pieces = _MATHTEXT_PATTERN.split(text)
         text = "".join(
-            p if _MATH_PATTERN.fullmatch(p) else re.sub(found, written, p) for p in pieces
+            p if _MATHTEXT_PATTERN.fullmatch(p) else re.sub(found, written, p) for p in pieces
         )
-    pieces = _MATH_PATTERN.split(text)
-    return "".join(p if _MATH_PATTERN.fullmatch(p) else p.replace("_", " ") for p in pieces)
+    pieces = _MATHTEXT_PATTERN.split(text)
+    return "".join(p if _MATHTEXT_PATTERN.fullmatch(p) else p.replace("_", " ") for p in pieces)
 
 
 def _is_valid_mathtext(text: str) -> bool:
@@ -112,7 +113,7 @@ def _is_valid_mathtext(text: str) -> bool:
     return True
 
 
-def wrap_text(text: str, width: int) -> str:
+def wrap_text(text: str, max_line_characters: int) -> str:
     """Wrap a text without breaking formulas.
 
     Existing line breaks are kept. Assignments such as ``x = 2 y`` are kept on one line.
@@ -130,7 +131,7 @@ def wrap_text(text: str, width: int) -> str:
         Text with line breaks.
     """
     if "\n" in text:
-        return "\n".join(wrap_text(line, width) for line in text.split("\n"))
+        return "\n".join(wrap_text(line, max_line_characters) for line in text.split("\n"))
     words: list[str] = []
     for word in _WORD_PATTERN.findall(text):
         last = words[-1].split()[-2:] if words else [""]
@@ -141,7 +142,7 @@ def wrap_text(text: str, width: int) -> str:
             words.append(word)
     lines: list[list[str]] = [[]]
     for word in words:
-        if lines[-1] and visible_length(" ".join([*lines[-1], word])) > width:
+        if lines[-1] and visible_length(" ".join([*lines[-1], word])) > max_line_characters:
             lines.append([])
         lines[-1].append(word)
     return "\n".join(" ".join(line) for line in lines)
@@ -163,7 +164,7 @@ def visible_length(text: str) -> int:
     return len(re.sub(r"[${}^_]", "", re.sub(r"\\[a-zA-Z]+", "x", text)))
 
 
-def axis_label(about: Quantity, width: int = 45) -> str:
+def format_quantity_axis_label(quantity: Quantity, max_line_characters: int = 45) -> str:
     """Return the label of an axis with name, symbol and units of a quantity.
 
     Parameters
@@ -179,15 +180,19 @@ def axis_label(about: Quantity, width: int = 45) -> str:
         Label in mathtext. If a quantity has neither units nor a symbol, its scale is used as the
         unit.
     """
-    words = _SHORT_NAMES.get(about.name, about.long_name.split(":")[0])
-    text = ", ".join(filter(None, (f"{words[:1].upper()}{words[1:]}", about.symbol)))
-    units = about.units if about.units not in ("", "1") else about.scale * (not about.symbol)
+    words = _SHORT_AXIS_NAMES_OF_QUANTITIES.get(quantity.name, quantity.long_name.split(":")[0])
+    text = ", ".join(filter(None, (f"{words[:1].upper()}{words[1:]}", quantity.symbol)))
+    units = (
+        quantity.units
+        if quantity.units not in ("", "1")
+        else quantity.scale * (not quantity.symbol)
+    )
     text = to_mathtext(text) + (
         f"{_UNBREAKABLE_SPACE}({format_units(units).replace(' ', _UNBREAKABLE_SPACE)})"
         if units
         else ""
     )
-    return wrap_text(text, width).replace(_UNBREAKABLE_SPACE, " ")
+    return wrap_text(text, max_line_characters).replace(_UNBREAKABLE_SPACE, " ")
 
 
 def format_units(units: str) -> str:
@@ -207,7 +212,7 @@ def format_units(units: str) -> str:
     return to_mathtext(re.sub(r"\bum\b", r"$\\mu$m", powers))
 
 
-def quantity_symbol(about: Quantity) -> str:
+def quantity_symbol(quantity: Quantity) -> str:
     """Return the symbol of a quantity, or its name if there is no symbol.
 
     Parameters
@@ -220,7 +225,7 @@ def quantity_symbol(about: Quantity) -> str:
     str
         Symbol or name in mathtext.
     """
-    return to_mathtext(about.symbol or about.name)
+    return to_mathtext(quantity.symbol or quantity.name)
 
 
 def format_number(value: float, digits: int = 3) -> str:
@@ -252,7 +257,7 @@ def format_number(value: float, digits: int = 3) -> str:
     return to_mathtext(text)
 
 
-def format_with_error(value: float, error: float, most: int | None = None) -> str:
+def format_with_error(value: float, error: float, max_decimals: int | None = None) -> str:
     r"""Format a value and its error, rounded to the first digit of the error.
 
     At least one decimal place is written.
@@ -275,13 +280,14 @@ def format_with_error(value: float, error: float, most: int | None = None) -> st
     """
     if not math.isfinite(value) or not math.isfinite(error):
         return "unknown"
-    if most is not None and error < 0.5 * 10.0**-most:
-        return f"${value:.{most}f}$"
+    if max_decimals is not None and error < 0.5 * 10.0**-max_decimals:
+        return f"${value:.{max_decimals}f}$"
     digits = max(1, math.ceil(-math.log10(error))) if error > 0.0 else 4
     return rf"${value:.{digits}f} \pm {error:.{digits}f}$"
 
 
-def format_slope(row: xr.Dataset, name: str, most: int | None = None) -> str:
+@renamed_keywords
+def format_slope(row: xr.Dataset, name: str, max_decimals: int | None = None) -> str:
     r"""Format a slope and its error.
 
     The error is the sum of the standard error, which measures the misfit of the fitted line, and
@@ -312,7 +318,9 @@ def format_slope(row: xr.Dataset, name: str, most: int | None = None) -> str:
     $0.664 \pm 0.002$
     """
     numerical = float(row[f"{name}_error"]) if f"{name}_error" in row else 0.0
-    return format_with_error(float(row[name]), float(row[f"{name}_stderr"]) + numerical, most)
+    return format_with_error(
+        float(row[name]), float(row[f"{name}_stderr"]) + numerical, max_decimals
+    )
 
 
 def format_stiffness_ratio(ratio: float) -> str:

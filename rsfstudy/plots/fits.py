@@ -24,13 +24,13 @@ from rsfstudy.study import Panel
 
 #: Maximum lag of the autocorrelation, minimum number of rows that remain when a long record is
 #: thinned, and maximum number of records with a panel.
-_MAX_LAGS, _MAX_ROWS, _MAX_RECORDS = 40, 20_000, 4
+_MAX_AUTOCORRELATION_LAGS, _MAX_DRAWN_RECORD_ROWS, _MAX_RECORD_PANELS = 40, 20_000, 4
 #: Margin on both sides of the windows as a fraction of their extent, and width of the moving
 #: average of residuals as a fraction of a window.
-_MARGIN_SHARE, _AVERAGING_SHARE = 0.15, 0.02
+_MARGIN_FRACTION_BESIDE_WINDOWS, _RESIDUAL_AVERAGING_FRACTION_OF_WINDOW = 0.15, 0.02
 #: Half width of the confidence band in standard errors.
-_BAND_STDERRS = 2.0
-_ROW_STYLE: dict[str, Any] = {
+_HALF_WIDTH_OF_BAND_IN_STDERRS = 2.0
+_LINE_STYLE_OF_RECORD_ROWS: dict[str, Any] = {
     "color": "0.7",
     "markersize": 1.5,
     "linestyle": "none",
@@ -65,10 +65,10 @@ def panels(dataset: xr.Dataset) -> Sequence[Panel]:
         replace(
             named,
             isel=dict.fromkeys(part, 0) | dict.fromkeys(record, number),
-            overlays=[_draw_record],
+            overlays=[_draw_record_with_fits],
             y_label="Friction coefficient",
         )
-        for number in range(min(records, _MAX_RECORDS))
+        for number in range(min(records, _MAX_RECORD_PANELS))
     ]
     first = replace(named, isel=of_record[0].isel)
     return (
@@ -89,7 +89,7 @@ def _record_title(records: int, dataset: xr.Dataset) -> str:
     """Return the name of the record if there are several records."""
     if records == 1:
         return ""
-    return f"{dataset['record'].item()}{f' (of {records})' * (records > _MAX_RECORDS)}"
+    return f"{dataset['record'].item()}{f' (of {records})' * (records > _MAX_RECORD_PANELS)}"
 
 
 def _step_title(dataset: xr.Dataset) -> str:
@@ -97,15 +97,15 @@ def _step_title(dataset: xr.Dataset) -> str:
     return f"Step {dataset['step'].values[0]:g}" if "step" in dataset.dims else ""
 
 
-def _iterate_fits(
-    dataset: xr.Dataset, *, first: bool = False
+def _iterate_fits_with_law(
+    dataset: xr.Dataset, *, only_first_step: bool = False
 ) -> Iterator[tuple[xr.Dataset, str, int]]:
     """Iterate over the fits of a record.
 
     Each item contains the results of a fit, the description of the law, and the index of the law.
     If ``first`` is True, only the fits of the first step are included.
     """
-    steps = range(1 if first else dataset.sizes.get("step", 1))
+    steps = range(1 if only_first_step else dataset.sizes.get("step", 1))
     for number in range(dataset.sizes["law"]):
         for step in steps:
             one = dataset.isel(
@@ -114,62 +114,68 @@ def _iterate_fits(
             yield one, describe_point(one, "law"), number
 
 
-def _thinned_columns(one: xr.Dataset, names: Sequence[str]) -> list[np.ndarray]:
+def _select_thinned_row_columns(fit: xr.Dataset, column_names: Sequence[str]) -> list[np.ndarray]:
     """Return the columns of a fit without missing values.
 
     Long columns are thinned by omitting rows.
     """
-    columns = np.array([one[name].values for name in names])
+    columns = np.array([fit[name].values for name in column_names])
     columns = columns[:, np.isfinite(columns).all(axis=0)]
-    return list(columns[:, :: max(1, columns.shape[1] // _MAX_ROWS)])
+    return list(columns[:, :: max(1, columns.shape[1] // _MAX_DRAWN_RECORD_ROWS)])
 
 
-def _window_columns(one: xr.Dataset, names: Sequence[str]) -> Iterator[list[np.ndarray]]:
+def _split_row_columns_by_window(
+    fit: xr.Dataset, column_names: Sequence[str]
+) -> Iterator[list[np.ndarray]]:
     """Iterate over the windows of a fit.
 
     Each item is a list of columns. A window consists of consecutive rows with values, in order of
     increasing time.
     """
-    rows = np.flatnonzero(one[names[-1]].notnull().values)
-    late = np.diff(one["record_time"].values[rows]) > 0.0
+    rows = np.flatnonzero(fit[column_names[-1]].notnull().values)
+    late = np.diff(fit["record_time"].values[rows]) > 0.0
     for part in np.split(rows, np.flatnonzero((np.diff(rows) > 1) | ~late) + 1):
         if len(part):
-            yield _thinned_columns(one.isel(row=part), names)
+            yield _select_thinned_row_columns(fit.isel(row=part), column_names)
 
 
-def _draw_record(dataset: xr.Dataset, axes: Axes) -> None:
+def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw a record with the fitted curves and their confidence bands."""
     windows = []
-    for number, (one, name, law) in enumerate(_iterate_fits(dataset)):
+    for number, (one, name, law) in enumerate(_iterate_fits_with_law(dataset)):
         if not number:
-            record = _thinned_columns(one, ("record_displacement", "record_friction"))
-            axes.plot(*record, label="record", **_ROW_STYLE)
+            record = _select_thinned_row_columns(one, ("record_displacement", "record_friction"))
+            axes.plot(*record, label="record", **_LINE_STYLE_OF_RECORD_ROWS)
         names = "record_displacement", "fitted_friction", "fitted_friction_stderr"
         style = cycle_style(law) | {"marker": "", "label": name, "linewidth": 1.2, "zorder": 3}
-        for x, y, error in _window_columns(one, names):
+        for x, y, error in _split_row_columns_by_window(one, names):
             if not law:
                 axes.axvspan(x[0], x[-1], color="0.94", lw=0, zorder=0, label="what is fitted")
             windows += [x[0], x[-1]]
             band = {"color": style["color"], "alpha": 0.3, "lw": 0, "zorder": 2}
-            said = f"within {_BAND_STDERRS:g} standard errors"
+            said = f"within {_HALF_WIDTH_OF_BAND_IN_STDERRS:g} standard errors"
             axes.fill_between(
-                x, y - _BAND_STDERRS * error, y + _BAND_STDERRS * error, label=said, **band
+                x,
+                y - _HALF_WIDTH_OF_BAND_IN_STDERRS * error,
+                y + _HALF_WIDTH_OF_BAND_IN_STDERRS * error,
+                label=said,
+                **band,
             )
             axes.plot(x, y, **style)
     if windows:
-        beside = _MARGIN_SHARE * (max(windows) - min(windows))
+        beside = _MARGIN_FRACTION_BESIDE_WINDOWS * (max(windows) - min(windows))
         axes.set_xlim(min(windows) - beside, max(windows) + beside)
 
 
 def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw the residuals of the fits and their moving averages."""
     axes.axhline(0.0, color="0.5", lw=0.8, zorder=2)
-    for one, name, law in _iterate_fits(dataset):
+    for one, name, law in _iterate_fits_with_law(dataset):
         style = cycle_style(law) | {"label": name, "marker": "", "linewidth": 1.0, "zorder": 3}
-        for x, y in _window_columns(one, ("record_displacement", "residual")):
+        for x, y in _split_row_columns_by_window(one, ("record_displacement", "residual")):
             if not law:
-                axes.plot(x, y, label=f"each row, {name}", **_ROW_STYLE)
-            count = max(1, round(_AVERAGING_SHARE * len(x)))
+                axes.plot(x, y, label=f"each row, {name}", **_LINE_STYLE_OF_RECORD_ROWS)
+            count = max(1, round(_RESIDUAL_AVERAGING_FRACTION_OF_WINDOW * len(x)))
             mean = np.ones(count) / count
             axes.plot(np.convolve(x, mean, "valid"), np.convolve(y, mean, "valid"), **style)
 
@@ -177,9 +183,9 @@ def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
 def _draw_autocorrelation(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw the autocorrelation of residuals and of whitened residuals."""
     axes.axhline(0.0, color="0.5", lw=0.8)
-    for one, name, law in _iterate_fits(dataset, first=True):
-        left, freed = _thinned_columns(one, ("residual", "innovation"))
-        if len(left) <= _MAX_LAGS:
+    for one, name, law in _iterate_fits_with_law(dataset, only_first_step=True):
+        left, freed = _select_thinned_row_columns(one, ("residual", "innovation"))
+        if len(left) <= _MAX_AUTOCORRELATION_LAGS:
             continue
         style = cycle_style(law) | {"marker": ""}
         axes.plot(_compute_autocorrelation(left), **style | {"label": name})
@@ -194,7 +200,9 @@ def _compute_autocorrelation(values: np.ndarray) -> np.ndarray:
     """Compute the autocorrelation at all lags up to the maximum lag."""
     seen = values - values.mean()
     size = float(seen @ seen) or 1.0
-    return np.array([1.0, *(seen[lag:] @ seen[:-lag] / size for lag in range(1, _MAX_LAGS + 1))])
+    return np.array(
+        [1.0, *(seen[lag:] @ seen[:-lag] / size for lag in range(1, _MAX_AUTOCORRELATION_LAGS + 1))]
+    )
 
 
 def _correlation_title(dataset: xr.Dataset) -> str:
@@ -205,9 +213,9 @@ def _correlation_title(dataset: xr.Dataset) -> str:
     return f"Correlation: {laws[0]} below, {laws[1]} above".replace("_", " ")
 
 
-def _parameter_symbol(name: str) -> str:
+def _parameter_symbol(parameter_name: str) -> str:
     """Return the symbol of a parameter, with its window number if any."""
-    plain, number = split_window_number(name)
+    plain, number = split_window_number(parameter_name)
     symbol = PARAMETERS[plain].symbol
     return f"{symbol[:-1]}^{{({number})}}$" if number else symbol
 
@@ -218,7 +226,7 @@ def _draw_correlation(dataset: xr.Dataset, axes: Axes) -> None:
     The lower triangle shows the fit of the first law, and the upper triangle shows the fit of the
     second law.
     """
-    fits = [one for one, _name, _law in _iterate_fits(dataset, first=True)][:2]
+    fits = [one for one, _name, _law in _iterate_fits_with_law(dataset, only_first_step=True)][:2]
     lower, upper = fits[0]["correlation"].values, fits[-1]["correlation"].values
     values = np.tril(lower) + np.triu(upper, 1)
     names = [_parameter_symbol(str(name)) for name in dataset["parameter"].values]

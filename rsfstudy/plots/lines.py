@@ -15,27 +15,27 @@ from matplotlib.axes import Axes
 
 from rsfstudy.plots._axes import (
     add_colour_bar,
+    are_log_spaced,
+    are_positive_and_span_decades,
     describe_point,
-    flag_meanings,
     has_numeric_points,
-    is_log_spaced,
     is_numeric_variable,
     point_colours,
-    set_up_x_axis,
-    spans_decades,
+    read_flag_words,
+    set_x_axis_of_dimension,
     varying_variables,
 )
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_marker, cycle_style
-from rsfstudy.plots._text import axis_label, to_mathtext
+from rsfstudy.plots._text import format_quantity_axis_label, to_mathtext
 from rsfstudy.storage import read_declaration
-from rsfstudy.study import Panel, read_quantities
+from rsfstudy.study import Panel, read_undocumented_quantities
 from rsfstudy.vocabulary import find_quantity
 
 #: Maximum number of panels, maximum number of lines with a legend entry, and maximum number of
 #: points of a numeric axis without a colour scale.
 _MAX_PANELS, _MAX_LEGEND_LINES, _MAX_CYCLED_COLOURS = 4, 12, 6
 #: Maximum number of identical curves that are all named in the legend.
-_MAX_NAMED_DUPLICATES = 3
+_MAX_NAMED_IDENTICAL_CURVES = 3
 #: Maximum number of points of a line with markers.
 _MAX_POINTS_WITH_MARKERS = 60
 
@@ -62,7 +62,7 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     else:
         known = variable in dataset
         drawn = known and (
-            is_numeric_variable(dataset[variable]) or flag_meanings(dataset[variable])
+            is_numeric_variable(dataset[variable]) or read_flag_words(dataset[variable])
         )
         names = [variable] if drawn else []
     named = len(names) == 1 and not read_declaration(dataset).overrides
@@ -72,30 +72,34 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     ]
 
 
-def _build_panel(dataset: xr.Dataset, name: str, title: str) -> Panel:
+def _build_panel(dataset: xr.Dataset, variable_name: str, title: str) -> Panel:
     """Build the panel of one variable."""
-    along = _choose_x_dimension(dataset, dataset[name]) if dataset[name].ndim else ""
+    along = (
+        _choose_x_dimension(dataset, dataset[variable_name]) if dataset[variable_name].ndim else ""
+    )
     return Panel(
         x=along,
-        overlays=[partial(_draw_lines, name, along)],
-        y_label=axis_label(find_quantity(name, read_quantities(dataset)), 200),
+        overlays=[partial(_draw_lines, variable_name, along)],
+        y_label=format_quantity_axis_label(
+            find_quantity(variable_name, read_undocumented_quantities(dataset)), 200
+        ),
         title=to_mathtext(title),
     )
 
 
-def _draw_lines(name: str, along: str, dataset: xr.Dataset, axes: Axes) -> None:
+def _draw_lines(variable_name: str, x_dimension: str, dataset: xr.Dataset, axes: Axes) -> None:
     """Draw the lines of a variable along a dimension."""
-    values = dataset[name]
-    if told := flag_meanings(values):
+    values = dataset[variable_name]
+    if told := read_flag_words(values):
         flags, places = np.unique(values.values, return_inverse=True)
         values = values.copy(data=np.reshape(places, values.shape).astype(float))
         axes.set_yticks(range(flags.size), [told[flag] for flag in flags.tolist()])
         axes.set_ylim(-0.5, flags.size - 0.5)
-    x = set_up_x_axis(axes, dataset, along) if along else np.zeros(1)
-    numeric = bool(along) and has_numeric_points(dataset, along)
-    coloured = _choose_colour_dimension(dataset, values, along)
-    others = [str(d) for d in values.dims if d not in (along, coloured)]
-    curves = _distinct_curves(list(_iterate_points(values, others)), others)
+    x = set_x_axis_of_dimension(axes, dataset, x_dimension) if x_dimension else np.zeros(1)
+    numeric = bool(x_dimension) and has_numeric_points(dataset, x_dimension)
+    coloured = _choose_colour_dimension(dataset, values, x_dimension)
+    others = [str(d) for d in values.dims if d not in (x_dimension, coloured)]
+    curves = _find_distinct_curves(list(_iterate_values_at_points(values, others)), others)
     for number, (group, text) in enumerate(curves):
         style = cycle_style(number) | {
             "label": text if number < _MAX_LEGEND_LINES and text else None
@@ -108,14 +112,14 @@ def _draw_lines(name: str, along: str, dataset: xr.Dataset, axes: Axes) -> None:
             axes.plot(x, np.atleast_1d(group.values), **style)
             continue
         shades = point_colours(dataset, coloured)
-        for row, colour in zip(_iterate_points(group, [coloured]), shades, strict=True):
+        for row, colour in zip(_iterate_values_at_points(group, [coloured]), shades, strict=True):
             axes.plot(x, row.values, **style | {"color": colour})
             style["label"] = None
     if coloured is not None:
         add_colour_bar(dataset, axes, coloured)
-    if numeric and is_log_spaced(x):
+    if numeric and are_log_spaced(x):
         axes.set_xscale("log")
-    if spans_decades(np.asarray(values.values, dtype=float)):
+    if are_positive_and_span_decades(np.asarray(values.values, dtype=float)):
         axes.set_yscale("log")
     if len(curves) > _MAX_LEGEND_LINES:
         add_grey_legend_entry(
@@ -123,61 +127,75 @@ def _draw_lines(name: str, along: str, dataset: xr.Dataset, axes: Axes) -> None:
         )
 
 
-def _choose_x_dimension(dataset: xr.Dataset, values: xr.DataArray) -> str:
+def _choose_x_dimension(dataset: xr.Dataset, variable: xr.DataArray) -> str:
     """Choose the dimension along x.
 
     The result is the longest numeric dimension, or the last dimension if no dimension is numeric.
     """
-    names = [str(dimension) for dimension in values.dims]
+    names = [str(dimension) for dimension in variable.dims]
     numeric = [
         name for name in names if name in dataset.coords and has_numeric_points(dataset, name)
     ]
-    return max(reversed(numeric), key=lambda name: values.sizes[name]) if numeric else names[-1]
+    return max(reversed(numeric), key=lambda name: variable.sizes[name]) if numeric else names[-1]
 
 
-def _choose_colour_dimension(dataset: xr.Dataset, values: xr.DataArray, along: str) -> str | None:
+def _choose_colour_dimension(
+    dataset: xr.Dataset, variable: xr.DataArray, x_dimension: str
+) -> str | None:
     """Choose the dimension that a colour scale represents.
 
     The result is the longest numeric dimension apart from the dimension along x. The result is None
     if no numeric dimension has more than six points.
     """
-    numeric = [str(d) for d in values.dims if d != along and has_numeric_points(dataset, str(d))]
-    long = [name for name in numeric if values.sizes[name] > _MAX_CYCLED_COLOURS]
-    return max(long, key=lambda name: values.sizes[name]) if long else None
+    numeric = [
+        str(d) for d in variable.dims if d != x_dimension and has_numeric_points(dataset, str(d))
+    ]
+    long = [name for name in numeric if variable.sizes[name] > _MAX_CYCLED_COLOURS]
+    return max(long, key=lambda name: variable.sizes[name]) if long else None
 
 
-def _iterate_points(values: xr.DataArray, dimensions: Sequence[str]) -> Iterator[xr.DataArray]:
+def _iterate_values_at_points(
+    values: xr.DataArray, dimensions: Sequence[str]
+) -> Iterator[xr.DataArray]:
     """Iterate over the values at each point of some dimensions."""
     for places in np.ndindex(*(values.sizes[d] for d in dimensions)):
         yield values.isel(dict(zip(dimensions, places, strict=True)))
 
 
-def _distinct_curves(
-    groups: Sequence[xr.DataArray], dimensions: Sequence[str]
+def _find_distinct_curves(
+    curves: Sequence[xr.DataArray], dimensions: Sequence[str]
 ) -> list[tuple[xr.DataArray, str]]:
     """Group identical curves and describe the points of each group.
 
     Curves without a finite value are omitted.
     """
     alike: dict[bytes, list[xr.DataArray]] = {}
-    for group in groups:
+    for group in curves:
         if bool(np.isfinite(group).any()):
             alike.setdefault(group.values.tobytes(), []).append(group)
-    several = [d for d in dimensions if len({str(group[d].item()) for group in groups}) > 1]
-    return [(same[0], ", ".join(_common_places(same, several))) for same in alike.values()]
+    several = [d for d in dimensions if len({str(group[d].item()) for group in curves}) > 1]
+    return [
+        (same[0], ", ".join(_describe_places_of_identical_curves(same, several)))
+        for same in alike.values()
+    ]
 
 
-def _common_places(same: Sequence[xr.DataArray], dimensions: Sequence[str]) -> tuple[str, ...]:
+def _describe_places_of_identical_curves(
+    identical_curves: Sequence[xr.DataArray], dimensions: Sequence[str]
+) -> tuple[str, ...]:
     """Describe the points of a group of identical curves.
 
     The description contains the coordinates that all curves share. If the curves share no
     coordinate, the description lists all points. For a large group, the description contains only
     the first point and the number of the other points.
     """
-    places = [list(dict.fromkeys(describe_point(group, d) for group in same)) for d in dimensions]
+    places = [
+        list(dict.fromkeys(describe_point(group, d) for group in identical_curves))
+        for d in dimensions
+    ]
     if not places or any(len(names) == 1 for names in places):
         return tuple(names[0] for names in places if len(names) == 1)
-    every = [", ".join(describe_point(one, d) for d in dimensions) for one in same]
-    if len(every) <= _MAX_NAMED_DUPLICATES:
+    every = [", ".join(describe_point(one, d) for d in dimensions) for one in identical_curves]
+    if len(every) <= _MAX_NAMED_IDENTICAL_CURVES:
         return (" and ".join(every),)
     return (f"{every[0]} and {len(every) - 1} more",)

@@ -23,30 +23,30 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 from scipy.spatial import cKDTree
 
 from rsfstudy.plots._axes import (
-    flag_meanings,
+    are_log_spaced,
+    are_positive_and_span_decades,
     has_numeric_points,
-    is_log_spaced,
     is_numeric_variable,
     measured_variables,
-    spans_decades,
+    read_flag_words,
 )
-from rsfstudy.plots._text import axis_label, to_mathtext
+from rsfstudy.plots._text import format_quantity_axis_label, to_mathtext
 from rsfstudy.status import Status
-from rsfstudy.study import Panel, read_quantities
+from rsfstudy.study import Panel, read_undocumented_quantities
 from rsfstudy.vocabulary import find_quantity
 
 #: Minimum number of points of each axis of a map, and maximum number of maps.
-_MIN_POINTS, _MAX_MAPS = 3, 12
+_MIN_POINTS_PER_MAP_AXIS, _MAX_MAPS = 3, 12
 #: Hatches of cells without a value, in the order of their status codes.
 _HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "||||", "----", "++++", "oooo")
 #: Minimum distance of a contour label from the frame and from other contours, as a fraction of the
 #: panel size.
-_LABEL_CLEARANCE = 0.06
+_CONTOUR_LABEL_CLEARANCE = 0.06
 #: Minimum extent of a contour with a label, as a fraction of the panel size.
-_MIN_LABELLED_LENGTH = 0.2
+_MIN_LENGTH_OF_LABELLED_CONTOUR = 0.2
 #: Minimum number of points of each axis for contours.
 _MIN_POINTS_FOR_CONTOURS = 6
-_STATUS_NAMES = {int(status): status.label for status in Status}
+_STATUS_LABEL_BY_CODE = {int(status): status.label for status in Status}
 
 
 def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
@@ -70,26 +70,28 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     if not names or names[0] not in dataset:
         return []
     values = dataset[names[0]]
-    if not (is_numeric_variable(values) or flag_meanings(values)):
+    if not (is_numeric_variable(values) or read_flag_words(values)):
         return []
-    plane, cells = _map_axes(dataset, values), dataset["status"].dims
+    plane, cells = _choose_map_dimensions(dataset, values), dataset["status"].dims
     if plane is None or not set(values.dims) <= set(cells):
         return []
     others = [str(d) for d in values.dims if d not in plane]
-    about = find_quantity(names[0], read_quantities(dataset))
+    about = find_quantity(names[0], read_undocumented_quantities(dataset))
     places = list(np.ndindex(*(values.sizes[d] for d in others)))[:_MAX_MAPS]
     panel = partial(
         Panel,
         x=plane[1],
         overlays=[partial(draw_map, names[0], plane, _colour_scale(values))],
-        y_label=axis_label(find_quantity(plane[0], read_quantities(dataset)), 200),
+        y_label=format_quantity_axis_label(
+            find_quantity(plane[0], read_undocumented_quantities(dataset)), 200
+        ),
         title=None if others else to_mathtext(dataset.attrs.get("title", "")),
-        legend_title=axis_label(about, 60) if flag_meanings(values) else None,
+        legend_title=format_quantity_axis_label(about, 60) if read_flag_words(values) else None,
     )
     return [panel(isel=dict(zip(others, at, strict=True))) for at in places]
 
 
-def _map_axes(dataset: xr.Dataset, values: xr.DataArray) -> tuple[str, str] | None:
+def _choose_map_dimensions(dataset: xr.Dataset, variable: xr.DataArray) -> tuple[str, str] | None:
     """Return the names of the y axis and the x axis of a map.
 
     The axes are the last two numeric dimensions with at least three points. The result is None if
@@ -97,16 +99,17 @@ def _map_axes(dataset: xr.Dataset, values: xr.DataArray) -> tuple[str, str] | No
     """
     numeric = [
         str(dimension)
-        for dimension in values.dims
-        if dataset.sizes[dimension] >= _MIN_POINTS and has_numeric_points(dataset, str(dimension))
+        for dimension in variable.dims
+        if dataset.sizes[dimension] >= _MIN_POINTS_PER_MAP_AXIS
+        and has_numeric_points(dataset, str(dimension))
     ]
     return (numeric[-2], numeric[-1]) if len(numeric) > 1 else None
 
 
 def draw_map(
-    name: str,
-    plane: tuple[str, str],
-    scale: tuple[Normalize, Sequence[float]] | None,
+    variable_name: str,
+    map_dimensions: tuple[str, str],
+    colour_scale: tuple[Normalize, Sequence[float]] | None,
     dataset: xr.Dataset,
     axes: Axes,
 ) -> None:
@@ -127,45 +130,51 @@ def draw_map(
     axes : matplotlib.axes.Axes
         Axes to draw on.
     """
-    dataset = dataset.sortby(list(plane))
-    values = dataset[name].astype(float).transpose(*plane)
-    y, x = (values[dimension].values.astype(float) for dimension in plane)
-    at = _cell_edges(x, is_log_spaced(x)), _cell_edges(y, is_log_spaced(y))
-    axes.set(**{f"{w}scale": "log" for w, points in (("x", x), ("y", y)) if is_log_spaced(points)})
+    dataset = dataset.sortby(list(map_dimensions))
+    values = dataset[variable_name].astype(float).transpose(*map_dimensions)
+    y, x = (values[dimension].values.astype(float) for dimension in map_dimensions)
+    at = _cell_edges(x, are_log_spaced(x)), _cell_edges(y, are_log_spaced(y))
+    axes.set(**{f"{w}scale": "log" for w, points in (("x", x), ("y", y)) if are_log_spaced(points)})
     axes.set(xlim=(at[0][0], at[0][-1]), ylim=(at[1][0], at[1][-1]))
-    if found := scale or _colour_scale(dataset[name]):
+    if found := colour_scale or _colour_scale(dataset[variable_name]):
         axes.grid(False)
         known = np.ma.masked_invalid(values.values)
         drawn = axes.pcolormesh(*at, known, rasterized=True, norm=found[0])
-        if meanings := flag_meanings(dataset[name]):
+        if meanings := read_flag_words(dataset[variable_name]):
             for flag in found[1]:
                 colour = drawn.to_rgba(np.array(flag))
                 axes.add_collection(PolyCollection([], facecolor=colour, label=meanings[flag]))
         else:
             bar = cast(Figure, axes.figure).colorbar(drawn, ax=axes, pad=0.02)
-            bar.set_label(axis_label(find_quantity(name, read_quantities(dataset)), 34))
+            bar.set_label(
+                format_quantity_axis_label(
+                    find_quantity(variable_name, read_undocumented_quantities(dataset)), 34
+                )
+            )
             draw_contours(axes, values, found[1])
     status = dataset["status"]
-    status = status.squeeze([d for d in status.dims if status.sizes[d] == 1 and d not in plane])
-    if set(status.dims) == set(plane):
+    status = status.squeeze(
+        [d for d in status.dims if status.sizes[d] == 1 and d not in map_dimensions]
+    )
+    if set(status.dims) == set(map_dimensions):
         unknown = ~np.isfinite(values.values)
-        _hatch_statuses(axes, at, status.transpose(*plane).values, unknown)
+        _hatch_statuses(axes, at, status.transpose(*map_dimensions).values, unknown)
 
 
-def _colour_scale(data: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
+def _colour_scale(map_values: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
     """Return the colour scale and the contour levels of a variable.
 
     For a variable with flags, the flag values replace the contour levels. The result is None if the
     variable has no finite value.
     """
-    values = data.values.astype(float)
+    values = map_values.values.astype(float)
     if not np.isfinite(values).any():
         return None
-    if flag_meanings(data):
+    if read_flag_words(map_values):
         flags = np.unique(values[np.isfinite(values)])
         return BoundaryNorm(_cell_edges(flags), 256), flags.tolist()
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    if spans_decades(values):
+    if are_positive_and_span_decades(values):
         subs = (1.0, 3.0) if high < 1e4 * low else (1.0,)
         return LogNorm(low, high), LogLocator(subs=subs).tick_values(low, high)
     return Normalize(low, high), MaxNLocator(8).tick_values(low, high)
@@ -174,22 +183,24 @@ def _colour_scale(data: xr.DataArray) -> tuple[Normalize, Sequence[float]] | Non
 # ---- contents of a map --------------------------------------------------------------------------
 
 
-def _cell_edges(points: np.ndarray, log: bool = False) -> np.ndarray:
+def _cell_edges(cell_centres: np.ndarray, is_log_scale: bool = False) -> np.ndarray:
     """Compute the edges of cells from their centres.
 
     The edges are the midpoints between neighbouring centres, on a linear or logarithmic scale.
     """
-    if points.size < 2:
+    if cell_centres.size < 2:
         return np.asarray(
-            [0.9 * points[0], 1.1 * points[0]] if log else [points[0] - 0.5, points[0] + 0.5]
+            [0.9 * cell_centres[0], 1.1 * cell_centres[0]]
+            if is_log_scale
+            else [cell_centres[0] - 0.5, cell_centres[0] + 0.5]
         )
-    at = np.log(points) if log else points.astype(float)
+    at = np.log(cell_centres) if is_log_scale else cell_centres.astype(float)
     halfway = 0.5 * (at[1:] + at[:-1])
     ends = np.concatenate([[2.0 * at[0] - halfway[0]], halfway, [2.0 * at[-1] - halfway[-1]]])
-    return np.asarray(np.exp(ends) if log else ends)
+    return np.asarray(np.exp(ends) if is_log_scale else ends)
 
 
-def draw_contours(axes: Axes, values: xr.DataArray, levels: Sequence[float]) -> None:
+def draw_contours(axes: Axes, values: xr.DataArray, contour_levels: Sequence[float]) -> None:
     """Draw labelled contours of a variable.
 
     Contours are drawn only if both axes have at least six points.
@@ -204,16 +215,18 @@ def draw_contours(axes: Axes, values: xr.DataArray, levels: Sequence[float]) -> 
         Values of the variable at the contours.
     """
     y, x = (values[dimension].values for dimension in values.dims)
-    if min(values.shape) < _MIN_POINTS_FOR_CONTOURS or not len(levels):
+    if min(values.shape) < _MIN_POINTS_FOR_CONTOURS or not len(contour_levels):
         return
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "No contour levels were found")
-        found = axes.contour(x, y, values, levels, colors="white", linewidths=0.6, linestyles="-")
+        found = axes.contour(
+            x, y, values, contour_levels, colors="white", linewidths=0.6, linestyles="-"
+        )
     for text in axes.clabel(found, fontsize=6, fmt="%.3g", manual=_label_positions(axes, found)):
         text.set_path_effects([withStroke(linewidth=1.0, foreground="0.2")])
 
 
-def _label_positions(axes: Axes, found: QuadContourSet) -> list[tuple[float, float]]:
+def _label_positions(axes: Axes, contour_set: QuadContourSet) -> list[tuple[float, float]]:
     """Choose the positions of the contour labels.
 
     The label of a level is placed on its longest contour, at the point with the largest distance
@@ -221,21 +234,29 @@ def _label_positions(axes: Axes, found: QuadContourSet) -> list[tuple[float, flo
     the contour is too short.
     """
     panel = axes.transData + axes.transAxes.inverted()
-    levels = [[panel.transform(part) for part in parts if len(part)] for parts in found.allsegs]
+    levels = [
+        [panel.transform(part) for part in parts if len(part)] for parts in contour_set.allsegs
+    ]
     places = []
     for level in filter(None, levels):
         others = [part for other in levels if other is not level for part in other]
         line = max(level, key=len)
         apart = cKDTree(np.concatenate(others)).query(line)[0] if others else np.ones(len(line))
         room = np.minimum(apart, np.minimum(line, 1.0 - line).min(axis=1))
-        if room.max() > _LABEL_CLEARANCE and np.ptp(line, axis=0).max() > _MIN_LABELLED_LENGTH:
+        if (
+            room.max() > _CONTOUR_LABEL_CLEARANCE
+            and np.ptp(line, axis=0).max() > _MIN_LENGTH_OF_LABELLED_CONTOUR
+        ):
             x, y = panel.inverted().transform(line[room.argmax()]).tolist()
             places.append((x, y))
     return places
 
 
 def _hatch_statuses(
-    axes: Axes, at: tuple[np.ndarray, np.ndarray], status: np.ndarray, unknown: np.ndarray
+    axes: Axes,
+    cell_edges: tuple[np.ndarray, np.ndarray],
+    status: np.ndarray,
+    missing_mask: np.ndarray,
 ) -> None:
     """Hatch the cells without a value, with a different hatch for each status.
 
@@ -252,26 +273,32 @@ def _hatch_statuses(
     unknown : ndarray of bool, shape (ny, nx)
         True for the cells to be hatched.
     """
-    for hatch, code in zip(_HATCHES, np.unique(status[unknown]), strict=False):
-        rows = [_run_outline(at, *run) for run in _horizontal_runs(unknown & (status == code))]
-        name = _STATUS_NAMES[int(code)].replace("_", " ") if code else "no number"
+    for hatch, code in zip(_HATCHES, np.unique(status[missing_mask]), strict=False):
+        rows = [
+            _outline_of_cell_run(cell_edges, *run)
+            for run in _find_horizontal_cell_runs(missing_mask & (status == code))
+        ]
+        name = _STATUS_LABEL_BY_CODE[int(code)].replace("_", " ") if code else "no number"
         grey: dict[str, Any] = {"facecolor": "0.93", "edgecolor": "0.55", "linewidth": 0.0}
         axes.add_collection(PolyCollection(rows, hatch=hatch, label=name, **grey), autolim=False)
 
 
-def _horizontal_runs(here: np.ndarray) -> list[tuple[int, int, int]]:
+def _find_horizontal_cell_runs(cell_mask: np.ndarray) -> list[tuple[int, int, int]]:
     """Find runs of neighbouring True values in the rows of an array.
 
     Each run is a tuple of the row, the first column, and the column after the last column.
     """
-    change = np.diff(np.pad(here.astype(int), ((0, 0), (1, 1))), axis=1)
+    change = np.diff(np.pad(cell_mask.astype(int), ((0, 0), (1, 1))), axis=1)
     first, last = np.argwhere(change == 1), np.argwhere(change == -1)
     return [(int(r), int(a), int(b)) for (r, a), (_r, b) in zip(first, last, strict=True)]
 
 
-def _run_outline(
-    at: tuple[np.ndarray, np.ndarray], row: int, a: int, b: int
+def _outline_of_cell_run(
+    cell_edges: tuple[np.ndarray, np.ndarray], row: int, first_column: int, stop_column: int
 ) -> list[tuple[Any, Any]]:
     """Return the corners of a run of cells."""
-    (left, right), (low, high) = at[0][[a, b]], at[1][row : row + 2]
+    (left, right), (low, high) = (
+        cell_edges[0][[first_column, stop_column]],
+        cell_edges[1][row : row + 2],
+    )
     return [(left, low), (right, low), (right, high), (left, high)]

@@ -24,18 +24,23 @@ from rsfstudy.plots._axes import (
 )
 from rsfstudy.plots._style import cycle_style
 from rsfstudy.plots._text import format_units, quantity_symbol, wrap_text
-from rsfstudy.storage import build_axis, read_declaration
-from rsfstudy.study import DrawFunction, Panel, read_quantities
+from rsfstudy.storage import build_axis_from_stored, read_declaration
+from rsfstudy.study import DrawFunction, Panel, read_undocumented_quantities
 from rsfstudy.vocabulary import find_quantity
 
 #: Maximum number of quantities in the scatter matrix, including the measured variable, and maximum
 #: number of ticks per axis.
-_MAX_QUANTITIES, _MAX_TICKS = 4, 3
+_MAX_SCATTERED_QUANTITIES, _MAX_TICKS = 4, 3
 #: Style of the scatter points. The points are rasterised in vector graphics, because there may be
 #: 10^5 points.
-_POINT_STYLE = {"marker": ".", "markersize": 2.0, "markeredgewidth": 0.0, "rasterized": True}
+_SCATTER_POINT_STYLE = {
+    "marker": ".",
+    "markersize": 2.0,
+    "markeredgewidth": 0.0,
+    "rasterized": True,
+}
 #: Maximum number of bins of a histogram, and maximum number of characters per line of a label.
-_MAX_BINS, _LABEL_WIDTH = 30, 17
+_MAX_BINS, _MAX_LABEL_LINE_CHARACTERS = 30, 17
 
 
 def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
@@ -62,12 +67,12 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
         return []
     names = [variable] if variable else varying_variables(dataset)[:1]
     names += [name for name in fields[along] if has_numeric_points(dataset, name)][
-        : _MAX_QUANTITIES - len(names)
+        : _MAX_SCATTERED_QUANTITIES - len(names)
     ]
     return [_build_panel(dataset, along, x, y) for y in names for x in names]
 
 
-def square_side(panels: Sequence[Panel]) -> int:
+def count_panels_per_side(panels: Sequence[Panel]) -> int:
     """Return the number of rows and columns of a scatter matrix.
 
     Parameters
@@ -86,57 +91,73 @@ def square_side(panels: Sequence[Panel]) -> int:
 def _sampled_fields(dataset: xr.Dataset) -> dict[str, list[str]]:
     """Return the fields of each axis with numbered points, by dimension."""
     found: dict[str, list[str]] = {}
-    for axis in map(build_axis, read_declaration(dataset).axes):
+    for axis in map(build_axis_from_stored, read_declaration(dataset).axes):
         if axis.has_numbered_points and dataset.sizes.get(axis.dimension, 1) > 1:
             found[axis.dimension] = [name for name in axis.fields if name in dataset.coords]
     return found
 
 
-def _build_panel(dataset: xr.Dataset, along: str, x: str, y: str) -> Panel:
+def _build_panel(
+    dataset: xr.Dataset, sample_dimension: str, x_variable: str, y_variable: str
+) -> Panel:
     """Build the panel of a pair of quantities.
 
     The panel is a histogram if both quantities are identical, and a scatter plot otherwise.
     """
-    by = dict.fromkeys(str(d) for name in (x, y) for d in dataset[name].dims if d != along)
-    few_ticks = partial(_limit_ticks, _MAX_TICKS - x.endswith("_error"))
-    if x == y:
-        marks: list[DrawFunction] = [partial(draw_histogram, x, list(by)), few_ticks]
-        return Panel(overlays=marks, x_label=_short_label(dataset, x), y_label="Number", title="")
+    by = dict.fromkeys(
+        str(d)
+        for name in (x_variable, y_variable)
+        for d in dataset[name].dims
+        if d != sample_dimension
+    )
+    few_ticks = partial(_limit_ticks, _MAX_TICKS - x_variable.endswith("_error"))
+    if x_variable == y_variable:
+        marks: list[DrawFunction] = [partial(draw_histogram, x_variable, list(by)), few_ticks]
+        return Panel(
+            overlays=marks,
+            x_label=_format_short_axis_label(dataset, x_variable),
+            y_label="Number",
+            title="",
+        )
     return Panel(
-        x=x,
-        y=y,
+        x=x_variable,
+        y=y_variable,
         hue=list(by),
         markers_only=True,
-        style=_POINT_STYLE,
+        style=_SCATTER_POINT_STYLE,
         overlays=[few_ticks],
         title="",
-        x_label=_short_label(dataset, x),
-        y_label=_short_label(dataset, y),
+        x_label=_format_short_axis_label(dataset, x_variable),
+        y_label=_format_short_axis_label(dataset, y_variable),
     )
 
 
-def _short_label(dataset: xr.Dataset, name: str) -> str:
+def _format_short_axis_label(dataset: xr.Dataset, variable_name: str) -> str:
     """Return an axis label with symbol and units in short lines.
 
     The lines are short because the panels are small. In addition, the power of ten of the tick
     labels is written next to the first line of the label.
     """
-    about = find_quantity(name.removesuffix("_error"), read_quantities(dataset))
+    about = find_quantity(
+        variable_name.removesuffix("_error"), read_undocumented_quantities(dataset)
+    )
     units = "" if about.units in ("", "1") or about.scale else f" ({format_units(about.units)})"
-    text = wrap_text(f"{quantity_symbol(about)}{units}", _LABEL_WIDTH)
-    return f"error of\n{text}" if name.endswith("_error") else text
+    text = wrap_text(f"{quantity_symbol(about)}{units}", _MAX_LABEL_LINE_CHARACTERS)
+    return f"error of\n{text}" if variable_name.endswith("_error") else text
 
 
-def _limit_ticks(along_x: int, _dataset: xr.Dataset, axes: Axes) -> None:
+def _limit_ticks(is_x_limited: int, _dataset: xr.Dataset, axes: Axes) -> None:
     """Limit the number of ticks, so that the tick labels do not overlap.
 
     The tick labels of error estimates are long, so fewer ticks are used along x.
     """
-    axes.xaxis.set_major_locator(MaxNLocator(along_x))
+    axes.xaxis.set_major_locator(MaxNLocator(is_x_limited))
     axes.yaxis.set_major_locator(MaxNLocator(_MAX_TICKS))
 
 
-def draw_histogram(name: str, by: Sequence[str], dataset: xr.Dataset, axes: Axes) -> None:
+def draw_histogram(
+    variable_name: str, colour_dimension: Sequence[str], dataset: xr.Dataset, axes: Axes
+) -> None:
     """Draw one histogram of a variable for each point of other axes.
 
     Parameters
@@ -150,11 +171,11 @@ def draw_histogram(name: str, by: Sequence[str], dataset: xr.Dataset, axes: Axes
     axes : matplotlib.axes.Axes
         Axes to draw on.
     """
-    values = dataset[name]
+    values = dataset[variable_name]
     known = values.values[np.isfinite(values.values)]
     edges = np.histogram_bin_edges(known, min(_MAX_BINS, max(5, round(known.size**0.5))))
-    for number, at in enumerate(np.ndindex(*(values.sizes[d] for d in by))):
-        part = values.isel(dict(zip(by, at, strict=True)))
-        text = ", ".join(describe_point(part, d) for d in by) or None
+    for number, at in enumerate(np.ndindex(*(values.sizes[d] for d in colour_dimension))):
+        part = values.isel(dict(zip(colour_dimension, at, strict=True)))
+        text = ", ".join(describe_point(part, d) for d in colour_dimension) or None
         style = {"color": cycle_style(number)["color"], "alpha": 0.5, "label": text}
         axes.hist(part.values[np.isfinite(part.values)], list(edges), **style)

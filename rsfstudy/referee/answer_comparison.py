@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rsfstudy.errors import RsfStudyError
-from rsfstudy.motion import COMPILED, SCIPY, Accuracy, is_installed
+from rsfstudy.motion import COMPILED, SCIPY, Accuracy, is_engine_installed
 from rsfstudy.referee import reference
 from rsfstudy.referee.external import ReportedQuantity
 from rsfstudy.referee.problem_files import BenchmarkProblem
@@ -32,15 +32,15 @@ _MIN_EXPLAINED_DIGITS, _MIN_DIGITS_GAINED = 3.0, 1.5
 _MAX_LAST_PLACE_DIFFERENCE = 1.51
 #: Quantities with differences relative to the largest value of the column, because they start at
 #: zero.
-_QUANTITIES_FROM_ZERO = ("slip", "pore_pressure")
+_QUANTITIES_STARTING_AT_ZERO = ("slip", "pore_pressure")
 #: Conventions of radiation damping, and the corresponding factors of eta.
-_DAMPING_FACTORS = {
+_RADIATION_DAMPING_CONVENTIONS = {
     "twice as much (G/c_s for G/(2 c_s))": 2.0,
     "half as much": 0.5,
     "left out": 0.0,
 }
 #: Common conversion factors of units, powers of ten, angles and logarithms.
-_USUAL_FACTORS = {
+_USUAL_CONVERSION_FACTORS = {
     "2": 2.0, "0.5": 0.5, "pi": math.pi, "1/pi": 1.0 / math.pi, "2 pi": 2.0 * math.pi,
     "1/(2 pi)": 0.5 / math.pi, "ln 10": math.log(10.0), "1/ln 10": 1.0 / math.log(10.0),
     **{f"{unit:g}": unit for unit in (60.0, 3600.0, 86400.0)},
@@ -55,7 +55,7 @@ _REFERENCE_RTOLS, _EXPLANATION_RTOL = (1e-9, 1e-11), 1e-8
 
 
 @dataclass(frozen=True)
-class Agreement:
+class QuantityAgreement:
     """Agreement of one quantity with the known answer.
 
     Parameters
@@ -74,11 +74,11 @@ class Agreement:
         Relative difference of each row.
     """
 
-    quantity: str
-    digits: float
-    worst_row: int
+    quantity_name: str
+    agreeing_digits: float
+    least_agreeing_row: int
     first_failing_row: int | None
-    agrees_as_written: bool
+    agrees_to_written_digits: bool
     relative_differences: np.ndarray
 
 
@@ -100,23 +100,23 @@ class AnswerComparison:
     """
 
     problem: BenchmarkProblem
-    agreements: tuple[Agreement, ...]
+    quantity_agreements: tuple[QuantityAgreement, ...]
     required_digits: float
     explanation: str = ""
 
     @property
-    def digits(self) -> float:
+    def agreeing_digits(self) -> float:
         """Number of digits to which all quantities agree."""
-        return min(agreement.digits for agreement in self.agreements)
+        return min(agreement.agreeing_digits for agreement in self.quantity_agreements)
 
     @property
-    def passes(self) -> bool:
+    def has_required_digits(self) -> bool:
         """True if all quantities have the required number of digits.
 
         If the known answer has fewer digits than required, agreement of all known digits is
         sufficient.
         """
-        return self.digits >= min(self.required_digits, self.problem.digits)
+        return self.agreeing_digits >= min(self.required_digits, self.problem.digits)
 
     def describe_agreements(self) -> list[str]:
         """Describe the agreement of each quantity.
@@ -128,28 +128,28 @@ class AnswerComparison:
             difference, and the first row with fewer digits than required.
         """
         problem, lines = self.problem, []
-        for agreement in self.agreements:
-            text = f"  {agreement.quantity:20s} {round_digits_down(agreement.digits):4.1f} digits"
-            if agreement.agrees_as_written:
+        for agreement in self.quantity_agreements:
+            text = f"  {agreement.quantity_name:20s} {round_digits_down(agreement.agreeing_digits):4.1f} digits"
+            if agreement.agrees_to_written_digits:
                 text += ", to the last place that is written"
-            elif agreement.digits == problem.digits:
+            elif agreement.agreeing_digits == problem.digits:
                 text += ", all that are known"
             elif problem.index_column:
-                text += f", fewest at {_format_row(problem, agreement.worst_row)}"
+                text += f", fewest at {_format_answer_row(problem, agreement.least_agreeing_row)}"
             if agreement.first_failing_row is not None and problem.index_column:
-                text += f"; they part at {_format_row(problem, agreement.first_failing_row)}"
+                text += f"; they part at {_format_answer_row(problem, agreement.first_failing_row)}"
             lines.append(text)
         return lines
 
 
-def _format_row(problem: BenchmarkProblem, row: int) -> str:
+def _format_answer_row(problem: BenchmarkProblem, row: int) -> str:
     """Format the index value of a row with its units."""
     units = {"time": " s"}.get(problem.index_column, "")
     return f"{problem.index_column} = {problem.index_values[row]:g}{units}"
 
 
 def known_answer(
-    problem: BenchmarkProblem, path: Path | None
+    problem: BenchmarkProblem, answer_path: Path | None
 ) -> tuple[BenchmarkProblem, AnswerTable]:
     """Return a problem and its known answer.
 
@@ -174,15 +174,17 @@ def known_answer(
     RsfStudyError
         If rsfstudy cannot compute the answer.
     """
-    if path is not None:
-        table = read_table(path)
+    if answer_path is not None:
+        table = read_table(answer_path)
         return problem, {name: column.values for name, column in table.items()}
-    engine = COMPILED if is_installed(COMPILED) else SCIPY
+    engine = COMPILED if is_engine_installed(COMPILED) else SCIPY
     rough, fine = (
-        reference.compute_answer(problem, Accuracy(rtol, reference.WORK_BUDGET, engine=engine))
+        reference.compute_answer(
+            problem, Accuracy(rtol, reference.ANSWER_EVALUATION_BUDGET, engine=engine)
+        )
         for rtol in _REFERENCE_RTOLS
     )
-    both = [a.digits for a in _compute_agreements(problem, rough, fine, 0.0)]
+    both = [a.agreeing_digits for a in _compute_quantity_agreements(problem, rough, fine, 0.0)]
     return replace(problem, digits=max(1, math.floor(min(both)))), fine
 
 
@@ -227,16 +229,16 @@ def compare_answers(
     \max \Delta`, limited to the digits of the known answer.
     """
     values = {name: column.values for name, column in reported.items()}
-    places = {name: column.resolution for name, column in reported.items()}
+    places = {name: column.last_place_unit for name, column in reported.items()}
     found = AnswerComparison(
         problem,
-        _compute_agreements(problem, values, answer, required_digits, places),
+        _compute_quantity_agreements(problem, values, answer, required_digits, places),
         required_digits,
     )
-    if found.passes:
+    if found.has_required_digits:
         return found
-    best, words = max(_iterate_explanations(problem, values, answer), default=(0.0, ""))
-    better = best >= max(_MIN_EXPLAINED_DIGITS, found.digits + _MIN_DIGITS_GAINED)
+    best, words = max(_iterate_possible_explanations(problem, values, answer), default=(0.0, ""))
+    better = best >= max(_MIN_EXPLAINED_DIGITS, found.agreeing_digits + _MIN_DIGITS_GAINED)
     explanation = f"{words}. With that undone, {round_digits_down(best):.1f} digits agree"
     return replace(found, explanation=explanation if better else "")
 
@@ -259,21 +261,21 @@ def round_digits_down(digits: float) -> float:
     return math.floor(10.0 * digits) / 10.0
 
 
-def _compute_agreements(
+def _compute_quantity_agreements(
     problem: BenchmarkProblem,
     reported: AnswerTable,
     answer: AnswerTable,
     required_digits: float,
-    resolutions: Mapping[str, float] | None = None,
-) -> tuple[Agreement, ...]:
+    last_place_units: Mapping[str, float] | None = None,
+) -> tuple[QuantityAgreement, ...]:
     """Compute the agreement of each quantity of a problem."""
     found = []
     for name in problem.quantities:
         apart = _relative_differences(name, reported[name], answer[name], problem.digits)
         few = np.flatnonzero(apart > 10.0**-required_digits)
-        place = (resolutions or {}).get(name, 0.0)
+        place = (last_place_units or {}).get(name, 0.0)
         found.append(
-            Agreement(
+            QuantityAgreement(
                 name,
                 min(max(0.0, -math.log10(max(apart.max(), 1e-300))), float(problem.digits)),
                 int(np.argmax(apart)),
@@ -290,7 +292,7 @@ def _compute_agreements(
 
 
 def _relative_differences(
-    name: str, reported: np.ndarray, reference: np.ndarray, digits: int
+    quantity_name: str, reported: np.ndarray, reference: np.ndarray, known_digits: int
 ) -> np.ndarray:
     """Compute the relative differences of a quantity from its reference.
 
@@ -299,31 +301,46 @@ def _relative_differences(
     start at zero, the remaining difference is divided by the largest reference value.
     """
     size = np.abs(reference)
-    rounded = 0.5 * 10.0 ** (np.floor(np.log10(np.maximum(size, 1e-300))) + 1.0 - digits)
-    scale = np.full(len(reference), size.max() or 1.0) if name in _QUANTITIES_FROM_ZERO else size
+    rounded = 0.5 * 10.0 ** (np.floor(np.log10(np.maximum(size, 1e-300))) + 1.0 - known_digits)
+    scale = (
+        np.full(len(reference), size.max() or 1.0)
+        if quantity_name in _QUANTITIES_STARTING_AT_ZERO
+        else size
+    )
     return np.asarray(np.maximum(np.abs(reported - reference) - rounded, 0.0) / scale)
 
 
-def _iterate_explanations(
+def _iterate_possible_explanations(
     problem: BenchmarkProblem, reported: AnswerTable, answer: AnswerTable
 ) -> Iterator[tuple[float, str]]:
     """Iterate over conventions that may explain a difference.
 
     Each item contains the number of digits that agree under the convention, and a description.
     """
-    for words, table in _reinterpret_answer(problem, reported, answer):
-        yield min(a.digits for a in _compute_agreements(problem, table, answer, 0.0)), words
-    for words, other in _reformulate_problem(problem):
+    for words, table in _iterate_reinterpreted_answers(problem, reported, answer):
+        yield (
+            min(
+                a.agreeing_digits for a in _compute_quantity_agreements(problem, table, answer, 0.0)
+            ),
+            words,
+        )
+    for words, other in _iterate_reformulated_problems(problem):
         try:
             table = reference.compute_answer(
-                other, Accuracy(_EXPLANATION_RTOL, reference.WORK_BUDGET)
+                other, Accuracy(_EXPLANATION_RTOL, reference.ANSWER_EVALUATION_BUDGET)
             )
         except RsfStudyError:
             continue
-        yield min(a.digits for a in _compute_agreements(problem, reported, table, 0.0)), words
+        yield (
+            min(
+                a.agreeing_digits
+                for a in _compute_quantity_agreements(problem, reported, table, 0.0)
+            ),
+            words,
+        )
 
 
-def _reinterpret_answer(
+def _iterate_reinterpreted_answers(
     problem: BenchmarkProblem, reported: AnswerTable, answer: AnswerTable
 ) -> Iterator[tuple[str, AnswerTable]]:
     """Iterate over answers that are converted from other conventions.
@@ -346,7 +363,7 @@ def _reinterpret_answer(
         factor = float(np.median(reported[name] / np.where(answer[name], answer[name], np.nan)))
         # An arbitrary factor or an arbitrary shift would explain any single value.
         several = len(answer[name]) > 1
-        usual = _usual_factor(factor, _FACTOR_RTOL if several else _SINGLE_VALUE_FACTOR_RTOL)
+        usual = _match_usual_factor(factor, _FACTOR_RTOL if several else _SINGLE_VALUE_FACTOR_RTOL)
         if usual is not None:
             yield f"{name} {usual[0]}", reported | {name: reported[name] / usual[1]}
         elif several and math.isfinite(factor) and factor:
@@ -354,11 +371,13 @@ def _reinterpret_answer(
             yield words, reported | {name: reported[name] / factor}
         if several:
             apart = float(np.median(reported[name] - answer[name]))
-            words = f"{name} is shifted by {apart:.6g} {problem.units[name]}".removesuffix(" 1")
+            words = f"{name} is shifted by {apart:.6g} {problem.quantity_units[name]}".removesuffix(
+                " 1"
+            )
             yield words, reported | {name: reported[name] - apart}
 
 
-def _usual_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
+def _match_usual_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
     """Return the common conversion factor that equals a given factor.
 
     The relative difference of the two factors must not exceed the tolerance.
@@ -370,7 +389,7 @@ def _usual_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
     """
     if math.isclose(factor, -1.0, rel_tol=tolerance):
         return "has the opposite sign", -1.0
-    for words, usual in _USUAL_FACTORS.items():
+    for words, usual in _USUAL_CONVERSION_FACTORS.items():
         if math.isclose(abs(factor), usual, rel_tol=tolerance):
             sign = "-" if factor < 0.0 else ""
             return f"is {sign}{words} times the known answer", math.copysign(usual, factor)
@@ -383,7 +402,9 @@ def _format_factor(factor: float) -> str:
     return text if text != "1" else f"(1 {'-' if beyond < 0.0 else '+'} {abs(beyond):.2g})"
 
 
-def _reformulate_problem(problem: BenchmarkProblem) -> Iterator[tuple[str, BenchmarkProblem]]:
+def _iterate_reformulated_problems(
+    problem: BenchmarkProblem,
+) -> Iterator[tuple[str, BenchmarkProblem]]:
     """Iterate over problems with other conventions.
 
     Each item contains a description of the convention, and the changed problem.
@@ -394,13 +415,13 @@ def _reformulate_problem(problem: BenchmarkProblem) -> Iterator[tuple[str, Bench
         return replace(problem, parameters={**problem.parameters, **parameters})
 
     if problem.radiation_damping:
-        for words, factor in _DAMPING_FACTORS.items():
+        for words, factor in _RADIATION_DAMPING_CONVENTIONS.items():
             eta = f"{factor * problem.radiation_damping!r} Pa s/m"
             yield f"damping is {words}", changed(radiation_damping=eta)
     if problem.initial:
         steady = [f"{theta!r} s" for theta in problem.theta_star]
         rate = problem.initial["slip_rate"]
-        factor = math.exp(-problem.log_slip_rate)
+        factor = math.exp(-problem.initial_log_slip_rate)
         at_rate = [f"{factor * theta!r} s" for theta in problem.theta_star]
         for words, thetas in (("D_c/V_*", steady), (f"D_c/V(0) with V(0) = {rate}", at_rate)):
             other = {**problem.initial, "theta": thetas}

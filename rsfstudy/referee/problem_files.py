@@ -24,38 +24,58 @@ import numpy as np
 from scipy.special import lambertw
 
 from rsfstudy.error_boundary import check_regular_file, format_exception
-from rsfstudy.errors import DataError, InvalidValue, shorten
-from rsfstudy.motion import Event, EventKind, MotionStopped, manifold_point, with_slip_rate
+from rsfstudy.errors import DataError, InvalidValue, shorten_text
+from rsfstudy.motion import (
+    Event,
+    EventKind,
+    MotionStopped,
+    point_with_slip_rate,
+    slow_manifold_point,
+)
 from rsfstudy.parts import Segment
 from rsfstudy.paths import check_path
 from rsfstudy.rig import Rig, convert_to_si
-from rsfstudy.slider import Scene, compute_steady_states, field_defaults, friction_relation
+from rsfstudy.slider import (
+    Scene,
+    build_friction_relation,
+    compute_steady_states,
+    scene_field_defaults,
+)
 
 #: Folder of the shipped problems and their answers.
-PROBLEM_FOLDER = Path(__file__).with_name("problems")
+SHIPPED_PROBLEM_FOLDER = Path(__file__).with_name("problems")
 #: SI units of the quantities that a problem can request, for each type of report.
-SERIES_UNITS = {
+UNITS_OF_SERIES_QUANTITIES = {
     "time": "s", "friction": "1", "slip_rate": "m/s", "theta": "s", "theta_1": "s", "theta_2": "s",
     "slip": "m", "normal_stress": "Pa", "pore_pressure": "Pa",
 }  # fmt: skip
-PEAK_UNITS = {"event": "1", "time": "s", "slip_rate": "m/s"}
-NUMBER_UNITS = {
+UNITS_OF_PEAK_QUANTITIES = {"event": "1", "time": "s", "slip_rate": "m/s"}
+UNITS_OF_NUMBER_QUANTITIES = {
     "critical_stiffness": "Pa/m", "growth_rate": "1/s", "angular_frequency": "1/s",
     "critical_velocity": "m/s", "critical_displacement": "m", "recurrence_interval": "s",
     "static_stress_drop": "Pa", "dynamic_stress_drop": "Pa", "peak_slip_rate": "m/s",
     "slowest_slip_rate": "m/s",
 }  # fmt: skip
-REPORT_UNITS = {"series": SERIES_UNITS, "peaks": PEAK_UNITS, "numbers": NUMBER_UNITS}
+QUANTITY_UNITS_BY_REPORT_KIND = {
+    "series": UNITS_OF_SERIES_QUANTITIES,
+    "peaks": UNITS_OF_PEAK_QUANTITIES,
+    "numbers": UNITS_OF_NUMBER_QUANTITIES,
+}
 #: Fields of the rig by the names of the problem parameters. The first dictionary contains only the
 #: required parameters.
-_REQUIRED_RIG_FIELDS = {
+_REQUIRED_RIG_FIELD_BY_PARAMETER = {
     "normal_stress": "normal_stress",
     "D_c": "slip_distance",
     "V_star": "reference_velocity",
 }
-_RIG_FIELDS = {**_REQUIRED_RIG_FIELDS, "stiffness": "stiffness", "period": "period", "mass": "mass"}
+_RIG_FIELD_BY_PARAMETER = {
+    **_REQUIRED_RIG_FIELD_BY_PARAMETER,
+    "stiffness": "stiffness",
+    "period": "period",
+    "mass": "mass",
+}
 #: SI units of the parameters that are converted to dimensionless fields of the scene.
-_PARAMETER_UNITS = {
+_UNITS_BY_PARAMETER = {
     "b": "1", "b_2": "1", "D_c_2": "m", "radiation_damping": "Pa s/m", "V_c": "m/s",
     "V_unstable": "m/s",
 }  # fmt: skip
@@ -68,7 +88,7 @@ _LAWS_WITH_THETA = (
 
 #: Pattern of the type errors of msgspec, and descriptions of the types for error messages.
 _TYPE_ERROR_PATTERN = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$(.*)`)?")
-_TYPE_DESCRIPTIONS = {
+_DESCRIPTION_BY_TYPE_NAME = {
     "array": "a list", "object": "a table", "str": "a text", "int": "a whole number",
     "float": "a number", "bool": "true or false", "null": "nothing", "date": "a date",
 }  # fmt: skip
@@ -137,16 +157,18 @@ class BenchmarkProblem:
 
     def __post_init__(self) -> None:
         """Validate the fields of the problem."""
-        if self.report not in REPORT_UNITS:
-            raise InvalidValue("report", self.report, "is unknown", choices=REPORT_UNITS)
+        if self.report not in QUANTITY_UNITS_BY_REPORT_KIND:
+            raise InvalidValue(
+                "report", self.report, "is unknown", choices=QUANTITY_UNITS_BY_REPORT_KIND
+            )
         if not self.quantities:
             rule = "must list at least one quantity"
-            raise InvalidValue("quantities", self.quantities, rule, choices=self.units)
+            raise InvalidValue("quantities", self.quantities, rule, choices=self.quantity_units)
         if not 1 <= self.digits <= _MAX_DIGITS:
             raise InvalidValue("digits", self.digits, f"must lie between 1 and {_MAX_DIGITS}")
         for name in self.quantities:
-            if name not in self.units:
-                raise InvalidValue("quantities", name, "is unknown", choices=self.units)
+            if name not in self.quantity_units:
+                raise InvalidValue("quantities", name, "is unknown", choices=self.quantity_units)
         times = np.array(self.times, dtype=float)
         if self.report == "series" and not (len(times) and np.isfinite(times).all()):
             raise InvalidValue("times", self.times, "must list the times of a series, in s")
@@ -158,7 +180,7 @@ class BenchmarkProblem:
         if self.law not in _LAWS_WITH_THETA:
             raise InvalidValue("law", self.law, "is unknown", choices=_LAWS_WITH_THETA)
         two = ("b_2", "D_c_2") if self.law.startswith("two") else ()
-        for name in ("a", "b", *two, *_REQUIRED_RIG_FIELDS):
+        for name in ("a", "b", *two, *_REQUIRED_RIG_FIELD_BY_PARAMETER):
             if name not in self.parameters:
                 raise InvalidValue("parameters", [*self.parameters], f"must state {name}")
         if self.initial and self.initial.keys() != {"slip_rate", "theta"}:
@@ -169,9 +191,9 @@ class BenchmarkProblem:
             raise InvalidValue("initial", [*self.initial], rule)
 
     @property
-    def units(self) -> Mapping[str, str]:
+    def quantity_units(self) -> Mapping[str, str]:
         """SI units of the quantities that can be requested, by name."""
-        return REPORT_UNITS[self.report]
+        return QUANTITY_UNITS_BY_REPORT_KIND[self.report]
 
     @property
     def index_column(self) -> str:
@@ -182,7 +204,7 @@ class BenchmarkProblem:
         return {"series": "time", "peaks": "event", "numbers": ""}[self.report]
 
     @property
-    def columns(self) -> tuple[str, ...]:
+    def column_names(self) -> tuple[str, ...]:
         """Names of the columns of the answer."""
         return (
             (self.index_column, *self.quantities) if self.index_column else tuple(self.quantities)
@@ -198,14 +220,20 @@ class BenchmarkProblem:
         return np.array(rows, dtype=float)
 
     @property
-    def header(self) -> list[str]:
+    def column_headings(self) -> list[str]:
         """Headings of the columns of the answer, with units."""
-        return [f"{name} ({self.units[name]})" for name in self.columns]
+        return [f"{name} ({self.quantity_units[name]})" for name in self.column_names]
 
     @cached_property
     def rig(self) -> Rig:
         """Rig with the scales, stiffness and inertia of the problem."""
-        return Rig(**{_RIG_FIELDS[n]: v for n, v in self.parameters.items() if n in _RIG_FIELDS})
+        return Rig(
+            **{
+                _RIG_FIELD_BY_PARAMETER[n]: v
+                for n, v in self.parameters.items()
+                if n in _RIG_FIELD_BY_PARAMETER
+            }
+        )
 
     @cached_property
     def si_parameters(self) -> Mapping[str, float]:
@@ -213,7 +241,7 @@ class BenchmarkProblem:
         stated = self.parameters
         return {
             n: convert_to_si(n, stated[n], units)
-            for n, units in _PARAMETER_UNITS.items()
+            for n, units in _UNITS_BY_PARAMETER.items()
             if n in stated
         }
 
@@ -235,9 +263,15 @@ class BenchmarkProblem:
     @cached_property
     def scene(self) -> Scene:
         """Scene of the problem, without the initial state."""
-        rig, si, a = self.rig, self.si_parameters, _positive_in_si("a", self.parameters["a"], "1")
+        rig, si, a = (
+            self.rig,
+            self.si_parameters,
+            _parse_positive_si_value("a", self.parameters["a"], "1"),
+        )
         fields = {
-            n: v for n, v in self.parameters.items() if n not in {*_RIG_FIELDS, *_PARAMETER_UNITS}
+            n: v
+            for n, v in self.parameters.items()
+            if n not in {*_RIG_FIELD_BY_PARAMETER, *_UNITS_BY_PARAMETER}
         }
         fields |= {"law": self.law, "a": a}
         if len(self.b) == 1:
@@ -252,7 +286,7 @@ class BenchmarkProblem:
         if "V_c" in si:
             fields["cutoff_velocity_ratio"] = si["V_c"] / rig.reference_velocity
         if "V_unstable" in si:
-            period = rig.period or field_defaults()["period"]
+            period = rig.period or scene_field_defaults()["period"]
             norm = si["V_unstable"] * period / (2.0 * math.pi * rig.slip_distance)
             fields["instability_norm"] = norm
         if self.loading:
@@ -290,9 +324,9 @@ class BenchmarkProblem:
         return tuple(scale * length / velocity for length in lengths[: len(self.b)])
 
     @cached_property
-    def log_slip_rate(self) -> float:
+    def initial_log_slip_rate(self) -> float:
         r"""Logarithm of the initial slip rate, :math:`\ln(V/V_*)`."""
-        rate = _positive_in_si("slip_rate", self.initial["slip_rate"], "m/s")
+        rate = _parse_positive_si_value("slip_rate", self.initial["slip_rate"], "m/s")
         return math.log(rate / self.rig.reference_velocity)
 
     @property
@@ -304,24 +338,24 @@ class BenchmarkProblem:
         """
         if not self.initial:
             return None
-        scene, x, states = self.scene, self.log_slip_rate, self._initial_states()
+        scene, x, states = self.scene, self.initial_log_slip_rate, self._initial_state_variables()
         acting, before = scene.continuous_segments[0][0], scene.with_segment(Segment(1.0))
         friction = scene.a * x + sum(states)
         if scene.parts.law.regularised:
             above = (scene.mu_star + friction) / scene.a
             friction = scene.a * math.asinh(0.5 * math.exp(above)) - scene.mu_star
-        taken = compute_steady_states(before, 0.0, friction_relation(before)(friction)[2])
+        taken = compute_steady_states(before, 0.0, build_friction_relation(before)(friction)[2])
         psis = (
             *map(add, states, taken),
             *taken[len(states) :],
             *scene.parts.loading.initial_unknowns(scene),
         )
         radiated = before.dynamics.radiated_stress(x)
-        point = manifold_point(acting, friction + radiated + acting.spring_stress_step, psis)
-        point = with_slip_rate(acting, point, x) if scene.has_mass else point
+        point = slow_manifold_point(acting, friction + radiated + acting.spring_stress_step, psis)
+        point = point_with_slip_rate(acting, point, x) if scene.has_mass else point
         return Event(EventKind.START, None, 0.0, 0.0, point, "", 0, 0.0)
 
-    def _initial_states(self) -> tuple[float, ...]:
+    def _initial_state_variables(self) -> tuple[float, ...]:
         r"""Compute the initial values of the state variables.
 
         The state variable is :math:`b \ln(\theta/\theta_*)`, which is zero in steady sliding at
@@ -333,10 +367,12 @@ class BenchmarkProblem:
             rule = f"must state {len(self.b)}, one for each b"
             raise InvalidValue("theta", stated, rule)
         known = zip(self.b, thetas, self.theta_star, strict=True)
-        return tuple(b * math.log(_positive_in_si("theta", x, "s") / star) for b, x, star in known)
+        return tuple(
+            b * math.log(_parse_positive_si_value("theta", x, "s") / star) for b, x, star in known
+        )
 
 
-def _positive_in_si(name: str, value: Any, units: str) -> float:
+def _parse_positive_si_value(name: str, value: Any, units: str) -> float:
     """Convert a value to SI units and check that the value is positive."""
     found = convert_to_si(name, value, units)
     if not found > 0.0:
@@ -371,7 +407,7 @@ def read_problem(path: Path) -> BenchmarkProblem:
         raise DataError(f"{path}: cannot be read as TOML (it is nested too deeply)") from error
     # ValueError is raised for wrong syntax, wrong encoding and numbers with too many digits.
     except (OSError, ValueError) as error:
-        raise DataError(f"{path}: cannot be read as TOML ({shorten(error)})") from error
+        raise DataError(f"{path}: cannot be read as TOML ({shorten_text(error)})") from error
     known = {
         name: kind for name, kind in get_type_hints(BenchmarkProblem).items() if name != "number"
     }
@@ -379,11 +415,11 @@ def read_problem(path: Path) -> BenchmarkProblem:
         for name, value in stated.items():
             if name not in known:
                 raise InvalidValue("key", name, "is unknown", choices=known)
-            _check_type(name, value, known[name])
+            _check_declared_type(name, value, known[name])
         for name in ("title", "law", "quantities", "parameters"):
             if name not in stated:
                 raise InvalidValue("problem", [*stated], f"must state {name}")
-        number = int(path.name[:2]) if path.parent == PROBLEM_FOLDER else 0
+        number = int(path.name[:2]) if path.parent == SHIPPED_PROBLEM_FOLDER else 0
         problem = BenchmarkProblem(**stated, number=number)
         _ = problem.scene, problem.initial_event
         return problem
@@ -402,7 +438,7 @@ def read_problem(path: Path) -> BenchmarkProblem:
         raise InvalidValue("problem", str(path), rule, remedy=remedy) from error
 
 
-def _check_type(name: str, value: Any, kind: Any) -> None:
+def _check_declared_type(name: str, value: Any, expected_type: Any) -> None:
     """Check that a value of a problem has the declared type.
 
     Raises
@@ -411,17 +447,17 @@ def _check_type(name: str, value: Any, kind: Any) -> None:
         If the value has another type.
     """
     try:
-        msgspec.convert(value, kind)
+        msgspec.convert(value, expected_type)
     except msgspec.ValidationError as error:
         found = _TYPE_ERROR_PATTERN.search(str(error))
         if found is None:
             raise InvalidValue(name, value, str(error)) from error
-        wanted, actual = (_TYPE_DESCRIPTIONS.get(kind, kind) for kind in found.groups()[:2])
+        wanted, actual = (_DESCRIPTION_BY_TYPE_NAME.get(kind, kind) for kind in found.groups()[:2])
         place = f"{name}{found[3] or ''}"
         raise InvalidValue(place, value, f"must be {wanted}, not {actual}") from error
 
 
-def shipped_problems() -> dict[int, Path]:
+def shipped_problem_files() -> dict[int, Path]:
     """Return the files of the shipped problems by number.
 
     Returns
@@ -429,7 +465,7 @@ def shipped_problems() -> dict[int, Path]:
     dict of int to Path
         Path of each problem file.
     """
-    return {int(path.name[:2]): path for path in sorted(PROBLEM_FOLDER.glob("*.toml"))}
+    return {int(path.name[:2]): path for path in sorted(SHIPPED_PROBLEM_FOLDER.glob("*.toml"))}
 
 
 def write_problems(directory: Path) -> int:
@@ -459,7 +495,7 @@ def write_problems(directory: Path) -> int:
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
         remedy = "Name a new one: nothing is replaced."
         raise InvalidValue("DIR", str(directory), "is there already", remedy=remedy)
-    shipped = shipped_problems()
+    shipped = shipped_problem_files()
     try:
         places = {name: directory / name for name in ("problems", "answers", "templates")}
         for place in places.values():
@@ -468,18 +504,18 @@ def write_problems(directory: Path) -> int:
             shutil.copyfile(path, places["problems"] / path.name)
             answer = path.with_suffix(".csv")
             shutil.copyfile(answer, places["answers"] / answer.name)
-            _write_template(read_problem(path), places["templates"] / answer.name)
-        shutil.copyfile(PROBLEM_FOLDER / "example.txt", directory / "example.py")
+            _write_answer_template(read_problem(path), places["templates"] / answer.name)
+        shutil.copyfile(SHIPPED_PROBLEM_FOLDER / "example.txt", directory / "example.py")
     except OSError as error:
         raise DataError(f"{directory}: cannot be written ({error})") from error
     return len(shipped)
 
 
-def _write_template(problem: BenchmarkProblem, path: Path) -> None:
+def _write_answer_template(problem: BenchmarkProblem, path: Path) -> None:
     """Write an empty answer with the headings and the index column."""
     empty = [""] * len(problem.quantities)
     rows = [f"{row:.12g}" for row in problem.index_values] if problem.index_column else []
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(problem.header)
+        table.writerow(problem.column_headings)
         table.writerows([[row, *empty] for row in rows] or [empty])

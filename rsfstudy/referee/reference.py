@@ -22,12 +22,12 @@ from rsfstudy.motion import (
     maximum,
 )
 from rsfstudy.referee.problem_files import BenchmarkProblem
-from rsfstudy.slider import critical_stiffness, growth_rates
+from rsfstudy.slider import critical_stiffness, linear_growth_rates
 from rsfstudy.status import Status
 
 AnswerTable = dict[str, np.ndarray]
 #: Maximum number of evaluations of the right-hand side per answer.
-WORK_BUDGET = 5_000_000
+ANSWER_EVALUATION_BUDGET = 5_000_000
 
 
 def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
@@ -51,14 +51,16 @@ def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable
         If the motion ends before the answer is complete, or if a requested number does not exist or
         cannot be computed.
     """
-    found = {"series": _answer_series, "peaks": _answer_peaks, "numbers": _answer_numbers}[
-        problem.report
-    ]
+    found = {
+        "series": _compute_series_answer,
+        "peaks": _compute_peaks_answer,
+        "numbers": _compute_numbers_answer,
+    }[problem.report]
     try:
         told = found(problem, accuracy)
     except MotionStopped as halt:
         raise RsfStudyError(f"{problem.title}: {halt.status.label} ({halt})") from halt
-    return {name: told[name] for name in problem.columns}
+    return {name: told[name] for name in problem.column_names}
 
 
 def compute_normal_stress(problem: BenchmarkProblem) -> np.ndarray:
@@ -75,10 +77,10 @@ def compute_normal_stress(problem: BenchmarkProblem) -> np.ndarray:
         Effective normal stress in Pa.
     """
     asked = replace(problem, quantities=["normal_stress"])
-    return compute_answer(asked, Accuracy(1e-11, WORK_BUDGET))["normal_stress"]
+    return compute_answer(asked, Accuracy(1e-11, ANSWER_EVALUATION_BUDGET))["normal_stress"]
 
 
-def _answer_series(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
     r"""Compute the values of a series at the times of the problem.
 
     The motion provides the state variables :math:`\Theta`, which are converted to :math:`\theta =
@@ -101,7 +103,7 @@ def _answer_series(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable
     )
     for _ in moving:
         pass
-    seen = recording.table(scene)
+    seen = recording.as_table(scene)
     told = dict(zip(MOTION_VARIABLES, seen.T, strict=False))
     sigma, b = rig.normal_stress, np.array(problem.b)
     states = seen[:, FIRST_STATE_COLUMN : FIRST_STATE_COLUMN + len(b)]
@@ -121,7 +123,7 @@ def _answer_series(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable
     }
 
 
-def _answer_peaks(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+def _compute_peaks_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
     """Compute the times and values of the maxima of slip rate."""
     rig, meter = problem.rig, WorkMeter(accuracy.budget, engine=accuracy.engine)
     watched = integrate_events(
@@ -140,16 +142,16 @@ def _answer_peaks(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
     }
 
 
-def _answer_numbers(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+def _compute_numbers_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
     """Compute the requested numbers."""
     told: dict[str, float] = {}
-    for names, find in _NUMBER_FUNCTIONS.items():
+    for names, find in _NUMBER_FUNCTION_BY_QUANTITIES.items():
         if {*names} & {*problem.quantities}:
             told |= zip(names, find(problem, accuracy), strict=True)
     return {name: np.array([value]) for name, value in told.items()}
 
 
-def _run_measure(
+def _run_measure_of_problem(
     problem: BenchmarkProblem, accuracy: Accuracy, measure: Measure
 ) -> Mapping[str, float]:
     """Apply a measure to the scene of a problem.
@@ -165,46 +167,48 @@ def _run_measure(
     return found.values
 
 
-def _linear_stability(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float, ...]:
+def _compute_stability_numbers(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float, ...]:
     """Compute the critical stiffness, the growth rate and the frequency."""
     scene, rig = problem.scene, problem.rig
-    growth = growth_rates(scene, scene.log_load_velocity)[0] * scene.load_velocity
+    growth = linear_growth_rates(scene, scene.log_load_velocity)[0] * scene.load_velocity
     stiffness = critical_stiffness(scene, scene.log_load_velocity)
     scale, rate = rig.normal_stress / rig.slip_distance, rig.dimensionless("1 s")
     return stiffness * scale, growth.real * rate, abs(growth.imag) * rate
 
 
-def _critical_velocity(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float]:
+def _compute_critical_velocity(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float]:
     """Compute the critical load point velocity in m/s."""
-    found = _run_measure(problem, accuracy, CriticalStep())
+    found = _run_measure_of_problem(problem, accuracy, CriticalStep())
     return (problem.rig.reference_velocity * found["critical_velocity_ratio"],)
 
 
-def _critical_displacement(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float]:
+def _compute_critical_displacement(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float]:
     """Compute the critical displacement step in m."""
-    found = _run_measure(problem, accuracy, CriticalStep(of="displacement_step"))
+    found = _run_measure_of_problem(problem, accuracy, CriticalStep(of="displacement_step"))
     return (problem.rig.slip_distance * found["critical_displacement"],)
 
 
-def _limit_cycle(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float, ...]:
+def _compute_limit_cycle_numbers(
+    problem: BenchmarkProblem, accuracy: Accuracy
+) -> tuple[float, ...]:
     """Compute the recurrence interval, stress drops and slip rates."""
-    rig, found = problem.rig, _run_measure(problem, accuracy, LimitCycle(phases=2))
+    rig, found = problem.rig, _run_measure_of_problem(problem, accuracy, LimitCycle(phases=2))
     drops = (rig.normal_stress * found[f"{name}_stress_drop"] for name in ("static", "dynamic"))
     rates = (rig.reference_velocity * 10.0 ** found[f"{m}_log10_slip_rate"] for m in ("max", "min"))
     return found["recurrence_interval"] / rig.dimensionless("1 s"), *drops, *rates
 
 
-_NUMBER_FUNCTIONS: Mapping[
+_NUMBER_FUNCTION_BY_QUANTITIES: Mapping[
     tuple[str, ...], Callable[[BenchmarkProblem, Accuracy], tuple[float, ...]]
 ] = {
-    ("critical_stiffness", "growth_rate", "angular_frequency"): _linear_stability,
-    ("critical_velocity",): _critical_velocity,
-    ("critical_displacement",): _critical_displacement,
+    ("critical_stiffness", "growth_rate", "angular_frequency"): _compute_stability_numbers,
+    ("critical_velocity",): _compute_critical_velocity,
+    ("critical_displacement",): _compute_critical_displacement,
     (
         "recurrence_interval",
         "static_stress_drop",
         "dynamic_stress_drop",
         "peak_slip_rate",
         "slowest_slip_rate",
-    ): _limit_cycle,
+    ): _compute_limit_cycle_numbers,
 }

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.referee.answer_comparison import AnswerComparison, compare_answers, known_answer
-from rsfstudy.referee.external import read_answer
-from rsfstudy.referee.problem_files import read_problem, shipped_problems
+from rsfstudy.referee.external import read_external_answer
+from rsfstudy.referee.problem_files import read_problem, shipped_problem_files
 
 
 def compare_file(
@@ -42,7 +42,7 @@ def compare_file(
     DataError
         If a file cannot be read.
     """
-    number, there, path = stated_problem or file.name[:2], shipped_problems(), None
+    number, there, path = stated_problem or file.name[:2], shipped_problem_files(), None
     if stated_problem and not number.isdecimal():
         posed = read_problem(Path(number))
     elif number.isdecimal() and int(number) in there:
@@ -51,7 +51,7 @@ def compare_file(
     else:
         remedy = "Give --problem, or a file name that begins with it, as in 01_mine.csv."
         raise InvalidValue("problem", number, "is none", choices=map(str, there), remedy=remedy)
-    told = read_answer(file, posed, columns)
+    told = read_external_answer(file, posed, columns)
     return compare_answers(*known_answer(posed, path), told, required_digits)
 
 
@@ -68,9 +68,13 @@ def summarise_comparisons(found: Sequence[AnswerComparison]) -> str:
     str
         Text such as "9 problems of 24, 9 to 10 digits". Only the problems that passed are counted.
     """
-    passed = {one.problem.title: math.floor(one.digits) for one in found if one.passes}
+    passed = {
+        one.problem.title: math.floor(one.agreeing_digits)
+        for one in found
+        if one.has_required_digits
+    }
     own = all(one.problem.number == 0 for one in found)
-    of = "one's own" if own else f"{len(shipped_problems())}"
+    of = "one's own" if own else f"{len(shipped_problem_files())}"
     text = f"{len(passed)} problem{'s' * (len(passed) != 1)} of {of}"
     if not passed:
         return text

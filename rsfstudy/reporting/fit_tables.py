@@ -19,12 +19,12 @@ from rsfstudy.fitting import (
     split_window_number,
 )
 from rsfstudy.formatting import pluralize
-from rsfstudy.reporting.tables import Table
+from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import STATUS_LABELS, Status
 from rsfstudy.storage import read_declaration
 
 #: What laboratories call parameters, where not as they are called here.
-_LABORATORY_NAMES = {
+_PARAMETER_NAMES_IN_LABORATORIES = {
     "slip_distance": "Dc",
     "slip_distance_2": "Dc2",
     "mu_star": "mu_0",
@@ -34,11 +34,11 @@ _LABORATORY_NAMES = {
 #: Most fits beside each other.
 _MAX_FITS_PER_TABLE = 3
 #: What is told of a fit in short.
-_SUMMARY_PARAMETERS = ("a", "b", "b1", "b2", "Dc")
+_PARAMETERS_IN_FIT_SUMMARY = ("a", "b", "b1", "b2", "Dc")
 #: How fits end that have numbers.
-_ANSWER_LABELS = (Status.OK.label, Status.NOT_IDENTIFIED.label)
+_STATUS_LABELS_OF_FITS_WITH_VALUES = (Status.OK.label, Status.NOT_IDENTIFIED.label)
 #: Error over the number beyond which neither is printed.
-_MAX_RELATIVE_ERROR = 1e4
+_MAX_PRINTED_RELATIVE_ERROR = 1e4
 #: Difference of criteria that decides between laws.
 _DECISIVE_AIC_DIFFERENCE = 10.0
 #: Mark of standard errors that are not valid.
@@ -61,13 +61,13 @@ def split_fits(dataset: xr.Dataset) -> list[xr.Dataset]:
     return [dataset.isel(dict(zip(dims, at, strict=True))) for at in np.ndindex(*sizes)]
 
 
-def record_and_step(one: xr.Dataset) -> dict[str, Any]:
+def record_and_step_of_fit(fit: xr.Dataset) -> dict[str, Any]:
     """Record and step of a fit, where there are several."""
-    found = {n: one[n].item() for n in ("record", "step") if n in one.coords}
+    found = {n: fit[n].item() for n in ("record", "step") if n in fit.coords}
     return {n: value if n == "record" else int(value) for n, value in found.items()}
 
 
-def parameter_headings(one: xr.Dataset) -> dict[str, str]:
+def parameter_headings(fit: xr.Dataset) -> dict[str, str]:
     """Return the column headings of the fitted parameters, in the order of the table.
 
     Returns
@@ -76,10 +76,12 @@ def parameter_headings(one: xr.Dataset) -> dict[str, str]:
         Name of each variable of the dataset, and its heading in the notation of laboratories, such
         as ``Dc`` and ``mu_0``.
     """
-    names, found = [*map(str, one["parameter"].values), "a_minus_b"], {}
+    names, found = [*map(str, fit["parameter"].values), "a_minus_b"], {}
     for short in dict.fromkeys(("a", "b", "b1", "b2", "a_minus_b", *PARAMETERS)):
         for name in (n for n in names if split_window_number(n)[0] == short):
-            found[name] = _LABORATORY_NAMES.get(short, short) + name.removeprefix(short)
+            found[name] = _PARAMETER_NAMES_IN_LABORATORIES.get(short, short) + name.removeprefix(
+                short
+            )
     return found
 
 
@@ -95,7 +97,7 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
     """
     rows = []
     for one in split_fits(dataset):
-        row: dict[str, Any] = dict(record_and_step(one))
+        row: dict[str, Any] = dict(record_and_step_of_fit(one))
         for name, short in parameter_headings(one).items():
             row[short] = one[name].item()
             row[f"{short}_std"] = one[f"{name}_stderr"].item()
@@ -108,44 +110,47 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
             row["k"] = one["window_stiffness"].item()
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
         row["R2"], row["criterion"] = one["r_squared"].item(), one["criterion"].item()
-        row["p_value"], row["status"] = one["whiteness"].item(), status_label(one)
+        row["p_value"], row["status"] = one["whiteness"].item(), status_label_of_fit(one)
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def _normal_stresses_in_mpa(one: xr.Dataset) -> dict[str, float]:
+def _normal_stresses_in_mpa(fit: xr.Dataset) -> dict[str, float]:
     """Return the normal stress before each step in MPa.
 
     If the fit has one step, the key is ``normal_stress``. If the fit has several steps, there is
     one numbered key per step. Normal stresses that are not finite are left out.
     """
-    names = [str(n) for n in one.data_vars if str(n).startswith("normal_stress_before_")]
-    stresses = {n: one[n].item() * 1e-6 for n in names or ["normal_stress_before"] if n in one}
+    names = [str(n) for n in fit.data_vars if str(n).startswith("normal_stress_before_")]
+    stresses = {n: fit[n].item() * 1e-6 for n in names or ["normal_stress_before"] if n in fit}
     known = {n: stress for n, stress in stresses.items() if math.isfinite(stress)}
     return {n.replace("_before", ""): stress for n, stress in known.items()}
 
 
-def status_label(one: xr.Dataset) -> str:
+def status_label_of_fit(fit: xr.Dataset) -> str:
     """Label of the status of a fit."""
-    return STATUS_LABELS[int(one["status"])]
+    return STATUS_LABELS[int(fit["status"])]
 
 
 # ---- as it is printed and shown -----------------------------------------------------------------
 
 
-def all_answered(dataset: xr.Dataset) -> bool:
+def all_fits_are_valid(dataset: xr.Dataset) -> bool:
     """Return True if each fit has verified values and valid standard errors.
 
     The status ``not_identified`` counts as answered.
     """
-    return all(status_label(one) in _ANSWER_LABELS for one in split_fits(dataset))
+    return all(
+        status_label_of_fit(one) in _STATUS_LABELS_OF_FITS_WITH_VALUES
+        for one in split_fits(dataset)
+    )
 
 
-def fit_summary(dataset: xr.Dataset) -> Iterator[Table | str]:
+def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
     """All fits, and what is to be said of each; of several steps one row each in the end."""
     places: dict[str, list[xr.Dataset]] = {}
     for one in split_fits(dataset):
-        where = ", ".join(f"{n} {value}" for n, value in record_and_step(one).items())
+        where = ", ".join(f"{n} {value}" for n, value in record_and_step_of_fit(one).items())
         places.setdefault(where, []).append(one)
     measure: Any = read_declaration(dataset).measure
     together = ", ".join(f"step {step} of {record}" for record, step in measure.get("together", ()))
@@ -155,13 +160,15 @@ def fit_summary(dataset: xr.Dataset) -> Iterator[Table | str]:
         for first in range(0, len(fits), _MAX_FITS_PER_TABLE):
             yield _parameter_table(where, fits[first : first + _MAX_FITS_PER_TABLE])
         for one in fits:
-            yield from _remarks(one)
-        yield from _law_comparison(fits)
+            yield from _iterate_fit_remarks(one)
+        yield from _compare_laws_of_fits(fits)
     if len(places) > 1:
-        yield Table([_summary_row(one) for fits in places.values() for one in fits], "Of all:")
+        yield TextTable(
+            [_summary_row_of_fit(one) for fits in places.values() for one in fits], "Of all:"
+        )
 
 
-def _law_comparison(fits: Sequence[xr.Dataset]) -> Iterator[str]:
+def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
     """Which law explains a record best, and whether by enough."""
     known = [(one["criterion"].item(), str(one["law"].item())) for one in fits]
     known = sorted(pair for pair in known if math.isfinite(pair[0]))
@@ -176,83 +183,85 @@ def _law_comparison(fits: Sequence[xr.Dataset]) -> Iterator[str]:
         yield f"{law} explains the record best; its criterion is lower by {by:.1f}, which {enough}"
 
 
-def _summary_row(one: xr.Dataset) -> dict[str, str]:
+def _summary_row_of_fit(fit: xr.Dataset) -> dict[str, str]:
     """Row of a fit in the table of all."""
     few = {
-        n: format_with_stderr(one, name)
-        for name, n in parameter_headings(one).items()
-        if n in _SUMMARY_PARAMETERS
+        n: format_with_stderr(fit, name)
+        for name, n in parameter_headings(fit).items()
+        if n in _PARAMETERS_IN_FIT_SUMMARY
     }
-    at = {n: str(value) for n, value in record_and_step(one).items()}
-    return {**at, "law": str(one["law"].item()), **few, "status": status_label(one)}
+    at = {n: str(value) for n, value in record_and_step_of_fit(fit).items()}
+    return {**at, "law": str(fit["law"].item()), **few, "status": status_label_of_fit(fit)}
 
 
-def _parameter_table(where: str, fits: Sequence[xr.Dataset]) -> Table:
-    columns = {str(one["law"].item()): _parameter_column(one) for one in fits}
+def _parameter_table(table_title: str, fits: Sequence[xr.Dataset]) -> TextTable:
+    columns = {str(one["law"].item()): _build_parameter_column(one) for one in fits}
     headings = next(iter(columns.values()))
     rows = [{"parameter": h, **{law: c[h] for law, c in columns.items()}} for h in headings]
     windows = (_describe_window(one) for one in fits if np.isfinite(one["rows_fitted"].item()))
-    return Table(rows, "\n".join(filter(None, (where, next(windows, "")))))
+    return TextTable(rows, "\n".join(filter(None, (table_title, next(windows, "")))))
 
 
-def _parameter_column(one: xr.Dataset) -> dict[str, str]:
+def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
     """The parameters of a fit, how well it explains its rows, and the noise that is left."""
     found = {
-        n + _bracketed_units(split_window_number(name)[0]): format_with_stderr(one, name)
-        for name, n in parameter_headings(one).items()
+        n + _bracketed_units(split_window_number(name)[0]): format_with_stderr(fit, name)
+        for name, n in parameter_headings(fit).items()
     }
-    if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
-        found["k" + _bracketed_units("stiffness")] = f"{one['window_stiffness'].item():.6g}"
-    stresses = [f"{stress:.6g}" for stress in _normal_stresses_in_mpa(one).values()]
+    if "window_stiffness" in fit and "stiffness" not in fit["parameter"].values:
+        found["k" + _bracketed_units("stiffness")] = f"{fit['window_stiffness'].item():.6g}"
+    stresses = [f"{stress:.6g}" for stress in _normal_stresses_in_mpa(fit).values()]
     if stresses:
         found["normal stress (MPa)"] = ", ".join(stresses)
     quality = dict.fromkeys(("R2", "criterion", "noise", "worth"), "-")
-    if np.isfinite(one["rows_fitted"].item()):
-        order = int(one["noise_order"].item())
+    if np.isfinite(fit["rows_fitted"].item()):
+        order = int(fit["noise_order"].item())
         process = f"AR({order})" if order else "white"
         quality = {
-            "R2": f"{one['r_squared'].item():.4f}",
-            "criterion": f"{one['criterion'].item():.1f}",
-            "noise": f"{process}, sd {one['noise_size'].item():.2g}",
-            "worth": pluralize(round(one["effective_samples"].item()), "independent row"),
+            "R2": f"{fit['r_squared'].item():.4f}",
+            "criterion": f"{fit['criterion'].item():.1f}",
+            "noise": f"{process}, sd {fit['noise_size'].item():.2g}",
+            "worth": pluralize(round(fit["effective_samples"].item()), "independent row"),
         }
-    return found | quality | {"status": status_label(one)}
+    return found | quality | {"status": status_label_of_fit(fit)}
 
 
-def _bracketed_units(name: str) -> str:
+def _bracketed_units(parameter_name: str) -> str:
     """Units of a parameter, in brackets behind its name."""
-    units = PARAMETERS[name].units if name in PARAMETERS else "1"
+    units = PARAMETERS[parameter_name].units if parameter_name in PARAMETERS else "1"
     if units.startswith("um-"):
         units = f"1/um^{units[3:]}".removesuffix("^1")
     return "" if units == "1" else f" ({units})"
 
 
-def _describe_window(one: xr.Dataset) -> str:
+def _describe_window(fit: xr.Dataset) -> str:
     """The step and the window of a fit."""
-    speeds = (one[n].item() for n in ("velocity_before", "velocity_after"))
-    ends = (one[n].item() for n in ("window_begins", "window_ends"))
-    rows = int(one["rows_fitted"].item())
+    speeds = (fit[n].item() for n in ("velocity_before", "velocity_after"))
+    ends = (fit[n].item() for n in ("window_begins", "window_ends"))
+    rows = int(fit["rows_fitted"].item())
     return (
         f"{' to '.join(f'{v:.4g}' for v in speeds)} um/s, "
         f"fitted from {' to '.join(f'{x:.6g}' for x in ends)} um, {rows:,} rows"
     )
 
 
-def format_with_stderr(one: xr.Dataset, name: str) -> str:
+def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
     """Format a value with its standard error, rounded to two digits of the error.
 
     An asterisk marks a standard error that is not valid.
     """
-    text = _format_rounded(one[name].item(), one[f"{name}_stderr"].item())
-    is_marked = " +- " in text and status_label(one) == Status.ERRORS_NOT_VALID.label
+    text = _format_rounded_to_error(
+        fit[parameter_name].item(), fit[f"{parameter_name}_stderr"].item()
+    )
+    is_marked = " +- " in text and status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label
     return text + _INVALID_ERROR_MARK * is_marked
 
 
-def _format_rounded(value: float, error: float) -> str:
+def _format_rounded_to_error(value: float, error: float) -> str:
     """Format a value with its standard error, rounded to two digits of the error."""
     if not math.isfinite(value):
         return "-"
-    if error > _MAX_RELATIVE_ERROR * abs(value) > 0.0:
+    if error > _MAX_PRINTED_RELATIVE_ERROR * abs(value) > 0.0:
         return "not told"
     if not (math.isfinite(error) and error > 0.0):
         return f"{value:.6g} +- {error:g}"
@@ -266,30 +275,30 @@ def _format_rounded(value: float, error: float) -> str:
     return f"({value / scale:z.{digits}f} +- {error / scale:.{digits}f})e{size:+03d}"
 
 
-def _remarks(one: xr.Dataset) -> Iterator[str]:
+def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
     """Yield remarks on a fit.
 
     The remarks are the message of the fit, the differences between windows, the intervals of the
     posterior, and the result of the autocorrelation test.
     """
-    law, message = one["law"].item(), str(one["message"].item())
-    if status_label(one) == Status.ERRORS_NOT_VALID.label:
+    law, message = fit["law"].item(), str(fit["message"].item())
+    if status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label:
         yield f"{law}: standard errors marked by {_INVALID_ERROR_MARK} are not valid: {message}"
     elif message:
-        yield f"{law}: {status_label(one).replace('_', ' ')}: {message}"
-    short = parameter_headings(one)
-    spreads = ((short[n], one[f"{n}_windows"].item()) for n in short if f"{n}_windows" in one)
+        yield f"{law}: {status_label_of_fit(fit).replace('_', ' ')}: {message}"
+    short = parameter_headings(fit)
+    spreads = ((short[n], fit[f"{n}_windows"].item()) for n in short if f"{n}_windows" in fit)
     if each := ", ".join(f"{n} {value:.2g}" for n, value in spreads if not math.isnan(value)):
         yield f"{law}: among windows parameters differ by {each}"
-    if "posterior" in one and math.isfinite(one["autocorrelation_time"].item()):
-        drawn = one["posterior"].quantile([0.025, 0.975], "draw")
+    if "posterior" in fit and math.isfinite(fit["autocorrelation_time"].item()):
+        drawn = fit["posterior"].quantile([0.025, 0.975], "draw")
         each = ", ".join(
             f"{short[str(of.parameter.values)]} {of.values[0]:.4g} to {of.values[1]:.4g}"
             for of in drawn.dropna("parameter").transpose("parameter", ...)
         )
-        time = f"{one['autocorrelation_time'].item():.2g} steps"
+        time = f"{fit['autocorrelation_time'].item():.2g} steps"
         yield f"{law}: 95 % of the posterior: {each} (autocorrelation time {time})"
-    p_value = one["whiteness"].item()
+    p_value = fit["whiteness"].item()
     if math.isfinite(p_value):
-        order, rows = int(one["noise_order"]), int(one["rows_fitted"])
+        order, rows = int(fit["noise_order"]), int(fit["rows_fitted"])
         yield f"{law}: {describe_whiteness(p_value, order, rows)}"

@@ -14,15 +14,15 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.critical_steps import SLOW_NORM_PREFIX
+from rsfstudy.critical_steps import SLOW_NORM_WARNING_PREFIX
 from rsfstudy.formatting import (
-    format_fields,
     format_list,
+    format_nonempty_fields,
     format_value,
     pluralize,
     read_flag_meanings,
 )
-from rsfstudy.quantities import units_or_scale
+from rsfstudy.quantities import units_or_scale_of_variable
 from rsfstudy.rig import (
     DIMENSIONLESS_PREFIX,
     convert_to_display_units,
@@ -31,28 +31,28 @@ from rsfstudy.rig import (
 )
 from rsfstudy.status import STATUS_LABELS, Status
 from rsfstudy.storage import find_primary_output, read_declaration, read_provenance
-from rsfstudy.study import NOT_APPLICABLE, VERDICTS, format_claim_row
+from rsfstudy.study import NOT_APPLICABLE_VERDICT, VERDICTS, format_verdict_row
 from rsfstudy.vocabulary import find_quantity
 
 #: Most cells of a lattice that are shown, unless few more are all; and most that failed.
-MAX_CELLS, _MAX_CELLS_SHOWN_ENTIRELY, _MAX_FAILURES = 24, 36, 20
+MAX_CELLS_SHOWN, _MAX_CELLS_SHOWN_WITHOUT_THINNING, _MAX_FAILURES = 24, 36, 20
 #: Quantities that are set at one point beyond which fewer cells are shown.
-_FIELDS_BEFORE_THINNING = 4
+_MAX_POINT_FIELDS_WITHOUT_THINNING = 4
 #: Digits of a float.
 _MAX_DIGITS = 15
 #: What is told of a slope, by the ends of names: headings and formats.
-_SLOPE_COLUMNS = {
+_COLUMNS_OF_SLOPE_TABLE = {
     "stderr": ("standard error", ".2g"),
     "misfit": ("largest misfit", ".2g"),
     "points": ("points", ".0f"),
     "error": ("numerical error", ".2g"),
 }
 #: Variables of columns, each with what makes a text of a value, by the headings.
-TableColumns = dict[str, tuple[str, Callable[[Any], str]]]
+VariableAndFormatByHeading = dict[str, tuple[str, Callable[[Any], str]]]
 
 
 @dataclass(frozen=True)
-class Table:
+class TextTable:
     """Rows of texts under headings.
 
     Parameters
@@ -69,24 +69,24 @@ class Table:
 
     rows: Sequence[Mapping[str, str]]
     caption: str = ""
-    wrappable: Collection[str] = ()
+    wrappable_columns: Collection[str] = ()
     colours: Sequence[str] = ()
 
 
-def format_number(value: float, form: str = ".8g") -> str:
+def format_number_or_dash(value: float, format_specification: str = ".8g") -> str:
     """A number, or a dash where there is none."""
-    return "-" if np.isnan(value) else format(value, form)
+    return "-" if np.isnan(value) else format(value, format_specification)
 
 
-def format_to_error(value: float, error: float) -> str:
+def format_rounded_to_error(value: float, error: float) -> str:
     """A number to two digits of its error; to eight where it has none, or is all error."""
     if not 0.0 < error < abs(value):
-        return format_number(value)
+        return format_number_or_dash(value)
     digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2
     return format(value, f".{min(digits, _MAX_DIGITS)}g")
 
 
-def answer_table(dataset: xr.Dataset) -> Table:
+def build_scene_answer_table(dataset: xr.Dataset) -> TextTable:
     """The numbers of an answer for one scene, each with its units and its error estimate; words for
     codes.
     """
@@ -96,26 +96,26 @@ def answer_table(dataset: xr.Dataset) -> Table:
             continue
         value, error = values.item(), float(dataset.get(f"{name}_error", np.nan))
         units, flags = format_units(values), read_flag_meanings(values.attrs)
-        text = flags.get(value, format_to_error(value, error))
+        text = flags.get(value, format_rounded_to_error(value, error))
         row = {
             "number": str(name),
             "value": text if units == "1" or text == "-" else f"{text} {units}",
-            "error": format_number(error, ".1e"),
+            "error": format_number_or_dash(error, ".1e"),
             "what": str(values.attrs.get("long_name", "")),
         }
         rows.append(row)
-    return Table(rows, wrappable={"what"})
+    return TextTable(rows, wrappable_columns={"what"})
 
 
-def format_units(values: xr.DataArray) -> str:
+def format_units(variable: xr.DataArray) -> str:
     """The units of values, or what those without units are measured in; "1" for numbers."""
-    units = re.sub(r" (s|[num]?m)-1\b", r"/\1", units_or_scale(values.attrs) or "1")
+    units = re.sub(r" (s|[num]?m)-1\b", r"/\1", units_or_scale_of_variable(variable.attrs) or "1")
     return re.sub(r" \((\w+)\)-1| (\(.*?\))-1", r"/\1\2", units)
 
 
-def format_axis_name(along: xr.DataArray) -> str:
+def format_axis_name(axis_coordinate: xr.DataArray) -> str:
     """The name of an axis, and its units where it is that of a rig."""
-    name, units = str(along.name), along.attrs.get("units", "1")
+    name, units = str(axis_coordinate.name), axis_coordinate.attrs.get("units", "1")
     return name if units in ("1", find_quantity(name).units) else f"{name} ({units})"
 
 
@@ -130,20 +130,25 @@ def format_status_counts(dataset: xr.Dataset) -> str:
     return f"{told}; {work:,} right-hand sides"
 
 
-def describe_fields(
-    what: str, fields: Mapping[str, Any], rig: Mapping[str, float], varied: Collection[str] = ()
+def describe_scene_and_rig_fields(
+    heading: str,
+    scene_fields: Mapping[str, Any],
+    rig_values: Mapping[str, float],
+    varied_names: Collection[str] = (),
 ) -> dict[str, str]:
     """Fields of a scene that have a value, under the heading stated, those that are 0, and what the
     rig states, but for what is varied; nothing of what there is none of.
     """
-    fields = {n: v for n, v in fields.items() if n not in varied}
-    sizes = in_display_units(rig, varied)
+    scene_fields = {n: v for n, v in scene_fields.items() if n not in varied_names}
+    sizes = in_display_units(rig_values, varied_names)
     told = {
-        what: format_fields({n: v for n, v in fields.items() if v}),
-        "0 or absent": ", ".join(n for n, v in fields.items() if not v and v is not None),
-        "laboratory": format_fields({n: f"{v:g} {units}" for n, (v, units) in sizes.items()}),
+        heading: format_nonempty_fields({n: v for n, v in scene_fields.items() if v}),
+        "0 or absent": ", ".join(n for n, v in scene_fields.items() if not v and v is not None),
+        "laboratory": format_nonempty_fields(
+            {n: f"{v:g} {units}" for n, (v, units) in sizes.items()}
+        ),
     }
-    norm, period = fields.get("instability_norm"), fields.get("period")
+    norm, period = scene_fields.get("instability_norm"), scene_fields.get("period")
     if norm and period and {"slip_distance", "reference_velocity"} <= set(sizes):
         rate = norm * math.tau * sizes["slip_distance"][0] / period
         if rate > sizes["reference_velocity"][0]:  # else it is no norm that tells anything
@@ -164,7 +169,7 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
     return {
         "lattice": " x ".join(f"{dataset.sizes[d]} {d}" for d in dims),
-        **describe_fields("fixed", declared.base, declared.laboratory or {}, varied),
+        **describe_scene_and_rig_fields("fixed", declared.base, declared.laboratory or {}, varied),
         "cells": f"{attrs['completeness']}; {format_status_counts(dataset)}",
         **({"reductions": reduced} if reduced else {}),
         "made by": f"{about['command']}, {about['time']}",
@@ -172,36 +177,41 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
     }
 
 
-def build_rows(
-    dataset: xr.Dataset, dims: Iterable[Hashable], columns: TableColumns
+def build_rows_along_dimensions(
+    dataset: xr.Dataset, dimensions: Iterable[Hashable], columns: VariableAndFormatByHeading
 ) -> list[dict[str, str]]:
     """A row for each point of some dimensions: where it is, then columns of variables."""
-    dims, found = list(map(str, dims)), []
-    for at in np.ndindex(*(dataset.sizes[d] for d in dims)):
-        one = dataset.isel(dict(zip(dims, at, strict=True)))
-        row = {format_axis_name(one[d]): format_value(one[d].item()) for d in dims}
+    dimensions, found = list(map(str, dimensions)), []
+    for at in np.ndindex(*(dataset.sizes[d] for d in dimensions)):
+        one = dataset.isel(dict(zip(dimensions, at, strict=True)))
+        row = {format_axis_name(one[d]): format_value(one[d].item()) for d in dimensions}
         found.append(row | {head: form(one[n].item()) for head, (n, form) in columns.items()})
     return found
 
 
-def headline_table(dataset: xr.Dataset) -> Table:
+def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
     """The headline along the axes, with what is set at points that only have numbers, its error
     estimate and how each cell ended; no row where there is none.
     """
     name = find_primary_output(dataset)
     if name is None:
-        return Table([])
+        return TextTable([])
     dataset = convert_to_display_units(dataset)
     name = name if name in dataset else drop_ratio_from_name(name)
     dims = dataset["status"].dims
-    drawn = [n for n in _sampled_fields(dataset) if n in dataset.coords]
-    columns = TableColumns({format_axis_name(dataset[n]): (n, format_value) for n in drawn})
-    columns[name] = name, format_number
+    drawn = [n for n in _fields_along_numbered_axes(dataset) if n in dataset.coords]
+    columns = VariableAndFormatByHeading(
+        {format_axis_name(dataset[n]): (n, format_value) for n in drawn}
+    )
+    columns[name] = name, format_number_or_dash
     if f"{name}_error" in dataset:
-        columns["error"] = f"{name}_error", partial(format_number, form=".1e")
-    size, fewer = dataset["status"].size, 1 + len(drawn) // _FIELDS_BEFORE_THINNING
-    most = size if size <= _MAX_CELLS_SHOWN_ENTIRELY // fewer else MAX_CELLS // fewer
-    at = thin_dimensions({str(d): dataset.sizes[d] for d in dims}, most)
+        columns["error"] = (
+            f"{name}_error",
+            partial(format_number_or_dash, format_specification=".1e"),
+        )
+    size, fewer = dataset["status"].size, 1 + len(drawn) // _MAX_POINT_FIELDS_WITHOUT_THINNING
+    most = size if size <= _MAX_CELLS_SHOWN_WITHOUT_THINNING // fewer else MAX_CELLS_SHOWN // fewer
+    at = select_thinned_points({str(d): dataset.sizes[d] for d in dims}, most)
     few = dataset[[*(n for n, _form in columns.values()), "status"]].isel(at).load()
     if (few["status"] != int(Status.OK)).any():
         columns["status"] = "status", STATUS_LABELS.__getitem__
@@ -212,10 +222,10 @@ def headline_table(dataset: xr.Dataset) -> Table:
         every = [f"{n} of {full[d]} {d}" for d, n in few.sizes.items() if n < full[d]]
         which = f"{shown} of {size:,} cells, {', '.join(every)}, from first to last"
         caption += f" ({which}; rsfstudy export --csv writes all)"
-    return Table(build_rows(few, dims, columns), caption)
+    return TextTable(build_rows_along_dimensions(few, dims, columns), caption)
 
 
-def _sampled_fields(dataset: xr.Dataset) -> list[str]:
+def _fields_along_numbered_axes(dataset: xr.Dataset) -> list[str]:
     """What is set along axes whose points only have numbers: samples, and cases."""
     axes = [axis["values"] for axis in read_declaration(dataset).axes]
     columns = [
@@ -224,7 +234,7 @@ def _sampled_fields(dataset: xr.Dataset) -> list[str]:
     return [name for column in columns for name in column]
 
 
-def summarise_in_lines(dataset: xr.Dataset) -> list[str]:
+def summarise_study_in_lines(dataset: xr.Dataset) -> list[str]:
     """The headline and the slopes in a line each, and how cells ended in another."""
     lines, converted = [], convert_to_display_units(dataset)
     if (name := find_primary_output(dataset)) is not None:
@@ -233,20 +243,20 @@ def summarise_in_lines(dataset: xr.Dataset) -> list[str]:
         ends = " to ".join(map(format_value, dict.fromkeys((*told[:1], *told[-1:]))))
         text = f"{ends}{f' {units}' * (units != '1')}" if ends else "no number"
         lines.append(f"{values.name}: {text}")
-    for slope in _slope_names(converted):
+    for slope in _names_of_slope_reductions(converted):
         slopes, units = converted[slope].values.ravel().tolist(), format_units(converted[slope])
         lines.append(f"{slope}: {format_list(slopes, ', ')}{f' {units}' * (units != '1')}")
     return [*lines, format_status_counts(dataset)]
 
 
-def reduction_tables(dataset: xr.Dataset) -> Iterator[Table]:
+def reduction_tables(dataset: xr.Dataset) -> Iterator[TextTable]:
     """Slopes and their like, those with a standard error, with one row for each point of their
     dimensions; and, where integrators were compared, the cheapest for each number of digits.
     """
     converted = convert_to_display_units(dataset)
-    for slope in _slope_names(converted):
+    for slope in _names_of_slope_reductions(converted):
         yield _slope_table(converted, slope)
-    columns: TableColumns = {
+    columns: VariableAndFormatByHeading = {
         "cheapest": ("cheapest_integrator", str),
         "its work": ("cheapest_work", "{:,.0f}".format),
         "work of the default": ("cheapest_default_work", "{:,.0f}".format),
@@ -254,17 +264,20 @@ def reduction_tables(dataset: xr.Dataset) -> Iterator[Table]:
     }
     if {name for name, _form in columns.values()} <= set(dataset.data_vars):
         dims = dataset["cheapest_work"].dims
-        yield Table(build_rows(dataset, dims, columns), wrappable={"problem", "cheapest"})
+        yield TextTable(
+            build_rows_along_dimensions(dataset, dims, columns),
+            wrappable_columns={"problem", "cheapest"},
+        )
 
 
-def reduction_pieces(dataset: xr.Dataset) -> Iterator[Table | str]:
+def reduction_pieces(dataset: xr.Dataset) -> Iterator[TextTable | str]:
     """The tables of reductions, and a sentence on each reduction that has no results."""
     yield from reduction_tables(dataset)
     for name, why in missing_result_reasons(dataset).items():
         yield f"no {name}: {why}"
 
 
-def refusal_reasons(dataset: xr.Dataset) -> dict[str, str]:
+def find_refusal_reasons(dataset: xr.Dataset) -> dict[str, str]:
     """Why reductions refuse to draw on cells, by their names."""
     named = [str(reduction["name"]) for reduction in read_declaration(dataset).reductions]
     named.sort(key=len, reverse=True)  # a name may begin with another
@@ -278,7 +291,7 @@ def refusal_reasons(dataset: xr.Dataset) -> dict[str, str]:
 
 def incomplete_notes(results: xr.Dataset) -> list[str]:
     """How many cells failed, with which status, and which reductions refused to draw on cells."""
-    told = [f"no {name}: {why}" for name, why in refusal_reasons(results).items()]
+    told = [f"no {name}: {why}" for name, why in find_refusal_reasons(results).items()]
     if failed := count_failures(results):
         each = ", ".join(f"{label} {number}" for label, number in failed.items())
         first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
@@ -288,7 +301,7 @@ def incomplete_notes(results: xr.Dataset) -> list[str]:
 
 def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
     """Why reductions have no results, by their names."""
-    found, there = refusal_reasons(dataset), tuple(map(str, dataset.data_vars))
+    found, there = find_refusal_reasons(dataset), tuple(map(str, dataset.data_vars))
     for stated_as in read_declaration(dataset).reductions:
         about: Mapping[str, Any] = {**stated_as}
         if not any(name.startswith(about["name"]) for name in there):
@@ -299,104 +312,120 @@ def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
     return found
 
 
-def slow_norm_note(dataset: xr.Dataset) -> str:
+def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
     """How many answers of a study of a rig are for a norm near the load point velocity, and what
     the first of them says; empty where there are none.
     """
     if read_declaration(dataset).laboratory is None:
         return ""
     ok = dataset["message"].values[dataset["status"].values == int(Status.OK)]
-    near = [text for text in ok.tolist() if text.startswith(SLOW_NORM_PREFIX)]
+    near = [text for text in ok.tolist() if text.startswith(SLOW_NORM_WARNING_PREFIX)]
     return f"{len(near)} of {pluralize(len(ok), 'answer')}: {near[0]}" if near else ""
 
 
-def _slope_names(dataset: xr.Dataset) -> list[str]:
+def _names_of_slope_reductions(dataset: xr.Dataset) -> list[str]:
     """Names of the reductions that have a standard error."""
     named = [reduction["name"] for reduction in read_declaration(dataset).reductions]
     return [name for name in named if {name, f"{name}_stderr"} <= set(dataset.data_vars)]
 
 
-def _slope_table(dataset: xr.Dataset, name: str) -> Table:
-    dims, words = dataset[name].dims, dataset[name].attrs.get("comment", name)
-    units = format_units(dataset[name])
-    columns: TableColumns = {f"{name} ({units})" if units != "1" else name: (name, format_value)}
-    for end, (heading, form) in _SLOPE_COLUMNS.items():
-        if (beside := f"{name}_{end}") in dataset:
+def _slope_table(dataset: xr.Dataset, reduction_name: str) -> TextTable:
+    dims, words = (
+        dataset[reduction_name].dims,
+        dataset[reduction_name].attrs.get("comment", reduction_name),
+    )
+    units = format_units(dataset[reduction_name])
+    columns: VariableAndFormatByHeading = {
+        f"{reduction_name} ({units})" if units != "1" else reduction_name: (
+            reduction_name,
+            format_value,
+        )
+    }
+    for end, (heading, form) in _COLUMNS_OF_SLOPE_TABLE.items():
+        if (beside := f"{reduction_name}_{end}") in dataset:
             if end != "points" and (own := format_units(dataset[beside])) != units:
                 heading += f" ({own})"
             columns[heading] = beside, f"{{:{form}}}".format
-    return Table(
-        build_rows(dataset, dims, columns), words, {format_axis_name(dataset[d]) for d in dims}
+    return TextTable(
+        build_rows_along_dimensions(dataset, dims, columns),
+        words,
+        {format_axis_name(dataset[d]) for d in dims},
     )
 
 
-def claims_table(frame: pd.DataFrame) -> Table | str:
+def claims_table(verdicts: pd.DataFrame) -> TextTable | str:
     """Claims and their verdicts, as `rsfstudy.check` gives them, of one study or of several; a
     sentence where none applies.
     """
-    rows = frame.to_dict("records")
-    if not any(row["verdict"] != NOT_APPLICABLE for row in rows):
-        return f"{pluralize(len(rows), 'claim')} not checked: {count_verdicts(frame)}" * bool(rows)
+    rows = verdicts.to_dict("records")
+    if not any(row["verdict"] != NOT_APPLICABLE_VERDICT for row in rows):
+        return f"{pluralize(len(rows), 'claim')} not checked: {count_verdicts(verdicts)}" * bool(
+            rows
+        )
     colours = [
         "red" if row["moved"] else "green" if row["verdict"] == "reproduced" else "yellow"
         for row in rows
     ]
-    return Table(
-        [format_claim_row(row) for row in rows],
-        wrappable={"claim", "tolerance, and why"},
+    return TextTable(
+        [format_verdict_row(row) for row in rows],
+        wrappable_columns={"claim", "tolerance, and why"},
         colours=colours,
     )
 
 
-def count_verdicts(found: pd.DataFrame) -> str:
+def count_verdicts(verdicts: pd.DataFrame) -> str:
     """How many claims have which verdict; where none applies, why."""
-    given = list(found["verdict"])
-    if set(given) == {NOT_APPLICABLE}:
+    given = list(verdicts["verdict"])
+    if set(given) == {NOT_APPLICABLE_VERDICT}:
         return "other values or units have no published numbers"
     return ", ".join(f"{given.count(v)} {v}" for v in VERDICTS if v in given)
 
 
-def summarise_verdicts(dataset: xr.Dataset, found: pd.DataFrame) -> tuple[str, list[str]]:
+def summarise_verdicts(dataset: xr.Dataset, verdicts: pd.DataFrame) -> tuple[str, list[str]]:
     """How many claims have which verdict, and what went wrong, in words."""
     wrong = [f"{count} {label}" for label, count in count_failures(dataset).items()]
-    wrong += [f"{claim} moved" for claim in dict.fromkeys(found["id"][found["moved"]])]
-    return count_verdicts(found), wrong
+    wrong += [f"{claim} moved" for claim in dict.fromkeys(verdicts["id"][verdicts["moved"]])]
+    return count_verdicts(verdicts), wrong
 
 
-def cells_frame(dataset: xr.Dataset, where: xr.DataArray, axes: Sequence[str]) -> pd.DataFrame:
+def build_frame_of_cells(
+    dataset: xr.Dataset, cell_mask: xr.DataArray, axis_names: Sequence[str]
+) -> pd.DataFrame:
     """Some cells, one row each: their places on axes, how each ended, and the message."""
-    at = where.values
-    columns = {name: dataset[name].broadcast_like(where).values[at] for name in axes}
+    at = cell_mask.values
+    columns = {name: dataset[name].broadcast_like(cell_mask).values[at] for name in axis_names}
     columns["status"] = [STATUS_LABELS[code] for code in dataset["status"].values[at].tolist()]
     return pd.DataFrame(columns | {"message": dataset["message"].values[at]})
 
 
-def failures_table(dataset: xr.Dataset, file: str) -> tuple[Table, list[str]]:
+def failures_table(dataset: xr.Dataset, file: str) -> tuple[TextTable, list[str]]:
     """The first cells that failed, and the commands that compute each alone from a file."""
     status = dataset["status"]
     failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
-    found = cells_frame(dataset, failed, list(map(str, failed.dims)))
+    found = build_frame_of_cells(dataset, failed, list(map(str, failed.dims)))
     first = found[:_MAX_FAILURES]
     places: list[dict[Any, Any]] = first[list(failed.dims)].to_dict("records")
     rows = [
-        {"cell": format_fields(place), "status": label, "message": message}
+        {"cell": format_nonempty_fields(place), "status": label, "message": message}
         for place, label, message in zip(places, first["status"], first["message"], strict=True)
     ]
     caption = f"{pluralize(len(found), 'cell')} failed"
     if len(found) > len(rows):
         caption += f", of which the first {len(rows)}"
-    return Table(rows, caption, wrappable={"cell", "message"}), [
-        rerun_command(dataset, file, place) for place in places
+    return TextTable(rows, caption, wrappable_columns={"cell", "message"}), [
+        format_recompute_command(dataset, file, place) for place in places
     ]
 
 
-def rerun_command(dataset: xr.Dataset, file: str, place: Mapping[str, Any]) -> str:
+def format_recompute_command(
+    dataset: xr.Dataset, results_file: str, cell_coordinates: Mapping[str, Any]
+) -> str:
     """The command that computes one cell alone."""
-    words = ["rsfstudy", "rerun", file]
+    words = ["rsfstudy", "rerun", results_file]
     declared_in = read_provenance(dataset)["declared_in"]
     if declared_in:
         words += ["--study", declared_in]
-    for name, value in place.items():
+    for name, value in cell_coordinates.items():
         words += ["--cell", f"{name}={value}"]
     return shlex.join(words)
 
@@ -406,7 +435,9 @@ def count_pending(dataset: xr.Dataset) -> int:
     return int((dataset["status"] == int(Status.PENDING)).sum())
 
 
-def thin_dimensions(sizes: Mapping[str, int], most: int) -> dict[str, np.ndarray]:
+def select_thinned_points(
+    dimension_sizes: Mapping[str, int], max_cells: int
+) -> dict[str, np.ndarray]:
     """Points of each dimension, both ends and some between, that make so many cells at most.
 
     Parameters
@@ -415,12 +446,12 @@ def thin_dimensions(sizes: Mapping[str, int], most: int) -> dict[str, np.ndarray
     most : int
         The longest dimensions are thinned first.
     """
-    kept = {dimension: min(size, most) for dimension, size in sizes.items()}
-    while math.prod(kept.values()) > most:
+    kept = {dimension: min(size, max_cells) for dimension, size in dimension_sizes.items()}
+    while math.prod(kept.values()) > max_cells:
         kept[max(kept, key=kept.__getitem__)] -= 1
     return {
         dimension: np.unique(np.linspace(0, size - 1, kept[dimension]).round().astype(int))
-        for dimension, size in sizes.items()
+        for dimension, size in dimension_sizes.items()
     }
 
 

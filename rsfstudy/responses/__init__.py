@@ -12,7 +12,10 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from rsfstudy.responses._recorded_motion import estimate_instant_errors, settled_flag
+    from rsfstudy.responses._recorded_motion import (
+        estimate_errors_at_instants,
+        flag_of_settled_friction,
+    )
     from rsfstudy.responses.healing import Healing
     from rsfstudy.responses.linear_stability import LinearStability
     from rsfstudy.responses.rigid_response import RigidResponse
@@ -22,7 +25,10 @@ else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
-            "responses._recorded_motion": ("estimate_instant_errors", "settled_flag"),
+            "responses._recorded_motion": (
+                "estimate_errors_at_instants",
+                "flag_of_settled_friction",
+            ),
             "responses.healing": ("Healing",),
             "responses.linear_stability": ("LinearStability",),
             "responses.rigid_response": ("RigidResponse",),
@@ -37,6 +43,6 @@ __all__ = [
     "RigidResponse",
     "StepResponse",
     "VelocityStep",
-    "estimate_instant_errors",
-    "settled_flag",
+    "estimate_errors_at_instants",
+    "flag_of_settled_friction",
 ]

@@ -5,13 +5,19 @@ from __future__ import annotations
 import math
 
 from rsfstudy.motion import Event
-from rsfstudy.slider import PATH_LOG_RATE_SCALE, RUPTURE_REGIME, Point, Scene, path_metric
+from rsfstudy.slider import (
+    LOG_RATE_PER_PATH_LENGTH,
+    RUPTURE_REGIME,
+    MotionPoint,
+    Scene,
+    displacement_per_path_length,
+)
 
 #: Smallest square of a direction cosine of the path in a rupture, where ln V changes at once.
-MIN_SQUARED_COSINE = 1e-12
+MIN_SQUARED_PATH_ANGLE_COSINE = 1e-12
 
 
-def distance_from_steady(scene: Scene, point: Point, load_velocity: float) -> float:
+def distance_from_steady_sliding(scene: Scene, point: MotionPoint, load_velocity: float) -> float:
     """Distance of a point from steady sliding at a load point velocity, in ln V or in the state
     over b.
     """
@@ -40,14 +46,16 @@ def growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> 
         return growth
     norm = scene.inertial_time * (math.exp(event.point.log_slip_rate) + load_velocity)
     slant = growth / (
-        PATH_LOG_RATE_SCALE
-        * math.sqrt(max(1.0 - (growth / PATH_LOG_RATE_SCALE) ** 2, MIN_SQUARED_COSINE))
+        LOG_RATE_PER_PATH_LENGTH
+        * math.sqrt(
+            max(1.0 - (growth / LOG_RATE_PER_PATH_LENGTH) ** 2, MIN_SQUARED_PATH_ANGLE_COSINE)
+        )
         * norm
     )
-    return PATH_LOG_RATE_SCALE * slant * path_metric(slant)
+    return LOG_RATE_PER_PATH_LENGTH * slant * displacement_per_path_length(slant)
 
 
-def friction_event_quantity(scene: Scene) -> tuple[str, float]:
+def friction_quantity_for_events(scene: Scene) -> tuple[str, float]:
     """Quantity that an engine watches to tell extrema and levels of the friction coefficient that
     is read, and what it is above it: spring stress itself where nothing changes normal stress and
     slip rate alone tells where that is extreme.

@@ -18,19 +18,19 @@ from rsfstudy.motion import (
     Recording,
     WorkMeter,
     estimate_error,
-    estimate_neglected_inertia,
-    friction_coefficient,
+    estimate_neglected_inertia_error,
     integrate_events,
     point_before_start,
+    recorded_friction_coefficient,
 )
-from rsfstudy.slider import Scene, largest_growth_rate
+from rsfstudy.slider import Scene, largest_linear_growth_rate
 
 #: Part of the accuracy asked for to which the errors of two runs may agree by chance.
-COINCIDENCE_FLOOR = 0.01
+ERROR_FLOOR_OVER_RTOL = 0.01
 #: Part of the same, times a, by which the friction coefficient of two runs may agree by chance at
 #: an instant: of 7,071 numbers of random holds 22 err by up to 22 times their estimates without it,
 #: and four by up to 1.7 times with it (study coverage).
-_INSTANT_FRICTION_ERROR = 0.1
+_FRICTION_ERROR_FLOOR_AT_INSTANT = 0.1
 
 
 class RecordedMotion(NamedTuple):
@@ -55,17 +55,17 @@ class RecordedMotion(NamedTuple):
         ``rsfstudy.motion.neglected_inertia``.
     """
 
-    segment_starts: list[Event]
-    friction_before_starts: list[float]
-    peak: Event | None
+    segment_start_events: list[Event]
+    friction_before_segments: list[float]
+    peak_event: Event | None
     last_event: Event
-    rows: np.ndarray
+    recorded_rows: np.ndarray
     neglected_inertia_error: np.ndarray
 
     @property
-    def start(self) -> Event:
+    def start_event(self) -> Event:
         """Beginning of the record."""
-        return self.segment_starts[0]
+        return self.segment_start_events[0]
 
     def neglected_error_until(self, time: float) -> float:
         """Return the error of ln V that is caused by neglected inertia.
@@ -80,14 +80,14 @@ class RecordedMotion(NamedTuple):
         float
             Error of ln V at this time, or at the end of the record if the record ends earlier.
         """
-        row = min(int(np.searchsorted(self.rows[:, 0], time)), len(self.rows) - 1)
+        row = min(int(np.searchsorted(self.recorded_rows[:, 0], time)), len(self.recorded_rows) - 1)
         return float(self.neglected_inertia_error[row])
 
 
-def record_motion(
+def record_motion_of_segment(
     scene: Scene,
     accuracy: Accuracy,
-    meter: WorkMeter,
+    work_meter: WorkMeter,
     specifications: Sequence[EventSpecification],
     first_segment: int,
     peak_segment: int,
@@ -134,7 +134,7 @@ def record_motion(
         for event in integrate_events(
             scene,
             accuracy,
-            meter,
+            work_meter,
             specifications,
             with_time=True,
             recording=recording,
@@ -153,21 +153,23 @@ def record_motion(
     except MotionStopped:
         if peak is None or not allow_early_stop:
             raise
-    rows, start = recording.table(scene), point_before_start(scene)
-    slow = recording.regime_number(scene.dynamics.regime)
-    neglected = estimate_neglected_inertia(scene, rows, slow, start.log_slip_rate)
+    rows, start = recording.as_table(scene), point_before_start(scene)
+    slow = recording.index_of_regime(scene.dynamics.regime)
+    neglected = estimate_neglected_inertia_error(scene, rows, slow, start.log_slip_rate)
     shown = rows[:, 0] >= begun[first_segment].time
     rows, neglected = rows[shown], neglected[shown]
     # The other samples of the step that ends at the first row are not part of the record.
     rows[0, SAMPLE_COLUMN] = 0.0
-    friction, later = friction_coefficient(rows), begun[max(first_segment, 1) :]
+    friction, later = recorded_friction_coefficient(rows), begun[max(first_segment, 1) :]
     before = [float(friction[rows[:, 0] == each.time][0]) for each in later]
     if first_segment == 0:
         before.insert(0, start.apparent_friction)
     return RecordedMotion(begun[first_segment:], before, peak, event, rows, neglected)
 
 
-def relative_to_start(start: Event, path: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def path_relative_to_start(
+    start_event: Event, path_variables: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
     """Return the quantities along a record relative to its beginning.
 
     Parameters
@@ -182,13 +184,17 @@ def relative_to_start(start: Event, path: Mapping[str, np.ndarray]) -> dict[str,
     dict of str to ndarray
         Time and slip since the beginning, friction coefficient, and logarithm of the slip rate.
     """
-    found = {name: path[name] for name in ("friction_coefficient", "log10_slip_rate")}
-    return {"time": path["time"] - start.time, "slip": path["slip"] - path["slip"][0], **found}
+    found = {name: path_variables[name] for name in ("friction_coefficient", "log10_slip_rate")}
+    return {
+        "time": path_variables["time"] - start_event.time,
+        "slip": path_variables["slip"] - path_variables["slip"][0],
+        **found,
+    }
 
 
-def estimate_instant_error(
+def estimate_error_at_instant(
     value: float,
-    refined: float,
+    refined_value: float,
     friction_derivative: float,
     scene: Scene,
     accuracy: Accuracy,
@@ -231,14 +237,14 @@ def estimate_instant_error(
 
     because friction changes by :math:`a` if :math:`\ln V` changes by 1.
     """
-    friction = (_INSTANT_FRICTION_ERROR * accuracy.rtol + neglected_error) * scene.a
-    chance = COINCIDENCE_FLOOR * accuracy.rtol
-    return estimate_error(value, refined, chance) + friction * abs(friction_derivative)
+    friction = (_FRICTION_ERROR_FLOOR_AT_INSTANT * accuracy.rtol + neglected_error) * scene.a
+    chance = ERROR_FLOOR_OVER_RTOL * accuracy.rtol
+    return estimate_error(value, refined_value, chance) + friction * abs(friction_derivative)
 
 
-def estimate_instant_errors(
+def estimate_errors_at_instants(
     values: Mapping[str, float],
-    refined: Mapping[str, float],
+    refined_values: Mapping[str, float],
     friction_derivatives: Mapping[str, float],
     scene: Scene,
     accuracy: Accuracy,
@@ -270,14 +276,14 @@ def estimate_instant_errors(
     """
     shared = neglected_errors or dict.fromkeys(values, 0.0)
     return {
-        f"{name}_error": estimate_instant_error(
-            value, refined[name], friction_derivatives[name], scene, accuracy, shared[name]
+        f"{name}_error": estimate_error_at_instant(
+            value, refined_values[name], friction_derivatives[name], scene, accuracy, shared[name]
         )
         for name, value in values.items()
     }
 
 
-def settled_flag(scene: Scene, *, is_flat: bool) -> float:
+def flag_of_settled_friction(scene: Scene, *, is_flat: bool) -> float:
     """Return 1 if friction has settled at the end of a record, and 0 if not.
 
     Friction has settled if it is nearly constant and if small perturbations of steady sliding do
@@ -297,7 +303,7 @@ def settled_flag(scene: Scene, *, is_flat: bool) -> float:
     """
     if not is_flat:
         return 0.0
-    growth = largest_growth_rate(scene, scene.log_load_velocity)
-    if growth is not None and growth.is_undecided:
+    growth = largest_linear_growth_rate(scene, scene.log_load_velocity)
+    if growth is not None and growth.is_zero_within_error:
         return math.nan
     return 0.0 if growth is not None and growth.is_positive else 1.0

@@ -14,8 +14,8 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import (
     Outcome,
     RecordingMeasure,
-    phase_outputs,
-    settles_to_steady_sliding,
+    outputs_along_phase,
+    steady_sliding_is_linearly_stable,
 )
 from rsfstudy.motion import (
     RECORDED_VARIABLES,
@@ -25,36 +25,36 @@ from rsfstudy.motion import (
     MotionStopped,
     WorkMeter,
     approach_to_steady_state,
-    friction_coefficient,
-    load_point_displacement,
     maximum,
-    sample_along_path,
+    recorded_friction_coefficient,
+    recorded_load_point_displacement,
+    resample_motion_along_path,
 )
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
 from rsfstudy.responses._readings import (
-    distance_from_steady,
-    friction_event_quantity,
+    distance_from_steady_sliding,
+    friction_quantity_for_events,
     growth_rate_along_path,
 )
 from rsfstudy.responses._recorded_motion import (
     RecordedMotion,
-    estimate_instant_errors,
-    record_motion,
-    relative_to_start,
+    estimate_errors_at_instants,
+    path_relative_to_start,
+    record_motion_of_segment,
 )
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 #: Largest distance from steady sliding, in ln V or in the state divided by b, at which the motion
 #: before a hold is treated as steady.
-_STEADY_TOLERANCE = 1e-3
+_MAX_DISTANCE_OF_STEADY_START = 1e-3
 #: Largest height of a peak, relative to the local tolerance, that is attributed to numerical errors
 #: near steady sliding. In 7,000 random motions with rtol from 1e-2 to 1e-6, the largest such height
 #: is 1.9.
-_PEAK_NOISE_FACTOR = 3.0
+_FRICTION_NOISE_OVER_LOCAL_TOLERANCE = 3.0
 #: Fraction of the largest distance from steady sliding below which no further peak is expected.
-_STEADY_FRACTION = 1e-6
+_SETTLED_FRACTION_OF_MAX_DISTANCE = 1e-6
 
 _PEAK_DISPLACEMENT_MEANING = "load point displacement from reloading to the peak of friction"
 _HEALING_MEANING = "healing: peak friction on reloading less friction before the hold"
@@ -65,7 +65,7 @@ _OUTPUTS = (
     Output(
         "peak_displacement", r"$\delta_0/D_c$", "1", _PEAK_DISPLACEMENT_MEANING, "D_c", error=True
     ),
-    *phase_outputs(
+    *outputs_along_phase(
         "time", "load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate"
     ),
 )
@@ -182,67 +182,82 @@ class Healing(RecordingMeasure):
         Outcome
             Status, results and message.
         """
-        hold = _find_hold(scene)
-        first = _record_hold(scene, hold, accuracy, meter)
-        said = _describe_initial_state(
-            scene, hold, first.start, max(_STEADY_TOLERANCE, accuracy.rtol)
+        hold = _find_first_hold_segment(scene)
+        first = _record_hold_and_reloading(scene, hold, accuracy, meter)
+        said = _describe_unsteady_start_of_hold(
+            scene, hold, first.start_event, max(_MAX_DISTANCE_OF_STEADY_START, accuracy.rtol)
         )
         peakless = Outcome(
             Status.NOT_APPLICABLE,
-            {"relaxation": first.friction_before_starts[1] - first.friction_before_starts[0]},
+            {"relaxation": first.friction_before_segments[1] - first.friction_before_segments[0]},
             "; ".join(filter(None, ("no peak of friction on reloading", said))),
         )
-        if first.peak is None:
+        if first.peak_event is None:
             if first.last_event.kind is EventKind.SETTLED:
                 # The call raises MotionStopped if the stability is undecided.
-                settles_to_steady_sliding(scene)
+                steady_sliding_is_linearly_stable(scene)
             return peakless
-        again = _record_hold(
-            scene, hold, accuracy.refined(), meter, self._record_end_time(scene, hold, first.peak)
+        again = _record_hold_and_reloading(
+            scene,
+            hold,
+            accuracy.refined(),
+            meter,
+            self._record_end_time(scene, hold, first.peak_event),
         )
-        if again.peak is None:
+        if again.peak_event is None:
             return peakless
         values, refined = (
-            _read_values(scene, record, peak)
-            for record, peak in ((first, first.peak), (again, again.peak))
+            _read_healing_values(scene, record, peak)
+            for record, peak in ((first, first.peak_event), (again, again.peak_event))
         )
         history = scene.parts.loading.segments
         # Friction peaks when the slip rate passes the load point velocity. A change of ln V by 1
         # changes friction by a.
-        growth = growth_rate_along_path(scene, first.peak, history[hold + 1].load_velocity)
+        growth = growth_rate_along_path(scene, first.peak_event, history[hold + 1].load_velocity)
         turning = 1.0 / (scene.a * growth) if growth else math.inf
         by_friction = {"healing": 1.0, "relaxation": 1.0, "peak_displacement": turning}
-        neglected = dict.fromkeys(values, first.neglected_error_until(first.peak.time))
-        neglected["relaxation"] = first.neglected_error_until(first.segment_starts[1].time)
+        neglected = dict.fromkeys(values, first.neglected_error_until(first.peak_event.time))
+        neglected["relaxation"] = first.neglected_error_until(first.segment_start_events[1].time)
         # The displacement depends on the growth of friction at the peak, and the error of the
         # growth rises earlier.
         neglected["peak_displacement"] = first.neglected_error_until(math.inf)
-        errors = estimate_instant_errors(values, refined, by_friction, scene, accuracy, neglected)
-        above = again.peak.point.apparent_friction - float(friction_coefficient(again.rows)[-1])
+        errors = estimate_errors_at_instants(
+            values, refined, by_friction, scene, accuracy, neglected
+        )
+        above = again.peak_event.point.apparent_friction - float(
+            recorded_friction_coefficient(again.recorded_rows)[-1]
+        )
         # Near steady sliding, friction may have spurious peaks on which both runs agree.
         if above <= max(
-            errors["healing_error"], _PEAK_NOISE_FACTOR * accuracy.refined().local_tolerance
+            errors["healing_error"],
+            _FRICTION_NOISE_OVER_LOCAL_TOLERANCE * accuracy.refined().local_tolerance,
         ):
             return peakless
-        return Outcome(Status.OK, {**values, **errors, **self._record_values(scene, again)}, said)
+        return Outcome(
+            Status.OK, {**values, **errors, **self._recorded_output_values(scene, again)}, said
+        )
 
-    def _record_end_time(self, scene: Scene, hold: int, peak: Event) -> float:
+    def _record_end_time(self, scene: Scene, hold_index: int, peak_event: Event) -> float:
         """Return the time at which the record ends, in units of D_c/V_*."""
         history = scene.parts.loading.segments
-        goes_on = self.record / history[hold + 1].load_velocity
-        return min(peak.time + goes_on, math.fsum(s.duration for s in history[: hold + 2]))
+        goes_on = self.record / history[hold_index + 1].load_velocity
+        return min(
+            peak_event.time + goes_on, math.fsum(s.duration for s in history[: hold_index + 2])
+        )
 
-    def _record_values(self, scene: Scene, record: RecordedMotion) -> dict[str, np.ndarray]:
+    def _recorded_output_values(
+        self, scene: Scene, record: RecordedMotion
+    ) -> dict[str, np.ndarray]:
         """Return the quantities along the record, beginning with the hold."""
-        path = sample_along_path(record.rows, self.phases, RECORDED_VARIABLES)
-        moved = load_point_displacement(scene, np.column_stack([*path.values()]))
+        path = resample_motion_along_path(record.recorded_rows, self.phases, RECORDED_VARIABLES)
+        moved = recorded_load_point_displacement(scene, np.column_stack([*path.values()]))
         return {
-            **relative_to_start(record.start, path),
+            **path_relative_to_start(record.start_event, path),
             "load_point_displacement": moved - moved[0],
         }
 
 
-def _find_hold(scene: Scene) -> int:
+def _find_first_hold_segment(scene: Scene) -> int:
     """Return the index of the first loading segment with a held load point.
 
     Raises
@@ -266,17 +281,23 @@ def _find_hold(scene: Scene) -> int:
     return holds[0]
 
 
-def _describe_initial_state(scene: Scene, hold: int, begin: Event, tolerance: float) -> str:
+def _describe_unsteady_start_of_hold(
+    scene: Scene, hold_index: int, hold_start_event: Event, tolerance: float
+) -> str:
     """Return a message if a hold does not begin in steady sliding."""
-    before = (Segment(1.0), *scene.parts.loading.segments)[hold]
-    away = distance_from_steady(scene, begin.point, before.load_velocity)
+    before = (Segment(1.0), *scene.parts.loading.segments)[hold_index]
+    away = distance_from_steady_sliding(scene, hold_start_event.point, before.load_velocity)
     if away <= tolerance:
         return ""
     return f"the hold does not begin in steady sliding, but {away:.2g} from it in ln V or state/b"
 
 
-def _record_hold(
-    scene: Scene, hold: int, accuracy: Accuracy, meter: WorkMeter, until: float = math.inf
+def _record_hold_and_reloading(
+    scene: Scene,
+    hold_index: int,
+    accuracy: Accuracy,
+    work_meter: WorkMeter,
+    end_time: float = math.inf,
 ) -> RecordedMotion:
     """Record a motion from the state before the hold to the peak of friction.
 
@@ -285,21 +306,33 @@ def _record_hold(
     after the peak.
     """
     peak, settled = (
-        maximum(friction_event_quantity(scene)[0]),
-        approach_to_steady_state(_STEADY_FRACTION, terminal=until == math.inf),
+        maximum(friction_quantity_for_events(scene)[0]),
+        approach_to_steady_state(_SETTLED_FRACTION_OF_MAX_DISTANCE, terminal=end_time == math.inf),
     )
     asked = peak, settled
-    return record_motion(
-        scene, accuracy, meter, asked, hold, hold + 1, end_time=until, allow_early_stop=True
+    return record_motion_of_segment(
+        scene,
+        accuracy,
+        work_meter,
+        asked,
+        hold_index,
+        hold_index + 1,
+        end_time=end_time,
+        allow_early_stop=True,
     )
 
 
-def _read_values(scene: Scene, record: RecordedMotion, peak: Event) -> dict[str, float]:
+def _read_healing_values(
+    scene: Scene, recorded_motion: RecordedMotion, peak_event: Event
+) -> dict[str, float]:
     """Return healing, relaxation and the peak displacement."""
-    (before, held), reload = record.friction_before_starts[:2], record.segment_starts[1]
-    longer = (peak.point.spring_stress - reload.point.spring_stress) / scene.stiffness
+    (before, held), reload = (
+        recorded_motion.friction_before_segments[:2],
+        recorded_motion.segment_start_events[1],
+    )
+    longer = (peak_event.point.spring_stress - reload.point.spring_stress) / scene.stiffness
     return {
-        "healing": peak.point.apparent_friction - before,
+        "healing": peak_event.point.apparent_friction - before,
         "relaxation": held - before,
-        "peak_displacement": peak.slip - reload.slip + longer,
+        "peak_displacement": peak_event.slip - reload.slip + longer,
     }

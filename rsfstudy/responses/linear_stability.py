@@ -21,13 +21,13 @@ from rsfstudy.slider import (
     Equations,
     Scene,
     SteadySliding,
+    all_critical_stiffnesses,
     critical_stiffness,
     critical_stiffness_closed_form,
-    critical_stiffnesses,
-    equations_by_displacement,
-    equations_by_inertial_time,
-    normal_stress_at,
-    steady_friction_excess,
+    effective_normal_stress_at,
+    equations_against_displacement,
+    equations_against_inertial_time,
+    steady_friction_minus_reference,
     steady_sliding,
 )
 from rsfstudy.status import Status
@@ -38,10 +38,10 @@ _RELATIVE_DIFFERENCE_STEP = 1e-4
 #: Slip rate norm above which growth rates are computed from the full equations. Below this norm,
 #: inertia is smaller than the rounding errors of the full equations, and the slow manifold, which
 #: is of second order in the mass, is accurate enough.
-_MIN_INERTIAL_NORM = 1e-3
+_MIN_NORM_FOR_FULL_EQUATIONS = 1e-3
 #: Relative increase of the critical stiffness by inertia above which steady sliding is treated as
 #: unstable at any stiffness.
-_MAX_STIFFNESS_RISE = 1e6
+_MAX_STIFFNESS_RISE_BY_INERTIA = 1e6
 
 _OUTPUTS = (
     Output("critical_stiffness", error=True),
@@ -142,10 +142,10 @@ class LinearStability(Measure):
         if steady is None:
             return Outcome(
                 Status.NO_STEADY_STATE,
-                {"steady_friction": scene.mu_star + steady_friction_excess(scene, load)},
+                {"steady_friction": scene.mu_star + steady_friction_minus_reference(scene, load)},
                 "phi < atan(mu_ss): the slider locks while stress rises, and runs while it falls",
             )
-        sigma_ss = normal_stress_at(scene, steady.frictional_stress)
+        sigma_ss = effective_normal_stress_at(scene, steady.frictional_stress)
         mu_ss = (scene.mu_star + steady.frictional_stress) / sigma_ss
         values = {"steady_friction": mu_ss, "steady_normal_stress": sigma_ss}
         massless = critical_stiffness(scene, load, quasi_static=True)
@@ -165,14 +165,14 @@ class LinearStability(Measure):
         at_reference = scene.critical_stiffness
         relative = critical / at_reference if at_reference else math.inf
         rise = critical / massless - 1.0 if massless else math.inf
-        if rise > _MAX_STIFFNESS_RISE:
+        if rise > _MAX_STIFFNESS_RISE_BY_INERTIA:
             norm = scene.dynamics.slip_rate_norm(scene, load)
             return Outcome(
                 Status.UNSTABLE_AT_ANY_STIFFNESS,
                 values,
                 f"at V T/(2 pi D_c) = {norm:.3g} the direct effect cannot damp the spring",
             )
-        by_growth = _stiffness_at_zero_growth(scene, steady, critical, meter)
+        by_growth = _find_stiffness_at_zero_growth(scene, steady, critical, meter)
         if math.isnan(by_growth):
             why = f"growth of the equations does not end at a stiffness of {critical:.9g}"
             return Outcome(Status.UNVERIFIED, values, why)
@@ -182,7 +182,8 @@ class LinearStability(Measure):
                 "critical_stiffness": critical,
                 "critical_stiffness_error": abs(by_growth - critical) + 1e-15 * critical,
                 "critical_stiffness_from_growth": by_growth,
-                "critical_stiffness_explicit": _closed_form_stiffness(scene) * (1.0 + rise),
+                "critical_stiffness_explicit": _closed_form_critical_stiffness(scene)
+                * (1.0 + rise),
                 "relative_critical_stiffness": relative,
                 "rise_by_dynamics": rise,
                 **values,
@@ -190,7 +191,7 @@ class LinearStability(Measure):
         )
 
 
-def _closed_form_stiffness(scene: Scene) -> float:
+def _closed_form_critical_stiffness(scene: Scene) -> float:
     """Compute the critical stiffness from the published formula.
 
     The result is NaN if the formula does not apply to the scene.
@@ -204,33 +205,42 @@ def _closed_form_stiffness(scene: Scene) -> float:
     )
 
 
-def _stiffness_at_zero_growth(
-    scene: Scene, steady: SteadySliding, guess: float, meter: WorkMeter
+def _find_stiffness_at_zero_growth(
+    scene: Scene, steady_state: SteadySliding, stiffness_guess: float, work_meter: WorkMeter
 ) -> float:
     """Find the stiffness at which the largest growth rate is zero.
 
     The result is NaN if perturbations do not grow below this stiffness, or do not decay above it.
     """
-    with_mass = scene.dynamics.slip_rate_norm(scene, steady.log_slip_rate) > _MIN_INERTIAL_NORM
+    with_mass = (
+        scene.dynamics.slip_rate_norm(scene, steady_state.log_slip_rate)
+        > _MIN_NORM_FOR_FULL_EQUATIONS
+    )
 
     def growth_at(stiffness: float) -> float:
         changed = scene.with_(stiffness=stiffness)
         if with_mass:
-            equations = equations_by_inertial_time(changed)
-            stress = steady.spring_stress
-            state = (stress, steady.log_slip_rate, stress, *steady.psis[1:])
+            equations = equations_against_inertial_time(changed)
+            stress = steady_state.spring_stress
+            state = (stress, steady_state.log_slip_rate, stress, *steady_state.states[1:])
         else:
-            equations = equations_by_displacement(changed)
-            state = (steady.spring_stress, *steady.psis)
-        meter.charge(equations.regime, 2 * len(state))
+            equations = equations_against_displacement(changed)
+            state = (steady_state.spring_stress, *steady_state.states)
+        work_meter.charge(equations.regime, 2 * len(state))
         return max_growth_rate(compute_jacobian(equations, state))
 
     # With several states, sliding may be stable again below the next smaller critical stiffness.
-    before = [k for k in critical_stiffnesses(scene, steady.log_slip_rate) if k < guess]
-    softer = max(0.5 * guess, math.sqrt(guess * before[-1]) if before else 0.0)
-    if not growth_at(softer) > 0.0 > growth_at(2.0 * guess):
+    before = [
+        k
+        for k in all_critical_stiffnesses(scene, steady_state.log_slip_rate)
+        if k < stiffness_guess
+    ]
+    softer = max(0.5 * stiffness_guess, math.sqrt(stiffness_guess * before[-1]) if before else 0.0)
+    if not growth_at(softer) > 0.0 > growth_at(2.0 * stiffness_guess):
         return math.nan
-    return float(brentq(growth_at, softer, 2.0 * guess, xtol=1e-15 * guess, rtol=1e-14))
+    return float(
+        brentq(growth_at, softer, 2.0 * stiffness_guess, xtol=1e-15 * stiffness_guess, rtol=1e-14)
+    )
 
 
 def max_growth_rate(jacobian: np.ndarray) -> float:
@@ -249,7 +259,7 @@ def max_growth_rate(jacobian: np.ndarray) -> float:
     return float(np.linalg.eigvals(jacobian).real.max())
 
 
-def compute_jacobian(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
+def compute_jacobian(equations: Equations, unknowns: tuple[float, ...]) -> np.ndarray:
     """Compute the Jacobian of the rates by central differences.
 
     Parameters
@@ -265,11 +275,11 @@ def compute_jacobian(equations: Equations, state: tuple[float, ...]) -> np.ndarr
         Derivatives of the rates (rows) with respect to the unknowns (columns).
     """
     columns = []
-    for number, scale in enumerate(equations.scales):
+    for number, scale in enumerate(equations.unknown_scales):
         step = _RELATIVE_DIFFERENCE_STEP * scale
         ahead, behind = (
             equations.evaluate_rates(
-                tuple(x + sign * step * (i == number) for i, x in enumerate(state))
+                tuple(x + sign * step * (i == number) for i, x in enumerate(unknowns))
             )
             for sign in (1.0, -1.0)
         )

@@ -19,24 +19,24 @@ from rsfstudy.motion import (
     MotionStopped,
     Recording,
     WorkMeter,
-    events_along,
     fall,
+    iterate_events_of_equations,
     rise,
 )
 from rsfstudy.quantities import Output
-from rsfstudy.responses._recorded_motion import estimate_instant_error
+from rsfstudy.responses._recorded_motion import estimate_error_at_instant
 from rsfstudy.slider import (
     Scene,
     compute_steady_states,
-    equations_of_rigid_slider,
+    equations_at_imposed_slip_rate,
+    frictional_stress_after_jump,
     steady_sliding,
-    stress_after_jump,
 )
 from rsfstudy.status import Status
 
 #: Smallest evolution of friction after a step, as a fraction of a. Smaller changes are dominated by
 #: rounding errors.
-_MIN_RELATIVE_EVOLUTION = 1e-9
+_MIN_FRICTION_EVOLUTION_OVER_A = 1e-9
 
 #: Names, scales and meanings of stress changes and of their ratios.
 _STRESS_CHANGE_OUTPUTS = (
@@ -198,12 +198,17 @@ class RigidResponse(Measure):
         sliding = steady_sliding(scene, log_slip_rate)
         if sliding is None:
             return Outcome(Status.NO_STEADY_STATE, message="no steady state at this slip rate")
-        start, steady = friction_after_step(scene, log_slip_rate), sliding.frictional_stress
-        if abs(start - steady) < _MIN_RELATIVE_EVOLUTION * scene.a:
+        start, steady = (
+            frictional_stress_after_rate_step(scene, log_slip_rate),
+            sliding.frictional_stress,
+        )
+        if abs(start - steady) < _MIN_FRICTION_EVOLUTION_OVER_A * scene.a:
             return Outcome(Status.NOT_APPLICABLE, message="friction does not evolve after the step")
         level = steady + (start - steady) / math.e
-        distance, left, rows = self._follow_response(scene, start, level, accuracy, meter)
-        again, _left, _rows = self._follow_response(scene, start, level, accuracy.refined(), meter)
+        distance, left, rows = self._follow_stress_over_slip(scene, start, level, accuracy, meter)
+        again, _left, _rows = self._follow_stress_over_slip(
+            scene, start, level, accuracy.refined(), meter
+        )
         # Derivative of the distance with respect to friction, for an exponential decay.
         by_friction = math.e * distance / (start - steady)
         slip = self.inner_coordinates["slip"]
@@ -213,14 +218,14 @@ class RigidResponse(Measure):
             Status.OK,
             {
                 "evolution_distance": distance,
-                "evolution_distance_error": estimate_instant_error(
+                "evolution_distance_error": estimate_error_at_instant(
                     distance, again, by_friction, scene, accuracy
                 ),
                 "direct_stress_change": start,
-                **_compute_asymmetries(scene, log_slip_rate),
+                **_compute_step_asymmetries(scene, log_slip_rate),
                 "steady_stress_change": steady,
                 "stress_left_at_unit_slip": left - steady,
-                "closed_form_misfit": _closed_form_misfit(scene, steady, slip, rows[:, 0]),
+                "closed_form_misfit": _misfit_to_closed_form(scene, steady, slip, rows[:, 0]),
                 "exponential_misfit": float(departs[np.abs(departs).argmax()]),
                 "shear_stress": scene.mu_star + rows[:, 0],
                 "normal_stress_ratio": rows[:, 2],
@@ -228,8 +233,13 @@ class RigidResponse(Measure):
             },
         )
 
-    def _follow_response(
-        self, scene: Scene, start: float, level: float, accuracy: Accuracy, meter: WorkMeter
+    def _follow_stress_over_slip(
+        self,
+        scene: Scene,
+        start_stress: float,
+        stress_level: float,
+        accuracy: Accuracy,
+        work_meter: WorkMeter,
     ) -> tuple[float, float, np.ndarray]:
         """Integrate the response of the slider over slip.
 
@@ -244,12 +254,14 @@ class RigidResponse(Measure):
         """
         at, distance = self.inner_coordinates["slip"], math.nan
         recording = Recording(sample_times=np.union1d(at, [1.0]))
-        equations = equations_of_rigid_slider(scene, scene.log_load_velocity)
-        watches = (rise("frictional_stress", level), fall("frictional_stress", level))
+        equations = equations_at_imposed_slip_rate(scene, scene.log_load_velocity)
+        watches = (rise("frictional_stress", stress_level), fall("frictional_stress", stress_level))
         # The step does not change the states Psi, which have their values of steady sliding at V_*.
-        state = (start, *compute_steady_states(scene, 0.0, 0.0)[1:])
+        state = (start_stress, *compute_steady_states(scene, 0.0, 0.0)[1:])
         tolerance, complete = accuracy.local_tolerance, False
-        for event in events_along(equations, state, tolerance, meter, watches, recording=recording):
+        for event in iterate_events_of_equations(
+            equations, state, tolerance, work_meter, watches, recording=recording
+        ):
             if event.specification is not None and math.isnan(distance):
                 distance = event.slip
             complete = complete or event.kind is EventKind.SAMPLED
@@ -257,13 +269,15 @@ class RigidResponse(Measure):
                 break
         names = ("slip", "frictional_stress", "state_variable", "normal_stress_ratio")
         columns = [RECORDED_VARIABLES.index(name) for name in names]
-        slips, *values = recording.table(scene)[:, columns].T
+        slips, *values = recording.as_table(scene)[:, columns].T
         values[0] = values[0] - scene.mu_star
         rows = np.stack(values, axis=1)
         return distance, float(rows[slips == 1.0, 0][0]), rows[np.isin(slips, at)]
 
 
-def _closed_form_misfit(scene: Scene, steady: float, slip: np.ndarray, stress: np.ndarray) -> float:
+def _misfit_to_closed_form(
+    scene: Scene, steady_state: float, slip: np.ndarray, stress: np.ndarray
+) -> float:
     r"""Compute the largest difference between stress and its closed form.
 
     The closed form applies if normal stress is constant after the step. The result is in units of
@@ -279,11 +293,11 @@ def _closed_form_misfit(scene: Scene, steady: float, slip: np.ndarray, stress: n
     if stress_acts or law.relaxation is None:
         return math.nan
     left = np.array([law.relaxation(scene.log_load_velocity, at) for at in slip.tolist()])
-    exact = steady + (1.0 + scene.imposed_normal_stress) * scene.b * left
+    exact = steady_state + (1.0 + scene.imposed_normal_stress) * scene.b * left
     return float(np.abs(stress - exact).max())
 
 
-def _compute_asymmetries(scene: Scene, log_slip_rate: float) -> dict[str, float]:
+def _compute_step_asymmetries(scene: Scene, log_slip_rate: float) -> dict[str, float]:
     """Compute the asymmetries between a step and the inverse step.
 
     An asymmetry is the ratio of the magnitudes of the two stress changes minus 1. The dictionary
@@ -293,7 +307,9 @@ def _compute_asymmetries(scene: Scene, log_slip_rate: float) -> dict[str, float]
     steady, inverse_steady = (steady_sliding(scene, x) for x in (log_slip_rate, -log_slip_rate))
     if steady is None or inverse_steady is None:
         return {}
-    direct, inverse = (friction_after_step(scene, x) for x in (log_slip_rate, -log_slip_rate))
+    direct, inverse = (
+        frictional_stress_after_rate_step(scene, x) for x in (log_slip_rate, -log_slip_rate)
+    )
     evolves = direct - steady.frictional_stress
     inverse_evolves = inverse - inverse_steady.frictional_stress
     return {
@@ -302,7 +318,7 @@ def _compute_asymmetries(scene: Scene, log_slip_rate: float) -> dict[str, float]
     }
 
 
-def friction_after_step(scene: Scene, log_slip_rate: float) -> float:
+def frictional_stress_after_rate_step(scene: Scene, log_slip_rate: float) -> float:
     """Compute the frictional stress immediately after a slip rate step.
 
     The step changes the slip rate from V_* to V and does not change the state Psi.
@@ -325,7 +341,7 @@ def friction_after_step(scene: Scene, log_slip_rate: float) -> float:
         With the status ``normal_stress_lost`` if a decrease of friction would open the fault, and
         with the status ``locked`` if no stress balances an increase of friction.
     """
-    friction = stress_after_jump(scene, scene.a * log_slip_rate)
+    friction = frictional_stress_after_jump(scene, scene.a * log_slip_rate)
     if friction is None and log_slip_rate < 0.0:
         raise MotionStopped(Status.NORMAL_STRESS_LOST, "the direct effect takes normal stress away")
     if friction is None:

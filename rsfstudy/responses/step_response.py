@@ -14,9 +14,9 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import (
     Outcome,
     RecordingMeasure,
-    check_steady_loading,
-    phase_outputs,
-    settles_to_steady_sliding,
+    check_loading_lets_motion_settle,
+    outputs_along_phase,
+    steady_sliding_is_linearly_stable,
 )
 from rsfstudy.motion import (
     MOTION_VARIABLES,
@@ -30,17 +30,17 @@ from rsfstudy.motion import (
     estimate_error,
     integrate_events,
     maximum,
-    sample_along_path,
+    resample_motion_along_path,
 )
 from rsfstudy.quantities import Output, Quantity
-from rsfstudy.responses._recorded_motion import COINCIDENCE_FLOOR
+from rsfstudy.responses._recorded_motion import ERROR_FLOOR_OVER_RTOL
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 LN10 = math.log(10.0)
 
 #: Fraction of the largest distance from steady sliding below which an oscillation has ended.
-_STEADY_FRACTION = 1e-3
+_SETTLED_FRACTION_OF_MAX_DISTANCE = 1e-3
 
 _OUTPUTS = (
     Output("max_log10_slip_rate", error=True),
@@ -50,7 +50,7 @@ _OUTPUTS = (
         "oscillations repeat",
     ),
     Output("peak_log10_slip_rate", dims=("peak",)),
-    *phase_outputs(*MOTION_VARIABLES),
+    *outputs_along_phase(*MOTION_VARIABLES),
 )
 
 
@@ -168,13 +168,13 @@ class StepResponse(RecordingMeasure):
         Outcome
             Status, results and message.
         """
-        check_steady_loading(scene)
+        check_loading_lets_motion_settle(scene)
         if scene.log_load_velocity == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
         if not scene.is_perturbed:
             return Outcome(Status.NO_STEP, message="V_0 = V_* is no step")
-        peaks, rows = self._follow_oscillations(scene, accuracy, meter)
-        again, _rows = self._follow_oscillations(scene, accuracy.refined(), meter)
+        peaks, rows = self._follow_and_record_oscillations(scene, accuracy, meter)
+        again, _rows = self._follow_and_record_oscillations(scene, accuracy.refined(), meter)
         heights = peaks - scene.log_load_velocity / LN10
         log_slip_rates = np.full(self.peaks, np.nan)
         log_slip_rates[: len(peaks)] = peaks
@@ -183,60 +183,60 @@ class StepResponse(RecordingMeasure):
             {
                 "max_log10_slip_rate": float(peaks.max()),
                 "max_log10_slip_rate_error": estimate_error(
-                    peaks.max(), again.max(), COINCIDENCE_FLOOR * accuracy.rtol
+                    peaks.max(), again.max(), ERROR_FLOOR_OVER_RTOL * accuracy.rtol
                 )
-                + _neglected_rise_error(scene, accuracy),
+                + _error_of_neglected_initial_rise(scene, accuracy),
                 "peak_ratio": float(heights[1] / heights[0]) if len(peaks) > 1 else 0.0,
                 "peak_log10_slip_rate": log_slip_rates,
-                **sample_along_path(rows, self.phases),
+                **resample_motion_along_path(rows, self.phases),
             },
         )
 
-    def _follow_oscillations(
-        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
+    def _follow_and_record_oscillations(
+        self, scene: Scene, accuracy: Accuracy, work_meter: WorkMeter
     ) -> tuple[np.ndarray, np.ndarray]:
         """Integrate the motion, and return its peaks and the record."""
         peaks: list[float] = []
         recording, asked = (
             Recording(),
-            (maximum("log_slip_rate"), approach_to_steady_state(_STEADY_FRACTION)),
+            (maximum("log_slip_rate"), approach_to_steady_state(_SETTLED_FRACTION_OF_MAX_DISTANCE)),
         )
         for event in integrate_events(
-            scene, accuracy, meter, asked, with_time=True, recording=recording
+            scene, accuracy, work_meter, asked, with_time=True, recording=recording
         ):
-            if event.kind is EventKind.MAXIMUM or _has_initial_maximum(scene, event):
+            if event.kind is EventKind.MAXIMUM or _slip_rate_peaks_at_start(scene, event):
                 peaks.append(event.point.log_slip_rate / LN10)
-            settles = event.kind is EventKind.SETTLED and settles_to_steady_sliding(scene)
+            settles = event.kind is EventKind.SETTLED and steady_sliding_is_linearly_stable(scene)
             if settles and not peaks:
                 text = "slip rate has no maximum: it changes steadily to that of the load point"
                 raise MotionStopped(Status.NOT_APPLICABLE, text)
             if len(peaks) == self.peaks or settles:
-                return np.array(peaks), recording.table(scene, until=event)
+                return np.array(peaks), recording.as_table(scene, end_event=event)
         raise AssertionError("a motion never ends by itself")
 
 
-def _has_initial_maximum(scene: Scene, event: Event) -> bool:
+def _slip_rate_peaks_at_start(scene: Scene, event: Event) -> bool:
     """Return True if the motion starts with a maximum of slip rate.
 
     With inertia, the slip rate may rise within the inertial time after the step. If this rise is
     not integrated, the start of the motion is a maximum.
     """
     return (
-        _delays_initial_rise(scene)
+        _inertia_delays_initial_rise(scene)
         and event.kind is EventKind.START
         and event.point.log_slip_rate_derivative <= 0.0
     )
 
 
-def _neglected_rise_error(scene: Scene, accuracy: Accuracy) -> float:
+def _error_of_neglected_initial_rise(scene: Scene, accuracy: Accuracy) -> float:
     """Return the error of log10(V/V_*) caused by an initial rise of slip rate.
 
     The error is zero unless inertia delays the rise.
     """
-    slip = accuracy.max_remaining_slip if _delays_initial_rise(scene) else 0.0
+    slip = accuracy.max_remaining_slip if _inertia_delays_initial_rise(scene) else 0.0
     return (1.0 + scene.stiffness / scene.a) * slip / LN10
 
 
-def _delays_initial_rise(scene: Scene) -> bool:
+def _inertia_delays_initial_rise(scene: Scene) -> bool:
     """Return True if inertia delays an initial rise of slip rate."""
     return scene.has_mass and (scene.starts_unsteady or scene.spring_stress_step > 0.0)

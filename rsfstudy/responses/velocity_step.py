@@ -11,7 +11,12 @@ import numpy as np
 
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base import Outcome, RecordingMeasure, check_steady_loading, phase_outputs
+from rsfstudy.measure_base import (
+    Outcome,
+    RecordingMeasure,
+    check_loading_lets_motion_settle,
+    outputs_along_phase,
+)
 from rsfstudy.motion import (
     MOTION_VARIABLES,
     RECORDED_VARIABLES,
@@ -20,34 +25,34 @@ from rsfstudy.motion import (
     MotionStopped,
     WorkMeter,
     fall,
-    friction_coefficient,
     integrate_events,
     maximum,
     minimum,
+    recorded_friction_coefficient,
+    resample_motion_along_path,
     rise,
-    sample_along_path,
 )
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
-from rsfstudy.responses._readings import distance_from_steady, friction_event_quantity
+from rsfstudy.responses._readings import distance_from_steady_sliding, friction_quantity_for_events
 from rsfstudy.responses._recorded_motion import (
     RecordedMotion,
-    estimate_instant_errors,
-    record_motion,
-    relative_to_start,
-    settled_flag,
+    estimate_errors_at_instants,
+    flag_of_settled_friction,
+    path_relative_to_start,
+    record_motion_of_segment,
 )
-from rsfstudy.slider import Scene, steady_friction_excess
+from rsfstudy.slider import Scene, steady_friction_minus_reference
 from rsfstudy.status import Status
 
 #: Fraction of the record, at its end, over which friction must be constant, and largest variation
 #: of constant friction as a fraction of the direct effect.
 _SETTLING_WINDOW_FRACTION, _SETTLING_TOLERANCE = 0.1, 0.01
 #: Largest distance from steady sliding before the step, as a fraction of ln r.
-_STEADY_TOLERANCE = 1e-3
+_MAX_STEADY_DISTANCE_OVER_LOG_RATIO = 1e-3
 
 #: Names, symbols, scales and meanings of the results.
-_APPARENT_QUANTITIES = (
+_APPARENT_PARAMETER_OUTPUTS = (
     ("apparent_a", "$a$", "", "direct effect parameter as read off"),
     ("apparent_b", "$b$", "", "evolution effect parameter as read off"),
     ("apparent_a_minus_b", "$a-b$", "", "rate dependence of friction as read off"),
@@ -65,14 +70,16 @@ _APPARENT_QUANTITIES = (
 _OUTPUTS = (
     *(
         Output(name, symbol, "1", meaning, scale, error=True)
-        for name, symbol, scale, meaning in _APPARENT_QUANTITIES
+        for name, symbol, scale, meaning in _APPARENT_PARAMETER_OUTPUTS
     ),
     Output("settled", long_name="whether friction has settled at the end of the record"),
     Output(
         "closed_form_departure",
         long_name="largest departure of friction, from the peak on, from that of a stiff slider",
     ),
-    *phase_outputs("load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate"),
+    *outputs_along_phase(
+        "load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate"
+    ),
 )
 
 
@@ -205,21 +212,27 @@ class VelocityStep(RecordingMeasure):
         mapping of str to float
             Scales by name of the result.
         """
-        slopes = self._friction_derivatives(self._find_step(scene).log_velocity_ratio, values)
+        slopes = self._friction_derivatives(
+            self._find_evaluated_step(scene).log_velocity_ratio, values
+        )
         return {name: abs(values[name]) + scene.a * abs(slopes[name]) for name in slopes}
 
-    def _friction_derivatives(self, ratio: float, values: Mapping[str, Any]) -> dict[str, float]:
+    def _friction_derivatives(
+        self, log_velocity_ratio: float, values: Mapping[str, Any]
+    ) -> dict[str, float]:
         """Return the derivatives of the results with respect to friction.
 
         The derivative is 1/ln r for a, b and a - b. For slip distances, the evolution of friction
         is approximated by an exponential. When 1/e of the evolution b ln r remains, friction
         changes by b ln r/(e D_c) per unit of slip.
         """
-        evolved = values["apparent_b"] * ratio
+        evolved = values["apparent_b"] * log_velocity_ratio
         over_friction = math.e / evolved if evolved else math.nan
         return {
             **dict.fromkeys(self.outputs_with_error, 1.0),
-            **dict.fromkeys(("apparent_a", "apparent_b", "apparent_a_minus_b"), 1.0 / ratio),
+            **dict.fromkeys(
+                ("apparent_a", "apparent_b", "apparent_a_minus_b"), 1.0 / log_velocity_ratio
+            ),
             "apparent_slip_distance": over_friction * values["apparent_slip_distance"],
             "corrected_slip_distance": over_friction * values["corrected_slip_distance"],
         }
@@ -245,22 +258,22 @@ class VelocityStep(RecordingMeasure):
         Outcome
             Status, results and message.
         """
-        check_steady_loading(scene)
-        step = self._find_step(scene)
+        check_loading_lets_motion_settle(scene)
+        step = self._find_evaluated_step(scene)
         records = [
             self._record_response(scene, step, a, meter) for a in (accuracy, accuracy.refined())
         ]
         (record, values), (_again, again) = records
         slopes = self._friction_derivatives(step.log_velocity_ratio, values)
         neglected = dict.fromkeys(slopes, record.neglected_error_until(record.last_event.time))
-        errors = estimate_instant_errors(values, again, slopes, scene, accuracy, neglected)
-        found = {**values, **errors, **self._record_values(scene, step, record)}
+        errors = estimate_errors_at_instants(values, again, slopes, scene, accuracy, neglected)
+        found = {**values, **errors, **self._recorded_output_values(scene, step, record)}
         if not abs(values["apparent_b"]) > errors["apparent_b_error"]:
             text = "friction has no extremum after the step, or does not evolve from there"
             return Outcome(Status.NOT_APPLICABLE, found, text)
         return Outcome(Status.OK, found)
 
-    def _find_step(self, scene: Scene) -> _EvaluatedStep:
+    def _find_evaluated_step(self, scene: Scene) -> _EvaluatedStep:
         """Return the step that the measure evaluates.
 
         Raises
@@ -284,39 +297,61 @@ class VelocityStep(RecordingMeasure):
         return _EvaluatedStep(before.load_velocity, own.load_velocity, start_time, duration)
 
     def _record_response(
-        self, scene: Scene, step: _EvaluatedStep, accuracy: Accuracy, meter: WorkMeter
+        self,
+        scene: Scene,
+        evaluated_step: _EvaluatedStep,
+        accuracy: Accuracy,
+        work_meter: WorkMeter,
     ) -> tuple[RecordedMotion, dict[str, float]]:
         """Record the motion, and return the record and the results."""
-        extreme = maximum if step.log_velocity_ratio > 0.0 else minimum
-        number, end = self.step_number - 1, step.start_time + step.duration
-        turn = extreme(friction_event_quantity(scene)[0])
-        record = record_motion(scene, accuracy, meter, [turn], number, number, end_time=end)
-        return record, self._read_values(
-            step, record, self._find_decay_event(scene, record, accuracy, meter)
+        extreme = maximum if evaluated_step.log_velocity_ratio > 0.0 else minimum
+        number, end = self.step_number - 1, evaluated_step.start_time + evaluated_step.duration
+        turn = extreme(friction_quantity_for_events(scene)[0])
+        record = record_motion_of_segment(
+            scene, accuracy, work_meter, [turn], number, number, end_time=end
+        )
+        return record, self._read_step_results(
+            evaluated_step, record, self._find_decay_event(scene, record, accuracy, work_meter)
         )
 
-    def _read_values(
-        self, step: _EvaluatedStep, record: RecordedMotion, left: Event | None
+    def _read_step_results(
+        self,
+        evaluated_step: _EvaluatedStep,
+        recorded_motion: RecordedMotion,
+        decay_event: Event | None,
     ) -> dict[str, float]:
         """Return the results that are read from a record.
 
         Results that depend on the extremum are NaN if there is no extremum.
         """
-        before, after = record.friction_before_starts[0], record.last_event.point.apparent_friction
-        top = record.peak.point.apparent_friction if record.peak else math.nan
+        before, after = (
+            recorded_motion.friction_before_segments[0],
+            recorded_motion.last_event.point.apparent_friction,
+        )
+        top = (
+            recorded_motion.peak_event.point.apparent_friction
+            if recorded_motion.peak_event
+            else math.nan
+        )
         return {
-            "apparent_a": (top - before) / step.log_velocity_ratio,
-            "apparent_b": (top - after) / step.log_velocity_ratio,
-            "apparent_a_minus_b": (after - before) / step.log_velocity_ratio,
-            "apparent_slip_distance": step.velocity_after * left.time if left else math.nan,
-            "corrected_slip_distance": left.slip if left else math.nan,
+            "apparent_a": (top - before) / evaluated_step.log_velocity_ratio,
+            "apparent_b": (top - after) / evaluated_step.log_velocity_ratio,
+            "apparent_a_minus_b": (after - before) / evaluated_step.log_velocity_ratio,
+            "apparent_slip_distance": evaluated_step.velocity_after * decay_event.time
+            if decay_event
+            else math.nan,
+            "corrected_slip_distance": decay_event.slip if decay_event else math.nan,
             "peak_friction": top,
             "friction_before": before,
             "friction_after": after,
         }
 
     def _find_decay_event(
-        self, scene: Scene, record: RecordedMotion, accuracy: Accuracy, meter: WorkMeter
+        self,
+        scene: Scene,
+        recorded_motion: RecordedMotion,
+        accuracy: Accuracy,
+        work_meter: WorkMeter,
     ) -> Event | None:
         """Return the event at which 1/e of the evolution remains.
 
@@ -324,64 +359,91 @@ class VelocityStep(RecordingMeasure):
         at the extremum, because the recorded integration step with the extremum may contain a
         crossing of the level on either side.
         """
-        peak = record.peak
-        if peak is None or not peak.time < record.last_event.time:
+        peak = recorded_motion.peak_event
+        if peak is None or not peak.time < recorded_motion.last_event.time:
             return None
-        after, top = (e.point.apparent_friction for e in (record.last_event, peak))
-        of, above = friction_event_quantity(scene)
+        after, top = (e.point.apparent_friction for e in (recorded_motion.last_event, peak))
+        of, above = friction_quantity_for_events(scene)
         level = after + (top - after) / math.e - above
         # If a state strengthens friction, the evolution may have the sign of the direct effect.
         watch = fall(of, level, terminal=True) if top > after else rise(of, level, terminal=True)
         stepped = scene.segment_scene(self.step_number - 1)
-        rest = record.last_event.time - peak.time
-        events = integrate_events(stepped, accuracy, meter, [watch], start=peak.point, until=rest)
+        rest = recorded_motion.last_event.time - peak.time
+        events = integrate_events(
+            stepped, accuracy, work_meter, [watch], start=peak.point, until=rest
+        )
         return next((event for event in events if event.specification == watch), None)
 
-    def _record_values(
-        self, scene: Scene, step: _EvaluatedStep, record: RecordedMotion
+    def _recorded_output_values(
+        self, scene: Scene, evaluated_step: _EvaluatedStep, recorded_motion: RecordedMotion
     ) -> dict[str, float | np.ndarray]:
         """Return the record, ``settled`` and the closed-form departure."""
-        rows, friction = record.rows, friction_coefficient(record.rows)
-        late = record.last_event.time - _SETTLING_WINDOW_FRACTION * step.duration
+        rows, friction = (
+            recorded_motion.recorded_rows,
+            recorded_friction_coefficient(recorded_motion.recorded_rows),
+        )
+        late = recorded_motion.last_event.time - _SETTLING_WINDOW_FRACTION * evaluated_step.duration
         # The last tenth of the record may contain few samples, because time steps may be long.
         last = [np.interp(late, rows[:, 0], friction), *friction[rows[:, 0] >= late]]
-        turned = record.peak or record.last_event
-        direct = turned.point.apparent_friction - record.friction_before_starts[0]
-        path = relative_to_start(
-            record.start, sample_along_path(rows, self.phases, RECORDED_VARIABLES)
+        turned = recorded_motion.peak_event or recorded_motion.last_event
+        direct = turned.point.apparent_friction - recorded_motion.friction_before_segments[0]
+        path = path_relative_to_start(
+            recorded_motion.start_event,
+            resample_motion_along_path(rows, self.phases, RECORDED_VARIABLES),
         )
         stepped = scene.segment_scene(self.step_number - 1)
         is_flat = bool(np.ptp(last) < _SETTLING_TOLERANCE * abs(direct))
         return {
-            "settled": settled_flag(stepped, is_flat=is_flat),
-            "closed_form_departure": _closed_form_departure(scene, step, record),
-            "load_point_displacement": step.velocity_after * path.pop("time"),
+            "settled": flag_of_settled_friction(stepped, is_flat=is_flat),
+            "closed_form_departure": _max_departure_from_closed_form(
+                scene, evaluated_step, recorded_motion
+            ),
+            "load_point_displacement": evaluated_step.velocity_after * path.pop("time"),
             **path,
         }
 
 
-def _closed_form_departure(scene: Scene, step: _EvaluatedStep, record: RecordedMotion) -> float:
+def _max_departure_from_closed_form(
+    scene: Scene, evaluated_step: _EvaluatedStep, recorded_motion: RecordedMotion
+) -> float:
     """Compute the largest difference from the friction of a rigid slider.
 
     Only friction after the extremum is compared. The result is NaN if there is no closed form.
     """
     relaxation = scene.parts.law.relaxation
-    if relaxation is None or record.peak is None or not _has_closed_form(scene, step, record):
+    if (
+        relaxation is None
+        or recorded_motion.peak_event is None
+        or not _closed_form_applies(scene, evaluated_step, recorded_motion)
+    ):
         return math.nan
-    before, after = math.log(step.velocity_before), math.log(step.velocity_after)
-    steady = steady_friction_excess(scene, after) - steady_friction_excess(scene, before)
+    before, after = (
+        math.log(evaluated_step.velocity_before),
+        math.log(evaluated_step.velocity_after),
+    )
+    steady = steady_friction_minus_reference(scene, after) - steady_friction_minus_reference(
+        scene, before
+    )
     steady += scene.dynamics.radiated_stress(after) - scene.dynamics.radiated_stress(before)
-    slip = record.rows[:, MOTION_VARIABLES.index("slip")]
-    later = record.rows[:, 0] >= record.peak.time
+    slip = recorded_motion.recorded_rows[:, MOTION_VARIABLES.index("slip")]
+    later = recorded_motion.recorded_rows[:, 0] >= recorded_motion.peak_event.time
     left = np.array(
-        [relaxation(step.log_velocity_ratio, at) for at in (slip[later] - slip[0]).tolist()]
+        [
+            relaxation(evaluated_step.log_velocity_ratio, at)
+            for at in (slip[later] - slip[0]).tolist()
+        ]
     )
     expected = steady + scene.b * left
-    seen = (friction_coefficient(record.rows) - record.friction_before_starts[0])[later]
+    seen = (
+        recorded_friction_coefficient(recorded_motion.recorded_rows)
+        - recorded_motion.friction_before_segments[0]
+    )[later]
     return float(np.abs(seen - expected).max())
 
 
-def _has_closed_form(scene: Scene, step: _EvaluatedStep, record: RecordedMotion) -> bool:
+def _closed_form_applies(
+    scene: Scene, evaluated_step: _EvaluatedStep, recorded_motion: RecordedMotion
+) -> bool:
     """Return True if the closed form of a rigid slider applies.
 
     The closed form requires steady sliding before the step, and a friction coefficient that does
@@ -392,8 +454,8 @@ def _has_closed_form(scene: Scene, step: _EvaluatedStep, record: RecordedMotion)
     stress_acts = stress.normal_stress or stress.state_effect or law.depends_on_stress
     if stress_acts or stress.effects or fluid.unknowns:
         return False
-    if not law.scale_free and step.velocity_before != 1.0:
+    if not law.scale_free and evaluated_step.velocity_before != 1.0:
         return False
-    return distance_from_steady(
-        scene, record.start.point, step.velocity_before
-    ) < _STEADY_TOLERANCE * abs(step.log_velocity_ratio)
+    return distance_from_steady_sliding(
+        scene, recorded_motion.start_event.point, evaluated_step.velocity_before
+    ) < _MAX_STEADY_DISTANCE_OVER_LOG_RATIO * abs(evaluated_step.log_velocity_ratio)

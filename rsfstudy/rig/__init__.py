@@ -13,54 +13,64 @@ from rsfstudy._lazy import lazy_exports
 
 if TYPE_CHECKING:
     from rsfstudy.rig.quantities import (
-        RATIO_FIELD,
+        RATIO_FIELD_BY_DIMENSIONAL_NAME,
         RIG_QUANTITIES,
         in_display_units,
         is_friction_stiffness,
     )
     from rsfstudy.rig.rig import Rig
-    from rsfstudy.rig.rig_scenes import RigScenes, put_on_rig, with_rig_value
+    from rsfstudy.rig.rig_scenes import LatticeScenesOnRig, put_on_rig, replace_rig_quantity
     from rsfstudy.rig.scales import (
         DIMENSIONLESS_PREFIX,
         DISPLAY_BASE_UNITS,
         SCALES_ATTRIBUTE,
+        convert_dataset_units,
         convert_to_display_units,
-        convert_units,
         drop_ratio_from_name,
-        has_unexpected_units,
-        read_scales,
+        find_scale_of_variable,
+        has_units_unlike_its_study,
+        read_si_scales,
         slip_rate_from_log,
-        variable_scale,
     )
     from rsfstudy.rig.table_files import Column, read_table
-    from rsfstudy.rig.unit_axes import axis_name_and_units, convert_axis, convert_values, make_axis
+    from rsfstudy.rig.unit_axes import (
+        axis_name_and_units,
+        convert_axis_to_stated_units,
+        convert_values_to_units,
+        make_axis_with_units,
+    )
     from rsfstudy.rig.units import convert_to_si, expand_range, parse_number, unit_factor
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
             "rig.quantities": (
-                "RATIO_FIELD",
+                "RATIO_FIELD_BY_DIMENSIONAL_NAME",
                 "RIG_QUANTITIES",
                 "in_display_units",
                 "is_friction_stiffness",
             ),
             "rig.rig": ("Rig",),
-            "rig.rig_scenes": ("RigScenes", "put_on_rig", "with_rig_value"),
+            "rig.rig_scenes": ("LatticeScenesOnRig", "put_on_rig", "replace_rig_quantity"),
             "rig.scales": (
                 "DIMENSIONLESS_PREFIX",
                 "DISPLAY_BASE_UNITS",
                 "SCALES_ATTRIBUTE",
                 "convert_to_display_units",
-                "convert_units",
+                "convert_dataset_units",
                 "drop_ratio_from_name",
-                "has_unexpected_units",
-                "read_scales",
+                "has_units_unlike_its_study",
+                "read_si_scales",
                 "slip_rate_from_log",
-                "variable_scale",
+                "find_scale_of_variable",
             ),
             "rig.table_files": ("Column", "read_table"),
-            "rig.unit_axes": ("axis_name_and_units", "convert_axis", "convert_values", "make_axis"),
+            "rig.unit_axes": (
+                "axis_name_and_units",
+                "convert_axis_to_stated_units",
+                "convert_values_to_units",
+                "make_axis_with_units",
+            ),
             "rig.units": ("convert_to_si", "expand_range", "parse_number", "unit_factor"),
         },
     )
@@ -69,29 +79,29 @@ __all__ = [
     "Column",
     "DIMENSIONLESS_PREFIX",
     "DISPLAY_BASE_UNITS",
-    "RATIO_FIELD",
+    "RATIO_FIELD_BY_DIMENSIONAL_NAME",
     "RIG_QUANTITIES",
     "Rig",
-    "RigScenes",
+    "LatticeScenesOnRig",
     "SCALES_ATTRIBUTE",
     "axis_name_and_units",
-    "convert_axis",
+    "convert_axis_to_stated_units",
     "convert_to_display_units",
     "convert_to_si",
-    "convert_units",
-    "convert_values",
+    "convert_dataset_units",
+    "convert_values_to_units",
     "drop_ratio_from_name",
     "expand_range",
-    "has_unexpected_units",
+    "has_units_unlike_its_study",
     "in_display_units",
     "is_friction_stiffness",
-    "make_axis",
+    "make_axis_with_units",
     "parse_number",
     "put_on_rig",
-    "read_scales",
+    "read_si_scales",
     "read_table",
     "slip_rate_from_log",
     "unit_factor",
-    "variable_scale",
-    "with_rig_value",
+    "find_scale_of_variable",
+    "replace_rig_quantity",
 ]

@@ -13,8 +13,8 @@ import numpy as np
 from rsfstudy._deprecation import renamed_keywords
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.rig import SEGMENT_UNITS, Rig
-from rsfstudy.rig.table_files import Column, pick_columns, read_table
+from rsfstudy.rig.rig import SLIDER_UNITS_OF_SEGMENT_FIELDS, Rig
+from rsfstudy.rig.table_files import Column, read_table, select_columns_of_arrays
 from rsfstudy.slider import (
     MIN_SEGMENT_DURATION,
     SEGMENT_KEYS,
@@ -25,7 +25,7 @@ from rsfstudy.slider import (
 )
 
 #: What a record may hold, and the units of the slider.
-_SLIDER_UNITS = {
+_SLIDER_UNITS_OF_RECORD_COLUMNS = {
     "time": "D_c/V_*", "displacement": "D_c", "velocity": "V_*", "normal_stress": "sigma_*",
     "pore_pressure": "sigma_*",
 }  # fmt: skip
@@ -75,8 +75,8 @@ def history(
     """
     found = _read_columns(record, columns, rig)
     for key in found:
-        if key not in _SLIDER_UNITS:
-            raise InvalidValue("column", key, "is unknown", choices=_SLIDER_UNITS)
+        if key not in _SLIDER_UNITS_OF_RECORD_COLUMNS:
+            raise InvalidValue("column", key, "is unknown", choices=_SLIDER_UNITS_OF_RECORD_COLUMNS)
     if "time" not in found or len(found) == 1:
         remedy = 'State "time" and what was sampled, as in {"time": ..., "displacement": ...}.'
         raise InvalidValue("record", [*found], "tells no history", remedy=remedy)
@@ -89,7 +89,9 @@ def history(
         raise InvalidValue("record", [*found], rule)
     for key, column in found.items():
         column.check_values(key, ~np.isfinite(column.values), "must be a finite number")
-    values = {key: _to_slider_units(key, column, rig) for key, column in found.items()}
+    values = {
+        key: _convert_column_to_slider_units(key, column, rig) for key, column in found.items()
+    }
     time = values["time"]
     late = np.append(False, np.diff(time) < MIN_SEGMENT_DURATION)
     found["time"].check_values("time", late, "must be later than the sample before")
@@ -118,9 +120,13 @@ def _read_columns(
         remedy = 'Give {"time": ..., "displacement": ...}, a Dataset, or the path of a CSV file.'
         raise InvalidValue("record", record, "is no record", remedy=remedy)
     if columns is None:  # a dataset may hold more
-        names = [n for n in record.variables if n in _SLIDER_UNITS] if is_dataset else [*record]
+        names = (
+            [n for n in record.variables if n in _SLIDER_UNITS_OF_RECORD_COLUMNS]
+            if is_dataset
+            else [*record]
+        )
         columns = {str(name): str(name) for name in names}
-    found = pick_columns(record, columns)
+    found = select_columns_of_arrays(record, columns)
     for key, column in found.items():
         if is_dataset and rig is not None and not column.units:
             remedy = "Set its attribute units."
@@ -128,40 +134,49 @@ def _read_columns(
     return found
 
 
-def _to_slider_units(key: str, column: Column, rig: Rig | None) -> np.ndarray:
+def _convert_column_to_slider_units(
+    quantity_name: str, column: Column, rig: Rig | None
+) -> np.ndarray:
     """Numbers of a column in units of the slider."""
-    scale, units = _SLIDER_UNITS[key], column.units
+    scale, units = _SLIDER_UNITS_OF_RECORD_COLUMNS[quantity_name], column.units
     if units == scale or (rig is None and units in ("", "1")):
         return column.values
     if rig is None:
-        rule = f"need the scales of a rig for {key}"
+        rule = f"need the scales of a rig for {quantity_name}"
         raise InvalidValue("units", units, rule, remedy=f"Give a rig, or {scale}.")
-    one = rig.dimensionless(f"1 {units}" if units else 1.0, scale, key)
+    one = rig.dimensionless(f"1 {units}" if units else 1.0, scale, quantity_name)
     return np.asarray(column.values * one)
 
 
 def _load_point_velocity(
-    values: Mapping[str, np.ndarray], found: Mapping[str, Column]
+    record_values: Mapping[str, np.ndarray], record_columns: Mapping[str, Column]
 ) -> tuple[np.ndarray, tuple[str, float, str] | None]:
     """Velocity of the load point from each sample on; and the sample by which it first moves back,
     with its name and place.
     """
-    time, key = values["time"], "velocity" if "velocity" in found else "displacement"
-    if key not in found:
+    time, key = (
+        record_values["time"],
+        "velocity" if "velocity" in record_columns else "displacement",
+    )
+    if key not in record_columns:
         return np.ones(len(time)), None
     if key == "velocity":
-        speeds = values[key]
+        speeds = record_values[key]
         back = speeds < 0.0
         mean = np.append(0.5 * (speeds[:-1] + speeds[1:]), speeds[-1])
     else:
-        steps = np.diff(values[key])
+        steps = np.diff(record_values[key])
         back = np.append(False, steps < 0.0)
         speeds = steps / np.diff(time)
         mean = np.append(speeds, speeds[-1])
     if not back.any():
         return mean, None
     first = int(np.argmax(back))
-    return mean, (key, float(found[key].values[first]), found[key].location(first))
+    return mean, (
+        key,
+        float(record_columns[key].values[first]),
+        record_columns[key].location(first),
+    )
 
 
 @renamed_keywords
@@ -194,7 +209,7 @@ def read_protocol(path: str | Path, rig: Rig | None = None, name: str = "protoco
         if key not in SEGMENT_KEYS:
             raise InvalidValue("column", key, "is unknown", choices=SEGMENT_KEYS)
     units = {key: column.units for key, column in columns.items()}
-    of_slider = all(SEGMENT_UNITS[key] == of for key, of in units.items())
+    of_slider = all(SLIDER_UNITS_OF_SEGMENT_FIELDS[key] == of for key, of in units.items())
     if not of_slider and rig is None:
         remedy = "Give a rig, or the units of the slider: V_*, D_c, D_c/V_*."
         rule = "need the scales of a rig"

@@ -19,7 +19,7 @@ class RigQuantity(NamedTuple):
     symbol, and what it is.
     """
 
-    units: str
+    si_units: str
     min_usual: float
     max_usual: float
     symbol: str
@@ -41,27 +41,29 @@ RIG_QUANTITIES: Mapping[str, RigQuantity] = {
 #: What it must state: the scales of all else.
 REQUIRED_QUANTITIES = ("normal_stress", "slip_distance", "reference_velocity")
 #: What axes call those that are fields of scenes in another sense.
-AXIS_NAME = {"normal_stress": "sigma_star"}
+AXIS_NAME_BY_RIG_NAME = {"normal_stress": "sigma_star"}
 #: Quantities by the names that they have on axes.
-RIG_NAME = {AXIS_NAME.get(name, name): name for name in RIG_QUANTITIES}
+RIG_NAME_BY_AXIS_NAME = {AXIS_NAME_BY_RIG_NAME.get(name, name): name for name in RIG_QUANTITIES}
 #: SI units of fields of a scene, by what they are measured in or their own units.
-SI_UNITS = {
+SI_UNIT_BY_SCALE = {
     "sigma_*": "Pa", "D_c": "m", "V_*": "m/s", "D_c/V_*": "s", "sigma_*/D_c": "Pa/m",
     "V_*/D_c": "1/s", "s": "s", "s-1": "1/s",
 }  # fmt: skip
 #: Units in which what a rig states is shown, by its SI units.
-DISPLAY_UNITS = {"Pa": "MPa", "m": "um", "m/s": "um/s", "Pa/m": "MPa/um"}
+DISPLAY_UNIT_BY_SI_UNIT = {"Pa": "MPa", "m": "um", "m/s": "um/s", "Pa/m": "MPa/um"}
 #: What fields of scenes are.
-SCENE_QUANTITIES = {about.name: about for about in FIELD_QUANTITIES}
+SCENE_QUANTITY_BY_FIELD_NAME = {about.name: about for about in FIELD_QUANTITIES}
 #: Slip rates of a scene, by the names that they have where they are no ratios.
-RATIO_FIELD = {
+RATIO_FIELD_BY_DIMENSIONAL_NAME = {
     name.removesuffix("_ratio"): name
-    for name, about in SCENE_QUANTITIES.items()
+    for name, about in SCENE_QUANTITY_BY_FIELD_NAME.items()
     if about.scale == "V_*" and name.endswith("_ratio")
 }
 
 
-def to_si_checked(name: str, value: Any, stress: float | None = None) -> float:
+def convert_rig_value_and_warn_if_unusual(
+    quantity_name: str, value: Any, normal_stress: float | None = None
+) -> float:
     """A quantity of a rig in SI units; warns of what is unusual.
 
     Raises
@@ -69,23 +71,25 @@ def to_si_checked(name: str, value: Any, stress: float | None = None) -> float:
     InvalidValue
         For what is no quantity, of another kind, or not positive.
     """
-    units, least, most, *_words = RIG_QUANTITIES[name]
-    found = convert_rig_value(name, value, units, stress)
+    units, least, most, *_words = RIG_QUANTITIES[quantity_name]
+    found = convert_rig_value_to_si(quantity_name, value, units, normal_stress)
     if not found > 0.0:
-        raise InvalidValue(name, value, "must be positive", remedy=f"Give it in {units}.")
+        raise InvalidValue(quantity_name, value, "must be positive", remedy=f"Give it in {units}.")
     if not least <= found <= most:
-        text = f"{name} is {found:g} {units}: unusual for a rig. Is the unit right?"
+        text = f"{quantity_name} is {found:g} {units}: unusual for a rig. Is the unit right?"
         warnings.warn(text, RsfStudyWarning, stacklevel=user_stacklevel())
     return found
 
 
-def convert_rig_value(name: str, value: Any, units: str, stress: float | None) -> float:
+def convert_rig_value_to_si(
+    quantity_name: str, value: Any, units: str, normal_stress: float | None
+) -> float:
     """A quantity in SI units; a stiffness may be of friction, over the normal stress in Pa."""
     try:
-        return convert_to_si(name, value, units)
+        return convert_to_si(quantity_name, value, units)
     except InvalidValue:
-        if units == "Pa/m" and stress is not None and is_friction_stiffness(value):
-            return convert_to_si(name, value, "1/m") * stress
+        if units == "Pa/m" and normal_stress is not None and is_friction_stiffness(value):
+            return convert_to_si(quantity_name, value, "1/m") * normal_stress
         raise
 
 
@@ -100,7 +104,7 @@ def is_friction_stiffness(stiffness: Any) -> bool:
     return True
 
 
-def check_consistency(rig: Mapping[str, Any]) -> None:
+def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
     """Refuse quantities that do not go with one another.
 
     Raises
@@ -108,65 +112,77 @@ def check_consistency(rig: Mapping[str, Any]) -> None:
     InvalidValue
         For mass beside period, mass without stiffness, and one of shear modulus and density.
     """
-    if "mass" in rig and "period" in rig:
-        rule = f"give mass or period (here {rig['period']:g} s), not both"
-        raise InvalidValue("mass", rig["mass"], rule)
-    if "mass" in rig and "stiffness" not in rig:
+    if "mass" in rig_values and "period" in rig_values:
+        rule = f"give mass or period (here {rig_values['period']:g} s), not both"
+        raise InvalidValue("mass", rig_values["mass"], rule)
+    if "mass" in rig_values and "stiffness" not in rig_values:
         remedy = "State the stiffness too, or the period."
-        raise InvalidValue("mass", rig["mass"], "needs a stiffness to oscillate", remedy=remedy)
-    if ("shear_modulus" in rig) != ("density" in rig):
+        raise InvalidValue(
+            "mass", rig_values["mass"], "needs a stiffness to oscillate", remedy=remedy
+        )
+    if ("shear_modulus" in rig_values) != ("density" in rig_values):
         remedy = "State shear_modulus and density, or neither."
-        raise InvalidValue("density", rig.get("density"), "goes with shear_modulus", remedy=remedy)
+        raise InvalidValue(
+            "density", rig_values.get("density"), "goes with shear_modulus", remedy=remedy
+        )
 
 
 def in_display_units(
     rig: Mapping[str, float], without: Collection[str] = ()
 ) -> dict[str, tuple[float, str]]:
     """Numbers and units in which what a rig states is shown, but for what these axes vary."""
-    units = {n: RIG_QUANTITIES[n].units for n in rig if AXIS_NAME.get(n, n) not in without}
-    shown = {n: DISPLAY_UNITS.get(si, si) for n, si in units.items()}
+    units = {
+        n: RIG_QUANTITIES[n].si_units for n in rig if AXIS_NAME_BY_RIG_NAME.get(n, n) not in without
+    }
+    shown = {n: DISPLAY_UNIT_BY_SI_UNIT.get(si, si) for n, si in units.items()}
     return {
         n: (multiply_exactly(rig[n], 1 / unit_factor(n, shown[n], si)), shown[n])
         for n, si in units.items()
     }
 
 
-def derive_scene_fields(rig: Mapping[str, Any]) -> dict[str, Any]:
+def derive_scene_fields_from_rig(rig_values: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a scene that a rig decides; arrays where its quantities are."""
-    found = {"reference_rate": rig["reference_velocity"] / rig["slip_distance"]}
-    if "stiffness" in rig:
-        found["stiffness"] = rig["stiffness"] * rig["slip_distance"] / rig["normal_stress"]
-    if "mass" in rig:
-        found["period"] = 2.0 * np.pi * np.sqrt(rig["mass"] / rig["stiffness"])
-    if "period" in rig:
-        found["period"] = rig["period"]
-    if "density" in rig:
-        impedance = 0.5 * np.sqrt(rig["shear_modulus"] * rig["density"])
-        found["radiation_damping"] = impedance * rig["reference_velocity"] / rig["normal_stress"]
+    found = {"reference_rate": rig_values["reference_velocity"] / rig_values["slip_distance"]}
+    if "stiffness" in rig_values:
+        found["stiffness"] = (
+            rig_values["stiffness"] * rig_values["slip_distance"] / rig_values["normal_stress"]
+        )
+    if "mass" in rig_values:
+        found["period"] = 2.0 * np.pi * np.sqrt(rig_values["mass"] / rig_values["stiffness"])
+    if "period" in rig_values:
+        found["period"] = rig_values["period"]
+    if "density" in rig_values:
+        impedance = 0.5 * np.sqrt(rig_values["shear_modulus"] * rig_values["density"])
+        found["radiation_damping"] = (
+            impedance * rig_values["reference_velocity"] / rig_values["normal_stress"]
+        )
     plain = {name: v if isinstance(v, np.ndarray) else float(v) for name, v in found.items()}
     return plain | ({"inertia": True} if "period" in found else {})
 
 
-def is_scaled_field(name: str) -> bool:
+def is_dimensionless_field_with_scale(field_name: str) -> bool:
     """True of a field of a scene that is measured in a unit of the slider, and no ratio."""
     return (
-        name in SCENE_QUANTITIES
-        and bool(SCENE_QUANTITIES[name].scale)
-        and not name.endswith("_ratio")
+        field_name in SCENE_QUANTITY_BY_FIELD_NAME
+        and bool(SCENE_QUANTITY_BY_FIELD_NAME[field_name].scale)
+        and not field_name.endswith("_ratio")
     )
 
 
-def field_si_units(name: str, value: Any) -> str | None:
+def find_si_units_of_field(field_name: str, value: Any) -> str | None:
     """SI units of a value of a field of a scene; None where it is none in units: a ratio that is a
     plain number, or a field of another kind.
     """
-    about = SCENE_QUANTITIES.get(name)
+    about = SCENE_QUANTITY_BY_FIELD_NAME.get(field_name)
     plain = isinstance(value, int | float | np.number)
-    if about is None or isinstance(value, type) or (plain and name.endswith("_ratio")):
+    if about is None or isinstance(value, type) or (plain and field_name.endswith("_ratio")):
         return None
     if about.scale:
-        return SI_UNITS[about.scale]
+        return SI_UNIT_BY_SCALE[about.scale]
     with_units = hasattr(value, "magnitude") or (isinstance(value, str) and about.units)
     return (
-        (SI_UNITS.get(about.units) or ("1" if about.units == "1" else None)) if with_units else None
+        (SI_UNIT_BY_SCALE.get(about.units) or ("1" if about.units == "1" else None))
+        if with_units
+        else None
     )

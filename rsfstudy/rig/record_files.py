@@ -20,13 +20,13 @@ from rsfstudy.rig.table_files import (
     ColumnSpec,
     check_heading_lengths,
     parse_column_spec,
-    pick_columns,
     read_table,
+    select_columns_of_arrays,
 )
 from rsfstudy.rig.units import convert_to_si, unit_factor
 
 #: SI units of what a record may hold, and what turns them into those of `Record`.
-_COLUMN_UNITS = {
+_UNITS_AND_FACTORS_OF_RECORD_COLUMNS = {
     "time": ("s", 1.0),
     "displacement": ("m", 1e6),
     "slip": ("m", 1e6),
@@ -35,9 +35,9 @@ _COLUMN_UNITS = {
     "normal_stress": ("Pa", 1.0),
 }
 #: The usual units.
-_USUAL_UNITS = {"time": "s", "displacement": "um", "slip": "um"}
+_USUAL_UNITS_OF_RECORD_COLUMNS = {"time": "s", "displacement": "um", "slip": "um"}
 #: How headings of the usual files begin.
-_HEADING_PATTERNS = {
+_PATTERNS_OF_USUAL_HEADINGS = {
     "time": r"t(ime)?\b|time",
     "displacement": r"(load.*)?disp|lp(\b|_?disp)|l\.?p\.? disp|load.?point",
     "slip": r"(fault.*)?slip",
@@ -125,33 +125,37 @@ def read_record(
     for key, column in found.items():
         _check_column_name(key)
         column.check_values(key, ~np.isfinite(column.values), "must be a finite number")
-        values[key] = column.values * _unit_factor(key, column.units)
-    return _build_record(values, normal_stress, stiffness, name or _record_name(source))
+        values[key] = column.values * _unit_factor_of_column(key, column.units)
+    return _build_record(values, normal_stress, stiffness, name or _record_name_from_source(source))
 
 
-def _check_column_name(key: str) -> None:
-    if key not in _COLUMN_UNITS:
-        raise InvalidValue("column", key, "is unknown", choices=_COLUMN_UNITS)
+def _check_column_name(column_name: str) -> None:
+    if column_name not in _UNITS_AND_FACTORS_OF_RECORD_COLUMNS:
+        raise InvalidValue(
+            "column", column_name, "is unknown", choices=_UNITS_AND_FACTORS_OF_RECORD_COLUMNS
+        )
 
 
-def _record_name(source: Any) -> str:
+def _record_name_from_source(source: Any) -> str:
     """That of a file, as an identifier."""
     stem = Path(source).stem if isinstance(source, str | Path) else "record"
     text = re.sub(r"\W", "_", stem, flags=re.ASCII)
     return text if text.isidentifier() else f"record_{text}"
 
 
-def _unit_factor(key: str, units: str) -> float:
+def _unit_factor_of_column(column_name: str, units: str) -> float:
     """What turns a column into units of `Record`; without units it is in those of laboratories."""
-    si, ours = _COLUMN_UNITS[key]
+    si, ours = _UNITS_AND_FACTORS_OF_RECORD_COLUMNS[column_name]
     if not units:
         return {"Pa": 1e6}.get(si, 1.0)
     if si == "1" and units in ("1", "-"):
         return 1.0
-    return float(unit_factor(key, units, si)) * ours
+    return float(unit_factor(column_name, units, si)) * ours
 
 
-def _compute_load_point_displacement(values: dict[str, np.ndarray], stiffness: Any) -> np.ndarray:
+def _compute_load_point_displacement(
+    record_values: dict[str, np.ndarray], stiffness: Any
+) -> np.ndarray:
     """Compute load point displacement in um from slip, friction and stiffness.
 
     Load point displacement is slip plus shear stress divided by stiffness. If the stiffness is
@@ -162,7 +166,7 @@ def _compute_load_point_displacement(values: dict[str, np.ndarray], stiffness: A
         remedy += "'0.05 MPa/um'), or --stiffness."
         rule = "needs a stiffness: the load point moves by slip plus shear stress over stiffness"
         raise InvalidValue("slip", "given without displacement", rule, remedy=remedy)
-    friction, stress = values["friction"], values.get("normal_stress")
+    friction, stress = record_values["friction"], record_values.get("normal_stress")
     is_number = isinstance(stiffness, int | float)
     over_stress = is_number or is_friction_stiffness(stiffness)
     if is_number:
@@ -172,35 +176,37 @@ def _compute_load_point_displacement(values: dict[str, np.ndarray], stiffness: A
     if not per_um > 0.0:
         raise InvalidValue("stiffness", stiffness, "must be positive")
     if over_stress:
-        return np.asarray(values["slip"] + friction / per_um)
+        return np.asarray(record_values["slip"] + friction / per_um)
     if stress is None:
         remedy = "Give --normal-stress (normal_stress=), or stiffness in 1/um."
         raise InvalidValue("stiffness", stiffness, "needs a normal stress", remedy=remedy)
-    return np.asarray(values["slip"] + friction * stress / per_um)
+    return np.asarray(record_values["slip"] + friction * stress / per_um)
 
 
 def _build_record(
-    values: dict[str, np.ndarray], normal_stress: Any, stiffness: Any, name: str
+    record_values: dict[str, np.ndarray], normal_stress: Any, stiffness: Any, name: str
 ) -> Record:
-    if normal_stress is not None and "normal_stress" not in values:
+    if normal_stress is not None and "normal_stress" not in record_values:
         stated = convert_to_si("normal_stress", normal_stress, "Pa")
-        values["normal_stress"] = np.full(len(values["time"]), stated)
-    if "friction" not in values:
-        if "shear_stress" not in values:
+        record_values["normal_stress"] = np.full(len(record_values["time"]), stated)
+    if "friction" not in record_values:
+        if "shear_stress" not in record_values:
             rule = "tells no friction: it needs friction, or shear_stress"
-            raise InvalidValue("record", [*values], rule)
-        stress = values.get("normal_stress")
+            raise InvalidValue("record", [*record_values], rule)
+        stress = record_values.get("normal_stress")
         if stress is None:
             remedy = "Give --normal-stress (normal_stress=), as in '20 MPa'."
-            raise InvalidValue("record", [*values], "tells no normal stress", remedy=remedy)
+            raise InvalidValue("record", [*record_values], "tells no normal stress", remedy=remedy)
         if not (stress > 0.0).all():
             row = int(np.argmax(~(stress > 0.0)))
             rule = f"must be positive, and is not in row {row + 1}"
             raise InvalidValue("normal_stress", float(stress[row]), rule)
-        values["friction"] = values["shear_stress"] / stress
-    if "displacement" not in values and "slip" in values:
-        values["displacement"] = _compute_load_point_displacement(values, stiffness)
-    return Record({q.name: values[q.name] for q in RECORD_COLUMNS if q.name in values}, name)
+        record_values["friction"] = record_values["shear_stress"] / stress
+    if "displacement" not in record_values and "slip" in record_values:
+        record_values["displacement"] = _compute_load_point_displacement(record_values, stiffness)
+    return Record(
+        {q.name: record_values[q.name] for q in RECORD_COLUMNS if q.name in record_values}, name
+    )
 
 
 def _read_text_columns(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
@@ -208,7 +214,7 @@ def _read_text_columns(path: Path, columns: Mapping[str, Any] | None) -> Mapping
 
     def select(headings: list[str], place: str) -> dict[str, ColumnSpec]:
         told = _complete_column_selection(columns or {}, headings, place)
-        return {key: _parse_column(key, of, headings) for key, of in told.items()}
+        return {key: _parse_column_selection(key, of, headings) for key, of in told.items()}
 
     return read_table(path, select)
 
@@ -218,25 +224,27 @@ def _read_array_columns(source: Any, columns: Mapping[str, Any] | None) -> Mappi
     headings = [*map(str, source)]
     check_heading_lengths(headings, "record")
     if columns is None and not any("(" in key or "[" in key for key in headings):
-        return pick_columns(source, {key: (key,) for key in headings})
+        return select_columns_of_arrays(source, {key: (key,) for key in headings})
     told = _complete_column_selection(columns or {}, headings, "record")
-    return pick_columns(source, {key: _parse_column(key, of, headings) for key, of in told.items()})
+    return select_columns_of_arrays(
+        source, {key: _parse_column_selection(key, of, headings) for key, of in told.items()}
+    )
 
 
 def _complete_column_selection(
-    columns: Mapping[str, Any], headings: list[str], place: str
+    selected_columns: Mapping[str, Any], headings: list[str], file_description: str
 ) -> dict[str, Any]:
     """Columns that are named, and those of the others that a record needs whose headings are of the
     usual ones.
     """
-    lacking = {"time", "displacement", "slip"} - set(columns)
-    if not {"friction", "shear_stress"} & set(columns):
-        lacking |= {"friction", "shear_stress", "normal_stress"} - set(columns)
-    wanted = dict(columns)
-    for key in _HEADING_PATTERNS:
+    lacking = {"time", "displacement", "slip"} - set(selected_columns)
+    if not {"friction", "shear_stress"} & set(selected_columns):
+        lacking |= {"friction", "shear_stress", "normal_stress"} - set(selected_columns)
+    wanted = dict(selected_columns)
+    for key in _PATTERNS_OF_USUAL_HEADINGS:
         if key in lacking and not (key == "shear_stress" and "friction" in wanted):
-            wanted |= _find_usual_heading(key, headings, place)
-    if "displacement" in wanted and "slip" not in columns:
+            wanted |= _find_usual_heading(key, headings, file_description)
+    if "displacement" in wanted and "slip" not in selected_columns:
         wanted.pop("slip", None)
     if "time" not in wanted or not {"displacement", "slip"} & set(wanted):
         remedy = (
@@ -245,44 +253,54 @@ def _complete_column_selection(
         )
         rule = "does not name time and displacement (or slip)"
         raise InvalidValue("header", ", ".join(headings)[:200], rule, remedy=remedy).with_location(
-            place
+            file_description
         )
     return wanted
 
 
-def _find_usual_heading(key: str, headings: list[str], place: str) -> dict[str, str]:
+def _find_usual_heading(
+    column_name: str, headings: list[str], file_description: str
+) -> dict[str, str]:
     """The column with the usual heading, if there is one: with the very name, or the only one that
     begins as usual, and is measured in units of its kind.
     """
     parts = {text: match for text in headings if (match := HEADING_PATTERN.fullmatch(text))}
     meant = [
-        text for text, m in parts.items() if re.match(_HEADING_PATTERNS[key], m[1], re.IGNORECASE)
+        text
+        for text, m in parts.items()
+        if re.match(_PATTERNS_OF_USUAL_HEADINGS[column_name], m[1], re.IGNORECASE)
     ]
-    meant = [text for text in meant if _has_compatible_units(key, parts[text][2] or "")] or meant
-    meant = [text for text in meant if parts[text][1] == key] or meant
+    meant = [
+        text for text in meant if _has_compatible_units(column_name, parts[text][2] or "")
+    ] or meant
+    meant = [text for text in meant if parts[text][1] == column_name] or meant
     if len(meant) > 1:
-        remedy = f"Say which, as in --columns '{key}={meant[-1]}' (columns={{'{key}': ...}})."
+        remedy = f"Say which, as in --columns '{column_name}={meant[-1]}' (columns={{'{column_name}': ...}})."
         rule = "may be any of several columns"
-        raise InvalidValue("column", key, rule, choices=meant, remedy=remedy).with_location(place)
-    return {key: meant[0]} if meant else {}
+        raise InvalidValue("column", column_name, rule, choices=meant, remedy=remedy).with_location(
+            file_description
+        )
+    return {column_name: meant[0]} if meant else {}
 
 
-def _has_compatible_units(key: str, units: str) -> bool:
+def _has_compatible_units(column_name: str, units: str) -> bool:
     """Whether units, where they are stated, are of the kind of a column."""
     try:
-        return _unit_factor(key, units) > 0.0
+        return _unit_factor_of_column(column_name, units) > 0.0
     except InvalidValue:
         return False
 
 
-def _parse_column(key: str, told: Any, headings: Sequence[str]) -> ColumnSpec:
+def _parse_column_selection(
+    column_name: str, column_specification: Any, headings: Sequence[str]
+) -> ColumnSpec:
     """A column that is named, which states its units: only those of friction go without saying."""
-    found = parse_column_spec(told, headings)
-    if not found.units and key != "friction" and isinstance(told, str):
-        whole = f"{found.heading} ({_USUAL_UNITS.get(key, 'MPa')})"
-        remedy = f"Write them in the file, as in {whole}, or here: --columns '{key}={whole},...' "
-        remedy += f"(columns={{'{key}': '{whole}', ...}})."
-        raise InvalidValue("heading", told, "states no units", remedy=remedy)
+    found = parse_column_spec(column_specification, headings)
+    if not found.units and column_name != "friction" and isinstance(column_specification, str):
+        whole = f"{found.heading} ({_USUAL_UNITS_OF_RECORD_COLUMNS.get(column_name, 'MPa')})"
+        remedy = f"Write them in the file, as in {whole}, or here: --columns '{column_name}={whole},...' "
+        remedy += f"(columns={{'{column_name}': '{whole}', ...}})."
+        raise InvalidValue("heading", column_specification, "states no units", remedy=remedy)
     return found
 
 
@@ -327,7 +345,7 @@ def _read_xlook_columns(path: Path, columns: Mapping[str, Any] | None) -> Mappin
         raise InvalidValue("columns", None, "are needed for a file of xlook", remedy=remedy)
     known = [heading for heading, _units, _values in headings]
     for key, told in columns.items():
-        heading, units, scale, offset = _parse_column(key, told, known)
+        heading, units, scale, offset = _parse_column_selection(key, told, known)
         places = [n for n, h in enumerate(known, 1) if heading in (str(n), h)]
         if len(places) != 1:
             raise InvalidValue("column", heading, f"heads {len(places)} columns", choices=known)

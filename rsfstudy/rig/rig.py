@@ -18,25 +18,30 @@ from rsfstudy.parts import Segment
 from rsfstudy.quantities import HtmlTableMixin, Quantity
 from rsfstudy.rig import unit_axes
 from rsfstudy.rig.quantities import (
-    AXIS_NAME,
-    RATIO_FIELD,
+    AXIS_NAME_BY_RIG_NAME,
+    RATIO_FIELD_BY_DIMENSIONAL_NAME,
     RIG_QUANTITIES,
-    SCENE_QUANTITIES,
-    SI_UNITS,
-    check_consistency,
-    convert_rig_value,
-    derive_scene_fields,
-    field_si_units,
-    to_si_checked,
+    SCENE_QUANTITY_BY_FIELD_NAME,
+    SI_UNIT_BY_SCALE,
+    check_rig_quantities_are_consistent,
+    convert_rig_value_and_warn_if_unusual,
+    convert_rig_value_to_si,
+    derive_scene_fields_from_rig,
+    find_si_units_of_field,
 )
-from rsfstudy.rig.scales import Scale, convert_units, read_scales, rig_scales
+from rsfstudy.rig.scales import (
+    UnitScale,
+    build_scales_of_rig,
+    convert_dataset_units,
+    read_si_scales,
+)
 from rsfstudy.rig.units import convert_to_si
-from rsfstudy.slider import Protocol, Scene, protocol, with_field_signature
+from rsfstudy.slider import Protocol, Scene, protocol, with_scene_field_signature
 
 __getattr__ = renamed_names(__name__)
 
 #: Units of the slider of what a segment of a protocol states.
-SEGMENT_UNITS = {
+SLIDER_UNITS_OF_SEGMENT_FIELDS = {
     "velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c",
     "normal_stress": "sigma_*",
 }  # fmt: skip
@@ -94,20 +99,24 @@ class Rig(HtmlTableMixin):
         for name in RIG_QUANTITIES:
             if getattr(self, name) is not None:
                 object.__setattr__(
-                    self, name, to_si_checked(name, getattr(self, name), self._normal_stress_in_pa)
+                    self,
+                    name,
+                    convert_rig_value_and_warn_if_unusual(
+                        name, getattr(self, name), self._normal_stress_in_pa
+                    ),
                 )
-        check_consistency(self.as_dict())
+        check_rig_quantities_are_consistent(self.as_dict())
 
     def quantities_with_values(self) -> Iterator[tuple[Quantity, object]]:
         """What the rig states, in SI units."""
         for name, value in self.as_dict().items():
             about = RIG_QUANTITIES[name]
-            yield Quantity(name, about.symbol, about.units, about.meaning), value
+            yield Quantity(name, about.symbol, about.si_units, about.meaning), value
 
     @property
-    def scales(self) -> dict[str, Scale]:
+    def scales(self) -> dict[str, UnitScale]:
         """Scales of dimensionless quantities, in SI units."""
-        return rig_scales(self.as_dict())
+        return build_scales_of_rig(self.as_dict())
 
     def dimensionless(self, value: Any, scale: str = "D_c/V_*", name: str = "value") -> float:
         """A quantity in units of a scale: of time, unless ``D_c``, ``V_*``, ``sigma_*`` or
@@ -116,11 +125,11 @@ class Rig(HtmlTableMixin):
         if scale not in self.scales:
             raise InvalidValue("scale", scale, "is no scale of a rig", choices=self.scales)
         return float(
-            convert_rig_value(name, value, SI_UNITS[scale], self._normal_stress_in_pa)
+            convert_rig_value_to_si(name, value, SI_UNIT_BY_SCALE[scale], self._normal_stress_in_pa)
             / self.scales[scale].factor
         )
 
-    @with_field_signature(*RATIO_FIELD)
+    @with_scene_field_signature(*RATIO_FIELD_BY_DIMENSIONAL_NAME)
     def scene(self, **fields: Any) -> Scene:
         """A scene of this rig.
 
@@ -134,19 +143,23 @@ class Rig(HtmlTableMixin):
             Normal stress is constant, or imposed where the loading changes it, unless a field says
             otherwise.
         """
-        if field_si_units("instability_norm", norm := fields.get("instability_norm")):
+        if find_si_units_of_field("instability_norm", norm := fields.get("instability_norm")):
             scene = self.scene(**{n: v for n, v in fields.items() if n != "instability_norm"})
             return scene.with_(instability_norm=compute_instability_norm(self, norm, scene))
-        for name in RATIO_FIELD.keys() & fields.keys():
-            if RATIO_FIELD[name] in fields:
+        for name in RATIO_FIELD_BY_DIMENSIONAL_NAME.keys() & fields.keys():
+            if RATIO_FIELD_BY_DIMENSIONAL_NAME[name] in fields:
                 raise InvalidValue(
-                    name, fields[name], f"give {name} or {RATIO_FIELD[name]}, not both"
+                    name,
+                    fields[name],
+                    f"give {name} or {RATIO_FIELD_BY_DIMENSIONAL_NAME[name]}, not both",
                 )
         fields = {
-            RATIO_FIELD.get(n, n): self._to_field_value(RATIO_FIELD.get(n, n), v)
+            RATIO_FIELD_BY_DIMENSIONAL_NAME.get(n, n): self._convert_to_scene_field(
+                RATIO_FIELD_BY_DIMENSIONAL_NAME.get(n, n), v
+            )
             for n, v in fields.items()
         }
-        fields = {**derive_scene_fields(self.as_dict()), **fields}
+        fields = {**derive_scene_fields_from_rig(self.as_dict()), **fields}
         for simplest in ("constant", "imposed") if "normal_stress" not in fields else ():
             with contextlib.suppress(InvalidValue):
                 return Scene(normal_stress=simplest, **fields)
@@ -168,14 +181,14 @@ class Rig(HtmlTableMixin):
         units : mapping of str to str, optional
             Of columns of a table that do not state them; SI units by default.
         """
-        return unit_axes.make_axis(dimension, values, units or "")
+        return unit_axes.make_axis_with_units(dimension, values, units or "")
 
     def protocol(
         self, segments: Sequence[Segment | Mapping[str, Any]], name: str = "protocol"
     ) -> Protocol:
         """A loading history whose segments state quantities: see `rsfstudy.protocol`."""
         if isinstance(segments, list | tuple):
-            segments = [self._to_segment(n, s) for n, s in enumerate(segments, start=1)]
+            segments = [self._convert_to_segment(n, s) for n, s in enumerate(segments, start=1)]
         return protocol(segments, name)
 
     def in_units(
@@ -199,8 +212,8 @@ class Rig(HtmlTableMixin):
             For a dataset that is in other units already, or not of rsfstudy.
         """
         rate = self.reference_velocity / self.slip_distance
-        si = read_scales(dataset, self.normal_stress, self.slip_distance, rate)
-        found = convert_units(dataset, si, stress, length, time)
+        si = read_si_scales(dataset, self.normal_stress, self.slip_distance, rate)
+        found = convert_dataset_units(dataset, si, stress, length, time)
         return found.assign_attrs(laboratory=json.dumps(self.as_dict()))
 
     def as_dict(self) -> dict[str, float]:
@@ -211,39 +224,43 @@ class Rig(HtmlTableMixin):
     @property
     def axis_fields(self) -> dict[str, float]:
         """Quantities that were stated, by the names that they have on axes, in SI units."""
-        return {AXIS_NAME.get(name, name): value for name, value in self.as_dict().items()}
+        return {
+            AXIS_NAME_BY_RIG_NAME.get(name, name): value for name, value in self.as_dict().items()
+        }
 
     @property
     def _normal_stress_in_pa(self) -> float | None:
         """sigma_* in Pa, once it is known."""
         return self.normal_stress if isinstance(self.normal_stress, float) else None
 
-    def _to_field_value(self, name: str, value: Any) -> Any:
-        units = field_si_units(name, value)
+    def _convert_to_scene_field(self, field_name: str, value: Any) -> Any:
+        units = find_si_units_of_field(field_name, value)
         if units is None or value is None:
             return value
-        scale = SCENE_QUANTITIES[name].scale
+        scale = SCENE_QUANTITY_BY_FIELD_NAME[field_name].scale
         return (
-            self.dimensionless(value, scale, name) if scale else convert_to_si(name, value, units)
+            self.dimensionless(value, scale, field_name)
+            if scale
+            else convert_to_si(field_name, value, units)
         )
 
-    def _to_segment(self, number: int, stated: Any) -> Any:
-        if not isinstance(stated, Mapping):
-            return stated  # a Segment is in units of the slider
+    def _convert_to_segment(self, segment_number: int, segment_fields: Any) -> Any:
+        if not isinstance(segment_fields, Mapping):
+            return segment_fields  # a Segment is in units of the slider
         try:
             return {
-                key: self.dimensionless(value, SEGMENT_UNITS[key], key)
-                if key in SEGMENT_UNITS
+                key: self.dimensionless(value, SLIDER_UNITS_OF_SEGMENT_FIELDS[key], key)
+                if key in SLIDER_UNITS_OF_SEGMENT_FIELDS
                 else value
-                for key, value in stated.items()
+                for key, value in segment_fields.items()
             }
         except InvalidValue as error:
-            raise error.with_location(f"segment {number}") from error
+            raise error.with_location(f"segment {segment_number}") from error
 
 
-def compute_instability_norm(rig: Rig, stated: Any, scene: Scene) -> float:
+def compute_instability_norm(rig: Rig, norm_or_slip_rate: Any, scene: Scene) -> float:
     """The norm V T/(2 pi D_c) of a scene of a rig, where it may be stated as the slip rate V."""
     try:
-        return convert_to_si("instability_norm", stated, "1")
+        return convert_to_si("instability_norm", norm_or_slip_rate, "1")
     except InvalidValue:
-        return rig.dimensionless(stated, "V_*", "instability_norm") * scene.inertial_time
+        return rig.dimensionless(norm_or_slip_rate, "V_*", "instability_norm") * scene.inertial_time

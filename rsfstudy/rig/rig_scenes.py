@@ -9,31 +9,31 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes import Axis, Row, row_kinds
+from rsfstudy.axes import Axis, AxisRow, classify_rows_by_fields
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.quantities import (
-    AXIS_NAME,
-    DISPLAY_UNITS,
-    RATIO_FIELD,
+    AXIS_NAME_BY_RIG_NAME,
+    DISPLAY_UNIT_BY_SI_UNIT,
+    RATIO_FIELD_BY_DIMENSIONAL_NAME,
     REQUIRED_QUANTITIES,
-    RIG_NAME,
-    SCENE_QUANTITIES,
-    SI_UNITS,
-    check_consistency,
-    derive_scene_fields,
+    RIG_NAME_BY_AXIS_NAME,
+    SCENE_QUANTITY_BY_FIELD_NAME,
+    SI_UNIT_BY_SCALE,
+    check_rig_quantities_are_consistent,
+    convert_rig_value_and_warn_if_unusual,
+    derive_scene_fields_from_rig,
+    is_dimensionless_field_with_scale,
     is_friction_stiffness,
-    is_scaled_field,
-    to_si_checked,
 )
 from rsfstudy.rig.rig import Rig, compute_instability_norm
-from rsfstudy.rig.scales import DIMENSIONLESS_PREFIX, rig_scales
-from rsfstudy.rig.unit_axes import factor_to_si, make_axis
+from rsfstudy.rig.scales import DIMENSIONLESS_PREFIX, build_scales_of_rig
+from rsfstudy.rig.unit_axes import factor_to_si, make_axis_with_units
 from rsfstudy.rig.units import multiply_exactly
 from rsfstudy.slider import Scene
 
 
 @dataclass(frozen=True)
-class RigScenes:
+class LatticeScenesOnRig:
     """The cells of a study of a rig: axes in units, turned into fields of scenes.
 
     What the base scene has in units of its rig (all but ratios) stays what it is in SI units where
@@ -54,22 +54,22 @@ class RigScenes:
     """
 
     rig: Rig
-    base: Scene
+    base_scene: Scene
     axes: Sequence[Axis]
 
     def __post_init__(self) -> None:
-        theirs = self.base.as_dict()
-        for name, value in derive_scene_fields(self.rig.as_dict()).items():
-            if name != "inertia" and not _is_close(theirs.get(name), value):
+        theirs = self.base_scene.as_dict()
+        for name, value in derive_scene_fields_from_rig(self.rig.as_dict()).items():
+            if name != "inertia" and not _is_close_within_rounding(theirs.get(name), value):
                 rule = f"is not that of the rig, {value:g}"
                 remedy = "Make the base of its study with rig.scene(...)."
                 raise InvalidValue(name, theirs.get(name), rule, remedy=remedy)
         for along in self.axes:
             for row in along.rows:
                 lacks = [name for name in self.rig.axis_fields if name not in row]
-                if lacks and not {AXIS_NAME.get(name, name) for name in REQUIRED_QUANTITIES} & set(
-                    lacks
-                ):
+                if lacks and not {
+                    AXIS_NAME_BY_RIG_NAME.get(name, name) for name in REQUIRED_QUANTITIES
+                } & set(lacks):
                     rule = f"does not state {lacks[0]}, which the rig of the study does"
                     raise InvalidValue(along.dimension, dict(row), rule, remedy="State it.")
 
@@ -78,54 +78,64 @@ class RigScenes:
         """Units of the fields that axes state in units, by the names that they have there."""
         return {name: units for along in self.axes for name, units in along.units.items()}
 
-    def rig_quantities(self, row: Row) -> dict[str, Any]:
+    def compute_rig_quantities(self, axis_row: AxisRow) -> dict[str, Any]:
         """The quantities of the rig in SI units, where axes have these values or arrays."""
         found, units = dict(self.rig.as_dict()), self.units
-        for name in RIG_NAME:
-            if name in units and row.get(name) is not None:
-                found[RIG_NAME[name]] = multiply_exactly(row[name], factor_to_si(name, units[name]))
+        for name in RIG_NAME_BY_AXIS_NAME:
+            if name in units and axis_row.get(name) is not None:
+                found[RIG_NAME_BY_AXIS_NAME[name]] = multiply_exactly(
+                    axis_row[name], factor_to_si(name, units[name])
+                )
         in_friction = is_friction_stiffness(f"1 {units.get('stiffness', '')}")
-        if row.get("stiffness") is not None and in_friction:
+        if axis_row.get("stiffness") is not None and in_friction:
             found["stiffness"] = found["stiffness"] * found["normal_stress"]
-        check_consistency(found)
+        check_rig_quantities_are_consistent(found)
         return found
 
-    def scene_fields(self, row: Row) -> dict[str, Any]:
+    def compute_scene_fields(self, axis_row: AxisRow) -> dict[str, Any]:
         """The fields of scenes that differ from the base, where axes have these values.
 
         Parameters
         ----------
         row : mapping of str to value, or to ndarray of float
         """
-        units, rig = self.units, self.rig_quantities(row)
-        here, found = scale_factors(rig), {}
-        if set(RIG_NAME) & set(units) & set(row):
-            found = self._fields_constant_in_si(here) | derive_scene_fields(rig)
-            if "period" in self.rig.as_dict() and not self.base.has_mass:
+        units, rig = self.units, self.compute_rig_quantities(axis_row)
+        here, found = scale_factors_of_rig(rig), {}
+        if set(RIG_NAME_BY_AXIS_NAME) & set(units) & set(axis_row):
+            found = self._base_fields_constant_in_si(here) | derive_scene_fields_from_rig(rig)
+            if "period" in self.rig.as_dict() and not self.base_scene.has_mass:
                 found.pop("inertia", None)  # it was left out
-        for name, value in row.items():
-            field = RATIO_FIELD.get(name, name)
+        for name, value in axis_row.items():
+            field = RATIO_FIELD_BY_DIMENSIONAL_NAME.get(name, name)
             if name not in units:
                 found[name] = value
-            elif name not in RIG_NAME:
-                scale = SCENE_QUANTITIES[field].scale
+            elif name not in RIG_NAME_BY_AXIS_NAME:
+                scale = SCENE_QUANTITY_BY_FIELD_NAME[field].scale
                 in_si = multiply_exactly(value, factor_to_si(name, units[name]))
                 found[field] = in_si / (here[scale] if scale else 1.0)
         return found
 
-    def _fields_constant_in_si(self, here: Mapping[str, Any]) -> dict[str, Any]:
+    def _base_fields_constant_in_si(
+        self, scale_factors_of_cell: Mapping[str, Any]
+    ) -> dict[str, Any]:
         """Fields of the base that stay what they are in SI units."""
-        base = scale_factors(self.rig.as_dict())
+        base = scale_factors_of_rig(self.rig.as_dict())
         held = {
-            name: value * (base[SCENE_QUANTITIES[name].scale] / here[SCENE_QUANTITIES[name].scale])
-            for name, value in self.base.as_dict().items()
-            if is_scaled_field(name) and isinstance(value, float) and value != 0.0
+            name: value
+            * (
+                base[SCENE_QUANTITY_BY_FIELD_NAME[name].scale]
+                / scale_factors_of_cell[SCENE_QUANTITY_BY_FIELD_NAME[name].scale]
+            )
+            for name, value in self.base_scene.as_dict().items()
+            if is_dimensionless_field_with_scale(name) and isinstance(value, float) and value != 0.0
         }
         if "radiation_damping" in held:  # eta is held: its stress goes with V_*
-            held["radiation_damping"] = held["radiation_damping"] * (here["V_*"] / base["V_*"])
+            held["radiation_damping"] = held["radiation_damping"] * (
+                scale_factors_of_cell["V_*"] / base["V_*"]
+            )
         return held
 
-    def scale_coordinates(self) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    def build_scale_coordinates(self) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
         """Dimensionless fields and scales, over the dimensions that they depend on.
 
         Returns
@@ -136,10 +146,12 @@ class RigScenes:
         """
         # of an axis of one point a second one tells what depends on it
         alone = {axis.dimension for axis in self.axes if len(axis) == 1 and axis.is_single_field}
-        along = [_with_second_point(a) if a.dimension in alone else a for a in self.axes if a.units]
+        along = [
+            _add_second_axis_point(a) if a.dimension in alone else a for a in self.axes if a.units
+        ]
         shape = tuple(len(axis) for axis in along)
         found: dict[str, np.ndarray] = {}
-        for rows in group_rows_by_kind(along):
+        for rows in group_rows_by_fields_set(along):
             numbers: dict[str, Any] = {}
             for place, axis in enumerate(along):
                 shaped = [-1 if p == place else 1 for p in range(len(along))]
@@ -147,7 +159,7 @@ class RigScenes:
                     if isinstance(value, float):
                         column = [axis.rows[n][name] for n in rows[place].tolist()]
                         numbers[name] = np.array(column).reshape(shaped)
-            for name, values in self._scale_fields(numbers).items():
+            for name, values in self._compute_scales_and_fields(numbers).items():
                 whole = found.setdefault(name, np.full(shape, np.nan))
                 whole[np.ix_(*rows)] = values
         squeezed = {
@@ -158,23 +170,23 @@ class RigScenes:
             for name, (dims, values) in squeezed.items()
         }
 
-    def _scale_fields(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        units, rig = self.units, self.rig_quantities(row)
-        scales_ = {AXIS_NAME.get(name, name): rig[name] for name in REQUIRED_QUANTITIES}
+    def _compute_scales_and_fields(self, axis_row: Mapping[str, Any]) -> dict[str, Any]:
+        units, rig = self.units, self.compute_rig_quantities(axis_row)
+        scales_ = {AXIS_NAME_BY_RIG_NAME.get(name, name): rig[name] for name in REQUIRED_QUANTITIES}
         found = {name: value for name, value in scales_.items() if name not in units}
-        for name, value in self.scene_fields(row).items():
-            if isinstance(value, bool | str) or (name in row and name not in units):
+        for name, value in self.compute_scene_fields(axis_row).items():
+            if isinstance(value, bool | str) or (name in axis_row and name not in units):
                 continue
             if name not in units:
                 found[name] = value
-            elif SCENE_QUANTITIES[name].scale:
+            elif SCENE_QUANTITY_BY_FIELD_NAME[name].scale:
                 found[DIMENSIONLESS_PREFIX + name] = value
         return found
 
 
-def _is_close(theirs: Any, value: Any) -> bool:
+def _is_close_within_rounding(other_value: Any, value: Any) -> bool:
     # both were made of the same numbers, by hand perhaps: what rounding leaves is far below
-    return isinstance(theirs, float) and math.isclose(theirs, value, rel_tol=1e-9)
+    return isinstance(other_value, float) and math.isclose(other_value, value, rel_tol=1e-9)
 
 
 def put_on_rig(
@@ -196,13 +208,18 @@ def put_on_rig(
     sizes : dict of str to float
         Factor by which the values of each field were multiplied.
     """
-    sizes_of = scale_factors(rig.as_dict())
+    sizes_of = scale_factors_of_rig(rig.as_dict())
     converted: list[Axis] = []
     every: dict[str, float] = {}
     for along in axes:
-        scales = {n: SCENE_QUANTITIES[n].scale for n in along.fields if is_scaled_field(n)}
+        scales = {
+            n: SCENE_QUANTITY_BY_FIELD_NAME[n].scale
+            for n in along.fields
+            if is_dimensionless_field_with_scale(n)
+        }
         units = {
-            n: DISPLAY_UNITS.get(SI_UNITS[scale], SI_UNITS[scale]) for n, scale in scales.items()
+            n: DISPLAY_UNIT_BY_SI_UNIT.get(SI_UNIT_BY_SCALE[scale], SI_UNIT_BY_SCALE[scale])
+            for n, scale in scales.items()
         }
         sizes = {
             n: multiply_exactly(sizes_of[s], 1 / factor_to_si(n, units[n]))
@@ -214,13 +231,15 @@ def put_on_rig(
             for row in along.rows
         ]
         converted.append(along.with_rows(rows, units, along.sampling_info))
-    changes = derive_scene_fields(rig.as_dict())
+    changes = derive_scene_fields_from_rig(rig.as_dict())
     if {"inertia", "radiation_damping"} & set(changes):  # in place of what the study has
         changes = {"inertia": False, "radiation_damping": 0.0, **changes}
     return base.with_(**changes), converted, every
 
 
-def with_rig_value(rig: Rig, base: Scene, name: str, value: Any) -> tuple[Rig, Scene]:
+def replace_rig_quantity(
+    rig: Rig, base_scene: Scene, quantity_name: str, value: Any
+) -> tuple[Rig, Scene]:
     """Return a rig and its scene with another value of one quantity.
 
     Parameters
@@ -237,22 +256,29 @@ def with_rig_value(rig: Rig, base: Scene, name: str, value: Any) -> tuple[Rig, S
     -------
     Rig, Scene
     """
-    if name == "instability_norm":
-        return rig, base.with_(instability_norm=compute_instability_norm(rig, value, base))
-    axis = make_axis(name, [value])
-    changed = base.with_(**RigScenes(rig, base, [axis]).scene_fields(axis.rows[0]))
-    if name in RIG_NAME:
-        quantity = RIG_NAME[name]
-        rig = replace(rig, **{quantity: to_si_checked(quantity, value, rig.normal_stress)})
+    if quantity_name == "instability_norm":
+        return rig, base_scene.with_(
+            instability_norm=compute_instability_norm(rig, value, base_scene)
+        )
+    axis = make_axis_with_units(quantity_name, [value])
+    changed = base_scene.with_(
+        **LatticeScenesOnRig(rig, base_scene, [axis]).compute_scene_fields(axis.rows[0])
+    )
+    if quantity_name in RIG_NAME_BY_AXIS_NAME:
+        quantity = RIG_NAME_BY_AXIS_NAME[quantity_name]
+        rig = replace(
+            rig,
+            **{quantity: convert_rig_value_and_warn_if_unusual(quantity, value, rig.normal_stress)},
+        )
     return rig, changed
 
 
-def scale_factors(rig: Mapping[str, Any]) -> dict[str, Any]:
+def scale_factors_of_rig(rig_values: Mapping[str, Any]) -> dict[str, Any]:
     """Value of 1 in SI units, by what quantities are measured in."""
-    return {name: scale.factor for name, scale in rig_scales(rig).items()}
+    return {name: scale.factor for name, scale in build_scales_of_rig(rig_values).items()}
 
 
-def _with_second_point(axis: Axis) -> Axis:
+def _add_second_axis_point(axis: Axis) -> Axis:
     """An axis of one point, with another near it."""
     (row,) = axis.rows
     near = {
@@ -262,11 +288,11 @@ def _with_second_point(axis: Axis) -> Axis:
 
 
 def _drop_constant_dimensions(
-    along: Sequence[Axis], values: np.ndarray
+    axes: Sequence[Axis], values: np.ndarray
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Values without the dimensions along which they are the same."""
     kept: list[str] = []
-    for place, axis in reversed(list(enumerate(along))):
+    for place, axis in reversed(list(enumerate(axes))):
         first = values.take([0], axis=place)
         if np.array_equal(np.broadcast_to(first, values.shape), values, equal_nan=True):
             values = values.take(0, axis=place)
@@ -275,8 +301,8 @@ def _drop_constant_dimensions(
     return tuple(kept), values
 
 
-def group_rows_by_kind(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
+def group_rows_by_fields_set(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
     """Rows on each axis that are of one kind, for each combination of kinds."""
-    every = [row_kinds(axis.rows) for axis in axes]
+    every = [classify_rows_by_fields(axis.rows) for axis in axes]
     for kind in np.ndindex(*(int(of.max()) + 1 for of in every)):
         yield tuple(np.flatnonzero(of == n) for of, n in zip(every, kind, strict=True))

@@ -23,7 +23,7 @@ __getattr__ = renamed_names(__name__)
 
 #: What numbers without surprises are made of.
 _PLAIN_TABLE_CHARACTERS = frozenset("0123456789+-.eE \t\r\n")
-_HEADER_EXAMPLE = "velocity (um/s), distance (um), a (1)"
+_EXAMPLE_OF_TABLE_HEADER = "velocity (um/s), distance (um), a (1)"
 _NUMBER_PATTERN = r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 #: A heading with the scale and the offset of what is below it.
 _SCALED_COLUMN_PATTERN = re.compile(
@@ -54,10 +54,12 @@ def check_heading_length(heading: str) -> None:
     """Raise ``InvalidValue`` if a heading is too long to be parsed."""
     if len(heading) > _MAX_HEADING_LENGTH:
         rule = f"must have at most {_MAX_HEADING_LENGTH} characters (it has {len(heading):,})"
-        raise InvalidValue("heading", heading, rule, remedy=f"Write it as in {_HEADER_EXAMPLE}.")
+        raise InvalidValue(
+            "heading", heading, rule, remedy=f"Write it as in {_EXAMPLE_OF_TABLE_HEADER}."
+        )
 
 
-def check_heading_lengths(headings: Iterable[str], place: str) -> None:
+def check_heading_lengths(headings: Iterable[str], file_description: str) -> None:
     """Check the length of all headings of a file.
 
     Errors report ``place`` and the number of the column.
@@ -66,18 +68,22 @@ def check_heading_lengths(headings: Iterable[str], place: str) -> None:
         try:
             check_heading_length(heading)
         except InvalidValue as error:
-            raise error.with_location(f"{place}, column {column}") from error
+            raise error.with_location(f"{file_description}, column {column}") from error
 
 
-def _listed(told: Any) -> ColumnSpec:
+def _parse_listed_column_spec(column_choice: Any) -> ColumnSpec:
     """Return the choice of a column that is a list of its heading, units, scale and offset."""
     rule = "must be a heading, or a list of a heading, its units, a scale and an offset"
     remedy = "Write ('Time (s)', 's', 0.001), for example."
-    wrong = InvalidValue("column", told, rule, remedy=remedy)
-    told = told.tolist() if isinstance(told, np.ndarray) else told
-    if not isinstance(told, Sequence) or not 1 <= len(told) <= len(ColumnSpec._fields):
+    wrong = InvalidValue("column", column_choice, rule, remedy=remedy)
+    column_choice = (
+        column_choice.tolist() if isinstance(column_choice, np.ndarray) else column_choice
+    )
+    if not isinstance(column_choice, Sequence) or not 1 <= len(column_choice) <= len(
+        ColumnSpec._fields
+    ):
         raise wrong
-    heading, units, *numbers = (*told, "")[: max(2, len(told))]
+    heading, units, *numbers = (*column_choice, "")[: max(2, len(column_choice))]
     # columns of an xlook file have numbers
     if not isinstance(heading, str | int) or not isinstance(units, str):
         raise wrong
@@ -88,7 +94,7 @@ def _listed(told: Any) -> ColumnSpec:
         raise wrong from error
 
 
-def parse_column_spec(told: Any, headings: Collection[str]) -> ColumnSpec:
+def parse_column_spec(column_choice: Any, headings: Collection[str]) -> ColumnSpec:
     """Parse the choice of a column.
 
     Parameters
@@ -104,17 +110,17 @@ def parse_column_spec(told: Any, headings: Collection[str]) -> ColumnSpec:
     InvalidValue
         If the choice is neither, or if the heading is too long.
     """
-    if not isinstance(told, str):
-        return _listed(told)
-    check_heading_length(told)
-    raw = None if told in headings else _SCALED_COLUMN_PATTERN.fullmatch(told)
+    if not isinstance(column_choice, str):
+        return _parse_listed_column_spec(column_choice)
+    check_heading_length(column_choice)
+    raw = None if column_choice in headings else _SCALED_COLUMN_PATTERN.fullmatch(column_choice)
     scale, offset = 1.0, 0.0
     if raw:
-        told, scale = raw[1], float(raw[2] + raw[3])
+        column_choice, scale = raw[1], float(raw[2] + raw[3])
         offset = float((raw[4] or "") + (raw[5] or "0"))
-    match = HEADING_PATTERN.fullmatch(told)
+    match = HEADING_PATTERN.fullmatch(column_choice)
     units = (match[2] or "").strip() if match else ""
-    heading = told if told in headings or not match else match[1]
+    heading = column_choice if column_choice in headings or not match else match[1]
     return ColumnSpec(heading, units, scale, offset)
 
 
@@ -148,16 +154,16 @@ class Column(NamedTuple):
             return f"sample {row + 1}"
         return f"{self.path}, line {self.line_numbers[row]}, column {self.column_number}"
 
-    def check_values(self, name: str, wrong: np.ndarray, rule: str) -> None:
+    def check_values(self, quantity_name: str, invalid_mask: np.ndarray, rule: str) -> None:
         """Raise `InvalidValue` for the first number that is wrong, with its place."""
-        if wrong.any():
-            row = int(np.argmax(wrong))
-            raise InvalidValue(name, float(self.values[row]), rule).with_location(
+        if invalid_mask.any():
+            row = int(np.argmax(invalid_mask))
+            raise InvalidValue(quantity_name, float(self.values[row]), rule).with_location(
                 self.location(row)
             )
 
 
-def pick_columns(source: Any, columns: Mapping[str, Any]) -> dict[str, Column]:
+def select_columns_of_arrays(source: Any, columns: Mapping[str, Any]) -> dict[str, Column]:
     """Columns of arrays, of variables or of a DataFrame, by name; units of variables are those that
     their attributes state.
 
@@ -174,7 +180,7 @@ def pick_columns(source: Any, columns: Mapping[str, Any]) -> dict[str, Column]:
         heading, units, scale, offset = parse_column_spec(told, names)
         if heading not in names:
             raise InvalidValue("column", heading, "is not in the record", choices=names)
-        values, of_times = _to_floats(key, source[heading])
+        values, of_times = _to_floats_and_units(key, source[heading])
         if values.ndim != 1:
             raise InvalidValue(key, values.shape, "must lie along one dimension")
         units = of_times or units or str(getattr(source[heading], "attrs", {}).get("units", ""))
@@ -182,18 +188,18 @@ def pick_columns(source: Any, columns: Mapping[str, Any]) -> dict[str, Column]:
     return found
 
 
-def _to_floats(key: str, values: Any) -> tuple[np.ndarray, str]:
+def _to_floats_and_units(column_name: str, values: Any) -> tuple[np.ndarray, str]:
     """Numbers of an array, NaN where it is masked, and their units if its type tells them: those of
     times are s, from the first of dates on.
     """
     kind = getattr(getattr(values, "dtype", None), "kind", "")
     if kind == "c":
-        raise InvalidValue(key, values.dtype.name, "must be real numbers")
+        raise InvalidValue(column_name, values.dtype.name, "must be real numbers")
     if kind not in ("m", "M"):
         try:
             return np.ma.asarray(values, dtype=float).filled(math.nan), ""
         except (TypeError, ValueError, OverflowError) as error:
-            raise InvalidValue(key, values, "must be a list of numbers") from error
+            raise InvalidValue(column_name, values, "must be a list of numbers") from error
     times = np.asarray(values, dtype=f"{'datetime' if kind == 'M' else 'timedelta'}64[ns]")
     first = times[:1] if times.ndim else times
     return (times - first if kind == "M" else times) / np.timedelta64(1, "s"), "s"
@@ -239,7 +245,7 @@ def read_table(
         raise DataError(f"{path}: cannot be read as CSV ({error})") from error
     check_heading_lengths(headings, f"{path}, line {line}")
     if not header:
-        remedy = f"Its first line reads, for instance, {_HEADER_EXAMPLE}."
+        remedy = f"Its first line reads, for instance, {_EXAMPLE_OF_TABLE_HEADER}."
         raise InvalidValue("table", str(path), "has no header", remedy=remedy)
     if values is None:
         lines = np.array([n for n, _row in rows], dtype=int)
@@ -253,7 +259,7 @@ def read_table(
     if isinstance(columns, Mapping):
         wanted = {name: parse_column_spec(told, headings) for name, told in columns.items()}
     else:
-        wanted = (columns or _columns_from_header)(headings, f"{path}, line {line}")
+        wanted = (columns or _choose_all_columns_of_header)(headings, f"{path}, line {line}")
     if not isinstance(wanted, Mapping):
         rule = "must be a mapping, or a function that returns one"
         raise InvalidValue("columns", columns, rule)
@@ -277,20 +283,24 @@ def read_table(
 
 
 def _read_plain_table(
-    text: str, between: str, line: int, width: int
+    text: str, delimiter: str, header_line_count: int, column_count: int
 ) -> tuple[np.ndarray | None, np.ndarray]:
     """Numbers of a plain table behind the line of its header, and their lines; None where a field
     is no finite number, or where they stand is to be looked for line by line.
     """
-    body = "".join(text.split("\n", line)[line:])
-    lines = line + 1 + np.arange(body.count("\n") + (not body.endswith("\n")))
-    if between == " " or not body.strip() or not set(body) <= _PLAIN_TABLE_CHARACTERS | {between}:
+    body = "".join(text.split("\n", header_line_count)[header_line_count:])
+    lines = header_line_count + 1 + np.arange(body.count("\n") + (not body.endswith("\n")))
+    if (
+        delimiter == " "
+        or not body.strip()
+        or not set(body) <= _PLAIN_TABLE_CHARACTERS | {delimiter}
+    ):
         return None, lines
     try:
-        found = np.loadtxt(io.StringIO(body), delimiter=between, comments=None, ndmin=2)
+        found = np.loadtxt(io.StringIO(body), delimiter=delimiter, comments=None, ndmin=2)
     except ValueError:
         return None, lines
-    plain = found.shape == (len(lines), width) and bool(np.isfinite(found).all())
+    plain = found.shape == (len(lines), column_count) and bool(np.isfinite(found).all())
     return (found if plain else None), lines
 
 
@@ -301,33 +311,39 @@ def _detect_delimiter(header: str) -> str:
     )
 
 
-def _columns_from_header(headings: list[str], place: str) -> dict[str, ColumnSpec]:
+def _choose_all_columns_of_header(
+    headings: list[str], file_description: str
+) -> dict[str, ColumnSpec]:
     """All columns by their names, by a header that states them with their units."""
     found: dict[str, ColumnSpec] = {}
     for n, heading in enumerate(headings, start=1):
         stated = parse_heading(heading)
         if stated is None:
-            remedy = f"Write the header as in {_HEADER_EXAMPLE}."
+            remedy = f"Write the header as in {_EXAMPLE_OF_TABLE_HEADER}."
             rule = "names no column with its units"
             raise InvalidValue("header", heading, rule, remedy=remedy).with_location(
-                f"{place}, column {n}"
+                f"{file_description}, column {n}"
             )
         name, units = stated
         if name in found:
-            raise InvalidValue("column", name, "stands twice in the header").with_location(place)
+            raise InvalidValue("column", name, "stands twice in the header").with_location(
+                file_description
+            )
         found[name] = ColumnSpec(heading, units)
     return found
 
 
-def _parse_field(name: str, text: str, column: Column, row: int) -> float:
+def _parse_field(column_name: str, text: str, column: Column, row: int) -> float:
     if not text.strip():
         return math.nan
     found = parse_number(text)
     if found is None:
         alone = "Write digits alone, as in 1.5e-3; units stand in the header."
         remedy = "Write a decimal point." if "," in text else alone
-        wrong = InvalidValue(name, text, "is no number", remedy=remedy)
+        wrong = InvalidValue(column_name, text, "is no number", remedy=remedy)
         raise wrong.with_location(column.location(row))
     if not math.isfinite(found):
-        raise InvalidValue(name, text.strip(), "must be finite").with_location(column.location(row))
+        raise InvalidValue(column_name, text.strip(), "must be finite").with_location(
+            column.location(row)
+        )
     return found

@@ -20,7 +20,7 @@ from rsfstudy.axes import to_plain_value
 from rsfstudy.errors import InvalidValue
 
 #: A factor to SI, and the exponents of kilogram, metre and second.
-Unit = tuple[Fraction, tuple[int, int, int]]
+SiFactorAndExponents = tuple[Fraction, tuple[int, int, int]]
 
 _STRESS_EXPONENTS, _FORCE_EXPONENTS, _LENGTH_EXPONENTS, _TIME_EXPONENTS = (
     (1, -1, -2),
@@ -28,7 +28,7 @@ _STRESS_EXPONENTS, _FORCE_EXPONENTS, _LENGTH_EXPONENTS, _TIME_EXPONENTS = (
     (0, 1, 0),
     (0, 0, 1),
 )
-_UNIT_SIZES: Mapping[str, tuple[str | int, tuple[int, int, int]]] = {
+_SIZES_OF_KNOWN_UNITS: Mapping[str, tuple[str | int, tuple[int, int, int]]] = {
     "kg": (1, (1, 0, 0)),
     **{
         f"{p}Pa": (x, _STRESS_EXPONENTS)
@@ -48,30 +48,30 @@ _UNIT_SIZES: Mapping[str, tuple[str | int, tuple[int, int, int]]] = {
     "day": (86400, _TIME_EXPONENTS),
     "year": (31557600, _TIME_EXPONENTS),
 }
-_KNOWN_UNITS: Mapping[str, Unit] = {
-    name: (Fraction(size), of) for name, (size, of) in _UNIT_SIZES.items()
+_KNOWN_UNITS: Mapping[str, SiFactorAndExponents] = {
+    name: (Fraction(size), of) for name, (size, of) in _SIZES_OF_KNOWN_UNITS.items()
 }
 _NUMBER_PATTERN = re.compile(
     r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|nan|[-+]?inf"
 )
 #: A name with its power: of one digit, so that no power overflows.
-_POWER_PATTERN = (
+_UNIT_WITH_POWER_PATTERN = (
     r"([A-Za-z\u00b5\u03bc](?:[A-Za-z\u00b5\u03bc0-9_]*[A-Za-z\u00b5\u03bc])?)"
     r"(?:(?:\^|\*\*)?([-+]?[1-9]))?"
 )
-_SIGNED_POWER_PATTERN = re.compile(rf"(/?)\s*{_POWER_PATTERN}")
+_UNIT_WITH_SIGNED_POWER_PATTERN = re.compile(rf"(/?)\s*{_UNIT_WITH_POWER_PATTERN}")
 #: A product, over others one by one: what ``Pa/m s`` means is not agreed upon.
 _UNIT_PATTERN = re.compile(
-    rf"(?:1(?=\s*/)|{_POWER_PATTERN}(?:(?:\s*[*.\u00b7]\s*|\s+){_POWER_PATTERN})*)?(?:\s*/\s*{_POWER_PATTERN})*"
+    rf"(?:1(?=\s*/)|{_UNIT_WITH_POWER_PATTERN}(?:(?:\s*[*.\u00b7]\s*|\s+){_UNIT_WITH_POWER_PATTERN})*)?(?:\s*/\s*{_UNIT_WITH_POWER_PATTERN})*"
 )
-_RANGE_RULE = "must read start:stop:count, two finite numbers and a count"
-_LOG_RANGE_REMEDY = (
+_RANGE_SYNTAX_RULE = "must read start:stop:count, two finite numbers and a count"
+_LOG_RANGE_SYNTAX_REMEDY = (
     "For logarithmic spacing write start:stop:count:log, as in hold_time=1:1e5:30:log."
 )
-_MAX_POINTS = 1_000_000
+_MAX_POINTS_OF_RANGE = 1_000_000
 #: Most characters of a quantity; the patterns above take quadratic time on longer texts.
 _MAX_QUANTITY_LENGTH = 200
-_PINT_REMEDY = "Install pint (pip install 'rsfstudy[units]')"
+_PINT_INSTALL_ADVICE = "Install pint (pip install 'rsfstudy[units]')"
 
 
 def parse_number(text: str) -> float | None:
@@ -85,7 +85,7 @@ def split_number_and_units(text: str) -> tuple[float | None, str]:
     return (float(match[0]), text.strip()[match.end() :].strip()) if match else (None, "")
 
 
-def expand_range(name: str, text: str, values: str) -> list[float] | list[str]:
+def expand_range(argument_name: str, text: str, range_text: str) -> list[float] | list[str]:
     """Numbers by their first, their last, how many there are and, perhaps, ``log``; with their
     units, where such follow.
 
@@ -95,28 +95,34 @@ def expand_range(name: str, text: str, values: str) -> list[float] | list[str]:
         What errors name.
     values : str
     """
-    *before, last = values.split(":")
+    *before, last = range_text.split(":")
     last, _, units = last.strip().partition(" ")
-    found = _expand_numbers(name, text, [*before, last])
+    found = _expand_range_of_numbers(argument_name, text, [*before, last])
     return [f"{number!r} {units.strip()}" for number in found] if units.strip() else found
 
 
-def _expand_numbers(name: str, text: str, parts: Sequence[str]) -> list[float]:
-    spacing = parts[3].strip().lower() if len(parts) == 4 else ""
-    first, last, points = map(parse_number, parts[:3] if len(parts) in (3, 4) else ["", "", ""])
+def _expand_range_of_numbers(
+    argument_name: str, text: str, range_parts: Sequence[str]
+) -> list[float]:
+    spacing = range_parts[3].strip().lower() if len(range_parts) == 4 else ""
+    first, last, points = map(
+        parse_number, range_parts[:3] if len(range_parts) in (3, 4) else ["", "", ""]
+    )
     if first is None or last is None or points is None or spacing not in ("", "log"):
-        raise InvalidValue(name, text, _RANGE_RULE, remedy=_LOG_RANGE_REMEDY)
+        raise InvalidValue(argument_name, text, _RANGE_SYNTAX_RULE, remedy=_LOG_RANGE_SYNTAX_REMEDY)
     finite = math.isfinite(first) and math.isfinite(last)
-    if not finite or points not in range(1, _MAX_POINTS + 1):
-        raise InvalidValue(name, text, f"{_RANGE_RULE}, from 1 to {_MAX_POINTS:,}")
+    if not finite or points not in range(1, _MAX_POINTS_OF_RANGE + 1):
+        raise InvalidValue(
+            argument_name, text, f"{_RANGE_SYNTAX_RULE}, from 1 to {_MAX_POINTS_OF_RANGE:,}"
+        )
     if spacing and min(first, last) <= 0.0:
         remedy = "Leave :log out, or start above 0."
-        raise InvalidValue(name, text, "has no logarithm of 0 or less", remedy=remedy)
+        raise InvalidValue(argument_name, text, "has no logarithm of 0 or less", remedy=remedy)
     laid = np.geomspace if spacing else np.linspace
     return [float(x) for x in laid(first, last, int(points))]
 
 
-def convert_to_si(name: str, value: Any, units: str) -> float:
+def convert_to_si(quantity_name: str, value: Any, units: str) -> float:
     """A quantity in SI units.
 
     Parameters
@@ -134,28 +140,28 @@ def convert_to_si(name: str, value: Any, units: str) -> float:
     InvalidValue
         For what is no finite number, and for units that are unknown or of another kind.
     """
-    return float(convert_to_si_exactly(name, value, units))
+    return float(convert_to_si_as_fraction(quantity_name, value, units))
 
 
-def convert_to_si_exactly(name: str, value: Any, units: str) -> Fraction:
+def convert_to_si_as_fraction(quantity_name: str, value: Any, units: str) -> Fraction:
     """A quantity in SI units before it is rounded; raises as `convert_to_si`."""
     if isinstance(value, str):
-        found: Any = _parse_quantity(name, value, units)
+        found: Any = _parse_quantity(quantity_name, value, units)
     elif hasattr(value, "to") and hasattr(value, "magnitude"):
-        found = _convert_pint_quantity(name, value, value, units)
+        found = _convert_pint_quantity(quantity_name, value, value, units)
     else:
-        found = to_plain_value(name, value)
+        found = to_plain_value(quantity_name, value)
     if isinstance(found, bool) or not isinstance(found, int | float | Fraction):
         remedy = f"Give a number in {units}, or a text with units."
-        raise InvalidValue(name, value, "is no quantity", remedy=remedy)
+        raise InvalidValue(quantity_name, value, "is no quantity", remedy=remedy)
     if not math.isfinite(_to_float(found)):
-        raise InvalidValue(name, value, "must be finite")
+        raise InvalidValue(quantity_name, value, "must be finite")
     return Fraction(found)
 
 
-def unit_factor(name: str, stated: str, units: str) -> Fraction:
+def unit_factor(quantity_name: str, stated_units: str, target_units: str) -> Fraction:
     """Factor from the units that were stated to SI units; raises as `convert_to_si`."""
-    return convert_to_si_exactly(name, f"1 {stated}", units)
+    return convert_to_si_as_fraction(quantity_name, f"1 {stated_units}", target_units)
 
 
 def multiply_exactly(values: Any, factor: Fraction) -> Any:
@@ -165,10 +171,14 @@ def multiply_exactly(values: Any, factor: Fraction) -> Any:
         return np.array([multiply_exactly(x, factor) for x in each.tolist()])[places].reshape(
             values.shape
         )
-    return _to_float(_shortest_fraction(values) * factor) if math.isfinite(values) else values
+    return (
+        _to_float(_fraction_of_shortest_digits(values) * factor)
+        if math.isfinite(values)
+        else values
+    )
 
 
-def _shortest_fraction(number: float) -> Fraction:
+def _fraction_of_shortest_digits(number: float) -> Fraction:
     """The shortest digits that round to a number: of as many as were written there may be any."""
     return Fraction(repr(float(number)))
 
@@ -180,7 +190,7 @@ def _to_float(number: Fraction | float) -> float:
         return math.inf
 
 
-def _parse_quantity(name: str, text: str, units: str) -> Fraction | float:
+def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | float:
     """Convert a string with a number and units to SI units.
 
     A number that is not finite is returned unchanged.
@@ -188,90 +198,96 @@ def _parse_quantity(name: str, text: str, units: str) -> Fraction | float:
     if len(text) > _MAX_QUANTITY_LENGTH:
         rule = f"is no quantity, because it has more than {_MAX_QUANTITY_LENGTH} characters"
         remedy = f"Write a number and its units, as in '2.5 {units.removesuffix('1')}'."
-        raise InvalidValue(name, text, rule, remedy=remedy)
+        raise InvalidValue(quantity_name, text, rule, remedy=remedy)
     match = _NUMBER_PATTERN.match(text.strip())
     powers = _parse_unit_powers(text.strip()[match.end() :].strip()) if match else None
     if match is None or powers is None:
         example = f"2.5 {units}".removesuffix(" 1")
         remedy = f"Write a number and its units, as in '{example}', with a decimal point."
-        raise InvalidValue(name, text, "is no quantity", remedy=remedy)
+        raise InvalidValue(quantity_name, text, "is no quantity", remedy=remedy)
     number = float(match[0])
     if not math.isfinite(number):
         return number
-    stated = _shortest_fraction(number)
+    stated = _fraction_of_shortest_digits(number)
     if not all(unit in _KNOWN_UNITS for unit, _power in powers):
-        size = _pint_factor(name, text, powers, units)
+        size = _compute_factor_with_pint(quantity_name, text, powers, units)
         return stated * Fraction(size) if math.isfinite(size) else size
-    scale, exponents = _multiply_units(powers)
-    wanted = _multiply_units(_parse_unit_powers(units.removeprefix("1")) or [])[1]
+    scale, exponents = _multiply_known_units(powers)
+    wanted = _multiply_known_units(_parse_unit_powers(units.removeprefix("1")) or [])[1]
     if exponents == (wanted[0], wanted[1] + 2, wanted[2]):
         rule = "is of force, and stress is force over area"
-        raise InvalidValue(name, text, rule, remedy="Divide it by the area of the fault.")
+        raise InvalidValue(quantity_name, text, rule, remedy="Divide it by the area of the fault.")
     if exponents != wanted:
-        raise _incompatible_units_error(name, text, units)
+        raise _incompatible_units_error(quantity_name, text, units)
     return stated * scale
 
 
-def _incompatible_units_error(name: str, value: Any, units: str) -> InvalidValue:
+def _incompatible_units_error(quantity_name: str, value: Any, units: str) -> InvalidValue:
     rule = f"has units of another kind than {units}"
-    return InvalidValue(name, value, rule, remedy=f"Give it in {units}, or a multiple of it.")
+    return InvalidValue(
+        quantity_name, value, rule, remedy=f"Give it in {units}, or a multiple of it."
+    )
 
 
-def _parse_unit_powers(units: str) -> list[tuple[str, int]] | None:
+def _parse_unit_powers(unit_text: str) -> list[tuple[str, int]] | None:
     """The units that a text multiplies and divides, with their powers; None where it does not."""
-    if not _UNIT_PATTERN.fullmatch(units):
+    if not _UNIT_PATTERN.fullmatch(unit_text):
         return None
-    found = _SIGNED_POWER_PATTERN.findall(units)
+    found = _UNIT_WITH_SIGNED_POWER_PATTERN.findall(unit_text)
     return [(name, int(power or 1) * (-1 if over else 1)) for over, name, power in found]
 
 
-def _multiply_units(powers: Iterable[tuple[str, int]]) -> Unit:
+def _multiply_known_units(units_and_powers: Iterable[tuple[str, int]]) -> SiFactorAndExponents:
     """Units that are known here, multiplied."""
     scale, exponents = Fraction(1), [0, 0, 0]
-    for name, power in powers:
+    for name, power in units_and_powers:
         size, of = _KNOWN_UNITS[name]
         scale *= size**power
         exponents = [e + power * o for e, o in zip(exponents, of, strict=True)]
     return scale, (exponents[0], exponents[1], exponents[2])
 
 
-def _pint_factor(name: str, text: str, powers: Iterable[tuple[str, int]], units: str) -> float:
+def _compute_factor_with_pint(
+    quantity_name: str, text: str, units_and_powers: Iterable[tuple[str, int]], units: str
+) -> float:
     try:
         pint = importlib.import_module("pint")
     except ImportError as error:
         usual = ", ".join(n for n in _KNOWN_UNITS if n != "kg" and n.isascii())
-        remedy = f"{_PINT_REMEDY}, write it in {usual}, or give a number in {units}."
-        remedy = _suggest_unit(powers) or remedy
+        remedy = f"{_PINT_INSTALL_ADVICE}, write it in {usual}, or give a number in {units}."
+        remedy = _suggest_unit_with_other_capitals(units_and_powers) or remedy
         raise InvalidValue(
-            name, text, "has units that are not known here", remedy=remedy
+            quantity_name, text, "has units that are not known here", remedy=remedy
         ) from error
     registry = pint.get_application_registry()
     try:
-        unit = math.prod(registry.parse_units(unit) ** power for unit, power in powers)
+        unit = math.prod(registry.parse_units(unit) ** power for unit, power in units_and_powers)
     except Exception as error:  # of its own, and of Python's parser
-        remedy = _suggest_unit(powers) or f"Write it as in '2.5 {units}'."
+        remedy = (
+            _suggest_unit_with_other_capitals(units_and_powers) or f"Write it as in '2.5 {units}'."
+        )
         rule = f"has units that pint does not know ({error})"
-        raise InvalidValue(name, text, rule, remedy=remedy) from error
-    if _convert_pint_quantity(name, text, registry.Quantity(0.0, unit), units) != 0.0:
+        raise InvalidValue(quantity_name, text, rule, remedy=remedy) from error
+    if _convert_pint_quantity(quantity_name, text, registry.Quantity(0.0, unit), units) != 0.0:
         raise _incompatible_units_error(
-            name, text, units
+            quantity_name, text, units
         )  # a logarithm, of which none is a multiple
-    return float(_convert_pint_quantity(name, text, registry.Quantity(1.0, unit), units))
+    return float(_convert_pint_quantity(quantity_name, text, registry.Quantity(1.0, unit), units))
 
 
-def _suggest_unit(powers: Iterable[tuple[str, int]]) -> str:
+def _suggest_unit_with_other_capitals(units_and_powers: Iterable[tuple[str, int]]) -> str:
     """The units that differ from what was written by capital letters only, if there are any."""
-    for name, _power in powers:
+    for name, _power in units_and_powers:
         meant = [known for known in _KNOWN_UNITS if known.lower() == name.lower() and known != name]
         if meant:
             return f"Did you mean {' or '.join(meant)}, instead of {name}?"
     return ""
 
 
-def _convert_pint_quantity(name: str, value: Any, quantity: Any, units: str) -> Any:
+def _convert_pint_quantity(quantity_name: str, value: Any, quantity: Any, units: str) -> Any:
     """Magnitude of a quantity of pint in SI units."""
     try:
         magnitude = quantity.to(units).magnitude
     except Exception as error:
-        raise _incompatible_units_error(name, value, units) from error
-    return to_plain_value(name, magnitude)
+        raise _incompatible_units_error(quantity_name, value, units) from error
+    return to_plain_value(quantity_name, magnitude)

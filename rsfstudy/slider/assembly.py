@@ -17,24 +17,28 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import HtmlTableMixin, Quantity
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
 from rsfstudy.slider.caching import cached_attribute
-from rsfstudy.slider.hints import suggest_choice, suggest_field, suggest_keyword
-from rsfstudy.slider.parts import Part, field_names, validate_value
+from rsfstudy.slider.hints import (
+    hint_for_unknown_choice,
+    hint_for_unknown_field,
+    hint_for_value_without_field_name,
+)
+from rsfstudy.slider.parts import Part, field_names, validate_field_value
 from rsfstudy.slider.protocols import UserLoading
 from rsfstudy.slider.registry import (
-    FIELD_OWNERS,
-    NAMED_SLOTS,
-    OMITTED_IF_NONE,
-    SELECTOR_FIELDS,
+    FIELDS_OMITTED_IF_NONE,
+    PART_CLASS_BY_FIELD_NAME,
+    PART_SELECTING_FIELDS,
     SLOT_NAMES,
     SLOTS,
+    SLOTS_CHOSEN_BY_NAME,
     Slot,
     UserPart,
+    check_and_register_part,
+    class_of_part,
     normalise_field_value,
-    part_class,
     quantities_with_values,
-    resolve_part,
-    scene_fields,
-    with_field_signature,
+    scene_field_quantities,
+    with_scene_field_signature,
 )
 from rsfstudy.slider.slider_parameters import (
     STIFFNESS_FIELDS,
@@ -70,7 +74,7 @@ class SceneParts(NamedTuple):
     loading: loading.Loading
 
 
-def build_parts(fields: Mapping[str, Any]) -> SceneParts:
+def build_parts(field_values: Mapping[str, Any]) -> SceneParts:
     """Build the parts of a scene from its fields.
 
     Parameters
@@ -88,9 +92,9 @@ def build_parts(fields: Mapping[str, Any]) -> SceneParts:
     InvalidValue
         If a name is not a field, or if a value violates its rule or has no meaning in this scene.
     """
-    chosen = tuple(_select_part(slot, fields) for slot in SLOTS)
-    layout = build_field_index(tuple(map(part_class, chosen)))
-    values = _group_by_part(fields, layout)
+    chosen = tuple(_select_part(slot, field_values) for slot in SLOTS)
+    layout = build_field_index(tuple(map(class_of_part, chosen)))
+    values = _group_values_by_part_index(field_values, layout)
     made: list[Any] = [
         part(**values.get(place, {})) if isinstance(part, type) else part
         for place, part in enumerate(chosen, start=1)
@@ -98,7 +102,9 @@ def build_parts(fields: Mapping[str, Any]) -> SceneParts:
     return SceneParts(SliderParameters(**with_stiffness_default(values.get(0, {}))), *made)
 
 
-def replace_field_values(parts: SceneParts, changes: Mapping[str, Any]) -> SceneParts:
+def replace_field_values(
+    scene_parts: SceneParts, changed_field_values: Mapping[str, Any]
+) -> SceneParts:
     """Return parts with new values of some fields.
 
     Parameters
@@ -118,9 +124,9 @@ def replace_field_values(parts: SceneParts, changes: Mapping[str, Any]) -> Scene
     InvalidValue
         If a value violates its rule or has no meaning for these parts.
     """
-    made: list[Any] = list(parts)
-    for place, values in _group_by_part(
-        changes, build_field_index(tuple(map(type, parts[1:])))
+    made: list[Any] = list(scene_parts)
+    for place, values in _group_values_by_part_index(
+        changed_field_values, build_field_index(tuple(map(type, scene_parts[1:])))
     ).items():
         if any(name in values for name in STIFFNESS_FIELDS):
             values = {**dict.fromkeys(STIFFNESS_FIELDS), **with_stiffness_default(values)}
@@ -128,53 +134,59 @@ def replace_field_values(parts: SceneParts, changes: Mapping[str, Any]) -> Scene
     return SceneParts._make(made)
 
 
-def _group_by_part(given: Mapping[str, Any], layout: FieldIndex) -> dict[int, dict[str, Any]]:
+def _group_values_by_part_index(
+    field_values: Mapping[str, Any], field_index: FieldIndex
+) -> dict[int, dict[str, Any]]:
     """Validate field values and group them by the index of their part.
 
     Fields with the value None are omitted.
     """
     values: dict[int, dict[str, Any]] = {}
-    kinds, places, idle = layout.part_classes, layout.part_index, layout.inactive_values
-    for name, value in given.items():
+    kinds, places, idle = (
+        field_index.part_classes,
+        field_index.part_index_by_field,
+        field_index.values_of_inactive_fields,
+    )
+    for name, value in field_values.items():
         place = places.get(name)
         if place is not None:
             if value is not None:
-                values.setdefault(place, {})[name] = validate_value(kinds[place], name, value)
+                values.setdefault(place, {})[name] = validate_field_value(kinds[place], name, value)
         elif name in idle:
             # A field that selects another part is accepted if its value does not select the part.
             if value is None or value is idle[name]:
                 continue
-            owner = FIELD_OWNERS[name]
-            if name != owner.selected_by or validate_value(owner, name, value):
-                raise layout.rejecting_part[name].rejection_error(name, value)
+            owner = PART_CLASS_BY_FIELD_NAME[name]
+            if name != owner.selected_by or validate_field_value(owner, name, value):
+                raise field_index.rejecting_part_class_by_field[name].rejection_error(name, value)
         elif name not in SLOT_NAMES:
-            raise _unknown_field_error(name, value, layout)
+            raise _unknown_field_error(name, value, field_index)
     return values
 
 
-def _select_part(slot: Slot, given: Mapping[str, Any]) -> UserPart:
+def _select_part(slot: Slot, field_values: Mapping[str, Any]) -> UserPart:
     """Return the part that the fields select for a slot."""
-    value = given.get(slot.name)
+    value = field_values.get(slot.name)
     if isinstance(value, type | UserLoading):
-        return resolve_part(slot, value)
-    if isinstance(value, str) and value in slot.user_parts and value not in slot.choices:
+        return check_and_register_part(slot, value)
+    if isinstance(value, str) and value in slot.user_parts and value not in slot.built_in_parts:
         return slot.user_parts[value]
-    if not slot.selectors:
-        name = normalise_field_value(slot.name, given.get(slot.name, slot.default))
-        if not isinstance(name, str) or name not in slot.choices:
-            choices = (*slot.choices, *slot.user_parts)
-            remedy = suggest_choice(slot.name, name, choices)
+    if not slot.parts_by_selecting_field:
+        name = normalise_field_value(slot.name, field_values.get(slot.name, slot.default_part_name))
+        if not isinstance(name, str) or name not in slot.built_in_parts:
+            choices = (*slot.built_in_parts, *slot.user_parts)
+            remedy = hint_for_unknown_choice(slot.name, name, choices)
             raise InvalidValue(slot.name, name, "is unknown", choices=choices, remedy=remedy)
-        return slot.choices[name]
+        return slot.built_in_parts[name]
     if value is not None:
-        others = ", ".join(slot.selectors) or "the other fields"
+        others = ", ".join(slot.parts_by_selecting_field) or "the other fields"
         remedy = f"Those of rsfstudy are called for by {others}."
         raise InvalidValue(slot.name, value, "is unknown", choices=slot.user_parts, remedy=remedy)
-    for caller, part in slot.selectors.items():
-        value = given.get(caller)
-        if value is not None and validate_value(part, caller, value):
+    for caller, part in slot.parts_by_selecting_field.items():
+        value = field_values.get(caller)
+        if value is not None and validate_field_value(part, caller, value):
             return part
-    return slot.choices[slot.default]
+    return slot.built_in_parts[slot.default_part_name]
 
 
 class FieldIndex(NamedTuple):
@@ -202,13 +214,13 @@ class FieldIndex(NamedTuple):
     """
 
     part_classes: tuple[type[Part], ...]
-    part_index: Mapping[str, int]
-    rejecting_part: Mapping[str, type[Part]]
-    inactive_values: Mapping[str, Any]
-    inapplicable: frozenset[str]
-    named_slots: tuple[str, ...]
-    fields: tuple[str, ...]
-    parameters: frozenset[str]
+    part_index_by_field: Mapping[str, int]
+    rejecting_part_class_by_field: Mapping[str, type[Part]]
+    values_of_inactive_fields: Mapping[str, Any]
+    inapplicable_fields: frozenset[str]
+    slots_given_by_name: tuple[str, ...]
+    all_field_names: tuple[str, ...]
+    plain_value_fields: frozenset[str]
 
 
 @cache
@@ -232,7 +244,7 @@ def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
     """
     kinds: tuple[type[Part], ...] = (SliderParameters, *part_classes)
     filled = list(zip(SLOTS, part_classes, strict=True))
-    owned = {slot.name: part for slot, part in filled if part not in slot.choices.values()}
+    owned = {slot.name: part for slot, part in filled if part not in slot.built_in_parts.values()}
     places = {name: place for place, part in enumerate(kinds) for name in field_names(part)}
     if len(places) < sum(len(field_names(part)) for part in kinds):
         names = ", ".join(part.name for part in owned.values())
@@ -241,21 +253,21 @@ def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
     idle: dict[str, Any] = {}
     foreign: set[str] = set()
     for slot, part in filled:
-        for other in slot.choices.values():
+        for other in slot.built_in_parts.values():
             for name in set(field_names(other)) - set(places):
                 refusing[name] = part
                 calls = name == other.selected_by
                 idle[name] = other.__dataclass_fields__[name].default if calls else None
                 if not calls or slot.name in owned:
                     foreign.add(name)
-    named = tuple(slot.name for slot in SLOTS if slot in NAMED_SLOTS or slot.name in owned)
-    fields = tuple(scene_fields(owned.values()))
-    plain = frozenset(fields) - {*SLOT_NAMES, *SELECTOR_FIELDS}
+    named = tuple(slot.name for slot in SLOTS if slot in SLOTS_CHOSEN_BY_NAME or slot.name in owned)
+    fields = tuple(scene_field_quantities(owned.values()))
+    plain = frozenset(fields) - {*SLOT_NAMES, *PART_SELECTING_FIELDS}
     return FieldIndex(kinds, places, refusing, idle, frozenset(foreign), named, fields, plain)
 
 
 def find_inapplicable_fields(
-    values: Mapping[str, Any], parts: Iterable[UserPart] = ()
+    field_values: Mapping[str, Any], user_parts: Iterable[UserPart] = ()
 ) -> frozenset[str]:
     """Find the fields that have no meaning for the selected parts.
 
@@ -273,14 +285,16 @@ def find_inapplicable_fields(
         valid parts.
     """
     try:
-        layout = build_field_index(tuple(part_class(_select_part(slot, values)) for slot in SLOTS))
+        layout = build_field_index(
+            tuple(class_of_part(_select_part(slot, field_values)) for slot in SLOTS)
+        )
     except InvalidValue:
         return frozenset()
-    of_others = {name for part in parts for name in field_names(part_class(part))}
-    return layout.inapplicable | (of_others - set(layout.part_index))
+    of_others = {name for part in user_parts for name in field_names(class_of_part(part))}
+    return layout.inapplicable_fields | (of_others - set(layout.part_index_by_field))
 
 
-def find_user_parts(parts: SceneParts) -> dict[str, UserPart]:
+def find_user_parts(scene_parts: SceneParts) -> dict[str, UserPart]:
     """Find the user-defined parts of a scene.
 
     Parameters
@@ -294,22 +308,22 @@ def find_user_parts(parts: SceneParts) -> dict[str, UserPart]:
         User-defined parts by slot. Protocols and sampled histories are included as objects, and
         other parts as classes.
     """
-    filled = zip(SLOTS, parts[1:], strict=True)
+    filled = zip(SLOTS, scene_parts[1:], strict=True)
     return {
         slot.name: part if isinstance(part, UserLoading) else type(part)
         for slot, part in filled
-        if type(part) not in slot.choices.values()
+        if type(part) not in slot.built_in_parts.values()
     }
 
 
 #: Attributes of a scene that are used only inside the package. They are hidden from ``dir``.
-_HIDDEN_ATTRIBUTES = frozenset(
+_ATTRIBUTES_HIDDEN_FROM_DIR = frozenset(
     {
         "field_index",
         "cache",
-        "functions",
-        "numbers",
-        "friction_numbers",
+        "equation_functions",
+        "parameter_values",
+        "friction_parameter_values",
         "with_segment",
         "quantities_with_values",
     }
@@ -337,7 +351,7 @@ class SceneBase(HtmlTableMixin):
         if parts is None:
             parts = build_parts(given)
         elif not isinstance(parts, SceneParts):
-            raise unnamed_value_error(parts)
+            raise value_without_field_name_error(parts)
         object.__setattr__(self, "parts", parts)
         self._check()
 
@@ -349,12 +363,12 @@ class SceneBase(HtmlTableMixin):
         if name.startswith("_"):
             raise AttributeError(name)
         layout = self.field_index
-        if name in layout.part_index:
-            return getattr(self.parts[layout.part_index[name]], name)
-        if name in layout.named_slots:
+        if name in layout.part_index_by_field:
+            return getattr(self.parts[layout.part_index_by_field[name]], name)
+        if name in layout.slots_given_by_name:
             return getattr(self.parts, name).name
-        if name in layout.inactive_values:
-            return layout.inactive_values[name]
+        if name in layout.values_of_inactive_fields:
+            return layout.values_of_inactive_fields[name]
         if (new := renamed_value(SceneBase, name)) == name:
             raise AttributeError(f"a {SceneBase.__name__} has no field or attribute {name!r}")
         return getattr(self, new)
@@ -367,7 +381,7 @@ class SceneBase(HtmlTableMixin):
         """Return the public attributes, without inapplicable fields."""
         # Fields without a value may be properties that are computed from other fields.
         stated = {name for name, value in self.as_dict().items() if value is not None}
-        names = {*super().__dir__(), *stated} - _HIDDEN_ATTRIBUTES
+        names = {*super().__dir__(), *stated} - _ATTRIBUTES_HIDDEN_FROM_DIR
         return [name for name in names if not name.startswith("_")]
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -387,13 +401,15 @@ class SceneBase(HtmlTableMixin):
         dict of str to object
             Values by field name.
         """
-        values = dict(self.field_index.inactive_values)
-        for name in self.field_index.named_slots:
+        values = dict(self.field_index.values_of_inactive_fields)
+        for name in self.field_index.slots_given_by_name:
             values[name] = getattr(self.parts, name).name
         for part in self.parts:
             values |= vars(part)
         kept = (
-            n for n in self.field_index.fields if n not in OMITTED_IF_NONE or values[n] is not None
+            n
+            for n in self.field_index.all_field_names
+            if n not in FIELDS_OMITTED_IF_NONE or values[n] is not None
         )
         return {name: values[name] for name in kept}
 
@@ -406,7 +422,11 @@ class SceneBase(HtmlTableMixin):
             Values by field name. A protocol adds its segments in the format of ``protocol``, and a
             sampled history adds the digest of its samples.
         """
-        history = self.parts.loading.describe() if "loading" in self.field_index.named_slots else {}
+        history = (
+            self.parts.loading.describe()
+            if "loading" in self.field_index.slots_given_by_name
+            else {}
+        )
         return self.as_dict() | history
 
     @property
@@ -424,7 +444,7 @@ class SceneBase(HtmlTableMixin):
         """
         return quantities_with_values(self.as_dict(), self.user_parts)
 
-    @with_field_signature()
+    @with_scene_field_signature()
     def with_(self, **changes: Any) -> Self:
         """Return a copy of the scene with new values of some fields.
 
@@ -447,7 +467,8 @@ class SceneBase(HtmlTableMixin):
             If a value is invalid in the new scene.
         """
         if all(
-            n in self.field_index.parameters and value is not None for n, value in changes.items()
+            n in self.field_index.plain_value_fields and value is not None
+            for n, value in changes.items()
         ):
             return type(self)(replace_field_values(self.parts, changes))
         theirs = find_user_parts(self.parts)
@@ -458,21 +479,23 @@ class SceneBase(HtmlTableMixin):
         return type(self)(**{name: kept[name] for name in kept if name not in dropped} | changes)
 
 
-def _unknown_field_error(name: str, value: Any, layout: FieldIndex) -> InvalidValue:
+def _unknown_field_error(name: str, value: Any, field_index: FieldIndex) -> InvalidValue:
     """Return the error for an unknown field name."""
-    for slot, part in zip(SLOTS, layout.part_classes[1:], strict=True):
-        known = map(part_class, slot.user_parts.values())
+    for slot, part in zip(SLOTS, field_index.part_classes[1:], strict=True):
+        known = map(class_of_part, slot.user_parts.values())
         owner = next((other for other in known if name in field_names(other)), None)
         if owner is not None:
             rule = f"has no meaning for {slot.name}={part.name!r}"
             remedy = f"Leave it out, or set {slot.name}={owner.name!r}."
             return InvalidValue(name, value, rule, remedy=remedy)
-    remedy, rule = suggest_field(name), "is not a field of a scene"
+    remedy, rule = hint_for_unknown_field(name), "is not a field of a scene"
     # Similar names would be misleading if the name is a known synonym of a field.
-    return InvalidValue("field", name, rule, choices=() if remedy else layout.fields, remedy=remedy)
+    return InvalidValue(
+        "field", name, rule, choices=() if remedy else field_index.all_field_names, remedy=remedy
+    )
 
 
-def unnamed_value_error(value: Any) -> InvalidValue:
+def value_without_field_name_error(value: Any) -> InvalidValue:
     """Return the error for a positional argument of ``Scene``.
 
     Parameters
@@ -485,5 +508,7 @@ def unnamed_value_error(value: Any) -> InvalidValue:
     InvalidValue
         Error whose message suggests the name of the field.
     """
-    remedy = suggest_keyword(value, {slot.name: slot.choices for slot in NAMED_SLOTS})
+    remedy = hint_for_value_without_field_name(
+        value, {slot.name: slot.built_in_parts for slot in SLOTS_CHOSEN_BY_NAME}
+    )
     return InvalidValue("Scene", value, "is given without a name", remedy=remedy)

@@ -30,9 +30,9 @@ class ClosedForm:
     """
 
     formula: str
-    fields: tuple[str, ...]
+    scene_field_names: tuple[str, ...]
     function: Callable[..., float]
-    source: str
+    literature_citation: str
 
 
 def critical_stiffness(
@@ -116,7 +116,7 @@ def effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
     return mu_star - alpha * (1.0 - 1.0 / b_over_a) if alpha else mu_star
 
 
-def instability_threshold(law_exponent: float, stiffness_ratio: float) -> float:
+def steady_state_offset_at_instability(law_exponent: float, stiffness_ratio: float) -> float:
     """``u = Theta/b + ln V`` at which the family of laws falls no faster than a spring pulls,
     ``h(u) = -stiffness_ratio``; infinite where it never does.
     """
@@ -126,14 +126,14 @@ def instability_threshold(law_exponent: float, stiffness_ratio: float) -> float:
     return -math.log1p(-product) / law_exponent if law_exponent else stiffness_ratio
 
 
-def offset_after_stress_fall(
-    mu_star: float, a: float, b_over_a: float, alpha: float, stress_quotient: float
+def steady_state_offset_after_normal_stress_fall(
+    mu_star: float, a: float, b_over_a: float, alpha: float, normal_stress_ratio: float
 ) -> float:
     """``u = Theta/b + ln V`` just after steady sliding at V_* has its normal stress changed to
     sigma_*/quotient: ``mu_* (q - 1)/a - alpha (1/a - 1/b) ln q``.
     """
-    taken = alpha * (1.0 - 1.0 / b_over_a) * math.log(stress_quotient)
-    return (mu_star * (stress_quotient - 1.0) - taken) / a
+    taken = alpha * (1.0 - 1.0 / b_over_a) * math.log(normal_stress_ratio)
+    return (mu_star * (normal_stress_ratio - 1.0) - taken) / a
 
 
 def critical_normal_stress_step(
@@ -154,8 +154,11 @@ def critical_normal_stress_step(
 
     def excess_over_threshold(growth: float) -> float:
         quotient = 1.0 + growth
-        needed = instability_threshold(law_exponent, quotient * stiffness_ratio)
-        return offset_after_stress_fall(mu_star, a, b_over_a, alpha, quotient) - needed
+        needed = steady_state_offset_at_instability(law_exponent, quotient * stiffness_ratio)
+        return (
+            steady_state_offset_after_normal_stress_fall(mu_star, a, b_over_a, alpha, quotient)
+            - needed
+        )
 
     factor = (_MAX_STRESS_FALL / _MIN_STRESS_FALL) ** (1.0 / _STRESS_FALL_COUNT)
     smaller = _MIN_STRESS_FALL

@@ -9,7 +9,7 @@ from rsfstudy._deprecation import renamed_members
 from rsfstudy.slider.caching import cached_per_scene
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.parts import Function, Numbers
-from rsfstudy.slider.point import Point
+from rsfstudy.slider.point import MotionPoint
 from rsfstudy.slider.scene_functions import RegimeFunctions, SceneFunctions, build_scene_functions
 from rsfstudy.slider.scene_view import SceneView
 
@@ -43,68 +43,88 @@ class Equations(NamedTuple):
     """
 
     regime: str
-    unknowns: tuple[str, ...]
-    scales: tuple[float, ...]
+    unknown_names: tuple[str, ...]
+    unknown_scales: tuple[float, ...]
     rate_function: Function
     point_function: Function
     parameters: Numbers
     state_count: int = 1
-    balance_function: Function | None = None
+    force_balance_function: Function | None = None
 
-    def evaluate_rates(self, state: Numbers) -> Numbers:
+    def evaluate_rates(self, unknown_values: Numbers) -> Numbers:
         """Derivatives of the unknowns."""
-        return self.rate_function(state, self.parameters)
+        return self.rate_function(unknown_values, self.parameters)
 
     @property
     def is_rigid(self) -> bool:
         """True if slip is the clock."""
         return self.regime == RIGID_REGIME
 
-    def evaluate_point(self, state: Numbers) -> Point:
+    def evaluate_point(self, unknown_values: Numbers) -> MotionPoint:
         """The point of the motion at a state."""
         return self.point_function(
-            state, self.rate_function(state, self.parameters), self.parameters
+            unknown_values, self.rate_function(unknown_values, self.parameters), self.parameters
         )
 
 
 @cached_per_scene
-def equations_between_ruptures(scene: SceneView, *, clock: bool) -> Equations:
+def equations_between_ruptures(scene: SceneView, *, with_time: bool) -> Equations:
     """The form of a scene where mass, if it has any, hardly acts: unknowns f and Psi (or the states
     of a law that has several), and time as a passenger where a `clock` is wanted.
     """
-    return _build_slow_equations(scene, scene.functions, scene.dynamics.regime, clock=clock)
+    return _build_slow_equations(
+        scene, scene.equation_functions, scene.dynamics.regime, with_time=with_time
+    )
 
 
 @cached_per_scene
-def equations_without_mass(scene: SceneView, *, clock: bool) -> Equations:
+def equations_without_mass(scene: SceneView, *, with_time: bool) -> Equations:
     """The form between ruptures with mass left out altogether."""
-    if scene.dynamics.rupture_rate is None:
-        return equations_between_ruptures(scene, clock=clock)
+    if scene.dynamics.build_rupture_rate_function is None:
+        return equations_between_ruptures(scene, with_time=with_time)
     return _build_slow_equations(
-        scene, build_scene_functions(scene, QuasiStatic()), QuasiStatic.regime, clock=clock
+        scene, build_scene_functions(scene, QuasiStatic()), QuasiStatic.regime, with_time=with_time
     )
 
 
 def _build_slow_equations(
-    scene: SceneView, forms: SceneFunctions, regime: str, *, clock: bool
+    scene: SceneView, scene_functions: SceneFunctions, regime_name: str, *, with_time: bool
 ) -> Equations:
-    unknowns, form = ("spring_stress", *_state_names(scene)), forms.between_ruptures
-    unknowns, scales, rate = _with_optional_time(
-        form, unknowns, (scene.a,) * len(unknowns), clock=clock
+    unknowns, form = (
+        ("spring_stress", *_state_names(scene)),
+        scene_functions.functions_between_ruptures,
     )
-    p, states = scene.numbers, scene.state_count
+    unknowns, scales, rate = _append_time_if_requested(
+        form, unknowns, (scene.a,) * len(unknowns), with_time=with_time
+    )
+    p, states = scene.parameter_values, scene.state_count
     return Equations(
-        regime, unknowns, scales, rate, form.point_function, p, states, forms.balance_function
+        regime_name,
+        unknowns,
+        scales,
+        rate,
+        form.point_function,
+        p,
+        states,
+        scene_functions.force_balance_function,
     )
 
 
-def _with_optional_time(
-    form: RegimeFunctions, unknowns: tuple[str, ...], scales: Numbers, *, clock: bool
+def _append_time_if_requested(
+    regime_functions: RegimeFunctions,
+    unknown_names: tuple[str, ...],
+    unknown_scales: Numbers,
+    *,
+    with_time: bool,
 ) -> tuple[tuple[str, ...], Numbers, Function]:
     """Unknowns, scales and rate of a form; with time, of its clock, as a passenger."""
-    if not clock:
-        return unknowns, scales, form.path_rates
-    return (*unknowns, "time"), (*scales, 1.0), form.path_rates_with_time
+    if not with_time:
+        return unknown_names, unknown_scales, regime_functions.rates_along_path
+    return (
+        (*unknown_names, "time"),
+        (*unknown_scales, 1.0),
+        regime_functions.rates_along_path_with_time,
+    )
 
 
 def _state_names(scene: SceneView) -> tuple[str, ...]:
@@ -115,43 +135,47 @@ def _state_names(scene: SceneView) -> tuple[str, ...]:
 
 
 @cached_per_scene
-def equations_in_rupture(scene: SceneView, *, clock: bool = False) -> Equations:
+def equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> Equations:
     """The full equations of a scene with mass: f, ln(V/V_*) and g, and the states but the first;
     and inertial time, in T/(2 pi), as a passenger where a `clock` is wanted.
     """
-    a, form, others = scene.a, _rupture_functions(scene), _state_names(scene)[1:]
+    a, form, others = scene.a, _require_rupture_functions(scene), _state_names(scene)[1:]
     unknowns = ("spring_stress", "log_slip_rate", "friction", *others)
-    scales, p = (a, 1.0, a, *[a] * len(others)), scene.numbers
-    unknowns, scales, rate = _with_optional_time(form, unknowns, scales, clock=clock)
+    scales, p = (a, 1.0, a, *[a] * len(others)), scene.parameter_values
+    unknowns, scales, rate = _append_time_if_requested(form, unknowns, scales, with_time=with_time)
     return Equations(
         RUPTURE_REGIME, unknowns, scales, rate, form.point_function, p, scene.state_count
     )
 
 
-def _rupture_functions(scene: SceneView) -> RegimeFunctions:
-    full = scene.functions.in_rupture
+def _require_rupture_functions(scene: SceneView) -> RegimeFunctions:
+    full = scene.equation_functions.functions_in_rupture
     if full is None:
         raise TypeError(f"{scene.dynamics.name} has no equations of ruptures")
     return full
 
 
-def equations_by_displacement(scene: SceneView) -> Equations:
+def equations_against_displacement(scene: SceneView) -> Equations:
     """The form between ruptures against slip plus load point displacement: differences of its rates
     are linear in departures farther from steady sliding than those along the path.
     """
-    along = equations_between_ruptures(scene, clock=False)
-    return along._replace(rate_function=scene.functions.between_ruptures.clock_rates)
+    along = equations_between_ruptures(scene, with_time=False)
+    return along._replace(
+        rate_function=scene.equation_functions.functions_between_ruptures.rates_against_clock
+    )
 
 
-def equations_by_inertial_time(scene: SceneView) -> Equations:
+def equations_against_inertial_time(scene: SceneView) -> Equations:
     """The full equations in inertial time T/(2 pi)."""
-    return equations_in_rupture(scene)._replace(rate_function=_rupture_functions(scene).clock_rates)
+    return equations_in_rupture(scene)._replace(
+        rate_function=_require_rupture_functions(scene).rates_against_clock
+    )
 
 
-def equations_of_rigid_slider(scene: SceneView, log_slip_rate: float) -> Equations:
+def equations_at_imposed_slip_rate(scene: SceneView, log_slip_rate: float) -> Equations:
     """A rigid slider at prescribed ln(V/V_*), against slip: g, and the states but the first."""
-    forms, unknowns = scene.functions, ("friction", *_state_names(scene)[1:])
-    scales, p = (scene.a,) * len(unknowns), (*scene.numbers, log_slip_rate)
+    forms, unknowns = scene.equation_functions, ("friction", *_state_names(scene)[1:])
+    scales, p = (scene.a,) * len(unknowns), (*scene.parameter_values, log_slip_rate)
     return Equations(
         RIGID_REGIME,
         unknowns,
@@ -163,42 +187,54 @@ def equations_of_rigid_slider(scene: SceneView, log_slip_rate: float) -> Equatio
     )
 
 
-def friction_relation(
-    scene: SceneView, psis: Numbers = ()
+def build_friction_relation(
+    scene: SceneView, states: Numbers = ()
 ) -> Callable[[float], tuple[float, float, float, float]]:
     """The friction relation of a scene: g -> (strength, slope, shift, slope of the shift); at the
     pore pressure of steady sliding, unless states are given.
     """
-    strength, p = scene.functions.friction.strength, scene.friction_numbers
-    known = psis or (0.0,) * scene.state_count
+    strength, p = (
+        scene.equation_functions.friction_functions.strength,
+        scene.friction_parameter_values,
+    )
+    known = states or (0.0,) * scene.state_count
     return lambda friction: strength(friction, known, p)
 
 
-def normal_stress_at(scene: SceneView, friction: float, psis: Numbers = ()) -> float:
+def effective_normal_stress_at(
+    scene: SceneView, frictional_stress: float, states: Numbers = ()
+) -> float:
     """Effective normal stress over sigma_* under a deviation of frictional stress, at steady
     sliding unless states are given.
     """
-    at = psis or (0.0,) * scene.state_count
-    stress = scene.functions.friction.effective_normal_stress(friction, at, scene.friction_numbers)
+    at = states or (0.0,) * scene.state_count
+    stress = scene.equation_functions.friction_functions.effective_normal_stress(
+        frictional_stress, at, scene.friction_parameter_values
+    )
     return 1.0 + float(stress[0])
 
 
-def log_slip_rate_at(scene: SceneView, spring_stress: float, psi: float) -> float:
+def quasi_static_log_slip_rate(scene: SceneView, spring_stress: float, state_sum: float) -> float:
     """ln(V/V_*) for a spring stress and state (the sum, of several) where mass does not act, and
     there is no pore pressure.
     """
-    forms = build_scene_functions(scene, QuasiStatic()) if scene.has_mass else scene.functions
-    psis = (psi, *(0.0,) * (scene.state_count - 1))
-    return float(forms.balance_function(spring_stress, psis, scene.numbers)[0])
+    forms = (
+        build_scene_functions(scene, QuasiStatic()) if scene.has_mass else scene.equation_functions
+    )
+    psis = (state_sum, *(0.0,) * (scene.state_count - 1))
+    return float(forms.force_balance_function(spring_stress, psis, scene.parameter_values)[0])
 
 
-def state_evolution(scene: SceneView) -> Callable[[float, Numbers, float], Numbers]:
+def build_state_evolution_function(scene: SceneView) -> Callable[[float, Numbers, float], Numbers]:
     """The law of a scene: (ln(V/V_*), Psi, shift) -> change of each state per unit slip."""
-    evolutions, p = scene.functions.friction.evolutions, scene.friction_numbers
+    evolutions, p = (
+        scene.equation_functions.friction_functions.evolutions,
+        scene.friction_parameter_values,
+    )
     return lambda log_slip_rate, psis, shift: evolutions(log_slip_rate, psis, shift, 1.0, p)
 
 
-def compute_steady_states(scene: SceneView, log_slip_rate: float, shift: float) -> Numbers:
+def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: float) -> Numbers:
     """The states of steady sliding at ln(V/V_*), of which stress has taken `shift`."""
-    p = scene.friction_numbers
-    return scene.functions.friction.steady_states(log_slip_rate, shift, p)
+    p = scene.friction_parameter_values
+    return scene.equation_functions.friction_functions.steady_states(log_slip_rate, state_shift, p)

@@ -40,15 +40,15 @@ from rsfstudy.slider.parameter_layout import (
 )
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.states import (
-    state_contribution_function,
-    states_from_strength_function,
-    sum_function,
-    with_auxiliary_evolutions,
-    with_auxiliary_steady_states,
+    append_auxiliary_evolutions,
+    append_auxiliary_steady_states,
+    build_state_contribution_function,
+    build_states_from_strength_function,
+    build_sum_function,
 )
 
 #: Friction coefficient below which none is told from zero, where slip reverses.
-_MIN_FRICTION_COEFFICIENT = 1e-280
+_MIN_NONZERO_FRICTION_COEFFICIENT = 1e-280
 
 
 @renamed_members
@@ -102,28 +102,30 @@ class FrictionFunctions(NamedTuple):
     load_point_stress: Function
     load_point_stress_change: Function
     state_count: int
-    distance_indices: tuple[int, ...]
+    indices_of_states_in_distance: tuple[int, ...]
 
 
 # ---- the friction relation -----------------------------------------------------------------------
 
 
-def constant_normal_stress(g: float, p: Numbers) -> tuple[float, float]:
+def zero_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[float, float]:
     """No excess of normal stress over its reference value, and no slope."""
     return 0.0, 0.0
 
 
 @cache
-def normal_stress_function(normal_stress: Function, pressure_index: int) -> Function:
+def build_effective_normal_stress_function(
+    total_normal_stress_function: Function, pressure_index: int
+) -> Function:
     """``(g, psis, p) -> (s - 1, its slope)``, made of ``(g, p) -> (sigma/sigma_* - 1, its slope)``
     and the pore pressure at a place among the states, from their end; 0 where there is none.
     """
 
     def total_normal_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
-        return normal_stress(g, p)
+        return total_normal_stress_function(g, p)
 
     def effective_normal_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
-        excess, change = normal_stress(g, p)
+        excess, change = total_normal_stress_function(g, p)
         return min(
             max(excess - psis[pressure_index], SMALLEST_NORMAL_STRESS_EXCESS),
             LARGEST_NORMAL_STRESS_EXCESS,
@@ -133,7 +135,7 @@ def normal_stress_function(normal_stress: Function, pressure_index: int) -> Func
 
 
 @cache
-def pressure_function(pressure_index: int) -> Function:
+def build_pressure_function(pressure_index: int) -> Function:
     """``(psis) -> P`` at a place; 0 where there is none."""
 
     def pressure(psis: Numbers) -> float:
@@ -142,25 +144,34 @@ def pressure_function(pressure_index: int) -> Function:
     return pressure if pressure_index else zero_pressure
 
 
-def zero_pressure(psis: Numbers) -> float:
+def zero_pressure(states: Numbers) -> float:
     """P where there is none."""
     return 0.0
 
 
-FrictionRelation = tuple[float, float, float, float]
+FrictionRelationValues = tuple[float, float, float, float]
 
 
-def relation_at_constant_stress(g: float, psis: Numbers, p: Numbers) -> FrictionRelation:
+def friction_relation_at_constant_normal_stress(
+    frictional_stress: float, states: Numbers, p: Numbers
+) -> FrictionRelationValues:
     """The friction relation at constant normal stress, of a state that stress does not change."""
-    return g, 1.0, 0.0, 0.0
+    return frictional_stress, 1.0, 0.0, 0.0
 
 
-def no_state_effect(g: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
+def zero_state_effect(
+    frictional_stress: float,
+    normal_stress_ratio: float,
+    normal_stress_derivative: float,
+    p: Numbers,
+) -> tuple[float, float]:
     """The shift and its slope where stress does not change the state."""
     return 0.0, 0.0
 
 
-def strength_function(stress: Function, state_effect: Function) -> Function:
+def build_strength_function(
+    normal_stress_function: Function, state_effect_function: Function
+) -> Function:
     """The friction relation ``(g, psis, p) -> (strength, its slope, shift, its slope)``, of normal
     stress that changes, and of the effect of stress on the state.
 
@@ -169,19 +180,22 @@ def strength_function(stress: Function, state_effect: Function) -> Function:
     g ``(1 - mu_* s' + bend)/s**2``.
     """
 
-    def strength(g: float, psis: Numbers, p: Numbers) -> FrictionRelation:
-        excess, change = stress(g, psis, p)
+    def strength(g: float, psis: Numbers, p: Numbers) -> FrictionRelationValues:
+        excess, change = normal_stress_function(g, psis, p)
         ratio, mu_star = 1.0 + excess, p[MU_STAR]
         bend, support = excess - change * g, 1.0 - mu_star * change
         value, slope = (g * support - mu_star * bend) / ratio, (support + bend) / (ratio * ratio)
-        shift, shift_slope = state_effect(g, ratio, change, p)
+        shift, shift_slope = state_effect_function(g, ratio, change, p)
         return value + shift, slope + shift_slope, shift, shift_slope
 
     return strength
 
 
-def stress_dependence_effect(
-    g: float, ratio: float, change: float, p: Numbers
+def shear_stress_effect_on_state(
+    frictional_stress: float,
+    normal_stress_ratio: float,
+    normal_stress_derivative: float,
+    p: Numbers,
 ) -> tuple[float, float]:
     """State variable lost to the present shear stress, and its derivative.
 
@@ -192,23 +206,23 @@ def stress_dependence_effect(
     ----------
     Nagata, Nakatani and Yoshida (2012), J. Geophys. Res. 117, B02314.
     """
-    excess, c = ratio - 1.0, p[STRESS_DEPENDENCE]
+    excess, c = normal_stress_ratio - 1.0, p[STRESS_DEPENDENCE]
     mean = math.log1p(excess) / excess if excess != 0.0 else 1.0
-    return c * g * mean, c / ratio
+    return c * frictional_stress * mean, c / normal_stress_ratio
 
 
-def add_state_effects(effect: Function, other: Function) -> Function:
+def sum_state_effects(first_effect: Function, second_effect: Function) -> Function:
     """Two effects of stress on the state at once: ``(g, ratio, change, p) -> (shift, slope)``."""
 
     def combined_effect(g: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
-        shift, slope = effect(g, ratio, change, p)
-        other_shift, other_slope = other(g, ratio, change, p)
+        shift, slope = first_effect(g, ratio, change, p)
+        other_shift, other_slope = second_effect(g, ratio, change, p)
         return shift + other_shift, slope + other_slope
 
     return combined_effect
 
 
-def make_reversible(forward_relation: Function) -> Function:
+def make_slip_reversible(forward_relation: Function) -> Function:
     """The relation of slip that may reverse, of that of slip forward: ln(V/V_*) is that of the
     magnitude of V.
 
@@ -223,11 +237,11 @@ def make_reversible(forward_relation: Function) -> Function:
     Rice and Ben-Zion (1996), Proc. Natl. Acad. Sci. 93, 3811-3818.
     """
 
-    def reversible_relation(g: float, psis: Numbers, p: Numbers) -> FrictionRelation:
+    def reversible_relation(g: float, psis: Numbers, p: Numbers) -> FrictionRelationValues:
         forward, slope, shift, shift_slope = forward_relation(g, psis, p)
         a, mu_star = p[A], p[MU_STAR]
         coefficient_now = mu_star + forward - shift
-        size = max(abs(coefficient_now), _MIN_FRICTION_COEFFICIENT)
+        size = max(abs(coefficient_now), _MIN_NONZERO_FRICTION_COEFFICIENT)
         value = size + a * math.log(-math.expm1(-2.0 * size / a)) - mu_star + shift
         steeper = math.copysign(1.0 / math.tanh(size / a), coefficient_now)
         return value, (slope - shift_slope) * steeper + shift_slope, shift, shift_slope
@@ -235,7 +249,9 @@ def make_reversible(forward_relation: Function) -> Function:
     return reversible_relation
 
 
-def pressure_derivatives_function(stress: Function, state_effect: Function) -> Function:
+def build_pressure_derivatives_function(
+    normal_stress_function: Function, state_effect_function: Function
+) -> Function:
     """Derivatives of strength, ``(mu_* + g)/s**2`` and that of the shift, and of the shift with
     respect to P, at constant frictional stress.
 
@@ -244,38 +260,38 @@ def pressure_derivatives_function(stress: Function, state_effect: Function) -> F
     """
 
     def pressure_derivatives(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
-        ratio = 1.0 + stress(g, psis, p)[0]
-        along = state_effect(g, ratio, -1.0, p)[1]
-        shift = along - state_effect(g, ratio, 0.0, p)[1]
+        ratio = 1.0 + normal_stress_function(g, psis, p)[0]
+        along = state_effect_function(g, ratio, -1.0, p)[1]
+        shift = along - state_effect_function(g, ratio, 0.0, p)[1]
         return (p[MU_STAR] + g) / ratio**2 + shift, shift
 
     return pressure_derivatives
 
 
-def zero_load_point_stress(psis: Numbers, p: Numbers) -> float:
+def zero_load_point_stress(states: Numbers, p: Numbers) -> float:
     """K D where the load point moves steadily."""
     return 0.0
 
 
-def load_point_stress(psis: Numbers, p: Numbers) -> float:
+def load_point_stress(states: Numbers, p: Numbers) -> float:
     """K D of an oscillation, which begins where D is 0."""
-    return psis[-1] - p[LOADING + 2]
+    return states[-1] - p[LOADING + 2]
 
 
-def add_load_point_stress(function: Function) -> Function:
+def wrap_with_load_point_stress(friction_function: Function) -> Function:
     """A function ``(g, psis, p)`` of frictional stress, of g without `load_point_stress`."""
 
     def function_with_load_point_stress(g: float, psis: Numbers, p: Numbers) -> Numbers:
-        return function(g + load_point_stress(psis, p), psis, p)
+        return friction_function(g + load_point_stress(psis, p), psis, p)
 
     return function_with_load_point_stress
 
 
-def load_point_derivatives_function(strength: Function) -> Function:
+def build_load_point_derivatives_function(strength_function: Function) -> Function:
     """Derivatives of strength and of the shift with respect to K D, which are those by g."""
 
     def load_point_derivatives(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
-        _value, slope, _shift, shift_slope = strength(g, psis, p)
+        _value, slope, _shift, shift_slope = strength_function(g, psis, p)
         return slope, shift_slope
 
     return load_point_derivatives
@@ -313,65 +329,86 @@ class FrictionTerms(NamedTuple):
         Places, among all states, of those that do not count for the distance from steady sliding.
     """
 
-    state_count: int
+    law_state_count: int
     evolutions: Function
     steady_states: Function
     state_effects: tuple[Function, ...]
-    regularised: bool
+    allows_reversed_slip: bool
     normal_stress: Function | None
-    unknown_count: int
+    auxiliary_unknown_count: int
     auxiliary_rates: Function | None
     auxiliary_steady_states: Function | None
     boundary_pressure_index: int
     has_load_point_unknown: bool = False
-    excluded_indices: tuple[int, ...] = ()
+    state_indices_excluded_from_distance: tuple[int, ...] = ()
 
 
 @cache
-def build_friction_functions(terms: FrictionTerms) -> FrictionFunctions:
+def build_friction_functions(friction_terms: FrictionTerms) -> FrictionFunctions:
     """Friction, made of what the parts of a scene say of it."""
     effect = (
-        reduce(add_state_effects, terms.state_effects) if terms.state_effects else no_state_effect
+        reduce(sum_state_effects, friction_terms.state_effects)
+        if friction_terms.state_effects
+        else zero_state_effect
     )
     pressure, outside = (
-        terms.unknown_count > 0 and not terms.has_load_point_unknown,
-        terms.boundary_pressure_index,
+        friction_terms.auxiliary_unknown_count > 0 and not friction_terms.has_load_point_unknown,
+        friction_terms.boundary_pressure_index,
     )
-    total = terms.normal_stress or constant_normal_stress
+    total = friction_terms.normal_stress or zero_normal_stress_excess
     effective, outer = (
-        normal_stress_function(total, -1 if pressure else 0),
-        normal_stress_function(total, outside),
+        build_effective_normal_stress_function(total, -1 if pressure else 0),
+        build_effective_normal_stress_function(total, outside),
     )
-    changes = pressure or total is not constant_normal_stress or len(terms.state_effects) > 0
-    strength = strength_function(effective, effect) if changes else relation_at_constant_stress
-    if terms.regularised:
-        strength = make_reversible(strength)
-    evolutions, steady_states = terms.evolutions, terms.steady_states
-    if terms.auxiliary_rates is not None and terms.auxiliary_steady_states is not None:
-        evolutions = with_auxiliary_evolutions(evolutions, terms.auxiliary_rates, terms.state_count)
-        steady_states = with_auxiliary_steady_states(steady_states, terms.auxiliary_steady_states)
-    by_last = pressure_derivatives_function(effective, effect) if pressure else None
-    states = terms.state_count + terms.unknown_count
-    if terms.has_load_point_unknown:
-        strength, effective, outer = map(add_load_point_stress, (strength, effective, outer))
-        by_last = load_point_derivatives_function(strength)
+    changes = (
+        pressure or total is not zero_normal_stress_excess or len(friction_terms.state_effects) > 0
+    )
+    strength = (
+        build_strength_function(effective, effect)
+        if changes
+        else friction_relation_at_constant_normal_stress
+    )
+    if friction_terms.allows_reversed_slip:
+        strength = make_slip_reversible(strength)
+    evolutions, steady_states = friction_terms.evolutions, friction_terms.steady_states
+    if (
+        friction_terms.auxiliary_rates is not None
+        and friction_terms.auxiliary_steady_states is not None
+    ):
+        evolutions = append_auxiliary_evolutions(
+            evolutions, friction_terms.auxiliary_rates, friction_terms.law_state_count
+        )
+        steady_states = append_auxiliary_steady_states(
+            steady_states, friction_terms.auxiliary_steady_states
+        )
+    by_last = build_pressure_derivatives_function(effective, effect) if pressure else None
+    states = friction_terms.law_state_count + friction_terms.auxiliary_unknown_count
+    if friction_terms.has_load_point_unknown:
+        strength, effective, outer = map(wrap_with_load_point_stress, (strength, effective, outer))
+        by_last = build_load_point_derivatives_function(strength)
     return FrictionFunctions(
         strength=strength,
         effective_normal_stress=effective,
         rig_normal_stress=outer,
-        boundary_pressure=pressure_function(outside),
+        boundary_pressure=build_pressure_function(outside),
         evolutions=evolutions,
         steady_states=steady_states,
-        state_sum=sum_function(terms.state_count),
-        state_contribution=state_contribution_function(terms.state_count, by_last),
-        pressure_derivatives=by_last or pressure_derivatives_function(effective, effect),
-        states_from_strength=states_from_strength_function(terms.state_count),
+        state_sum=build_sum_function(friction_terms.law_state_count),
+        state_contribution=build_state_contribution_function(
+            friction_terms.law_state_count, by_last
+        ),
+        pressure_derivatives=by_last or build_pressure_derivatives_function(effective, effect),
+        states_from_strength=build_states_from_strength_function(friction_terms.law_state_count),
         load_point_stress=load_point_stress
-        if terms.has_load_point_unknown
+        if friction_terms.has_load_point_unknown
         else zero_load_point_stress,
-        load_point_stress_change=pressure_function(-1 if terms.has_load_point_unknown else 0),
+        load_point_stress_change=build_pressure_function(
+            -1 if friction_terms.has_load_point_unknown else 0
+        ),
         state_count=states,
-        distance_indices=tuple(
-            place for place in range(states) if place not in terms.excluded_indices
+        indices_of_states_in_distance=tuple(
+            place
+            for place in range(states)
+            if place not in friction_terms.state_indices_excluded_from_distance
         ),
     )

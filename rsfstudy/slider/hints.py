@@ -27,84 +27,92 @@ def _rig_quantity_hint(symbol: str, name: str) -> str:
     )
 
 
-def _map_names(names: str, remedy: str) -> dict[str, str]:
-    return dict.fromkeys(names.split(), remedy)
+def _map_each_name_to(space_separated_names: str, value: str) -> dict[str, str]:
+    return dict.fromkeys(space_separated_names.split(), value)
 
 
 #: What to do instead of stating a field by another name.
-_FIELD_HINTS: Mapping[str, str] = {
-    **_map_names("k K kappa spring_constant", f"Write {_STIFFNESS_HINT}."),
-    **_map_names("b B", "Write b_over_a, which is b/a."),
-    **_map_names("a_minus_b b_minus_a ab", "Write b_over_a, which is b/a, beside a."),
-    **_map_names("A", "Write a."),
-    **_map_names(
+_HINT_BY_WRONG_FIELD_NAME: Mapping[str, str] = {
+    **_map_each_name_to("k K kappa spring_constant", f"Write {_STIFFNESS_HINT}."),
+    **_map_each_name_to("b B", "Write b_over_a, which is b/a."),
+    **_map_each_name_to("a_minus_b b_minus_a ab", "Write b_over_a, which is b/a, beside a."),
+    **_map_each_name_to("A", "Write a."),
+    **_map_each_name_to(
         "Dc dc D_c d_c DC L dcrit slip_distance", _rig_quantity_hint("D_c", "slip_distance")
     ),
-    **_map_names("mu mu0 mu_0 mu_ref f0 f_0", "Write mu_star."),
-    **_map_names(
+    **_map_each_name_to("mu mu0 mu_0 mu_ref f0 f_0", "Write mu_star."),
+    **_map_each_name_to(
         "sigma sigma_n sigman sigma0 sigma_star sn", _rig_quantity_hint("sigma_*", "normal_stress")
     ),
-    **_map_names("V0 V_0 v0 v_0 V v Vl vl vlp Vlp velocity load_velocity", _LOAD_VELOCITY_HINT),
-    **_map_names(
+    **_map_each_name_to(
+        "V0 V_0 v0 v_0 V v Vl vl vlp Vlp velocity load_velocity", _LOAD_VELOCITY_HINT
+    ),
+    **_map_each_name_to(
         "V_star v_star vstar Vref vref V_ref v_ref reference_velocity",
         _rig_quantity_hint("V_*", "reference_velocity"),
     ),
-    **_map_names("G shear_modulus", _rig_quantity_hint("G", "shear_modulus")),
-    **_map_names("rho density", _rig_quantity_hint("rho", "density")),
-    **_map_names(
+    **_map_each_name_to("G shear_modulus", _rig_quantity_hint("G", "shear_modulus")),
+    **_map_each_name_to("rho density", _rig_quantity_hint("rho", "density")),
+    **_map_each_name_to(
         "kc k_c kcr k_cr k_ratio k_over_kc k_kc", "Write stiffness_ratio, which is k/k_cr."
     ),
-    **_map_names(
+    **_map_each_name_to(
         "tau tau0 tau_0", "Write initial_stress, over sigma_*, above that of steady sliding."
     ),
-    **_map_names("theta theta0 theta_0", "Write initial_state, which is b ln(theta/theta_*)."),
-    **_map_names("m M mass", _INERTIA_HINT),
-    **_map_names("eta damping", "Write radiation_damping: eta V_*/sigma_*."),
-    **_map_names("T", "Write period, in s."),
-    **_map_names("evolution evolution_law state_law friction_law", "Write law."),
-    **_map_names("duration t_end tmax", _DURATION_HINT),
+    **_map_each_name_to(
+        "theta theta0 theta_0", "Write initial_state, which is b ln(theta/theta_*)."
+    ),
+    **_map_each_name_to("m M mass", _INERTIA_HINT),
+    **_map_each_name_to("eta damping", "Write radiation_damping: eta V_*/sigma_*."),
+    **_map_each_name_to("T", "Write period, in s."),
+    **_map_each_name_to("evolution evolution_law state_law friction_law", "Write law."),
+    **_map_each_name_to("duration t_end tmax", _DURATION_HINT),
 }
 #: Laws by their other names.
-_LAW_ALIASES: Mapping[str, str] = {
-    **_map_names("aging ageing dieterich dieterich_ruina dr aging_law ageing_law", "slowness"),
-    **_map_names("slowness_law", "slowness"),
-    **_map_names("ruina ruina_dieterich rr slip_law", "slip"),
-    **_map_names("prz perrin", "perrin_rice_zheng"),
-    **_map_names("kato_tullis kato", "composite"),
-    **_map_names("okubo cutoff", "cut_off"),
+_LAW_NAME_BY_ALIAS: Mapping[str, str] = {
+    **_map_each_name_to(
+        "aging ageing dieterich dieterich_ruina dr aging_law ageing_law", "slowness"
+    ),
+    **_map_each_name_to("slowness_law", "slowness"),
+    **_map_each_name_to("ruina ruina_dieterich rr slip_law", "slip"),
+    **_map_each_name_to("prz perrin", "perrin_rice_zheng"),
+    **_map_each_name_to("kato_tullis kato", "composite"),
+    **_map_each_name_to("okubo cutoff", "cut_off"),
 }
 
 
-def suggest_field(name: str) -> str:
+def hint_for_unknown_field(field_name: str) -> str:
     """Remedy for a field of this name; empty where nobody knows."""
-    return _FIELD_HINTS.get(name, "")
+    return _HINT_BY_WRONG_FIELD_NAME.get(field_name, "")
 
 
-def canonical_law_name(value: str) -> str:
+def canonical_law_name(law_name: str) -> str:
     """The name of a law here, where others call it by this one; else the value itself."""
-    return _LAW_ALIASES.get(_normalise_name(value), value)
+    return _LAW_NAME_BY_ALIAS.get(_normalise_name(law_name), law_name)
 
 
-def _normalise_name(value: str) -> str:
-    return value.strip().lower().replace("-", "_").replace(" ", "_")
+def _normalise_name(law_name: str) -> str:
+    return law_name.strip().lower().replace("-", "_").replace(" ", "_")
 
 
-def suggest_choice(slot: str, value: Any, choices: Iterable[str]) -> str:
+def hint_for_unknown_choice(slot_name: str, value: Any, choices: Iterable[str]) -> str:
     """Remedy for this choice in a slot; empty where nobody knows."""
-    if slot == "normal_stress" and re.match(r"[\d.]", str(value)):
-        return _rig_quantity_hint("sigma_*", slot)
+    if slot_name == "normal_stress" and re.match(r"[\d.]", str(value)):
+        return _rig_quantity_hint("sigma_*", slot_name)
     if not isinstance(value, str):
         return ""
     plain = _normalise_name(value)
-    if slot == "law" and plain == "nagata":
+    if slot_name == "law" and plain == "nagata":
         return "Write stress_dependence=..., beside any law."
-    return f"Write {slot}={plain!r}." if plain in choices else ""
+    return f"Write {slot_name}={plain!r}." if plain in choices else ""
 
 
-def suggest_keyword(value: Any, slots: Mapping[str, Iterable[str]]) -> str:
+def hint_for_value_without_field_name(
+    value: Any, choices_by_slot_name: Mapping[str, Iterable[str]]
+) -> str:
     """Remedy for a value that was given to a scene without a name."""
-    for slot, choices in slots.items() if isinstance(value, str) else ():
-        found = suggest_choice(slot, value, choices)
+    for slot, choices in choices_by_slot_name.items() if isinstance(value, str) else ():
+        found = hint_for_unknown_choice(slot, value, choices)
         if found:
             return found
     if isinstance(value, Mapping):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from rsfstudy._deprecation import renamed_names
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.parts import Numbers, Part, collect_numbers
+from rsfstudy.slider.parts import Numbers, Part, collect_parameter_values
 from rsfstudy.slider.scene_view import SceneView
 
 #: Indices of the parameters that every scene has: the direct effect parameter a, the change of the
@@ -60,16 +60,16 @@ LARGEST_LOG_SLOWNESS = 680.0
 SMALLEST_NORMAL_STRESS_EXCESS, LARGEST_NORMAL_STRESS_EXCESS = 1e-12 - 1.0, 1e12
 
 
-class _NumberSource(Protocol):
+class _HasParameterValues(Protocol):
     """Part, or combination of parts, with parameters for the equations."""
 
     @property
     def name(self) -> str: ...
 
-    def numbers(self, scene: SceneView) -> Numbers: ...
+    def parameter_values(self, scene: SceneView) -> Numbers: ...
 
 
-def pack_numbers(scene: SceneView) -> Numbers:
+def pack_parameter_values(scene: SceneView) -> Numbers:
     """Collect all parameters of a scene in a tuple.
 
     Parameters
@@ -82,12 +82,12 @@ def pack_numbers(scene: SceneView) -> Numbers:
     tuple of float
         Parameters at the indices of this module.
     """
-    p = scene.friction_numbers
+    p = scene.friction_parameter_values
     of_load = scene.stiffness, scene.load_velocity, scene.log_load_velocity
     return (*p[:STIFFNESS], *of_load, *p[STRESS_DEPENDENCE:])
 
 
-def pack_friction_numbers(scene: SceneView) -> Numbers:
+def pack_friction_parameter_values(scene: SceneView) -> Numbers:
     """Collect the parameters that affect friction in a tuple.
 
     Parameters
@@ -108,22 +108,30 @@ def pack_friction_numbers(scene: SceneView) -> Numbers:
     of_stress = law.stress_dependence, scene.imposed_normal_stress
     common = slider.a, size, slider.mu_star, *of_load, *of_stress
     own = (
-        *_pad_with_nan(parts.normal_stress, scene, FLUID - NORMAL_STRESS),
-        *_pad_with_nan(scene.pressure_source, scene, DYNAMICS - FLUID),
-        *_pad_with_nan(parts.dynamics, scene, LAW - DYNAMICS),
+        *_part_parameters_padded_with_nan(parts.normal_stress, scene, FLUID - NORMAL_STRESS),
+        *_part_parameters_padded_with_nan(scene.pressure_source, scene, DYNAMICS - FLUID),
+        *_part_parameters_padded_with_nan(parts.dynamics, scene, LAW - DYNAMICS),
     )
-    return (*common, *own, *collect_numbers(law, scene))
+    return (*common, *own, *collect_parameter_values(law, scene))
 
 
-def _pad_with_nan(part: _NumberSource, scene: SceneView, length: int) -> Numbers:
+def _part_parameters_padded_with_nan(
+    part: _HasParameterValues, scene: SceneView, length: int
+) -> Numbers:
     """Return the parameters of a part, padded with NaN.
 
     A function that reads an unused element then returns NaN instead of a wrong number.
     """
-    own = collect_numbers(part, scene) if isinstance(part, Part) else part.numbers(scene)
+    own = (
+        collect_parameter_values(part, scene)
+        if isinstance(part, Part)
+        else part.parameter_values(scene)
+    )
     if len(own) > length:
         rule = f"states {len(own)} numbers, and there are places for {length}"
-        raise InvalidValue("numbers", part.name, rule, remedy="Make fewer of them, as quotients.")
+        raise InvalidValue(
+            "parameter_values", part.name, rule, remedy="Make fewer of them, as quotients."
+        )
     return (*own, *(math.nan,) * (length - len(own)))
 
 

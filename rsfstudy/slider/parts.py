@@ -115,7 +115,7 @@ class Part:
                 if name not in vars(cls):
                     setattr(cls, name, vars(base)[name])
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the values that the functions of the part read from ``p``.
 
         The first value is stored at the index of the slot. A law can have any number of values. The
@@ -261,8 +261,8 @@ def number(
     >>> PowerLaw().power
     2.0
     """
-    if rule not in RULES:
-        raise InvalidValue("rule", rule, "is unknown", choices=RULES)
+    if rule not in VALUE_RULES:
+        raise InvalidValue("rule", rule, "is unknown", choices=VALUE_RULES)
     about = {"symbol": symbol, "units": units, "long_name": long_name, "scale": scale}
     metadata = {"about": about, "rule": rule, "remedy": remedy, "omit_if_none": omit_if_none}
     return field(default=default, metadata=metadata)
@@ -298,7 +298,7 @@ def flag(default: bool, long_name: str) -> Any:
 
 
 #: Conditions of numeric fields, by the text of the rule.
-RULES: Mapping[str, Callable[[float], bool]] = {
+VALUE_RULES: Mapping[str, Callable[[float], bool]] = {
     "": lambda value: True,
     POSITIVE: lambda value: value > 0.0,
     NON_NEGATIVE: lambda value: value >= 0.0,
@@ -310,7 +310,7 @@ RULES: Mapping[str, Callable[[float], bool]] = {
 }
 
 
-def is_boolean_field(part: type[Part], name: str) -> bool:
+def is_boolean_field(part_class: type[Part], field_name: str) -> bool:
     """Return True if a field of a part is boolean.
 
     Parameters
@@ -325,10 +325,10 @@ def is_boolean_field(part: type[Part], name: str) -> bool:
     bool
         True for fields that ``flag`` declares.
     """
-    return bool(part.__dataclass_fields__[name].metadata["rule"] == _BOOLEAN_RULE)
+    return bool(part_class.__dataclass_fields__[field_name].metadata["rule"] == _BOOLEAN_RULE)
 
 
-def field_names(part: type[Part]) -> tuple[str, ...]:
+def field_names(part_class: type[Part]) -> tuple[str, ...]:
     """Return the names of the fields that a part adds to a scene.
 
     Parameters
@@ -343,25 +343,27 @@ def field_names(part: type[Part]) -> tuple[str, ...]:
         comes first. Journals identify cells by the fields in this order, so the order must not
         change.
     """
-    names = (f.name for f in fields(part) if "about" in f.metadata)
-    return tuple(sorted(names, key=lambda name: name != part.selected_by))
+    names = (f.name for f in fields(part_class) if "about" in f.metadata)
+    return tuple(sorted(names, key=lambda name: name != part_class.selected_by))
 
 
 @cache
-def _appended_fields(part: type[Part]) -> tuple[str, ...]:
+def _fields_appended_to_parameter_values(part_class: type[Part]) -> tuple[str, ...]:
     """Return the names of the fields whose values are appended to ``numbers``.
 
     The fields are numeric and are declared in subclasses of the last class that overrides
     ``numbers``.
     """
-    overriding = next(kind for kind in part.__mro__ if "numbers" in vars(kind))
+    overriding = next(kind for kind in part_class.__mro__ if "parameter_values" in vars(kind))
     known = vars(overriding).get("__dataclass_fields__", {})
     return tuple(
-        name for name in field_names(part) if name not in known and not is_boolean_field(part, name)
+        name
+        for name in field_names(part_class)
+        if name not in known and not is_boolean_field(part_class, name)
     )
 
 
-def collect_numbers(part: Part, scene: SceneView) -> Numbers:
+def collect_parameter_values(part: Part, scene: SceneView) -> Numbers:
     """Return the values of ``part.numbers``, followed by the appended fields.
 
     Parameters
@@ -376,12 +378,12 @@ def collect_numbers(part: Part, scene: SceneView) -> Numbers:
     tuple of float
         Parameters of the part. Fields without a value are NaN.
     """
-    values = (getattr(part, name) for name in _appended_fields(type(part)))  # type: ignore[arg-type]
+    values = (getattr(part, name) for name in _fields_appended_to_parameter_values(type(part)))  # type: ignore[arg-type]
     others = (math.nan if value is None else float(value) for value in values)
-    return (*part.numbers(scene), *others)
+    return (*part.parameter_values(scene), *others)
 
 
-def field_quantities(part: type[Part]) -> list[Quantity]:
+def field_quantities(part_class: type[Part]) -> list[Quantity]:
     """Return the quantities that describe the fields of a part.
 
     Parameters
@@ -394,21 +396,21 @@ def field_quantities(part: type[Part]) -> list[Quantity]:
     list of Quantity
         Quantities with the names, symbols and units of the fields.
     """
-    stated = (part.__dataclass_fields__[name] for name in field_names(part))
+    stated = (part_class.__dataclass_fields__[name] for name in field_names(part_class))
     return [Quantity(f.name, **f.metadata["about"]) for f in stated]
 
 
 @cache
-def _field_rule(
-    part: type[Part], name: str
+def _field_validation_rule(
+    part_class: type[Part], field_name: str
 ) -> tuple[Any, str, str, Callable[[float], bool] | None]:
     """Return the default, rule, remedy and condition of a field."""
-    stated = part.__dataclass_fields__[name]
+    stated = part_class.__dataclass_fields__[field_name]
     rule = stated.metadata["rule"]
-    return stated.default, rule, stated.metadata["remedy"], RULES.get(rule)
+    return stated.default, rule, stated.metadata["remedy"], VALUE_RULES.get(rule)
 
 
-def validate_value(part: type[Part], name: str, value: Any) -> Any:
+def validate_field_value(part_class: type[Part], field_name: str, value: Any) -> Any:
     """Validate the value of a field and convert it to a Python object.
 
     Parameters
@@ -430,7 +432,7 @@ def validate_value(part: type[Part], name: str, value: Any) -> Any:
     InvalidValue
         If the value has the wrong type, is not finite or violates the rule of the field.
     """
-    default, rule, remedy, allows = _field_rule(part, name)  # type: ignore[arg-type]
+    default, rule, remedy, allows = _field_validation_rule(part_class, field_name)  # type: ignore[arg-type]
     if type(value) is float and math.isfinite(value) and allows and allows(value):
         return value  # This shortcut accepts most values.
     if value is None and default is None:
@@ -438,26 +440,26 @@ def validate_value(part: type[Part], name: str, value: Any) -> Any:
     flagged = type(value).__name__ == "bool"  # NumPy booleans have the same type name.
     if rule == _BOOLEAN_RULE:
         if not flagged:
-            raise InvalidValue(name, value, rule)
+            raise InvalidValue(field_name, value, rule)
         return bool(value)
     if flagged or not isinstance(value, Real):
         has_units = isinstance(value, str) and value.strip()[:1].isdigit()
         remedy = "Units are those of a rig: state it, as rsfstudy.Rig." * has_units
-        raise InvalidValue(name, value, "must be a number", remedy=remedy)
+        raise InvalidValue(field_name, value, "must be a number", remedy=remedy)
     try:
         plain = float(value)
     except OverflowError:
         plain = math.inf
     except TypeError as error:  # Time differences of NumPy are instances of Real.
-        raise InvalidValue(name, value, "must be a number") from error
+        raise InvalidValue(field_name, value, "must be a number") from error
     if not math.isfinite(plain):
-        raise InvalidValue(name, plain, "must be finite")
-    if not RULES[rule](plain):
-        raise InvalidValue(name, plain, rule, remedy=remedy)
+        raise InvalidValue(field_name, plain, "must be finite")
+    if not VALUE_RULES[rule](plain):
+        raise InvalidValue(field_name, plain, rule, remedy=remedy)
     return plain
 
 
-def discover_parts(package: str, path: Iterable[str]) -> dict[str, type[Part]]:
+def discover_parts(package: str, package_path: Iterable[str]) -> dict[str, type[Part]]:
     """Import the modules of a package and collect their parts.
 
     Parameters
@@ -473,7 +475,7 @@ def discover_parts(package: str, path: Iterable[str]) -> dict[str, type[Part]]:
         Classes of the parts by their names.
     """
     parts: dict[str, type[Part]] = {}
-    for file in sorted(module.name for module in pkgutil.iter_modules(path)):
+    for file in sorted(module.name for module in pkgutil.iter_modules(package_path)):
         if file.startswith("_"):  # These modules contain shared code.
             continue
         module = importlib.import_module(f"{package}.{file}")

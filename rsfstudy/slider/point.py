@@ -8,7 +8,7 @@ from rsfstudy._deprecation import renamed_members
 
 
 @renamed_members
-class Point(NamedTuple):
+class MotionPoint(NamedTuple):
     r"""Stress, slip rate and states of a motion at a point in time.
 
     The values do not depend on the unknowns of the equations that were integrated.

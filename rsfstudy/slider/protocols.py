@@ -47,13 +47,13 @@ class UserLoading(Loading, ABC):
         """
         back = np.asarray(self.segment_table)[:, SEGMENT_VELOCITY] < 0.0
         if back.any() and not scene.parts.law.regularised:
-            name, value, place = self.describe_reversal(int(np.argmax(back)))
+            name, value, place = self.locate_load_point_reversal(int(np.argmax(back)))
             rule = "moves the load point back, and friction is that of forward slip"
             remedy = "Set regularised=True, by which slip reverses with shear stress."
             raise InvalidValue(name, value, rule, remedy=remedy).with_location(place)
         super().check(scene)
 
-    def describe_reversal(self, index: int) -> tuple[str, float, str]:
+    def locate_load_point_reversal(self, segment_index: int) -> tuple[str, float, str]:
         """Describe the input value that moves the load point backwards.
 
         Parameters
@@ -70,7 +70,11 @@ class UserLoading(Loading, ABC):
         place : str
             Position of the value in the input.
         """
-        return "velocity", self.segments[index].load_velocity, f"segment {index + 1}"
+        return (
+            "velocity",
+            self.segments[segment_index].load_velocity,
+            f"segment {segment_index + 1}",
+        )
 
     @property
     @abstractmethod
@@ -180,51 +184,61 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
     return Protocol(name=name, input_segments=tuple(history))
 
 
-def _parse_segment(stated: Any, normal_stress: float, place: str) -> Segment:
+def _parse_segment(declared_segment: Any, previous_normal_stress: float, location: str) -> Segment:
     """Convert an input segment to a validated ``Segment``.
 
     The argument ``normal_stress`` is the value of the previous segment, and ``place`` is the
     position of the segment in error messages.
     """
     try:
-        if isinstance(stated, Segment):
-            return _validated_segment(*stated)
-        if not isinstance(stated, Mapping):
+        if isinstance(declared_segment, Segment):
+            return _build_validated_segment(*declared_segment)
+        if not isinstance(declared_segment, Mapping):
             remedy = 'Write {"velocity": 10, "duration": 2}.'
-            raise InvalidValue("segment", stated, "is no segment", remedy=remedy)
-        for key in stated:
+            raise InvalidValue("segment", declared_segment, "is no segment", remedy=remedy)
+        for key in declared_segment:
             if key not in SEGMENT_KEYS:
                 raise InvalidValue("segment", key, "is unknown", choices=SEGMENT_KEYS)
-        if "normal_stress" in stated:
-            normal_stress = (
-                _read_positive(stated, "normal_stress", "greater than 0, and finite") - 1.0
+        if "normal_stress" in declared_segment:
+            previous_normal_stress = (
+                _read_positive_number(
+                    declared_segment, "normal_stress", "greater than 0, and finite"
+                )
+                - 1.0
             )
-        velocity, duration = stated.get("velocity"), stated.get("duration", math.inf)
+        velocity, duration = (
+            declared_segment.get("velocity"),
+            declared_segment.get("duration", math.inf),
+        )
         if velocity is None:
             raise InvalidValue("velocity", None, "must be stated", remedy="0 holds the load point.")
-        if "distance" in stated:
-            distance = stated["distance"]
-            if "duration" in stated:
+        if "distance" in declared_segment:
+            distance = declared_segment["distance"]
+            if "duration" in declared_segment:
                 rule = f"give duration or distance (here {distance!r}), not both"
                 raise InvalidValue("duration", duration, rule)
-            distance = _read_positive(stated, "distance", "positive and finite")
-            duration = distance / _read_positive(
-                stated, "velocity", "positive where a distance is stated"
+            distance = _read_positive_number(declared_segment, "distance", "positive and finite")
+            duration = distance / _read_positive_number(
+                declared_segment, "velocity", "positive where a distance is stated"
             )
-        return _validated_segment(velocity, stated.get("step", 0.0), duration, normal_stress)
+        return _build_validated_segment(
+            velocity, declared_segment.get("step", 0.0), duration, previous_normal_stress
+        )
     except InvalidValue as error:
-        raise error.with_location(place) from error
+        raise error.with_location(location) from error
 
 
-def _read_positive(stated: Mapping[str, Any], name: str, what: str) -> float:
+def _read_positive_number(declared_segment: Mapping[str, Any], key: str, rule: str) -> float:
     """Return a positive finite value of a mapping."""
-    value = stated[name]
+    value = declared_segment[key]
     if not (_is_number(value) and 0.0 < value < math.inf):
-        raise InvalidValue(name, value, f"must be {what}")
+        raise InvalidValue(key, value, f"must be {rule}")
     return float(value)
 
 
-def _validated_segment(velocity: Any, step: Any, duration: Any, normal_stress: Any) -> Segment:
+def _build_validated_segment(
+    velocity: Any, step: Any, duration: Any, normal_stress: Any
+) -> Segment:
     """Return a ``Segment`` whose values have been validated."""
     if not _is_number(velocity) or not math.isfinite(velocity):
         remedy = "0 holds the load point."

@@ -21,7 +21,7 @@ from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
 from rsfstudy.slider.hints import canonical_law_name
 from rsfstudy.slider.parts import Part, field_names, field_quantities, is_boolean_field
 from rsfstudy.slider.protocols import UserLoading
-from rsfstudy.slider.requirements import check_declared_needs
+from rsfstudy.slider.requirements import check_names_of_needed_quantities
 from rsfstudy.slider.slider_parameters import SliderParameters
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -50,21 +50,21 @@ class Slot:
     """
 
     name: str
-    base: type[Part]
-    choices: Mapping[str, type[Part]]
-    default: str
+    base_class: type[Part]
+    built_in_parts: Mapping[str, type[Part]]
+    default_part_name: str
     long_name: str
     user_parts: dict[str, UserPart] = field(default_factory=dict)
 
     @property
-    def quantity(self) -> Quantity:
+    def field_quantity(self) -> Quantity:
         """Quantity that describes the slot as a field."""
         return Quantity(self.name, "", "", self.long_name)
 
     @cached_property
-    def selectors(self) -> Mapping[str, type[Part]]:
+    def parts_by_selecting_field(self) -> Mapping[str, type[Part]]:
         """Mapping from field names to the parts that the fields select."""
-        return {part.selected_by: part for part in self.choices.values() if part.selected_by}
+        return {part.selected_by: part for part in self.built_in_parts.values() if part.selected_by}
 
 
 SLOTS: tuple[Slot, ...] = (
@@ -87,35 +87,37 @@ SLOTS: tuple[Slot, ...] = (
     Slot("loading", loading.Loading, loading.BUILT_IN_PARTS, "step", "what the load point does"),
 )
 #: Slots whose part is selected by name. In the other slots, the values of fields select the part.
-NAMED_SLOTS = tuple(slot for slot in SLOTS if not slot.selectors)
-_ALL_PARTS: tuple[type[Part], ...] = (
+SLOTS_CHOSEN_BY_NAME = tuple(slot for slot in SLOTS if not slot.parts_by_selecting_field)
+_ALL_PART_CLASSES: tuple[type[Part], ...] = (
     SliderParameters,
-    *(part for slot in SLOTS for part in slot.choices.values()),
+    *(part for slot in SLOTS for part in slot.built_in_parts.values()),
 )
 #: Built-in part that owns each field.
-FIELD_OWNERS: Mapping[str, type[Part]] = {
-    name: part for part in reversed(_ALL_PARTS) for name in field_names(part)
+PART_CLASS_BY_FIELD_NAME: Mapping[str, type[Part]] = {
+    name: part for part in reversed(_ALL_PART_CLASSES) for name in field_names(part)
 }
 #: Quantities that describe the fields of a scene.
 FIELD_QUANTITIES: tuple[Quantity, ...] = (
-    *(slot.quantity for slot in NAMED_SLOTS),
-    *(about for part in _ALL_PARTS for about in field_quantities(part)),
+    *(slot.field_quantity for slot in SLOTS_CHOSEN_BY_NAME),
+    *(about for part in _ALL_PART_CLASSES for about in field_quantities(part)),
 )
 #: Names of the fields of a scene.
 FIELD_NAMES: tuple[str, ...] = tuple(dict.fromkeys(about.name for about in FIELD_QUANTITIES))
 #: Names of the fields that are included among the values of a scene only if the user sets them.
-OMITTED_IF_NONE: frozenset[str] = frozenset(
+FIELDS_OMITTED_IF_NONE: frozenset[str] = frozenset(
     name
-    for name, part in FIELD_OWNERS.items()
+    for name, part in PART_CLASS_BY_FIELD_NAME.items()
     if part.__dataclass_fields__[name].metadata.get("omit_if_none")
 )
 #: Names of the slots.
 SLOT_NAMES: frozenset[str] = frozenset(slot.name for slot in SLOTS)
 #: Names of the fields whose values select a part.
-SELECTOR_FIELDS: tuple[str, ...] = tuple(name for slot in SLOTS for name in slot.selectors)
+PART_SELECTING_FIELDS: tuple[str, ...] = tuple(
+    name for slot in SLOTS for name in slot.parts_by_selecting_field
+)
 
 
-def field_defaults() -> dict[str, Any]:
+def scene_field_defaults() -> dict[str, Any]:
     """Return the default values of all fields of a scene.
 
     Returns
@@ -123,12 +125,18 @@ def field_defaults() -> dict[str, Any]:
     dict of str to object
         Default values by field name. The default of a slot is None if other fields select the part.
     """
-    choices = {slot.name: slot.default if slot in NAMED_SLOTS else None for slot in SLOTS}
-    fields = {name: part.__dataclass_fields__[name].default for name, part in FIELD_OWNERS.items()}
+    choices = {
+        slot.name: slot.default_part_name if slot in SLOTS_CHOSEN_BY_NAME else None
+        for slot in SLOTS
+    }
+    fields = {
+        name: part.__dataclass_fields__[name].default
+        for name, part in PART_CLASS_BY_FIELD_NAME.items()
+    }
     return {name: {**choices, **fields}[name] for name in dict.fromkeys((*FIELD_NAMES, *choices))}
 
 
-def with_field_signature(*extra_names: str) -> Callable[[F], F]:
+def with_scene_field_signature(*extra_field_names: str) -> Callable[[F], F]:
     """Return a decorator that adds the fields of scenes to a signature.
 
     The signature is used for code completion in editors. The decorated function takes the fields as
@@ -148,7 +156,7 @@ def with_field_signature(*extra_names: str) -> Callable[[F], F]:
     def decorate(function: F) -> F:
         stated = signature(function)
         *first, last = stated.parameters.values()
-        names = (*field_defaults(), *extra_names)
+        names = (*scene_field_defaults(), *extra_field_names)
         fields = [Parameter(name, Parameter.KEYWORD_ONLY, default=...) for name in names]
         function.__signature__ = stated.replace(parameters=[*first, *fields, last])  # type: ignore[attr-defined]
         return function
@@ -162,10 +170,10 @@ def with_field_signature(*extra_names: str) -> Callable[[F], F]:
 #: names.
 RESERVED_NAMES: set[str] = set()
 #: Classes that have been checked.
-_CHECKED_CLASSES: set[type[Part]] = set()
+_CHECKED_PART_CLASSES: set[type[Part]] = set()
 
 
-def part_class(part: UserPart) -> type[Part]:
+def class_of_part(part: UserPart) -> type[Part]:
     """Return the class of a part.
 
     Parameters
@@ -181,7 +189,7 @@ def part_class(part: UserPart) -> type[Part]:
     return part if isinstance(part, type) else type(part)
 
 
-def find_slot(part_class: type[Part]) -> Slot:
+def find_slot_of_part_class(part_class: type[Part]) -> Slot:
     """Return the slot that a class of parts fills.
 
     Parameters
@@ -194,10 +202,10 @@ def find_slot(part_class: type[Part]) -> Slot:
     Slot
         Slot with a base class of the part.
     """
-    return next(slot for slot in SLOTS if issubclass(part_class, slot.base))
+    return next(slot for slot in SLOTS if issubclass(part_class, slot.base_class))
 
 
-def resolve_part(slot: Slot, part: Any) -> UserPart:
+def check_and_register_part(slot: Slot, part: Any) -> UserPart:
     """Check and register a part that is passed as a class or an object.
 
     Parameters
@@ -218,21 +226,21 @@ def resolve_part(slot: Slot, part: Any) -> UserPart:
         If the part cannot fill the slot.
     """
     found: UserPart = part
-    if part in slot.choices.values() and slot in NAMED_SLOTS:
+    if part in slot.built_in_parts.values() and slot in SLOTS_CHOSEN_BY_NAME:
         return found
-    if isinstance(part, UserLoading) and slot.base is loading.Loading:
+    if isinstance(part, UserLoading) and slot.base_class is loading.Loading:
         _check_part_name(slot, part)
-    elif part not in _CHECKED_CLASSES or find_slot(part) is not slot:
-        _check_part(slot, part)
-    register_parts([found])
+    elif part not in _CHECKED_PART_CLASSES or find_slot_of_part_class(part) is not slot:
+        _check_user_part(slot, part)
+    register_user_parts([found])
     return found
 
 
-def _check_part(slot: Slot, part: Any) -> None:
+def _check_user_part(slot: Slot, part: Any) -> None:
     """Raise ``InvalidValue`` if a class cannot fill a slot."""
-    if not isinstance(part, type) or not issubclass(part, slot.base):
+    if not isinstance(part, type) or not issubclass(part, slot.base_class):
         rule = f"is no class that fills the slot {slot.name}"
-        remedy = f"Derive a class from {slot.base.__module__}.{slot.base.__name__}."
+        remedy = f"Derive a class from {slot.base_class.__module__}.{slot.base_class.__name__}."
         raise InvalidValue(slot.name, part, rule, remedy=remedy)
     params = vars(part).get("__dataclass_params__")
     if params is None or not params.frozen:
@@ -241,7 +249,7 @@ def _check_part(slot: Slot, part: Any) -> None:
     _check_part_name(slot, part)
     _check_part_fields(slot, part)
     _check_excluded_unknowns(slot, part)
-    check_declared_needs(slot.name, part)
+    check_names_of_needed_quantities(slot.name, part)
     for name in part.required_functions():
         function = getattr_static(part, name, None)
         if not isinstance(getattr(function, "__func__", None), FunctionType):
@@ -270,21 +278,25 @@ def _check_part_name(slot: Slot, part: UserPart) -> None:
     name: object = getattr(part, "name", None)
     rule = "" if is_variable_name(name) else f"must be named by a Python identifier, not {name!r}"
     for other in SLOTS:
-        if name in other.choices:
+        if name in other.built_in_parts:
             rule = f"takes the name of a part of rsfstudy, {name!r}"
-        elif name in other.user_parts and _origin(other.user_parts[name]) != _origin(part):
-            rule = f"takes the name {name!r} of {'.'.join(_origin(other.user_parts[name]))}"
+        elif name in other.user_parts and _definition_origin(
+            other.user_parts[name]
+        ) != _definition_origin(part):
+            rule = (
+                f"takes the name {name!r} of {'.'.join(_definition_origin(other.user_parts[name]))}"
+            )
     if rule:
-        remedy = f'Write name = "..." in {_origin(part)[1]}.'
+        remedy = f'Write name = "..." in {_definition_origin(part)[1]}.'
         raise InvalidValue(slot.name, part, rule, remedy=remedy)
 
 
-def _origin(part: UserPart) -> tuple[str, str]:
+def _definition_origin(part: UserPart) -> tuple[str, str]:
     """Return the module and the qualified name of the definition of a part.
 
     The result is the same if a notebook cell with the definition is run again.
     """
-    return part_class(part).__module__, part_class(part).__qualname__
+    return class_of_part(part).__module__, class_of_part(part).__qualname__
 
 
 def _check_part_fields(slot: Slot, part: type[Part]) -> None:
@@ -297,7 +309,7 @@ def _check_part_fields(slot: Slot, part: type[Part]) -> None:
         name, about, owner = (
             stated.name,
             stated.metadata.get("about"),
-            FIELD_OWNERS.get(stated.name),
+            PART_CLASS_BY_FIELD_NAME.get(stated.name),
         )
         if about is None:
             rule, state = "says neither what it is nor its rule", "State it by number() or flag()."
@@ -309,14 +321,14 @@ def _check_part_fields(slot: Slot, part: type[Part]) -> None:
             taken = name in RESERVED_NAMES | SLOT_NAMES
         else:  # Another part of the slot may have the same field with another rule.
             known = owner.__dataclass_fields__[name].metadata["about"]
-            taken = about != known or owner not in slot.choices.values()
+            taken = about != known or owner not in slot.built_in_parts.values()
         if taken:
             rule = "is the name of something else, of "
             rule += owner.name if owner else "every scene"
             raise InvalidValue(what, name, rule, remedy="Give it another name.")
 
 
-def register_parts(parts: Iterable[UserPart]) -> None:
+def register_user_parts(parts: Iterable[UserPart]) -> None:
     """Register the names of parts that have been checked.
 
     An earlier part with the same name is replaced.
@@ -327,13 +339,13 @@ def register_parts(parts: Iterable[UserPart]) -> None:
         Parts to register.
     """
     for part in parts:
-        slot = find_slot(part_class(part))
+        slot = find_slot_of_part_class(class_of_part(part))
         if slot.user_parts.get(part.name) is not part:
             slot.user_parts[part.name] = part
-            _CHECKED_CLASSES.add(part_class(part))
+            _CHECKED_PART_CLASSES.add(class_of_part(part))
 
 
-def normalise_field_value(field: str, value: Any) -> Any:
+def normalise_field_value(field_name: str, value: Any) -> Any:
     """Convert a part or the synonym of a law to a name.
 
     Parameters
@@ -354,12 +366,14 @@ def normalise_field_value(field: str, value: Any) -> Any:
         If the part cannot fill the slot.
     """
     for slot in SLOTS if isinstance(value, type | UserLoading) else ():
-        if slot.name == field:
-            return resolve_part(slot, value).name
-    return canonical_law_name(value) if field == "law" and isinstance(value, str) else value
+        if slot.name == field_name:
+            return check_and_register_part(slot, value).name
+    return canonical_law_name(value) if field_name == "law" and isinstance(value, str) else value
 
 
-def names_to_parts(values: Mapping[str, Any], parts: Mapping[str, UserPart]) -> Mapping[str, Any]:
+def replace_names_by_user_parts(
+    field_values: Mapping[str, Any], user_parts_by_name: Mapping[str, UserPart]
+) -> Mapping[str, Any]:
     """Replace the names of user-defined parts by the parts themselves.
 
     Parameters
@@ -374,13 +388,20 @@ def names_to_parts(values: Mapping[str, Any], parts: Mapping[str, UserPart]) -> 
     mapping of str to object
         Field values with parts instead of names.
     """
-    if not parts:
-        return values
-    texts = {n: values[n] for n in SLOT_NAMES & set(values) if isinstance(values[n], str)}
-    return {**values, **{name: parts.get(text, text) for name, text in texts.items()}}
+    if not user_parts_by_name:
+        return field_values
+    texts = {
+        n: field_values[n]
+        for n in SLOT_NAMES & set(field_values)
+        if isinstance(field_values[n], str)
+    }
+    return {
+        **field_values,
+        **{name: user_parts_by_name.get(text, text) for name, text in texts.items()},
+    }
 
 
-def scene_fields(parts: Iterable[UserPart]) -> dict[str, Quantity]:
+def scene_field_quantities(user_parts: Iterable[UserPart]) -> dict[str, Quantity]:
     """Return the fields of scenes that may contain the given parts.
 
     Parameters
@@ -399,15 +420,15 @@ def scene_fields(parts: Iterable[UserPart]) -> dict[str, Quantity]:
         If two parts have different fields with the same name.
     """
     found = {about.name: about for about in FIELD_QUANTITIES}
-    for kind in map(part_class, parts):
-        for about in (find_slot(kind).quantity, *field_quantities(kind)):
+    for kind in map(class_of_part, user_parts):
+        for about in (find_slot_of_part_class(kind).field_quantity, *field_quantities(kind)):
             if found.setdefault(about.name, about) != about:
                 rule = "is the name of something else, of another part"
                 raise InvalidValue(f"field of {kind.name}", about.name, rule)
     return found
 
 
-def field_types(parts: Iterable[UserPart]) -> Mapping[str, Any]:
+def scene_field_types(user_parts: Iterable[UserPart]) -> Mapping[str, Any]:
     """Return the types of the fields of scenes.
 
     Parameters
@@ -421,11 +442,11 @@ def field_types(parts: Iterable[UserPart]) -> Mapping[str, Any]:
         Types by field name. The type includes None if some parts of the slot lack the field.
     """
     kinds: dict[str, Any] = dict.fromkeys(SLOT_NAMES, str)
-    classes = tuple(map(part_class, parts))
+    classes = tuple(map(class_of_part, user_parts))
     filling: dict[str, list[type[Part]]] = {"": [SliderParameters]}
-    filling |= {slot.name: [*slot.choices.values()] for slot in SLOTS}
+    filling |= {slot.name: [*slot.built_in_parts.values()] for slot in SLOTS}
     for own_kind in classes:
-        filling[find_slot(own_kind).name].append(own_kind)
+        filling[find_slot_of_part_class(own_kind).name].append(own_kind)
     for every in filling.values():
         for part in every:
             for name in field_names(part):
@@ -433,15 +454,15 @@ def field_types(parts: Iterable[UserPart]) -> Mapping[str, Any]:
                 stated = name == part.selected_by or all(name in field_names(one) for one in every)
                 default = part.__dataclass_fields__[name].default
                 kinds[name] = kind if stated and default is not None else kind | None
-    return {name: kinds[name] for name in scene_fields(classes)}
+    return {name: kinds[name] for name in scene_field_quantities(classes)}
 
 
 #: Types of the fields of scenes without user-defined parts.
-FIELD_TYPES = field_types(())
+FIELD_TYPES = scene_field_types(())
 
 
 def quantities_with_values(
-    values: Mapping[str, Any], parts: Iterable[UserPart] = ()
+    field_values: Mapping[str, Any], user_parts: Iterable[UserPart] = ()
 ) -> Iterator[tuple[Quantity, object]]:
     """Iterate over the fields that have a value.
 
@@ -459,7 +480,7 @@ def quantities_with_values(
     value : object
         Value of the field, which is not None.
     """
-    about = scene_fields(parts)
-    for name, value in values.items():
+    about = scene_field_quantities(user_parts)
+    for name, value in field_values.items():
         if value is not None:
             yield about.get(name, Quantity(name, "", "", "")), value

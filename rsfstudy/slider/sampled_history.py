@@ -29,12 +29,12 @@ from rsfstudy.slider.scene_view import SceneView
 #: Columns of the sample table: time since the first sample, load point velocity after the sample,
 #: decrease of normal stress from sigma_* at the sample, and rate of normal stress after the sample.
 TIME_COLUMN, VELOCITY_COLUMN, STRESS_FALL_COLUMN, STRESS_RATE_COLUMN = range(4)
-_STRESS_UNKNOWNS = (
+_NORMAL_STRESS_UNKNOWNS = (
     Quantity("recorded_fall", "$P$", "1", "imposed fall of normal stress", "sigma_*"),
 )
 
 
-class LazySegments(Sequence[Segment]):
+class LazySegmentSequence(Sequence[Segment]):
     """Sequence of segments that are created on access.
 
     Parameters
@@ -98,15 +98,15 @@ class SampledHistory(UserLoading):
         If normal stress is sampled, its decrease is an unknown. Otherwise the loading has no
         unknowns.
         """
-        return _STRESS_UNKNOWNS if self.of_stress else ()
+        return _NORMAL_STRESS_UNKNOWNS if self.of_stress else ()
 
-    def describe_reversal(self, index: int) -> tuple[str, float, str]:
+    def locate_load_point_reversal(self, segment_index: int) -> tuple[str, float, str]:
         """Describe the input value that moves the load point backwards.
 
         See the base class.
         """
-        velocity = float(self.sample_table[index, VELOCITY_COLUMN])
-        return self.first_reversal or ("velocity", velocity, f"sample {index + 1}")
+        velocity = float(self.sample_table[segment_index, VELOCITY_COLUMN])
+        return self.first_reversal or ("velocity", velocity, f"sample {segment_index + 1}")
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
         """Return the decrease of normal stress at the first sample.
@@ -115,7 +115,7 @@ class SampledHistory(UserLoading):
         """
         return (float(self.sample_table[0, STRESS_FALL_COLUMN]),) if self.of_stress else ()
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the rate of normal stress after the first sample.
 
         See the base class.
@@ -151,7 +151,7 @@ class SampledHistory(UserLoading):
     @property
     def segments(self) -> Any:
         """Segments between the samples, with an infinite last segment."""
-        return LazySegments(self.segment_table)
+        return LazySegmentSequence(self.segment_table)
 
     @property
     def jump_mask(self) -> np.ndarray:
@@ -166,7 +166,7 @@ class SampledHistory(UserLoading):
         """
         return min(1, len(self.sample_table) - 1)
 
-    def _check_durations(self) -> None:
+    def _check_segment_durations(self) -> None:
         """Do nothing, because the samples are checked when they are read."""
 
     def describe(self) -> dict[str, Any]:
@@ -191,12 +191,12 @@ class SampledHistory(UserLoading):
         """True, because a record generally differs from steady sliding."""
         return True
 
-    def isolate_segment(self, index: int) -> SampledHistory:
+    def isolate_segment(self, segment_index: int) -> SampledHistory:
         """Return a history that consists of a single segment.
 
         See the base class.
         """
-        one = self.sample_table[index].copy()
+        one = self.sample_table[segment_index].copy()
         one[TIME_COLUMN] = 0.0
         return replace(self, samples=one.tobytes())
 
@@ -246,11 +246,13 @@ def build_sampled_history(
     if stress_fall is not None:
         columns[:, STRESS_FALL_COLUMN] = stress_fall
         columns[:-1, STRESS_RATE_COLUMN] = -np.diff(stress_fall) / np.diff(time)
-    history = history_from_table(columns, stress_fall is not None, name, of_pressure=of_pressure)
+    history = build_sampled_history_from_table(
+        columns, stress_fall is not None, name, of_pressure=of_pressure
+    )
     return replace(history, first_reversal=first_reversal)
 
 
-def history_from_table(
+def build_sampled_history_from_table(
     sample_table: np.ndarray, of_stress: bool, name: str, *, of_pressure: bool = False
 ) -> SampledHistory:
     """Build a loading history from a table of samples.

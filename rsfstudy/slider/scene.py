@@ -33,13 +33,13 @@ from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.fluid._boundary_pressure import FluidWithBoundaryPressure
 from rsfstudy.slider.loading.step import StepLoading
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.requirements import check_needs
+from rsfstudy.slider.requirements import check_needed_quantities
 from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.slider.states import check_steady_states
 
 #: Number of cached critical stiffnesses. Studies request the same values repeatedly along axes that
 #: do not affect friction.
-_CACHE_SIZE = 4096
+_CRITICAL_STIFFNESS_CACHE_SIZE = 4096
 #: Segment table of loadings that consist of a single segment without an end.
 ENDLESS_SEGMENT_TABLE = np.array([[0.0, math.inf, *[math.nan] * 4]])
 
@@ -218,13 +218,13 @@ class Scene(SceneBase):
     __signature__: ClassVar[Signature] = Signature(
         [
             Parameter(n, Parameter.KEYWORD_ONLY, default=d)
-            for n, d in registry.field_defaults().items()
+            for n, d in registry.scene_field_defaults().items()
         ]
     )
 
     def _check(self) -> None:
         """Check each part, and the compatibility of the parts."""
-        check_needs(self)
+        check_needed_quantities(self)
         # The law is checked last, because its check may compute steady sliding of the whole scene.
         for part in (*self.parts[:1], *reversed(self.parts[2:]), self.parts.law):
             part.check(self)
@@ -282,7 +282,7 @@ class Scene(SceneBase):
             return self
         return self.with_segment(loading.Segment(self.load_velocity))
 
-    def segment_scene(self, index: int) -> Scene:
+    def segment_scene(self, segment_index: int) -> Scene:
         """Return the scene during one segment of its loading.
 
         Parameters
@@ -295,7 +295,7 @@ class Scene(SceneBase):
         Scene
             Scene whose loading is the segment.
         """
-        alone = self.parts.loading.isolate_segment(index)
+        alone = self.parts.loading.isolate_segment(segment_index)
         if alone is self.parts.loading:
             return self
         if isinstance(alone, loading.Segment):
@@ -333,20 +333,20 @@ class Scene(SceneBase):
         return {}
 
     @cached_attribute
-    def numbers(self) -> Numbers:
+    def parameter_values(self) -> Numbers:
         """Parameters of the equations in the order of ``parameter_layout``."""
-        return parameter_layout.pack_numbers(self)
+        return parameter_layout.pack_parameter_values(self)
 
     @cached_attribute
-    def friction_numbers(self) -> Numbers:
+    def friction_parameter_values(self) -> Numbers:
         """Parameters of functions that depend only on friction.
 
         The elements for the spring and the load point are NaN.
         """
-        return parameter_layout.pack_friction_numbers(self)
+        return parameter_layout.pack_friction_parameter_values(self)
 
     @cached_attribute
-    def functions(self) -> scene_functions.SceneFunctions:
+    def equation_functions(self) -> scene_functions.SceneFunctions:
         """Functions of the equations of motion (see ``scene_functions``)."""
         return scene_functions.build_scene_functions(self)
 
@@ -373,7 +373,7 @@ class Scene(SceneBase):
     @property
     def has_mass(self) -> bool:
         """True if inertia acts during ruptures."""
-        return self.parts.dynamics.rupture_rate is not None
+        return self.parts.dynamics.build_rupture_rate_function is not None
 
     @cached_attribute
     def state_count(self) -> int:
@@ -495,18 +495,20 @@ class Scene(SceneBase):
 registry.RESERVED_NAMES.update(dir(Scene), Scene.__annotations__)
 
 
-@lru_cache(_CACHE_SIZE)
+@lru_cache(_CRITICAL_STIFFNESS_CACHE_SIZE)
 def _critical_stiffness(
     a: float,
     mu_star: float,
     law: laws.LawBase,
-    stress: normal_stress.NormalStress,
-    pores: fluid.Fluid,
+    normal_stress_part: normal_stress.NormalStress,
+    fluid_part: fluid.Fluid,
 ) -> float:
     """Compute the critical stiffness of all sliders with the same friction.
 
     The stiffness of the slider does not affect the result and is set to a.
     """
     slider = SliderParameters(a=a, mu_star=mu_star, stiffness=a)
-    scene = Scene(SceneParts(slider, law, stress, pores, QuasiStatic(), StepLoading()))
+    scene = Scene(
+        SceneParts(slider, law, normal_stress_part, fluid_part, QuasiStatic(), StepLoading())
+    )
     return stability.critical_stiffness(scene, 0.0, quasi_static=True)

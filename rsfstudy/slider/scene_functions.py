@@ -32,12 +32,12 @@ from rsfstudy.slider import friction
 from rsfstudy.slider.friction import FrictionFunctions, build_friction_functions
 from rsfstudy.slider.parameter_layout import LOAD_VELOCITY, LOG_LOAD_VELOCITY, MU_STAR, STIFFNESS, A
 from rsfstudy.slider.parts import Function, Numbers
-from rsfstudy.slider.point import Point
+from rsfstudy.slider.point import MotionPoint
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.states import (
+    build_tuple_scaling_function,
     default_steady_state,
-    evolutions_from_single_state,
-    scaling_function,
+    wrap_single_state_evolution,
 )
 
 if TYPE_CHECKING:
@@ -48,12 +48,12 @@ STOPPED_LOG_SLIP_RATE = -290.0 * math.log(10.0)
 
 #: Where slip is slower than V_0 by this in ln V, contact is stationary: the state then changes by
 #: less than exp(-100) of itself over all the slip there is.
-STATIONARY_LOG_RATIO = 100.0
+STATIONARY_CONTACT_LOG_VELOCITY_RATIO = 100.0
 
 #: Units of ln V that are as long a way as slip of D_c, or inertial time.
-PATH_LOG_RATE_SCALE = 6.0
+LOG_RATE_PER_PATH_LENGTH = 6.0
 #: From where on the square of a slant, and 1 more than that, are the same number.
-STEEP_SLANT = 1e9
+MAX_FINITE_PATH_SLOPE = 1e9
 
 
 # ---- clocks --------------------------------------------------------------------------------------
@@ -69,32 +69,35 @@ def velocity_ratios(log_slip_rate: float, p: Numbers) -> VelocityRatios:
     unit slip may grow like 1/V there, so that its product with the fraction has a limit, whose
     factors would underflow and overflow.
     """
-    least = p[LOG_LOAD_VELOCITY] - STATIONARY_LOG_RATIO
+    least = p[LOG_LOAD_VELOCITY] - STATIONARY_CONTACT_LOG_VELOCITY_RATIO
     x = least if log_slip_rate < least else log_slip_rate
     slower = math.exp(p[LOG_LOAD_VELOCITY] - x)
     return x, slower, 1.0 / (1.0 + slower)
 
 
-def time_per_displacement(ratios: VelocityRatios, p: Numbers) -> float:
+def time_per_displacement(velocity_ratio_values: VelocityRatios, p: Numbers) -> float:
     """Time over slip and load point displacement together, ``1/(V + V_0)``."""
-    x, slower, fraction = ratios
+    x, slower, fraction = velocity_ratio_values
     if p[LOAD_VELOCITY] != 0.0:
         return slower * fraction / abs(p[LOAD_VELOCITY])
     return math.exp(-max(x, STOPPED_LOG_SLIP_RATE))
 
 
-def path_metric(slant: float) -> float:
+def displacement_per_path_length(path_slope: float) -> float:
     """Displacement along a path that is so steep: its square may overflow where slip stops."""
-    if abs(slant) > STEEP_SLANT:
-        return 1.0 / abs(slant)
-    return 1.0 / math.sqrt(1.0 + slant * slant)
+    if abs(path_slope) > MAX_FINITE_PATH_SLOPE:
+        return 1.0 / abs(path_slope)
+    return 1.0 / math.sqrt(1.0 + path_slope * path_slope)
 
 
 # ---- rates between ruptures ----------------------------------------------------------------------
 
 
-def displacement_rate_function(
-    friction_functions: FrictionFunctions, balance: Function, *, allows_reversed_slip: bool
+def build_displacement_rate_function(
+    friction_functions: FrictionFunctions,
+    force_balance_function: Function,
+    *,
+    allows_reversed_slip: bool,
 ) -> Function:
     """``(state, p) -> (df/ds, dPsi/ds, velocity ratios)``.
 
@@ -109,7 +112,7 @@ def displacement_rate_function(
 
     def forward_rates(state: Numbers, p: Numbers) -> tuple[float, Numbers, VelocityRatios]:
         psis = state[1:end]
-        log_slip_rate, _g, shift = balance(state[0], psis, p)
+        log_slip_rate, _g, shift = force_balance_function(state[0], psis, p)
         ratios = velocity_ratios(log_slip_rate, p)
         x, slower, fraction = ratios
         loading = p[STIFFNESS] * (slower - 1.0) * fraction
@@ -125,29 +128,33 @@ def displacement_rate_function(
     return reversible_rates if allows_reversed_slip else forward_rates
 
 
-def rate_functions_between_ruptures(
-    friction_functions: FrictionFunctions, displacement_rates: Function
+def build_rate_functions_between_ruptures(
+    friction_functions: FrictionFunctions, displacement_rate_function: Function
 ) -> tuple[Function, Function, Function]:
     """``(state, p) -> tuple``: derivatives of f and the states against displacement, along the
     path, and along the path with time as a passenger.
     """
     state_sum, times = (
         friction_functions.state_sum,
-        scaling_function(friction_functions.state_count),
+        build_tuple_scaling_function(friction_functions.state_count),
     )
 
     def rates_by_displacement(state: Numbers, p: Numbers) -> Numbers:
-        loading, changes, _ratios = displacement_rates(state, p)
+        loading, changes, _ratios = displacement_rate_function(state, p)
         return (loading, *changes)
 
     def rates_along_path(state: Numbers, p: Numbers) -> Numbers:
-        loading, changes, _ratios = displacement_rates(state, p)
-        along = path_metric((loading - state_sum(changes)) / (PATH_LOG_RATE_SCALE * p[A]))
+        loading, changes, _ratios = displacement_rate_function(state, p)
+        along = displacement_per_path_length(
+            (loading - state_sum(changes)) / (LOG_RATE_PER_PATH_LENGTH * p[A])
+        )
         return (along * loading, *times(changes, along))
 
     def rates_along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
-        loading, changes, ratios = displacement_rates(state, p)
-        along = path_metric((loading - state_sum(changes)) / (PATH_LOG_RATE_SCALE * p[A]))
+        loading, changes, ratios = displacement_rate_function(state, p)
+        along = displacement_per_path_length(
+            (loading - state_sum(changes)) / (LOG_RATE_PER_PATH_LENGTH * p[A])
+        )
         return (along * loading, *times(changes, along), along * time_per_displacement(ratios, p))
 
     return rates_by_displacement, rates_along_path, rates_along_path_with_time
@@ -156,28 +163,28 @@ def rate_functions_between_ruptures(
 # ---- rates in ruptures, and of a rigid slider ----------------------------------------------------
 
 
-def rate_functions_in_rupture(
-    friction_functions: FrictionFunctions, rupture_rate: Function
+def build_rate_functions_in_rupture(
+    friction_functions: FrictionFunctions, rupture_rate_function: Function
 ) -> tuple[Function, Function, Function]:
     """``(state, p) -> tuple``: derivatives of the unknowns f, x, g and the states but the first
     against inertial time, along the path in that and ln V, and so with that time as a passenger.
     """
     end = 2 + friction_functions.state_count
-    times = scaling_function(end)
+    times = build_tuple_scaling_function(end)
 
     def rates_along_path(state: Numbers, p: Numbers) -> Numbers:
-        by = rupture_rate(state, p)
-        return times(by, path_metric(by[1] / PATH_LOG_RATE_SCALE))
+        by = rupture_rate_function(state, p)
+        return times(by, displacement_per_path_length(by[1] / LOG_RATE_PER_PATH_LENGTH))
 
     def rates_along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
-        by = rupture_rate(state[:end], p)
-        along = path_metric(by[1] / PATH_LOG_RATE_SCALE)
+        by = rupture_rate_function(state[:end], p)
+        along = displacement_per_path_length(by[1] / LOG_RATE_PER_PATH_LENGTH)
         return (*times(by, along), along)
 
-    return rupture_rate, rates_along_path, rates_along_path_with_time
+    return rupture_rate_function, rates_along_path, rates_along_path_with_time
 
 
-def rigid_rate_function(friction_functions: FrictionFunctions) -> Function:
+def build_rigid_rate_function(friction_functions: FrictionFunctions) -> Function:
     """``(state, p) -> tuple``: derivatives of g and the states but the first, against slip at the
     ln(V/V_*) that stands last in `p`: ``strength'(g) dg = dPsi``.
     """
@@ -196,7 +203,7 @@ def rigid_rate_function(friction_functions: FrictionFunctions) -> Function:
 # ---- points --------------------------------------------------------------------------------------
 
 
-def point_function(friction_functions: FrictionFunctions) -> Function:
+def build_point_assembling_function(friction_functions: FrictionFunctions) -> Function:
     """``(x, growth, forces, states, changes, shift, p) -> Point`` at x = ln(V/V_*), which grows so:
     of forces, f and its change, g and its change; the states, their changes, and what stress has
     taken from them.
@@ -206,7 +213,7 @@ def point_function(friction_functions: FrictionFunctions) -> Function:
     steady_states, state_sum, counted = (
         friction_functions.steady_states,
         friction_functions.state_sum,
-        friction_functions.distance_indices,
+        friction_functions.indices_of_states_in_distance,
     )
     effective_stress, stress = (
         friction_functions.effective_normal_stress,
@@ -226,7 +233,7 @@ def point_function(friction_functions: FrictionFunctions) -> Function:
         changes: Numbers,
         shift: float,
         p: Numbers,
-    ) -> Point:
+    ) -> MotionPoint:
         f, f_change, g, g_change = forces
         steady = steady_states(x, shift, p)
         psi, distance = state_sum(psis), 0.0
@@ -238,7 +245,7 @@ def point_function(friction_functions: FrictionFunctions) -> Function:
         outside = 1.0 + excess
         outside_change = slope * (g_change + pushed_change) - pressure(changes)
         reading = (p[MU_STAR] + f + pushed) / outside
-        return Point(
+        return MotionPoint(
             x,
             growth,
             f,
@@ -257,8 +264,11 @@ def point_function(friction_functions: FrictionFunctions) -> Function:
     return point_at
 
 
-def point_function_between_ruptures(
-    friction_functions: FrictionFunctions, balance: Function, growth: Function, point_at: Function
+def build_point_function_between_ruptures(
+    friction_functions: FrictionFunctions,
+    force_balance_function: Function,
+    log_slip_rate_growth_function: Function,
+    assemble_point: Function,
 ) -> Function:
     """``(state, rates, p) -> Point`` between ruptures, where ``a dx = strength'(g) dg -
     contribution`` says how g changes.
@@ -269,20 +279,20 @@ def point_function_between_ruptures(
         1 + friction_functions.state_count,
     )
 
-    def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
+    def point(state: Numbers, rates: Numbers, p: Numbers) -> MotionPoint:
         unknowns, changes = state[:end], rates[1:end]
         f, psis = unknowns[0], unknowns[1:]
-        x, g, _shift = balance(f, psis, p)
-        x_change = growth(unknowns, rates[:end], x, g, p)
+        x, g, _shift = force_balance_function(f, psis, p)
+        x_change = log_slip_rate_growth_function(unknowns, rates[:end], x, g, p)
         _value, slope, shift, _shift_slope = strength(g, psis, p)
         g_change = (p[A] * x_change + contribution(changes, g, psis, p)) / slope
-        return point_at(x, x_change, (f, rates[0], g, g_change), psis, changes, shift, p)
+        return assemble_point(x, x_change, (f, rates[0], g, g_change), psis, changes, shift, p)
 
     return point
 
 
-def point_function_in_rupture(
-    friction_functions: FrictionFunctions, point_at: Function
+def build_point_function_in_rupture(
+    friction_functions: FrictionFunctions, assemble_point: Function
 ) -> Function:
     """``(state, rates, p) -> Point`` of the full equations."""
     strength, states_at, end = (
@@ -291,24 +301,26 @@ def point_function_in_rupture(
         2 + friction_functions.state_count,
     )
 
-    def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
+    def point(state: Numbers, rates: Numbers, p: Numbers) -> MotionPoint:
         f, x, g, others = state[0], state[1], state[2], state[3:end]
         value, _slope, shift, _shift_slope = strength(g, others, p)
         psis = states_at(value, x, others, p)
-        return point_at(x, rates[1], (f, rates[0], g, rates[2]), psis, rates[:end], shift, p)
+        return assemble_point(x, rates[1], (f, rates[0], g, rates[2]), psis, rates[:end], shift, p)
 
     return point
 
 
-def rigid_point_function(friction_functions: FrictionFunctions, point_at: Function) -> Function:
+def build_rigid_point_function(
+    friction_functions: FrictionFunctions, assemble_point: Function
+) -> Function:
     """``(state, rates, p) -> Point`` of a rigid slider, whose f is g."""
     strength, states_at = friction_functions.strength, friction_functions.states_from_strength
 
-    def point(state: Numbers, rates: Numbers, p: Numbers) -> Point:
+    def point(state: Numbers, rates: Numbers, p: Numbers) -> MotionPoint:
         g, others, x = state[0], state[1:], p[-1]
         value, _slope, shift, _shift_slope = strength(g, others, p)
         psis = states_at(value, x, others, p)
-        return point_at(x, 0.0, (g, rates[0], g, rates[0]), psis, rates, shift, p)
+        return assemble_point(x, 0.0, (g, rates[0], g, rates[0]), psis, rates, shift, p)
 
     return point
 
@@ -328,9 +340,9 @@ class RegimeFunctions(NamedTuple):
         ``(state, derivatives, p) -> Point``.
     """
 
-    clock_rates: Function
-    path_rates: Function
-    path_rates_with_time: Function
+    rates_against_clock: Function
+    rates_along_path: Function
+    rates_along_path_with_time: Function
     point_function: Function
 
 
@@ -351,35 +363,37 @@ class SceneFunctions(NamedTuple):
         Those of a rigid slider, against slip.
     """
 
-    friction: FrictionFunctions
-    balance_function: Function
-    between_ruptures: RegimeFunctions
-    in_rupture: RegimeFunctions | None
+    friction_functions: FrictionFunctions
+    force_balance_function: Function
+    functions_between_ruptures: RegimeFunctions
+    functions_in_rupture: RegimeFunctions | None
     rigid_rate_function: Function
     rigid_point_function: Function
 
 
 @cache
-def assemble_functions(
-    terms: friction.FrictionTerms,
-    slip_rate: Callable[[FrictionFunctions], tuple[Function, Function]],
-    rupture_rate: Callable[[FrictionFunctions], Function] | None,
+def assemble_scene_functions(
+    friction_terms: friction.FrictionTerms,
+    slip_rate_functions_builder: Callable[[FrictionFunctions], tuple[Function, Function]],
+    rupture_rate_function_builder: Callable[[FrictionFunctions], Function] | None,
 ) -> SceneFunctions:
     """The functions of a combination of parts; the same ones whenever it is asked for."""
-    made = build_friction_functions(terms)
-    balance, growth = slip_rate(made)
-    against = displacement_rate_function(made, balance, allows_reversed_slip=terms.regularised)
-    point_at = point_function(made)
-    point = point_function_between_ruptures(made, balance, growth, point_at)
-    slow, full = RegimeFunctions(*rate_functions_between_ruptures(made, against), point), None
-    if rupture_rate is not None:
-        rates = rate_functions_in_rupture(made, rupture_rate(made))
-        full = RegimeFunctions(*rates, point_function_in_rupture(made, point_at))
-    of_rigid = rigid_rate_function(made), rigid_point_function(made, point_at)
+    made = build_friction_functions(friction_terms)
+    balance, growth = slip_rate_functions_builder(made)
+    against = build_displacement_rate_function(
+        made, balance, allows_reversed_slip=friction_terms.allows_reversed_slip
+    )
+    point_at = build_point_assembling_function(made)
+    point = build_point_function_between_ruptures(made, balance, growth, point_at)
+    slow, full = RegimeFunctions(*build_rate_functions_between_ruptures(made, against), point), None
+    if rupture_rate_function_builder is not None:
+        rates = build_rate_functions_in_rupture(made, rupture_rate_function_builder(made))
+        full = RegimeFunctions(*rates, build_point_function_in_rupture(made, point_at))
+    of_rigid = build_rigid_rate_function(made), build_rigid_point_function(made, point_at)
     return SceneFunctions(made, balance, slow, full, *of_rigid)
 
 
-def excluded_state_indices(scene: SceneView) -> tuple[int, ...]:
+def state_indices_excluded_from_distance(scene: SceneView) -> tuple[int, ...]:
     """Return the indices of states excluded from the distance from steady sliding."""
     law, source = scene.parts.law, scene.pressure_source
     unknowns = enumerate(source.unknowns, start=law.state_count)
@@ -389,23 +403,25 @@ def excluded_state_indices(scene: SceneView) -> tuple[int, ...]:
 def build_scene_functions(scene: SceneView, dynamics: Dynamics | None = None) -> SceneFunctions:
     """The functions of a scene, with other dynamics than its own where some are given."""
     law, stress, source = scene.parts.law, scene.parts.normal_stress, scene.pressure_source
-    of_shear_stress = friction.stress_dependence_effect if law.stress_dependence else None
+    of_shear_stress = friction.shear_stress_effect_on_state if law.stress_dependence else None
     effects = stress.state_effect, law.state_effect, of_shear_stress
     acting = scene.dynamics if dynamics is None else dynamics
     parts = friction.FrictionTerms(
-        state_count=law.state_count,
-        evolutions=law.evolutions or evolutions_from_single_state(law.evolution),
+        law_state_count=law.state_count,
+        evolutions=law.evolutions or wrap_single_state_evolution(law.evolution),
         steady_states=law.steady_states or default_steady_state,
         state_effects=tuple(effect for effect in effects if effect is not None),
-        regularised=law.regularised,
+        allows_reversed_slip=law.regularised,
         normal_stress=stress.normal_stress,
-        unknown_count=len(source.unknowns),
+        auxiliary_unknown_count=len(source.unknowns),
         auxiliary_rates=source.auxiliary_rates,
         auxiliary_steady_states=source.auxiliary_steady_states,
         boundary_pressure_index=-1 - len(scene.parts.fluid.unknowns)
         if scene.parts.loading.has_stress_unknowns
         else 0,
         has_load_point_unknown=scene.parts.loading.has_load_point_unknown,
-        excluded_indices=excluded_state_indices(scene),
+        state_indices_excluded_from_distance=state_indices_excluded_from_distance(scene),
     )
-    return assemble_functions(parts, acting.slip_rate, acting.rupture_rate)
+    return assemble_scene_functions(
+        parts, acting.build_slip_rate_functions, acting.build_rupture_rate_function
+    )

@@ -94,7 +94,7 @@ class SliderParameters(Part):
 STIFFNESS_FIELDS = ("stiffness_ratio", "stiffness")
 
 
-def with_stiffness_default(values: dict[str, Any]) -> dict[str, Any]:
+def with_stiffness_default(field_values: dict[str, Any]) -> dict[str, Any]:
     """Return slider parameters with exactly one field for the stiffness.
 
     Parameters
@@ -112,8 +112,8 @@ def with_stiffness_default(values: dict[str, Any]) -> dict[str, Any]:
     InvalidValue
         If both the stiffness and the stiffness ratio are given.
     """
-    given = [name for name in STIFFNESS_FIELDS if name in values]
+    given = [name for name in STIFFNESS_FIELDS if name in field_values]
     if len(given) == 2:
-        rule = f"give stiffness or stiffness_ratio (here {values['stiffness_ratio']:g}), not both"
-        raise InvalidValue("stiffness", values["stiffness"], rule)
-    return values if given else {**values, "stiffness_ratio": 1.0}
+        rule = f"give stiffness or stiffness_ratio (here {field_values['stiffness_ratio']:g}), not both"
+        raise InvalidValue("stiffness", field_values["stiffness"], rule)
+    return field_values if given else {**field_values, "stiffness_ratio": 1.0}

@@ -33,21 +33,25 @@ from typing import NamedTuple
 import numpy as np
 
 from rsfstudy.slider.caching import cached_per_scene
-from rsfstudy.slider.equations import friction_relation
-from rsfstudy.slider.law_slopes import LawSlopes, Matrix, compute_law_slopes
+from rsfstudy.slider.equations import build_friction_relation
+from rsfstudy.slider.law_slopes import (
+    Matrix,
+    StateEvolutionDerivatives,
+    compute_state_evolution_derivatives,
+)
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding, steady_sliding
 
 #: Critical stiffness over a, and growth per slip in D_c, that rounding leaves where there is none.
 _MIN_CRITICAL_STIFFNESS_OVER_A, _GROWTH_RATE_FLOOR = 1e-12, 1e-9
 #: Rounding error of growth rates, relative to the largest.
-_ROOT_ROUNDING_ERROR = 64.0 * 2.0**-52
+_RELATIVE_ROOT_ROUNDING_ERROR = 64.0 * 2.0**-52
 
 #: Part of the next coefficient below which the one of mass is small, and steps of Newton from the
 #: growth rates without it.
 _SMALL_MASS_RATIO, _NEWTON_STEPS = 1e-6, 2
 
-Polynomial = list[float]
+PolynomialCoefficients = list[float]
 
 
 def critical_stiffness(
@@ -79,16 +83,16 @@ def critical_stiffness(
     steady = steady_sliding(scene, log_slip_rate)
     if steady is None:
         return math.nan
-    around = _linearise(scene, steady, quasi_static=quasi_static)
+    around = _linearise_force_balance(scene, steady, quasi_static=quasi_static)
     crossings = _find_critical_stiffnesses(around, _MIN_CRITICAL_STIFFNESS_OVER_A * scene.a)
     critical = crossings[-1] if crossings else 0.0
     # of one state drained, no perturbation grows beyond the only crossing
     if scene.state_count == 1 or critical == math.inf:
         return critical
-    return math.inf if _is_unstable(around, 2.0 * critical or scene.a) else critical
+    return math.inf if _is_unstable_at_stiffness(around, 2.0 * critical or scene.a) else critical
 
 
-def critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[float]:
+def all_critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[float]:
     """Every stiffness over sigma_*/D_c at which small changes of steady sliding come to grow or to
     decay, or more of them grow, from the smallest up: several states may have more than one.
 
@@ -100,65 +104,90 @@ def critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[float]:
         []
         if steady is None
         else _find_critical_stiffnesses(
-            _linearise(scene, steady), _MIN_CRITICAL_STIFFNESS_OVER_A * scene.a
+            _linearise_force_balance(scene, steady), _MIN_CRITICAL_STIFFNESS_OVER_A * scene.a
         )
     )
 
 
-class _LinearisedBalance(NamedTuple):
+class _LinearisedForceBalance(NamedTuple):
     """Terms that balance a spring around steady sliding: friction above/below, waves and mass."""
 
-    numerator: Polynomial
-    denominator: Polynomial
-    damping: float
+    friction_response_numerator: PolynomialCoefficients
+    friction_response_denominator: PolynomialCoefficients
+    radiation_damping: float
     slip_rate_norm: float
 
 
-def _linearise(
+def _linearise_force_balance(
     scene: SceneView,
-    steady: SteadySliding,
-    slopes: LawSlopes | None = None,
+    steady_state: SteadySliding,
+    evolution_derivatives: StateEvolutionDerivatives | None = None,
     *,
     quasi_static: bool = False,
-) -> _LinearisedBalance:
-    damping = 0.0 if quasi_static else scene.dynamics.radiated_stress_slope(steady.log_slip_rate)
-    norm = 0.0 if quasi_static else scene.dynamics.slip_rate_norm(scene, steady.log_slip_rate)
-    return _LinearisedBalance(*friction_response(scene, steady, slopes), damping, norm)
+) -> _LinearisedForceBalance:
+    damping = (
+        0.0 if quasi_static else scene.dynamics.radiated_stress_slope(steady_state.log_slip_rate)
+    )
+    norm = 0.0 if quasi_static else scene.dynamics.slip_rate_norm(scene, steady_state.log_slip_rate)
+    return _LinearisedForceBalance(
+        *linear_friction_response(scene, steady_state, evolution_derivatives), damping, norm
+    )
 
 
-def _find_critical_stiffnesses(around: _LinearisedBalance, least: float) -> list[float]:
+def _find_critical_stiffnesses(
+    linearised_balance: _LinearisedForceBalance, min_stiffness: float
+) -> list[float]:
     """Stiffnesses above the least at which a growth rate is imaginary, from the smallest up;
     ``math.inf`` for one that mass leaves none for.
     """
     # at p = i omega, as polynomials in omega**2
     (a_even, a_odd), (b_even, b_odd) = (
-        _split_even_odd(around.numerator),
-        _split_even_odd(around.denominator),
+        _split_even_and_odd_powers(linearised_balance.friction_response_numerator),
+        _split_even_and_odd_powers(linearised_balance.friction_response_denominator),
     )
-    size = _add(_multiply(b_even, b_even), [0.0, *_multiply(b_odd, b_odd)])
-    resists = _add(_multiply(a_even, b_even), [0.0, *_multiply(a_odd, b_odd)])
-    turns = _add(_multiply(a_odd, b_even), [-x for x in _multiply(a_even, b_odd)])
+    size = _add_polynomials(
+        _multiply_polynomials(b_even, b_even), [0.0, *_multiply_polynomials(b_odd, b_odd)]
+    )
+    resists = _add_polynomials(
+        _multiply_polynomials(a_even, b_even), [0.0, *_multiply_polynomials(a_odd, b_odd)]
+    )
+    turns = _add_polynomials(
+        _multiply_polynomials(a_odd, b_even), [-x for x in _multiply_polynomials(a_even, b_odd)]
+    )
     crossings = []
-    for squared in _positive_roots(_add(resists, [around.damping * x for x in size])):
-        elastic = squared * _evaluate(turns, squared) / _evaluate(size, squared)
-        inertial = 1.0 - around.slip_rate_norm**2 * squared
+    for squared in _positive_real_roots(
+        _add_polynomials(resists, [linearised_balance.radiation_damping * x for x in size])
+    ):
+        elastic = (
+            squared * _evaluate_polynomial(turns, squared) / _evaluate_polynomial(size, squared)
+        )
+        inertial = 1.0 - linearised_balance.slip_rate_norm**2 * squared
         crossings.append(elastic / inertial if inertial > 0.0 else math.inf)
-    return sorted(stiffness for stiffness in crossings if stiffness > least)
+    return sorted(stiffness for stiffness in crossings if stiffness > min_stiffness)
 
 
-def _compute_growth_rates(around: _LinearisedBalance, stiffness: float) -> np.ndarray:
+def _compute_growth_rates(
+    linearised_balance: _LinearisedForceBalance, stiffness: float
+) -> np.ndarray:
     """Growth rates p at a stiffness, the fastest first."""
-    spring_stress = [stiffness, around.damping, stiffness * around.slip_rate_norm**2]
-    polynomial = _add(_multiply(spring_stress, around.denominator), [0.0, *around.numerator])
+    spring_stress = [
+        stiffness,
+        linearised_balance.radiation_damping,
+        stiffness * linearised_balance.slip_rate_norm**2,
+    ]
+    polynomial = _add_polynomials(
+        _multiply_polynomials(spring_stress, linearised_balance.friction_response_denominator),
+        [0.0, *linearised_balance.friction_response_numerator],
+    )
     light = (
         0.0 < abs(polynomial[-1]) < _SMALL_MASS_RATIO * abs(polynomial[-2])
-        and around.slip_rate_norm > 0.0
+        and linearised_balance.slip_rate_norm > 0.0
     )
-    roots = _roots_with_distant_root(polynomial) if light else np.roots(polynomial[::-1])
+    roots = _find_roots_if_one_is_distant(polynomial) if light else np.roots(polynomial[::-1])
     return np.asarray(roots[np.argsort(-roots.real)])
 
 
-def _roots_with_distant_root(polynomial: Polynomial) -> np.ndarray:
+def _find_roots_if_one_is_distant(polynomial: PolynomialCoefficients) -> np.ndarray:
     """Roots of which a small mass makes one, 1e20 of the others: next to it they would lose digits,
     and are found without it.
     """
@@ -170,13 +199,17 @@ def _roots_with_distant_root(polynomial: Polynomial) -> np.ndarray:
     return roots
 
 
-def _is_unstable(around: _LinearisedBalance, stiffness: float) -> bool:
-    return bool(_compute_growth_rates(around, stiffness)[0].real > _GROWTH_RATE_FLOOR)
+def _is_unstable_at_stiffness(
+    linearised_balance: _LinearisedForceBalance, stiffness: float
+) -> bool:
+    return bool(_compute_growth_rates(linearised_balance, stiffness)[0].real > _GROWTH_RATE_FLOOR)
 
 
-def friction_response(
-    scene: SceneView, steady: SteadySliding, slopes: LawSlopes | None = None
-) -> tuple[Polynomial, Polynomial]:
+def linear_friction_response(
+    scene: SceneView,
+    steady_state: SteadySliding,
+    evolution_derivatives: StateEvolutionDerivatives | None = None,
+) -> tuple[PolynomialCoefficients, PolynomialCoefficients]:
     """Compute the response of friction to small changes of slip in steady sliding.
 
     The response is the rational function ``G(p) = p above(p)/below(p)``. See the module docstring
@@ -199,37 +232,45 @@ def friction_response(
     ----------
     Rice and Ruina (1983), J. Appl. Mech. 50, 343-349.
     """
-    _value, slope, _shift, shift_slope = friction_relation(scene)(steady.frictional_stress)
-    by_rate, by_shift, by_state, _error = slopes or compute_law_slopes(scene, steady)
+    _value, slope, _shift, shift_slope = build_friction_relation(scene)(
+        steady_state.frictional_stress
+    )
+    by_rate, by_shift, by_state, _error = (
+        evolution_derivatives or compute_state_evolution_derivatives(scene, steady_state)
+    )
     by_state = [list(row) for row in by_state]
-    weights, shifting = _state_weights(scene, steady)
+    weights, shifting = _state_weights_in_log_slip_rate(scene, steady_state)
     for row, of_shift in zip(by_state, by_shift, strict=True):
         row[-1] += of_shift * shifting
-    denominator, adjugate = resolvent(by_state)
+    denominator, adjugate = compute_matrix_resolvent(by_state)
     above = [scene.a * x for x in denominator]
     below = [slope * x for x in denominator]
     for power, matrix in enumerate(adjugate):
         for weight, row in zip(weights, matrix, strict=True):
-            above[power] += weight * _dot(row, by_rate)
-            below[power] -= shift_slope * (weight * _dot(row, by_shift))
+            above[power] += weight * _dot_product(row, by_rate)
+            below[power] -= shift_slope * (weight * _dot_product(row, by_shift))
     return above, below
 
 
-def _state_weights(scene: SceneView, steady: SteadySliding) -> tuple[list[float], float]:
+def _state_weights_in_log_slip_rate(
+    scene: SceneView, steady_state: SteadySliding
+) -> tuple[list[float], float]:
     """Change of a ln V by each state, and by how much the last moves the shift."""
     law, fluid = scene.parts.law.state_count, len(scene.parts.fluid.unknowns)
     if not fluid:
         return [1.0] * law, 0.0
-    by_pressure = scene.functions.friction.pressure_derivatives
-    gained, shifted = by_pressure(steady.frictional_stress, steady.psis, scene.friction_numbers)
+    by_pressure = scene.equation_functions.friction_functions.pressure_derivatives
+    gained, shifted = by_pressure(
+        steady_state.frictional_stress, steady_state.states, scene.friction_parameter_values
+    )
     return [*[1.0] * law, *[0.0] * (fluid - 1), -gained], shifted
 
 
-def _dot(first: Sequence[float], second: Sequence[float]) -> float:
+def _dot_product(first: Sequence[float], second: Sequence[float]) -> float:
     return sum(map(mul, first, second))
 
 
-def resolvent(matrix: Matrix) -> tuple[Polynomial, list[Matrix]]:
+def compute_matrix_resolvent(matrix: Matrix) -> tuple[PolynomialCoefficients, list[Matrix]]:
     """Characteristic polynomial of a matrix M, and the adjugate of p - M, whose quotient is the
     inverse of p - M: coefficients from the constant one up (Faddeev and LeVerrier).
     """
@@ -237,7 +278,7 @@ def resolvent(matrix: Matrix) -> tuple[Polynomial, list[Matrix]]:
     coefficients, terms = [1.0], [[[float(i == j) for j in places] for i in places]]
     for order in range(1, len(matrix) + 1):
         columns = list(zip(*terms[0], strict=True))
-        term = [[_dot(row, column) for column in columns] for row in matrix]
+        term = [[_dot_product(row, column) for column in columns] for row in matrix]
         coefficients.insert(0, -sum(term[i][i] for i in places) / order)
         for i in places:
             term[i][i] += coefficients[0]
@@ -245,7 +286,7 @@ def resolvent(matrix: Matrix) -> tuple[Polynomial, list[Matrix]]:
     return coefficients, terms[1:]
 
 
-def growth_rates(scene: SceneView, log_slip_rate: float) -> np.ndarray:
+def linear_growth_rates(scene: SceneView, log_slip_rate: float) -> np.ndarray:
     """Growth rates p of small changes of steady sliding at the stiffness of the scene.
 
     The roots of ``K (1 + w**2 p**2) + eta V p + G(p) = 0`` with w = V T/(2 pi D_c). Small changes
@@ -269,7 +310,8 @@ def growth_rates(scene: SceneView, log_slip_rate: float) -> np.ndarray:
     """
     scene = scene.under_steady_loading
     return _compute_growth_rates(
-        _linearise(scene, _require_steady_sliding(scene, log_slip_rate)), scene.stiffness
+        _linearise_force_balance(scene, _require_steady_sliding(scene, log_slip_rate)),
+        scene.stiffness,
     )
 
 
@@ -293,13 +335,13 @@ class GrowthRate(NamedTuple):
         return self.value > self.error
 
     @property
-    def is_undecided(self) -> bool:
+    def is_zero_within_error(self) -> bool:
         """True if the growth rate is zero within its error estimate."""
         return abs(self.value) <= self.error
 
 
 @cached_per_scene
-def largest_growth_rate(scene: SceneView, log_slip_rate: float) -> GrowthRate | None:
+def largest_linear_growth_rate(scene: SceneView, log_slip_rate: float) -> GrowthRate | None:
     """Compute the largest growth rate of small perturbations of steady sliding.
 
     The growth rate is computed at the stiffness of the scene. Its error estimate includes the
@@ -320,12 +362,14 @@ def largest_growth_rate(scene: SceneView, log_slip_rate: float) -> GrowthRate | 
     steady = steady_sliding(scene, log_slip_rate)
     if steady is None:
         return None
-    slopes = compute_law_slopes(scene, steady)
+    slopes = compute_state_evolution_derivatives(scene, steady)
     error = slopes.relative_error
 
     def perturbed_growth_rates(part: float) -> np.ndarray:
         changed = slopes.with_relative_change(part)
-        return _compute_growth_rates(_linearise(scene, steady, changed), scene.stiffness)
+        return _compute_growth_rates(
+            _linearise_force_balance(scene, steady, changed), scene.stiffness
+        )
 
     found = perturbed_growth_rates(0.0)
     changes = [
@@ -333,11 +377,13 @@ def largest_growth_rate(scene: SceneView, log_slip_rate: float) -> GrowthRate | 
     ]
     # the root that a small mass sends far off is found apart from the others
     sizes = np.sort(np.abs(found))[: -1 if scene.has_mass else None]
-    rounding = _ROOT_ROUNDING_ERROR * float(sizes.max(initial=0.0))
+    rounding = _RELATIVE_ROOT_ROUNDING_ERROR * float(sizes.max(initial=0.0))
     return GrowthRate(float(found[0].real), float(max(changes)) + rounding + _GROWTH_RATE_FLOOR)
 
 
-def response_to_normal_stress(scene: SceneView, log_slip_rate: float, frequency: float) -> complex:
+def spring_response_to_normal_stress(
+    scene: SceneView, log_slip_rate: float, angular_frequency: float
+) -> complex:
     """Spring stress over imposed normal stress in small oscillations around steady sliding, of a
     scene whose loading goes on changing that.
 
@@ -360,20 +406,28 @@ def response_to_normal_stress(scene: SceneView, log_slip_rate: float, frequency:
     """
     still = scene.under_steady_loading
     steady = _require_steady_sliding(still, log_slip_rate)
-    psis = (*steady.psis, *(0.0 for _unknown in scene.pressure_source.unknowns))
-    by_pressure, p = scene.functions.friction.pressure_derivatives, scene.friction_numbers
+    psis = (*steady.states, *(0.0 for _unknown in scene.pressure_source.unknowns))
+    by_pressure, p = (
+        scene.equation_functions.friction_functions.pressure_derivatives,
+        scene.friction_parameter_values,
+    )
     gained, shifted = by_pressure(steady.frictional_stress, psis, p)
-    _by_rate, by_shift, by_state, _error = compute_law_slopes(still, steady)
-    denominator, adjugate = resolvent(by_state)
+    _by_rate, by_shift, by_state, _error = compute_state_evolution_derivatives(still, steady)
+    denominator, adjugate = compute_matrix_resolvent(by_state)
     forced = [gained * x for x in denominator]
     for power, matrix in enumerate(adjugate):
-        forced[power] -= shifted * math.fsum(_dot(row, by_shift) for row in matrix)
-    around, stiffness = _linearise(still, steady), scene.stiffness
-    spring_stress = [stiffness, around.damping, stiffness * around.slip_rate_norm**2]
-    at = 1j * frequency * math.exp(-log_slip_rate)
+        forced[power] -= shifted * math.fsum(_dot_product(row, by_shift) for row in matrix)
+    around, stiffness = _linearise_force_balance(still, steady), scene.stiffness
+    spring_stress = [stiffness, around.radiation_damping, stiffness * around.slip_rate_norm**2]
+    at = 1j * angular_frequency * math.exp(-log_slip_rate)
     left, above, below, balance = (
         complex(np.polyval(polynomial[::-1], at))
-        for polynomial in (forced, around.numerator, around.denominator, spring_stress)
+        for polynomial in (
+            forced,
+            around.friction_response_numerator,
+            around.friction_response_denominator,
+            spring_stress,
+        )
     )
     return stiffness * left / (balance * below + at * above)
 
@@ -386,14 +440,18 @@ def _require_steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySli
     return steady
 
 
-def _split_even_odd(polynomial: Polynomial) -> tuple[Polynomial, Polynomial]:
+def _split_even_and_odd_powers(
+    polynomial: PolynomialCoefficients,
+) -> tuple[PolynomialCoefficients, PolynomialCoefficients]:
     """Real part, and imaginary part over omega, of a polynomial at i omega, in omega**2."""
     even = [x * (-1.0) ** n for n, x in enumerate(polynomial[0::2])]
     odd = [x * (-1.0) ** n for n, x in enumerate(polynomial[1::2])]
     return even, odd
 
 
-def _multiply(first: Polynomial, second: Polynomial) -> Polynomial:
+def _multiply_polynomials(
+    first: PolynomialCoefficients, second: PolynomialCoefficients
+) -> PolynomialCoefficients:
     product = [0.0] * (len(first) + len(second) - 1)
     for i, x in enumerate(first):
         for j, y in enumerate(second):
@@ -401,15 +459,17 @@ def _multiply(first: Polynomial, second: Polynomial) -> Polynomial:
     return product
 
 
-def _add(first: Polynomial, second: Polynomial) -> Polynomial:
+def _add_polynomials(
+    first: PolynomialCoefficients, second: PolynomialCoefficients
+) -> PolynomialCoefficients:
     return [x + y for x, y in zip_longest(first, second, fillvalue=0.0)]
 
 
-def _evaluate(polynomial: Polynomial, at: float) -> float:
-    return math.fsum([x * at**n for n, x in enumerate(polynomial)])
+def _evaluate_polynomial(polynomial: PolynomialCoefficients, argument: float) -> float:
+    return math.fsum([x * argument**n for n, x in enumerate(polynomial)])
 
 
-def _positive_roots(polynomial: Polynomial) -> list[float]:
+def _positive_real_roots(polynomial: PolynomialCoefficients) -> list[float]:
     while polynomial and polynomial[-1] == 0.0:
         polynomial = polynomial[:-1]
     if len(polynomial) == 2:

@@ -23,7 +23,7 @@ _CHECKED_LOG_SLIP_RATES, _REST_TOLERANCE = (0.0, -0.5, 0.5), 1e-6
 
 
 @cache
-def evolutions_from_single_state(evolution: Function) -> Function:
+def wrap_single_state_evolution(single_state_evolution: Function) -> Function:
     r"""Return the function ``evolutions`` of a law with one state.
 
     Parameters
@@ -41,12 +41,12 @@ def evolutions_from_single_state(evolution: Function) -> Function:
     def evolutions(
         log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
     ) -> Numbers:
-        return (fraction * evolution(log_slip_rate, psis[0] - shift, p),)
+        return (fraction * single_state_evolution(log_slip_rate, psis[0] - shift, p),)
 
     return evolutions
 
 
-def default_steady_state(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
+def default_steady_state(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
     r"""Compute the default steady state of laws with one state.
 
     Parameters
@@ -63,11 +63,11 @@ def default_steady_state(log_slip_rate: float, shift: float, p: Numbers) -> Numb
     tuple of float
         State :math:`\Psi`. In steady sliding, :math:`\Theta = -b \ln(V/V_*)`.
     """
-    return (shift - p[B] * log_slip_rate,)
+    return (state_shift - p[B] * log_slip_rate,)
 
 
-def with_auxiliary_evolutions(
-    evolutions: Function, auxiliary: Function, law_state_count: int
+def append_auxiliary_evolutions(
+    law_evolutions: Function, auxiliary_rates: Function, law_state_count: int
 ) -> Function:
     """Append the rates of unknowns to the rates of the states of the law.
 
@@ -90,14 +90,16 @@ def with_auxiliary_evolutions(
         log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
     ) -> Numbers:
         return (
-            *evolutions(log_slip_rate, psis[:law_state_count], shift, fraction, p),
-            *auxiliary(log_slip_rate, psis[law_state_count:], fraction, p),
+            *law_evolutions(log_slip_rate, psis[:law_state_count], shift, fraction, p),
+            *auxiliary_rates(log_slip_rate, psis[law_state_count:], fraction, p),
         )
 
     return all_evolutions
 
 
-def with_auxiliary_steady_states(steady_states: Function, auxiliary: Function) -> Function:
+def append_auxiliary_steady_states(
+    law_steady_states: Function, auxiliary_steady_states: Function
+) -> Function:
     """Append the steady unknowns to the steady states of the law.
 
     Parameters
@@ -114,13 +116,16 @@ def with_auxiliary_steady_states(steady_states: Function, auxiliary: Function) -
     """
 
     def all_steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
-        return (*steady_states(log_slip_rate, shift, p), *auxiliary(log_slip_rate, p))
+        return (
+            *law_steady_states(log_slip_rate, shift, p),
+            *auxiliary_steady_states(log_slip_rate, p),
+        )
 
     return all_steady_states
 
 
 @cache
-def sum_function(count: int) -> Function:
+def build_sum_function(term_count: int) -> Function:
     """Return a function that sums the first elements of a tuple.
 
     Parameters
@@ -133,11 +138,11 @@ def sum_function(count: int) -> Function:
     callable
         Function ``(numbers) -> float``.
     """
-    return _function_from_expression("numbers", _sum_expression("numbers", count))
+    return _evaluate_lambda_source("numbers", _sum_source_text("numbers", term_count))
 
 
 @cache
-def scaling_function(count: int) -> Function:
+def build_tuple_scaling_function(component_count: int) -> Function:
     """Return a function that scales the first elements of a tuple.
 
     Parameters
@@ -150,12 +155,12 @@ def scaling_function(count: int) -> Function:
     callable
         Function ``(numbers, by) -> tuple`` that multiplies each element by ``by``.
     """
-    each = (f"by * numbers[{i}], " for i in range(count))
-    return _function_from_expression("numbers, by", f"({''.join(each)})")
+    each = (f"by * numbers[{i}], " for i in range(component_count))
+    return _evaluate_lambda_source("numbers, by", f"({''.join(each)})")
 
 
 @cache
-def state_step_function(count: int) -> Function:
+def build_state_step_function(state_count: int) -> Function:
     """Return a function that advances the states by a step.
 
     Parameters
@@ -169,25 +174,27 @@ def state_step_function(count: int) -> Function:
         Function ``(psis, changes, by) -> tuple`` that returns ``psis + by * changes`` for each
         state.
     """
-    each = (f"psis[{i}] + by * changes[{i}], " for i in range(count))
-    return _function_from_expression("psis, changes, by", f"({''.join(each)})")
+    each = (f"psis[{i}] + by * changes[{i}], " for i in range(state_count))
+    return _evaluate_lambda_source("psis, changes, by", f"({''.join(each)})")
 
 
-def _sum_expression(numbers: str, count: int) -> str:
+def _sum_source_text(tuple_name: str, term_count: int) -> str:
     """Return the source code of a sum of the first elements of a tuple."""
-    return " + ".join(f"{numbers}[{i}]" for i in range(count))
+    return " + ".join(f"{tuple_name}[{i}]" for i in range(term_count))
 
 
-def _function_from_expression(arguments: str, value: str) -> Function:
+def _evaluate_lambda_source(argument_names: str, expression: str) -> Function:
     """Create a function from the source code of its arguments and value.
 
     The code has no loop, because the compiler cannot iterate over tuples.
     """
-    function: Function = eval(f"lambda {arguments}: {value}", {"__name__": __name__})
+    function: Function = eval(f"lambda {argument_names}: {expression}", {"__name__": __name__})
     return function
 
 
-def state_contribution_function(count: int, pressure_derivatives: Function | None) -> Function:
+def build_state_contribution_function(
+    law_state_count: int, pressure_derivatives: Function | None
+) -> Function:
     r"""Return a function for the contribution of the states to the slip rate.
 
     Parameters
@@ -205,8 +212,10 @@ def state_contribution_function(count: int, pressure_derivatives: Function | Non
         due to changes of the states.
     """
     if pressure_derivatives is None:
-        return _function_from_expression("changes, g, psis, p", _sum_expression("changes", count))
-    state_sum = sum_function(count)
+        return _evaluate_lambda_source(
+            "changes, g, psis, p", _sum_source_text("changes", law_state_count)
+        )
+    state_sum = build_sum_function(law_state_count)
 
     def contribution_with_pressure(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
         return state_sum(changes) - pressure_derivatives(g, psis, p)[0] * changes[-1]
@@ -214,7 +223,7 @@ def state_contribution_function(count: int, pressure_derivatives: Function | Non
     return contribution_with_pressure
 
 
-def states_from_strength_function(count: int) -> Function:
+def build_states_from_strength_function(law_state_count: int) -> Function:
     """Return a function that computes the first state from the strength.
 
     Parameters
@@ -228,7 +237,7 @@ def states_from_strength_function(count: int) -> Function:
         Function ``(strength, log_slip_rate, others, p) -> tuple`` that returns all states. The
         argument ``others`` contains all states except the first.
     """
-    if count == 1:
+    if law_state_count == 1:
 
         def single_law_state(
             strength: float, log_slip_rate: float, others: Numbers, p: Numbers
@@ -237,7 +246,7 @@ def states_from_strength_function(count: int) -> Function:
 
         return single_law_state
 
-    sum_of_others = sum_function(count - 1)
+    sum_of_others = build_sum_function(law_state_count - 1)
 
     def several_law_states(
         strength: float, log_slip_rate: float, others: Numbers, p: Numbers
@@ -264,8 +273,8 @@ def check_steady_states(scene: SceneView) -> None:
     InvalidValue
         If the law violates one of the conditions.
     """
-    law, p, still = scene.parts.law, scene.numbers, _REST_TOLERANCE * scene.a
-    evolutions = law.evolutions or evolutions_from_single_state(law.evolution)
+    law, p, still = scene.parts.law, scene.parameter_values, _REST_TOLERANCE * scene.a
+    evolutions = law.evolutions or wrap_single_state_evolution(law.evolution)
     for rate in _CHECKED_LOG_SLIP_RATES:
         psis = (law.steady_states or default_steady_state)(rate, 0.0, p)
         change = max(map(abs, evolutions(rate, psis, 0.0, 1.0, p)))
@@ -284,16 +293,16 @@ def check_steady_states(scene: SceneView) -> None:
 
 
 def _evolution_jacobian(
-    evolutions: Function, rate: float, psis: Numbers, size: float, p: Numbers
+    evolutions: Function, log_slip_rate: float, states: Numbers, state_scale: float, p: Numbers
 ) -> list[list[float]]:
     """Compute the Jacobian matrix of the evolution by central differences.
 
     The step is 1e-4 times ``size``.
     """
-    step, rows = 1e-4 * size, list[list[float]]()
-    for n, psi in enumerate(psis):
+    step, rows = 1e-4 * state_scale, list[list[float]]()
+    for n, psi in enumerate(states):
         ahead, behind = (
-            evolutions(rate, (*psis[:n], psi + off, *psis[n + 1 :]), 0.0, 1.0, p)
+            evolutions(log_slip_rate, (*states[:n], psi + off, *states[n + 1 :]), 0.0, 1.0, p)
             for off in (step, -step)
         )
         rows.append([(x - y) / (2.0 * step) for x, y in zip(ahead, behind, strict=True)])

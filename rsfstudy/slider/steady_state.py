@@ -17,12 +17,12 @@ from dataclasses import dataclass
 from scipy.optimize import brentq
 
 from rsfstudy.slider.caching import cached_per_scene
-from rsfstudy.slider.equations import compute_steady_states, friction_relation
+from rsfstudy.slider.equations import build_friction_relation, compute_steady_states
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 
 #: Deviation of frictional stress, over sigma_*, beyond which none counts as steady.
-_MAX_STEADY_STRESS = 1e9
+_MAX_STEADY_FRICTIONAL_STRESS = 1e9
 #: ln(V/V_*) below which steady sliding is not followed.
 _MIN_LOG_SLIP_RATE = -1e6
 
@@ -43,7 +43,7 @@ class SteadySliding:
     log_slip_rate: float
     frictional_stress: float
     spring_stress: float
-    psis: Numbers
+    states: Numbers
 
 
 @cached_per_scene
@@ -60,17 +60,19 @@ def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | No
     log_slip_rate : float
         ln(V/V_*).
     """
-    friction = stress_for_friction(scene, steady_friction_excess(scene, log_slip_rate))
+    friction = frictional_stress_for_friction(
+        scene, steady_friction_minus_reference(scene, log_slip_rate)
+    )
     if friction is None:
         return None
     spring_stress = friction + scene.dynamics.radiated_stress(log_slip_rate)
-    shift = friction_relation(scene)(friction)[2]
+    shift = build_friction_relation(scene)(friction)[2]
     return SteadySliding(
         log_slip_rate, friction, spring_stress, compute_steady_states(scene, log_slip_rate, shift)
     )
 
 
-def steady_friction_excess(scene: SceneView, log_slip_rate: float) -> float:
+def steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> float:
     """Steady friction coefficient at a slip rate, less mu_*.
 
     ``mu_ss - mu_* = (a - b) ln(V/V_*)`` by most laws.
@@ -85,11 +87,15 @@ def steady_friction_excess(scene: SceneView, log_slip_rate: float) -> float:
     ----------
     Ruina (1983), J. Geophys. Res. 88, 10359-10370.
     """
-    psi = scene.functions.friction.state_sum(compute_steady_states(scene, log_slip_rate, 0.0))
+    psi = scene.equation_functions.friction_functions.state_sum(
+        compute_steady_states(scene, log_slip_rate, 0.0)
+    )
     return float(scene.a * log_slip_rate + psi)
 
 
-def stress_for_friction(scene: SceneView, excess: float) -> float | None:
+def frictional_stress_for_friction(
+    scene: SceneView, friction_minus_reference: float
+) -> float | None:
     """Deviation of frictional stress from tau_*, over sigma_*, at which the friction coefficient is
     mu_* + `excess`; None where it never is.
 
@@ -103,16 +109,20 @@ def stress_for_friction(scene: SceneView, excess: float) -> float | None:
     excess : float
         Friction coefficient less mu_*.
     """
-    relation = friction_relation(scene)
+    relation = build_friction_relation(scene)
 
     def residual(friction: float) -> float:
         value, _slope, shift, _shift_slope = relation(friction)
-        return value - shift - excess
+        return value - shift - friction_minus_reference
 
-    return _find_root(residual, excess, _min_frictional_stress(scene))
+    return _find_root_of_increasing_function(
+        residual, friction_minus_reference, _min_frictional_stress(scene)
+    )
 
 
-def stress_after_jump(scene: SceneView, excess: float, psis: Numbers = ()) -> float | None:
+def frictional_stress_after_jump(
+    scene: SceneView, strength: float, states: Numbers = ()
+) -> float | None:
     """Deviation of frictional stress from tau_*, over sigma_*, just after a sudden change; None
     where there is none.
 
@@ -127,9 +137,9 @@ def stress_after_jump(scene: SceneView, excess: float, psis: Numbers = ()) -> fl
     psis : tuple of float, optional
         States freed of stress, by which pore pressure is told; else that of steady sliding.
     """
-    relation = friction_relation(scene, psis)
-    return _find_root(
-        lambda friction: relation(friction)[0] - excess, excess, _min_frictional_stress(scene)
+    relation = build_friction_relation(scene, states)
+    return _find_root_of_increasing_function(
+        lambda friction: relation(friction)[0] - strength, strength, _min_frictional_stress(scene)
     )
 
 
@@ -140,31 +150,33 @@ def _min_frictional_stress(scene: SceneView) -> float:
     return max(weakest, -scene.mu_star) if scene.parts.law.regularised else weakest
 
 
-def _find_root(missing: Callable[[float], float], near: float, lowest: float) -> float | None:
+def _find_root_of_increasing_function(
+    increasing_function: Callable[[float], float], initial_guess: float, lower_bound: float
+) -> float | None:
     """Zero of a growing function, above `lowest`; None where there is none."""
-    low = near if near > lowest else 0.5 * lowest
+    low = initial_guess if initial_guess > lower_bound else 0.5 * lower_bound
     high, stride = low, 1e-3 + abs(low)
-    at = missing(low)
+    at = increasing_function(low)
     if at == 0.0:
         return float(low)
     while at > 0.0:
         high = low
         low = (
-            max(low - stride, lowest + 0.5 * (low - lowest))
-            if math.isfinite(lowest)
+            max(low - stride, lower_bound + 0.5 * (low - lower_bound))
+            if math.isfinite(lower_bound)
             else (low - stride)
         )
         stride *= 2.0
-        if stride > _MAX_STEADY_STRESS or low == high:
+        if stride > _MAX_STEADY_FRICTIONAL_STRESS or low == high:
             return None
-        at = missing(low)
+        at = increasing_function(low)
     if high == low:
-        while missing(high) <= 0.0:
-            if high > _MAX_STEADY_STRESS:
+        while increasing_function(high) <= 0.0:
+            if high > _MAX_STEADY_FRICTIONAL_STRESS:
                 return None
             low, high = high, high + stride
             stride *= 2.0
-    return float(brentq(missing, low, high, xtol=1e-22, rtol=8.9e-16, maxiter=500))
+    return float(brentq(increasing_function, low, high, xtol=1e-22, rtol=8.9e-16, maxiter=500))
 
 
 def min_steady_log_slip_rate(scene: SceneView) -> float:
@@ -174,17 +186,21 @@ def min_steady_log_slip_rate(scene: SceneView) -> float:
     Of a driving stress at the angle phi, without an effect of normal stress on the law, it is where
     ``mu_ss = tan(phi)``, eq. 9 of doi:10.1007/s11589-014-0098-4.
     """
-    value, _slope, shift, _shift_slope = friction_relation(scene)(_MAX_STEADY_STRESS)
+    value, _slope, shift, _shift_slope = build_friction_relation(scene)(
+        _MAX_STEADY_FRICTIONAL_STRESS
+    )
     strongest = value - shift
     if strongest > 1e6:
         return -math.inf
     if scene.parts.law.steady_states is None:
         return strongest / (scene.a - scene.b) if scene.b > scene.a else -math.inf
     slower = -1.0
-    while steady_friction_excess(scene, slower) <= strongest:
+    while steady_friction_minus_reference(scene, slower) <= strongest:
         slower *= 2.0
         if slower < _MIN_LOG_SLIP_RATE:
             return -math.inf
     return float(
-        brentq(lambda x: steady_friction_excess(scene, x) - strongest, slower, 0.0, xtol=1e-12)
+        brentq(
+            lambda x: steady_friction_minus_reference(scene, x) - strongest, slower, 0.0, xtol=1e-12
+        )
     )

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import DataError, shorten
+from rsfstudy.errors import DataError, shorten_text
 
 #: Attributes that must be texts, and the most characters of each.
-_MAX_TEXT_LENGTHS = {
+_MAX_CHARACTERS_OF_TEXT_ATTRIBUTES = {
     "long_name": 2000,
     "units": 200,
     "scale": 200,
@@ -23,10 +23,10 @@ _MAX_TEXT_LENGTHS = {
     "comment": 100_000,
     "loading": 200,
 }
-_REMEDY = "Correct it with xarray, or run the study again."
+_INVALID_ATTRIBUTE_REMEDY = "Correct it with xarray, or run the study again."
 
 
-def check_attributes(dataset: xr.Dataset) -> None:
+def check_variable_attributes(dataset: xr.Dataset) -> None:
     """Check the type and length of the attributes that rsfstudy uses.
 
     Raises
@@ -36,9 +36,9 @@ def check_attributes(dataset: xr.Dataset) -> None:
         not match.
     """
     for name, values in dataset.variables.items():
-        for key, most in _MAX_TEXT_LENGTHS.items():
+        for key, most in _MAX_CHARACTERS_OF_TEXT_ATTRIBUTES.items():
             if key in values.attrs:
-                _check_text(f"{shorten(name)}.{key}", values.attrs[key], most)
+                _check_text_attribute(f"{shorten_text(name)}.{key}", values.attrs[key], most)
         _check_flags(str(name), values.attrs)
 
 
@@ -53,23 +53,29 @@ def check_motion_variables(dataset: xr.Dataset) -> None:
     along = dataset["slip"].dims if "slip" in dataset.variables else ()
     for name, values in dataset.variables.items():
         if along and values.dims == along and values.dtype.kind not in "fiub":
-            raise DataError(f"{shorten(name)} is {values.dtype}, and must be numbers. {_REMEDY}")
+            raise DataError(
+                f"{shorten_text(name)} is {values.dtype}, and must be numbers. {_INVALID_ATTRIBUTE_REMEDY}"
+            )
 
 
-def _check_text(path: str, value: object, most: int) -> None:
+def _check_text_attribute(attribute_path: str, value: object, max_characters: int) -> None:
     if not isinstance(value, str):
-        raise DataError(f"{path} is {shorten(value)}, and must be a text. {_REMEDY}")
-    if len(value) > most:
-        raise DataError(f"{path} has {len(value):,} characters, at most {most:,}. {_REMEDY}")
+        raise DataError(
+            f"{attribute_path} is {shorten_text(value)}, and must be a text. {_INVALID_ATTRIBUTE_REMEDY}"
+        )
+    if len(value) > max_characters:
+        raise DataError(
+            f"{attribute_path} has {len(value):,} characters, at most {max_characters:,}. {_INVALID_ATTRIBUTE_REMEDY}"
+        )
 
 
-def _check_flags(name: str, attributes: Mapping[Any, Any]) -> None:
+def _check_flags(variable_name: str, attributes: Mapping[Any, Any]) -> None:
     if not {"flag_values", "flag_meanings"} & set(attributes):
         return
     values = np.ravel(attributes.get("flag_values", ()))
     meanings = str(attributes.get("flag_meanings", "")).split()
     if values.dtype.kind not in "iuf" or len(values) != len(meanings):
         raise DataError(
-            f"{shorten(name)}.flag_values must be numbers, one for each of the {len(meanings)} "
-            f"flag_meanings (got {shorten(values.tolist())}). {_REMEDY}"
+            f"{shorten_text(variable_name)}.flag_values must be numbers, one for each of the {len(meanings)} "
+            f"flag_meanings (got {shorten_text(values.tolist())}). {_INVALID_ATTRIBUTE_REMEDY}"
         )

@@ -13,26 +13,27 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from rsfstudy._deprecation import renamed_members
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import format_list
 from rsfstudy.status import STATUS_LABELS, Status
-from rsfstudy.storage.journal import find_differences
+from rsfstudy.storage.journal import find_fingerprint_differences
 from rsfstudy.storage.rebuild import find_primary_output
-from rsfstudy.storage.schema import is_single_scene, read_provenance
+from rsfstudy.storage.schema import is_of_single_scene, read_provenance
 from rsfstudy.vocabulary import TIMING_VARIABLES
 
 _AGREEMENT_COLUMNS = ["variable", "values", "identical", "largest_difference", "beyond_errors"]
 #: Of a fingerprint, what the declaration states too.
-_DECLARED_FINGERPRINT_KEYS = {"study", "measure", "rtol", "budget", "methods", "engine"}
+_FINGERPRINT_KEYS_ALSO_DECLARED = {"study", "measure", "rtol", "budget", "methods", "engine"}
 
-ValuePair = tuple[Any, Any]
+FirstAndSecondValue = tuple[Any, Any]
 
 
 # ---- one lattice --------------------------------------------------------------------------------
 
 
-def compare_same_lattice(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
+def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
     """Agreement of two datasets of one study, variable by variable, in the cells that both have.
 
     Returns
@@ -43,20 +44,20 @@ def compare_same_lattice(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
         ``attrs["differs"]`` what decides a number and differs between them. Measured times, which
         no two runs share, are left out.
     """
-    if is_single_scene(theirs):
-        return _compare_motions(theirs, ours)
-    both = _finished_cells(theirs) & _finished_cells(ours)
+    if is_of_single_scene(first):
+        return _compare_motions(first, second)
+    both = _finished_cell_mask(first) & _finished_cell_mask(second)
     rows = []
-    for name, values in theirs.data_vars.items():
+    for name, values in first.data_vars.items():
         if name in TIMING_VARIABLES:
             continue
         if set(both.dims) <= set(values.dims):
             known = both.broadcast_like(values).transpose(*values.dims).values
-            rows.append(_variable_agreement(name, theirs, ours, known))
+            rows.append(_variable_agreement(name, first, second, known))
         elif bool(both.all()):  # else it may be reduced from cells missing in one of them
-            rows.append(_variable_agreement(name, theirs, ours))
+            rows.append(_variable_agreement(name, first, second))
     return _agreement_table(
-        rows, *(read_provenance(dataset)["fingerprint"] for dataset in (theirs, ours))
+        rows, *(read_provenance(dataset)["fingerprint"] for dataset in (first, second))
     )
 
 
@@ -72,37 +73,37 @@ def _compare_motions(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
 
 
 def _agreement_table(
-    rows: Sequence[dict[str, Any]], theirs: Mapping[str, Any], ours: Mapping[str, Any]
+    variable_rows: Sequence[dict[str, Any]], first: Mapping[str, Any], second: Mapping[str, Any]
 ) -> pd.DataFrame:
-    frame = pd.DataFrame(rows, columns=_AGREEMENT_COLUMNS)
-    frame.attrs["differs"] = find_differences(theirs, ours)
+    frame = pd.DataFrame(variable_rows, columns=_AGREEMENT_COLUMNS)
+    frame.attrs["differs"] = find_fingerprint_differences(first, second)
     return frame
 
 
-def _finished_cells(dataset: xr.Dataset) -> xr.DataArray:
+def _finished_cell_mask(dataset: xr.Dataset) -> xr.DataArray:
     return dataset["status"] != int(Status.PENDING)
 
 
 def _variable_agreement(
-    name: Hashable, theirs: xr.Dataset, ours: xr.Dataset, known: Any = ...
+    variable_name: Hashable, first: xr.Dataset, second: xr.Dataset, common_cell_mask: Any = ...
 ) -> dict[str, Any]:
     """Agreement of a variable where it is known to both. Variables agree nowhere that differ in
     shape, or of which one alone holds real numbers.
     """
-    a, b = theirs[name], ours.get(name)
-    found: dict[str, Any] = {"variable": name, "values": a.size, "identical": 0}
+    a, b = first[variable_name], second.get(variable_name)
+    found: dict[str, Any] = {"variable": variable_name, "values": a.size, "identical": 0}
     if b is None or a.shape != b.shape or (a.dtype.kind == "f") != (b.dtype.kind == "f"):
         return found
-    x, y = a.values[known], b.values[known]
+    x, y = a.values[common_cell_mask], b.values[common_cell_mask]
     if a.dtype.kind != "f":
         return found | {"values": x.size, "identical": int(np.sum(x == y))}
     gap = np.abs(x - y)
     same = (x == y) | (np.isnan(x) & np.isnan(y))
     found |= {"values": x.size, "identical": int(same.sum())}
     found["largest_difference"] = float(np.max(gap[~same], initial=0.0))
-    errors = [d[f"{name}_error"] for d in (theirs, ours) if f"{name}_error" in d]
+    errors = [d[f"{variable_name}_error"] for d in (first, second) if f"{variable_name}_error" in d]
     if [error.shape for error in errors] == [a.shape, a.shape]:
-        allowed = errors[0].values[known] + errors[1].values[known]
+        allowed = errors[0].values[common_cell_mask] + errors[1].values[common_cell_mask]
         # a number that one of them lacks, or whose error is unknown, is beyond any estimate
         found["beyond_errors"] = int((~same & ~(gap <= allowed)).sum())
     elif "flag_values" in a.attrs:  # codes have no errors
@@ -113,6 +114,7 @@ def _variable_agreement(
 # ---- side by side -------------------------------------------------------------------------------
 
 
+@renamed_members
 @guard_methods
 @dataclass(frozen=True)
 class Comparison:
@@ -140,25 +142,25 @@ class Comparison:
         Variables that are not compared, and why.
     """
 
-    declaration: Mapping[str, ValuePair]
-    origin: Mapping[str, ValuePair]
-    points: Mapping[str, tuple[list[Any], list[Any]]]
-    cells: tuple[int, int, int]
+    declaration: Mapping[str, FirstAndSecondValue]
+    origin: Mapping[str, FirstAndSecondValue]
+    differing_axis_points: Mapping[str, tuple[list[Any], list[Any]]]
+    finished_cell_counts: tuple[int, int, int]
     statuses: pd.DataFrame
-    numbers: pd.DataFrame
-    left_out: Mapping[str, str]
+    agreement_table: pd.DataFrame
+    uncompared_variables: Mapping[str, str]
 
     @property
     def beyond_errors(self) -> list[str]:
         """Variables with numbers that differ by more than both error estimates allow."""
-        return list(self.numbers["variable"][self.numbers["beyond_errors"] > 0])
+        return list(self.agreement_table["variable"][self.agreement_table["beyond_errors"] > 0])
 
     @property
     def agrees(self) -> bool:
         """True where both have cells in common, which ended alike, with the same numbers within
         their error estimates.
         """
-        return self.cells[0] > 0 and self.statuses.empty and not self.beyond_errors
+        return self.finished_cell_counts[0] > 0 and self.statuses.empty and not self.beyond_errors
 
 
 def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
@@ -170,35 +172,39 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
         Where an axis of one has no counterpart in the other, not even a fixed value; and where its
         points have the same names in both and hold other values, as samples drawn anew do.
     """
-    both = [_with_axes_of(one, other) for one, other in ((first, second), (second, first))]
+    both = [
+        _add_axes_of_other_dataset(one, other) for one, other in ((first, second), (second, first))
+    ]
     dims = [str(d) for d in both[0]["status"].dims]
     labelled = [dataset.assign_coords(_alignment_labels(dataset)) for dataset in both]
     left_out = _uncompared_variables(labelled)
     kept = [dataset.drop_vars(left_out, errors="ignore") for dataset in labelled]
     shared = [one.transpose(*dims, ...) for one in xr.align(*kept, join="inner")]
-    _check_same_points(*shared)
+    _check_same_axis_points(*shared)
     indexes = [[dataset.indexes[d] for dataset in labelled] for d in dims]
     points = {
         d: (a.difference(b, sort=False).tolist(), b.difference(a, sort=False).tolist())
         for d, (a, b) in zip(dims, indexes, strict=True)
         if set(a) != set(b)
     }
-    known = _finished_cells(shared[0]) & _finished_cells(shared[1])
-    alone = [int(_finished_cells(dataset).sum() - known.sum()) for dataset in both]
+    known = _finished_cell_mask(shared[0]) & _finished_cell_mask(shared[1])
+    alone = [int(_finished_cell_mask(dataset).sum() - known.sum()) for dataset in both]
     return Comparison(
-        declaration=find_differences(
-            *(dict(_flatten(json.loads(d.attrs["declaration"]))) for d in both)
+        declaration=find_fingerprint_differences(
+            *(dict(_flatten_declaration(json.loads(d.attrs["declaration"]))) for d in both)
         ),
-        origin=find_differences(*(_read_origin(dataset) for dataset in both)),
-        points=points,
-        cells=(int(known.sum()), alone[0], alone[1]),
-        statuses=_compare_statuses(shared, known),
-        numbers=_compare_numbers(shared),
-        left_out=left_out,
+        origin=find_fingerprint_differences(
+            *(_read_versions_and_machine(dataset) for dataset in both)
+        ),
+        differing_axis_points=points,
+        finished_cell_counts=(int(known.sum()), alone[0], alone[1]),
+        statuses=_compare_statuses_of_shared_cells(shared, known),
+        agreement_table=_compare_numbers_of_shared_cells(shared),
+        uncompared_variables=left_out,
     )
 
 
-def _with_axes_of(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
+def _add_axes_of_other_dataset(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     """A dataset with all axes of another: one that it lacks has its fixed value for only point."""
     cells = set(dataset["status"].dims)
     for dimension in other["status"].dims:
@@ -227,7 +233,7 @@ def _alignment_labels(dataset: xr.Dataset) -> dict[str, Any]:
     return labels
 
 
-def _check_same_points(first: xr.Dataset, second: xr.Dataset) -> None:
+def _check_same_axis_points(first: xr.Dataset, second: xr.Dataset) -> None:
     """Refuse points of one name that hold other values of a field in the two, beyond rounding."""
     for name, one in first.coords.items():
         if not one.dims or name in one.dims or name not in second.coords:
@@ -243,9 +249,9 @@ def _check_same_points(first: xr.Dataset, second: xr.Dataset) -> None:
             raise InvalidValue("axis", ", ".join(map(str, one.dims)), rule, remedy=remedy)
 
 
-def _uncompared_variables(both: Sequence[xr.Dataset]) -> dict[str, str]:
+def _uncompared_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict[str, str]:
     """Variables that cannot be compared, or would compare other things than numbers of cells."""
-    first, second = both
+    first, second = aligned_datasets
     unequal = {
         str(d) for d in first["status"].dims if set(first.indexes[d]) != set(second.indexes[d])
     }
@@ -261,41 +267,49 @@ def _uncompared_variables(both: Sequence[xr.Dataset]) -> dict[str, str]:
     return why
 
 
-def _compare_numbers(shared: Sequence[xr.Dataset]) -> pd.DataFrame:
+def _compare_numbers_of_shared_cells(shared_cells: Sequence[xr.Dataset]) -> pd.DataFrame:
     """Agreement of the numbers; a headline without an error estimate is held to be exact."""
-    frame = compare_same_lattice(*shared)
-    about = find_primary_output(shared[0])
+    frame = compare_same_lattice(*shared_cells)
+    about = find_primary_output(shared_cells[0])
     exact = (frame["variable"] == about) & frame["beyond_errors"].isna()
     frame.loc[exact, "beyond_errors"] = (frame["values"] - frame["identical"])[exact]
     return frame
 
 
-def _compare_statuses(shared: Sequence[xr.Dataset], known: xr.DataArray) -> pd.DataFrame:
+def _compare_statuses_of_shared_cells(
+    shared_cells: Sequence[xr.Dataset], common_cell_mask: xr.DataArray
+) -> pd.DataFrame:
     """The cells that ended otherwise, by their places on the axes."""
-    first, second = (one["status"].reset_coords(drop=True) for one in shared)
-    both = xr.Dataset({"first": first, "second": second, "known": known}).reset_coords(drop=True)
+    first, second = (one["status"].reset_coords(drop=True) for one in shared_cells)
+    both = xr.Dataset({"first": first, "second": second, "known": common_cell_mask}).reset_coords(
+        drop=True
+    )
     frame = both.to_dataframe(dim_order=[*map(str, first.dims)]).reset_index()
     ended = frame[frame["known"] & (frame["first"] != frame["second"])].drop(columns="known")
     return ended.replace({"first": STATUS_LABELS, "second": STATUS_LABELS}).reset_index(drop=True)
 
 
-def _flatten(part: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+def _flatten_declaration(declaration_part: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     """The parts of a declaration by their paths; lists of plain values are parts as they are."""
-    if isinstance(part, dict) and part:
-        for name, value in part.items():
-            yield from _flatten(value, f"{path}.{name}" if path else name)
-    elif isinstance(part, list) and any(isinstance(value, dict) for value in part):
-        for number, value in enumerate(part):
+    if isinstance(declaration_part, dict) and declaration_part:
+        for name, value in declaration_part.items():
+            yield from _flatten_declaration(value, f"{path}.{name}" if path else name)
+    elif isinstance(declaration_part, list) and any(
+        isinstance(value, dict) for value in declaration_part
+    ):
+        for number, value in enumerate(declaration_part):
             named = value.get("dimension") if isinstance(value, dict) else None
-            yield from _flatten(value, f"{path}[{named or number}]")
+            yield from _flatten_declaration(value, f"{path}[{named or number}]")
     else:
-        yield path, part
+        yield path, declaration_part
 
 
-def _read_origin(dataset: xr.Dataset) -> dict[str, Any]:
+def _read_versions_and_machine(dataset: xr.Dataset) -> dict[str, Any]:
     """Versions, code and machine that made a dataset."""
     about: Mapping[str, Any] = read_provenance(dataset)
-    decided = {n: v for n, v in about["fingerprint"].items() if n not in _DECLARED_FINGERPRINT_KEYS}
+    decided = {
+        n: v for n, v in about["fingerprint"].items() if n not in _FINGERPRINT_KEYS_ALSO_DECLARED
+    }
     others = {n: v for n, v in about.items() if isinstance(v, str)}
     for name in ("time", "command", "declared_in"):
         others.pop(name, None)
@@ -305,7 +319,7 @@ def _read_origin(dataset: xr.Dataset) -> dict[str, Any]:
 # ---- one cell -----------------------------------------------------------------------------------
 
 
-def find_cell_number(dataset: xr.Dataset, place: Mapping[str, Any]) -> int:
+def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) -> int:
     """The number of the cell at a place, in row-major order.
 
     Raises
@@ -314,38 +328,40 @@ def find_cell_number(dataset: xr.Dataset, place: Mapping[str, Any]) -> int:
         Where the place names no dimension, leaves one out, or is not on its axis.
     """
     status = dataset["status"]
-    for name in place:
+    for name in coordinate_values:
         if name not in status.dims:
             raise InvalidValue("cell", name, "is no axis", choices=[str(d) for d in status.dims])
     index = []
     for dimension in map(str, status.dims):
         values = dataset[dimension].values
-        if dimension not in place:
+        if dimension not in coordinate_values:
             if values.size > 1:
                 rule = f"leaves {dimension} open"
                 remedy = (
                     f"Name one value of each axis (--cell is repeated). {dimension} has "
                     f"{format_list(values.tolist(), ', ')}."
                 )
-                raise InvalidValue("cell", dict(place), rule, remedy=remedy)
+                raise InvalidValue("cell", dict(coordinate_values), rule, remedy=remedy)
             index.append(0)
             continue
-        number = _find_on_axis(values, place[dimension])
+        number = _find_index_on_axis(values, coordinate_values[dimension])
         if number is None:
             rule = "is not on its axis"
-            raise InvalidValue(dimension, place[dimension], rule, choices=map(str, values))
+            raise InvalidValue(
+                dimension, coordinate_values[dimension], rule, choices=map(str, values)
+            )
         index.append(number)
     return int(np.ravel_multi_index(index, status.shape))
 
 
-def _find_on_axis(values: np.ndarray, wanted: Any) -> int | None:
+def _find_index_on_axis(axis_values: np.ndarray, wanted_value: Any) -> int | None:
     """Index of a value on an axis: an equal label, or the nearest number if it is close enough."""
-    if values.dtype.kind in "iuf":
+    if axis_values.dtype.kind in "iuf":
         try:
-            number = float({"true": 1.0, "false": 0.0}.get(str(wanted).lower(), wanted))
+            number = float({"true": 1.0, "false": 0.0}.get(str(wanted_value).lower(), wanted_value))
         except (TypeError, ValueError):
             return None
-        nearest = int(np.argmin(np.abs(values - number)))
-        return nearest if np.isclose(values[nearest], number, rtol=1e-5, atol=0.0) else None
-    places = np.flatnonzero(values.astype(object).astype(str) == str(wanted))
+        nearest = int(np.argmin(np.abs(axis_values - number)))
+        return nearest if np.isclose(axis_values[nearest], number, rtol=1e-5, atol=0.0) else None
+    places = np.flatnonzero(axis_values.astype(object).astype(str) == str(wanted_value))
     return int(places[0]) if places.size else None

@@ -16,13 +16,13 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from rsfstudy.errors import DataError, shorten
-from rsfstudy.quantities import units_or_scale
+from rsfstudy.errors import DataError, shorten_text
+from rsfstudy.quantities import units_or_scale_of_variable
 
 #: The attribute of the file that holds the digest.
 DIGEST_ATTRIBUTE = "content_digest"
 #: Attributes of the file that decide how rsfstudy interprets its numbers.
-_DIGESTED_ATTRIBUTES = ("declaration", "provenance", "scene", "end", "laboratory")
+_NAMES_OF_DIGESTED_ATTRIBUTES = ("declaration", "provenance", "scene", "end", "laboratory")
 
 
 def compute_content_digest(dataset: xr.Dataset) -> str:
@@ -53,18 +53,18 @@ def check_content(dataset: xr.Dataset, path: str) -> None:
         return
     listed, found = _parse_digest(dataset.attrs[DIGEST_ATTRIBUTE]), _compute_digests(dataset)
     if not listed:
-        raise _damaged_error(path, DIGEST_ATTRIBUTE)
+        raise _build_damaged_file_error(path, DIGEST_ATTRIBUTE)
     for name in [name for name in found if name in listed]:
         (form, _, digest), (form_now, _, digest_now) = (
             each[name].rpartition(" ") for each in (listed, found)
         )
         if form == form_now and digest != digest_now:
-            raise _damaged_error(path, name)
+            raise _build_damaged_file_error(path, name)
 
 
-def _damaged_error(path: str, name: str) -> DataError:
+def _build_damaged_file_error(path: str, part_name: str) -> DataError:
     return DataError(
-        f"{path} is damaged, or was edited: {shorten(name)} is not what was written. Run the study "
+        f"{path} is damaged, or was edited: {shorten_text(part_name)} is not what was written. Run the study "
         f"again. If you changed it on purpose, delete the attribute {DIGEST_ATTRIBUTE} and save "
         "the file again."
     )
@@ -76,14 +76,16 @@ def _compute_digests(dataset: xr.Dataset) -> dict[str, str]:
     The digest of a variable is preceded by its sizes, units and scale.
     """
     texts = {
-        name: str(dataset.attrs[name]) for name in _DIGESTED_ATTRIBUTES if name in dataset.attrs
+        name: str(dataset.attrs[name])
+        for name in _NAMES_OF_DIGESTED_ATTRIBUTES
+        if name in dataset.attrs
     }
     found = {
         f"attribute {name}": f"text {_hash_bytes(text.encode())}" for name, text in texts.items()
     }
     for name, values in dataset.variables.items():
-        form = f"{dict(values.sizes)} {units_or_scale(values.attrs)}"
-        found[str(name)] = f"{form} {_hash_bytes(_to_bytes(values.values))}"
+        form = f"{dict(values.sizes)} {units_or_scale_of_variable(values.attrs)}"
+        found[str(name)] = f"{form} {_hash_bytes(_array_to_portable_bytes(values.values))}"
     return found
 
 
@@ -91,7 +93,7 @@ def _hash_bytes(content: bytes) -> str:
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
 
-def _to_bytes(values: np.ndarray) -> bytes:
+def _array_to_portable_bytes(values: np.ndarray) -> bytes:
     """Convert an array to bytes that do not depend on the storage format of the file."""
     if values.dtype.kind in "OUTS":
         return json.dumps([str(text) for text in values.flat]).encode()

@@ -11,12 +11,12 @@ from rsfstudy.slider import (
     Scene,
     UserLoading,
     UserPart,
-    history_from_table,
+    build_sampled_history_from_table,
     normalise_field_value,
     protocol,
 )
-from rsfstudy.storage.lattice import build_coordinates
-from rsfstudy.storage.schema import build_scene, invalid_part_error, read_scene_fields
+from rsfstudy.storage.lattice import build_lattice_coordinates
+from rsfstudy.storage.schema import build_scene_from_stored, invalid_part_error, read_scene_fields
 from rsfstudy.study import Study
 
 
@@ -30,12 +30,12 @@ def scene_of_dataset(dataset: xr.Dataset, study: Study | None) -> Scene:
     """
     if study is not None:
         return study.scene(selected_cell_number(dataset, study))
-    return described_scene(dataset)
+    return read_described_scene(dataset)
 
 
 def selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
     """The number of the cell that is selected."""
-    ours = xr.Dataset(coords=build_coordinates(study))
+    ours = xr.Dataset(coords=build_lattice_coordinates(study))
     places = []
     for name in study.dimensions:
         given = dataset[name].values.ravel() if name in dataset.coords else np.array([])
@@ -50,7 +50,7 @@ def selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
     return int(np.ravel_multi_index(places, study.shape))
 
 
-def described_scene(dataset: xr.Dataset) -> Scene:
+def read_described_scene(dataset: xr.Dataset) -> Scene:
     """The scene that the attributes of a dataset describe."""
     plain = read_scene_fields(dataset)
     segments, loading = plain.pop("segments", ()), str(plain.get("loading"))
@@ -65,17 +65,19 @@ def described_scene(dataset: xr.Dataset) -> Scene:
     if digest:
         told = dataset["history_samples"]
         pressure, stress = (bool(told.attrs.get(n)) for n in ("of_pressure", "of_stress"))
-        sampled = history_from_table(told.values, stress, loading, of_pressure=pressure)
+        sampled = build_sampled_history_from_table(
+            told.values, stress, loading, of_pressure=pressure
+        )
         if sampled.digest != digest:
             raise invalid_part_error("history_samples", f"are not those of the scene ({digest})")
         own[normalise_field_value("loading", sampled)] = sampled
     for slot in SLOTS:
         name = plain.get(slot.name)
-        if isinstance(name, str) and name not in {*slot.choices, *own}:
+        if isinstance(name, str) and name not in {*slot.built_in_parts, *own}:
             remedy = (
                 "Make a scene with the class itself first, so that its name is known; commands are "
                 "told it by --study FILE."
             )
             rule = "is a user's own, and not known here"
             raise InvalidValue(slot.name, name, rule, remedy=remedy)
-    return build_scene(plain, own, "scene")
+    return build_scene_from_stored(plain, own, "scene")

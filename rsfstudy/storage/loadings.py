@@ -15,32 +15,35 @@ from rsfstudy.slider import (
     SampledHistory,
     UserLoading,
     UserPart,
-    history_from_table,
+    build_sampled_history_from_table,
     protocol,
 )
 from rsfstudy.storage.schema import invalid_part_error
 
 #: What the columns are, by how many there are in each row, and what a row is.
-_SAMPLE_ROW = ("sample", "time, load point velocity, fall and rate of normal stress")
-_SEGMENT_ROW = (
+_DESCRIPTION_OF_SAMPLE_ROWS = (
+    "sample",
+    "time, load point velocity, fall and rate of normal stress",
+)
+_DESCRIPTION_OF_SEGMENT_ROWS = (
     "segment",
     "load point velocity and step, duration, and normal stress above sigma_star",
 )
 
 #: What tells of which kind samples are.
-_HISTORY_FLAGS = ("of_stress", "of_pressure")
+_FLAGS_OF_SAMPLED_HISTORIES = ("of_stress", "of_pressure")
 
 
-def loading_variables(parts: Iterable[UserPart]) -> dict[str, xr.Variable]:
+def loading_variables(user_parts: Iterable[UserPart]) -> dict[str, xr.Variable]:
     """Variables that hold the loadings among parts of the user's own, a row a sample or a segment
     of what they are made of, in units of the slider.
     """
     found = {}
-    for part in parts:
+    for part in user_parts:
         if isinstance(part, SampledHistory):
-            (row, columns), rows = _SAMPLE_ROW, part.sample_table
+            (row, columns), rows = _DESCRIPTION_OF_SAMPLE_ROWS, part.sample_table
         elif isinstance(part, Protocol):
-            (row, columns), rows = _SEGMENT_ROW, np.array(part.input_segments)
+            (row, columns), rows = _DESCRIPTION_OF_SEGMENT_ROWS, np.array(part.input_segments)
         else:
             continue
         about: dict[str, Any] = {
@@ -50,7 +53,7 @@ def loading_variables(parts: Iterable[UserPart]) -> dict[str, xr.Variable]:
             "coverage_content_type": "auxiliaryInformation",
         }
         if isinstance(part, SampledHistory):
-            about |= {name: int(getattr(part, name)) for name in _HISTORY_FLAGS}
+            about |= {name: int(getattr(part, name)) for name in _FLAGS_OF_SAMPLED_HISTORIES}
         dims = (f"{part.name}_{row}", f"{part.name}_column")
         found[f"{part.name}_{row}s"] = xr.Variable(dims, rows, about)
     return found
@@ -78,8 +81,8 @@ def read_loadings(results: xr.Dataset) -> Mapping[str, UserLoading]:
                 str(key), f"holds no loading of {STRESS_RATE_COLUMN + 1} columns"
             )
         if "of_stress" in values.attrs:
-            of = {key: bool(values.attrs.get(key, False)) for key in _HISTORY_FLAGS}
-            found[name] = history_from_table(values.values, name=name, **of)
+            of = {key: bool(values.attrs.get(key, False)) for key in _FLAGS_OF_SAMPLED_HISTORIES}
+            found[name] = build_sampled_history_from_table(values.values, name=name, **of)
         else:
             found[name] = protocol([Segment(*row) for row in values.values.tolist()], name)
     return found

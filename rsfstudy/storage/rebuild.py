@@ -15,57 +15,61 @@ import xarray as xr
 
 from rsfstudy import measures, reductions
 from rsfstudy.axes import Axis
-from rsfstudy.errors import DataError, InvalidValue, shorten
+from rsfstudy.errors import DataError, InvalidValue, shorten_text
 from rsfstudy.measures import Measure
 
 # to be found by its name
 from rsfstudy.reductions import Reduction
 from rsfstudy.rig import Rig
-from rsfstudy.slider import SLOTS, UserPart, names_to_parts
+from rsfstudy.slider import SLOTS, UserPart, replace_names_by_user_parts
 from rsfstudy.storage import loadings, schema
-from rsfstudy.storage.lattice import build_coordinates
+from rsfstudy.storage.lattice import build_lattice_coordinates
 from rsfstudy.storage.schema import (
-    Declaration,
-    PlainAxis,
-    PlainMeasure,
-    PlainReduction,
-    build_dataclass,
+    StoredAxis,
+    StoredDeclaration,
+    StoredMeasure,
+    StoredReduction,
+    build_dataclass_from_plain_data,
     invalid_part_error,
 )
 from rsfstudy.study import Study, load_study, study_names
 from rsfstudy.vocabulary import coverage_content_type
 
-_STUDY_FILE_REMEDY = "Name the file that declares it: --study FILE (study=)."
+_NAME_STUDY_FILE_REMEDY = "Name the file that declares it: --study FILE (study=)."
 
 
-def rebuild_study(results: xr.Dataset, file: str | Path | None = None) -> Study:
+def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> Study:
     """The study that made a dataset, from the declaration in it; where it uses code of the user,
     from the file that declares the study. Parts of a named study's own are those of rsfstudy.
     """
     declared = schema.read_declaration(results)
-    if file is None and declared.name in study_names() and schema.find_user_part(declared):
-        file = declared.name
+    if (
+        study_file is None
+        and declared.name in study_names()
+        and schema.find_user_part_not_stored(declared)
+    ):
+        study_file = declared.name
     for axis in declared.axes:
         points = results.sizes.get(axis["dimension"])
-        declared_points = len(schema.build_axis(axis))
+        declared_points = len(schema.build_axis_from_stored(axis))
         if declared_points != points:
             rule = f"has {declared_points} points in the declaration, and {points} in the file"
             raise invalid_part_error(axis["dimension"], rule)
     held = loadings.read_loadings(results)
-    if file is None and has_user_code(results):
+    if study_file is None and has_user_code(results):
         rule = "is a user's own, and code is never taken from a results file"
-        remedy, named_in = _STUDY_FILE_REMEDY, schema.read_provenance(results)["declared_in"]
+        remedy, named_in = _NAME_STUDY_FILE_REMEDY, schema.read_provenance(results)["declared_in"]
         if named_in:
-            remedy += f" It was {shorten(named_in)}."
-        name, value = schema.find_user_part(declared, held) or (
+            remedy += f" It was {shorten_text(named_in)}."
+        name, value = schema.find_user_part_not_stored(declared, held) or (
             "measure",
             declared.measure["name"],
         )
         raise InvalidValue(name, value, rule, remedy=remedy)
-    named = None if file is None else load_study(str(file))
+    named = None if study_file is None else load_study(str(study_file))
     if named and named.name != declared.name:
         rule = f"declares the study {named.name!r}, and the results are of {declared.name!r}"
-        raise InvalidValue("study", str(file), rule)
+        raise InvalidValue("study", str(study_file), rule)
     study = study_from_declaration(declared, held, named)
     _check_axes(study, results)
     return study
@@ -92,12 +96,15 @@ def has_user_code(results: xr.Dataset) -> bool:
     if schema.read_provenance(results)["fingerprint"]["own_code"] == "none":
         return False
     held = loadings.read_loadings(results)
-    return not held or schema.find_user_part(schema.read_declaration(results), held) is not None
+    return (
+        not held
+        or schema.find_user_part_not_stored(schema.read_declaration(results), held) is not None
+    )
 
 
 def _check_axes(study: Study, results: xr.Dataset) -> None:
     """Refuse results whose axes differ from those in their declaration."""
-    ours, dims = xr.Dataset(coords=build_coordinates(study)), results["status"].dims
+    ours, dims = xr.Dataset(coords=build_lattice_coordinates(study)), results["status"].dims
     if dims != study.dimensions:
         raise invalid_part_error("status", f"lies along {dims}, not the axes of the declaration")
     for name in study.dimensions:
@@ -106,7 +113,9 @@ def _check_axes(study: Study, results: xr.Dataset) -> None:
 
 
 def study_from_declaration(
-    declared: Declaration, held: Mapping[str, UserPart], of_its_own: Study | None = None
+    declaration: StoredDeclaration,
+    stored_loadings: Mapping[str, UserPart],
+    study_with_user_code: Study | None = None,
 ) -> Study:
     """The study with this declaration.
 
@@ -126,32 +135,32 @@ def study_from_declaration(
     DataError
         Where the declaration makes no study, naming the part.
     """
-    parts = msgspec.structs.asdict(declared)
-    own = {**_known_user_parts(of_its_own), **held}
-    parts["base"] = schema.build_scene(declared.base, own)
-    if of_its_own is None:
-        parts["measure"] = rebuild_measure(declared.measure, "declaration.measure")
+    parts = msgspec.structs.asdict(declaration)
+    own = {**_collect_known_user_parts(study_with_user_code), **stored_loadings}
+    parts["base"] = schema.build_scene_from_stored(declaration.base, own)
+    if study_with_user_code is None:
+        parts["measure"] = rebuild_measure(declaration.measure, "declaration.measure")
         parts["reductions"] = [
             _rebuild_reduction(described, f"declaration.reductions[{number}]")
-            for number, described in enumerate(declared.reductions)
+            for number, described in enumerate(declaration.reductions)
         ]
     else:
         for name in ("reductions", "source_file"):
-            parts[name] = getattr(of_its_own, name)
-        kind = of_its_own.measure
-        stated = {name: v for name, v in declared.measure.items() if name in kind.plain_fields}
+            parts[name] = getattr(study_with_user_code, name)
+        kind = study_with_user_code.measure
+        stated = {name: v for name, v in declaration.measure.items() if name in kind.plain_fields}
         parts["measure"] = kind.with_(**stated)
     try:
-        parts["axes"] = [_rebuild_axis(axis, own) for axis in declared.axes]
+        parts["axes"] = [_rebuild_axis(axis, own) for axis in declaration.axes]
         del parts["laboratory"]
-        if declared.laboratory is not None:
-            parts["rig"] = _rebuild_rig(declared.laboratory)
+        if declaration.laboratory is not None:
+            parts["rig"] = _rebuild_rig(declaration.laboratory)
         return Study(**parts)
     except InvalidValue as error:
         raise invalid_part_error("declaration", f"makes no study ({error})") from error
 
 
-def _known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
+def _collect_known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
     """Parts that a user wrote, by name: those of the study, and all others defined in the files
     that were loaded with it.
     """
@@ -159,61 +168,65 @@ def _known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
     return {} if study is None else {**others, **study.user_parts}
 
 
-def _rebuild_axis(described: PlainAxis, own: Mapping[str, UserPart]) -> Axis:
-    named = schema.build_axis(described)
-    rows = [names_to_parts(row, own) for row in named.rows]
+def _rebuild_axis(plain_axis: StoredAxis, user_parts: Mapping[str, UserPart]) -> Axis:
+    named = schema.build_axis_from_stored(plain_axis)
+    rows = [replace_names_by_user_parts(row, user_parts) for row in named.rows]
     return named.with_rows(rows, named.units, named.sampling_info)
 
 
-def _rebuild_rig(stated: Mapping[str, float]) -> Rig:
-    unknown = sorted(set(stated) - {field.name for field in fields(Rig)})
+def _rebuild_rig(stated_quantities: Mapping[str, float]) -> Rig:
+    unknown = sorted(set(stated_quantities) - {field.name for field in fields(Rig)})
     if unknown:
         raise invalid_part_error(f"declaration.laboratory.{unknown[0]}", "is unknown")
-    return Rig(**stated)
+    return Rig(**stated_quantities)
 
 
-def rebuild_measure(described: PlainMeasure, path: str) -> Measure:
+def rebuild_measure(plain_measure: StoredMeasure, path_in_file: str) -> Measure:
     """The measure with this description, which stands at `path` in a file."""
-    values: dict[str, Any] = dict(described)
-    kind = _find_class("measure", Measure, measures, values.pop("name"))
-    given = dict(kind.fields_from_description(values, path))
+    values: dict[str, Any] = dict(plain_measure)
+    kind = _find_declared_class("measure", Measure, measures, values.pop("name"))
+    given = dict(kind.fields_from_description(values, path_in_file))
     if isinstance(values.get("measure"), Mapping):
-        given["measure"] = rebuild_measure(values.pop("measure"), f"{path}.measure")
-    made: Measure = build_dataclass(values, kind, path, **given)
+        given["measure"] = rebuild_measure(values.pop("measure"), f"{path_in_file}.measure")
+    made: Measure = build_dataclass_from_plain_data(values, kind, path_in_file, **given)
     return made
 
 
-def _rebuild_reduction(described: PlainReduction, path: str) -> Reduction:
-    values: dict[str, Any] = dict(described)
+def _rebuild_reduction(plain_reduction: StoredReduction, path_in_file: str) -> Reduction:
+    values: dict[str, Any] = dict(plain_reduction)
     if values["kind"] == "spread":  # what a range of a part of a coordinate was called
         values |= {"kind": "range", "over": values.pop("on", "")}
-    kind = _find_class("reduction", Reduction, reductions, values.pop("kind"))
-    made: Reduction = build_dataclass(values, kind, path)
+    kind = _find_declared_class("reduction", Reduction, reductions, values.pop("kind"))
+    made: Reduction = build_dataclass_from_plain_data(values, kind, path_in_file)
     return made
 
 
-def _find_class(what: str, base: Any, package: ModuleType, name: str) -> Any:
+def _find_declared_class(
+    declaration_key: str, base_class: Any, exporting_package: ModuleType, declared_name: str
+) -> Any:
     """The class of rsfstudy that is derived from `base` and has a name in declarations; those in
     the files of named studies are looked for where their package has none.
     """
-    for exported in package.__all__:
-        getattr(package, exported)  # loads the module that defines it
-    if name not in _named_subclasses(base):
+    for exported in exporting_package.__all__:
+        getattr(exporting_package, exported)  # loads the module that defines it
+    if declared_name not in _named_subclasses(base_class):
         for study in study_names():
             load_study(study)
-    kinds = _named_subclasses(base)
-    if name not in kinds:
+    kinds = _named_subclasses(base_class)
+    if declared_name not in kinds:
         rule = "is not part of rsfstudy"
-        raise InvalidValue(what, name, rule, choices=kinds, remedy=_STUDY_FILE_REMEDY)
-    return kinds[name]
+        raise InvalidValue(
+            declaration_key, declared_name, rule, choices=kinds, remedy=_NAME_STUDY_FILE_REMEDY
+        )
+    return kinds[declared_name]
 
 
-def _named_subclasses(base: Any) -> dict[str, Any]:
+def _named_subclasses(base_class: Any) -> dict[str, Any]:
     """The concrete classes of rsfstudy that are derived from `base`, by their names in
     declarations.
     """
     found: dict[str, Any] = {}
-    for kind in base.__subclasses__():
+    for kind in base_class.__subclasses__():
         found |= _named_subclasses(kind)
         name = vars(kind).get("name") or vars(kind).get("kind")
         if name and kind.__module__.partition(".")[0] == __name__.partition(".")[0]:

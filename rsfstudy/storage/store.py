@@ -23,12 +23,12 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.error_boundary import user_stacklevel
-from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, shorten
-from rsfstudy.netcdf import fill_value_encoding, with_cf_encoding
+from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, shorten_text
+from rsfstudy.netcdf import copy_with_cf_encoding, encoding_without_fill_values
 from rsfstudy.paths import check_path
 from rsfstudy.storage import content_digest, schema
-from rsfstudy.storage.attribute_checks import check_attributes, check_motion_variables
-from rsfstudy.storage.schema import LAYOUT_VERSION
+from rsfstudy.storage.attribute_checks import check_motion_variables, check_variable_attributes
+from rsfstudy.storage.schema import FILE_LAYOUT_VERSION
 
 #: How Zarr stores are opened: lazily, and none of an older format.
 ZARR_OPEN_OPTIONS: Mapping[str, Any] = {
@@ -39,9 +39,9 @@ ZARR_OPEN_OPTIONS: Mapping[str, Any] = {
     "zarr_format": 3,
 }
 #: Codecs of our Zarr stores. Any other might run code that the store names.
-_ALLOWED_CODECS = {"bytes", "vlen-utf8", "zstd"}
-_TRAILER_PREFIX = b"\nrsfstudy sha256 "
-_TRAILER_LENGTH = len(_TRAILER_PREFIX) + 64
+_ALLOWED_ZARR_CODECS = {"bytes", "vlen-utf8", "zstd"}
+_DIGEST_TRAILER_PREFIX = b"\nrsfstudy sha256 "
+_DIGEST_TRAILER_LENGTH = len(_DIGEST_TRAILER_PREFIX) + 64
 _STORE_DIGEST_ATTRIBUTE = "digest"
 
 
@@ -61,7 +61,7 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     DataError
         If the directory cannot be written, or what is read back differs from what was written.
     """
-    clean = clean_attributes(dataset.assign_attrs({"layout": LAYOUT_VERSION, **dataset.attrs}))
+    clean = clean_attributes(dataset.assign_attrs({"layout": FILE_LAYOUT_VERSION, **dataset.attrs}))
     clean.attrs.pop(content_digest.DIGEST_ATTRIBUTE, None)
     digest = {content_digest.DIGEST_ATTRIBUTE: content_digest.compute_content_digest(clean)}
     stored = clean.assign_attrs(digest)
@@ -74,9 +74,9 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
         with dask.config.set(scheduler="synchronous"), warnings.catch_warnings():
             # of older versions of Dask, although the client is set aside on purpose
             warnings.filterwarnings("ignore", "Running on a single-machine scheduler", UserWarning)
-            stored.to_netcdf(beside, **how, encoding=fill_value_encoding(clean))
+            stored.to_netcdf(beside, **how, encoding=encoding_without_fill_values(clean))
         with open(beside, "ab") as file:
-            file.write(_TRAILER_PREFIX + _hash_file(beside, beside.stat().st_size))
+            file.write(_DIGEST_TRAILER_PREFIX + _hash_file_contents(beside, beside.stat().st_size))
         with xr.open_dataset(beside, engine="netcdf4") as back:
             if not stored.identical(back.load()):
                 raise DataError(f"{path} was not written: what was read back differs.")
@@ -96,12 +96,12 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     return clean
 
 
-def _hash_file(path: Path, size: int) -> bytes:
+def _hash_file_contents(path: Path, byte_count: int) -> bytes:
     digest = hashlib.sha256()
     with open(path, "rb") as file:
-        while size > 0 and (part := file.read(min(size, 2**20))):
+        while byte_count > 0 and (part := file.read(min(byte_count, 2**20))):
             digest.update(part)
-            size -= len(part)
+            byte_count -= len(part)
     return digest.hexdigest().encode()
 
 
@@ -155,13 +155,13 @@ def _check_store_digest(path: Path) -> bool:
 
 def _check_file_digest(path: Path) -> bool:
     """Check a file against the digest of its bytes; whether it has one."""
-    size = path.stat().st_size - _TRAILER_LENGTH
+    size = path.stat().st_size - _DIGEST_TRAILER_LENGTH
     with open(path, "rb") as file:
         file.seek(max(0, size))
         trailer = file.read()
-    if not trailer.startswith(_TRAILER_PREFIX):
+    if not trailer.startswith(_DIGEST_TRAILER_PREFIX):
         return False
-    if trailer != _TRAILER_PREFIX + _hash_file(path, size):
+    if trailer != _DIGEST_TRAILER_PREFIX + _hash_file_contents(path, size):
         raise DataError(f"{path} is damaged, or was edited: its bytes are not what was written.")
     return True
 
@@ -175,11 +175,11 @@ def read_dataset(path: Path) -> xr.Dataset:
     DataError
         If it is missing, unreadable, not written by rsfstudy, or damaged.
     """
-    where = shorten(path)
+    where = shorten_text(path)
     try:
         _check_readable_path(path, where)
         if path.is_dir():
-            _check_codecs(path)
+            _check_zarr_codecs(path)
             sealed = _check_store_digest(path)
             dataset = open_zarr_store(path)
         else:
@@ -191,11 +191,11 @@ def read_dataset(path: Path) -> xr.Dataset:
     except RsfStudyError:
         raise
     except Exception as error:  # HDF5, Zarr and xarray raise almost anything on damaged data
-        raise DataError(f"{where} cannot be read: {shorten(error)}") from error
-    dataset = with_cf_encoding(dataset)
+        raise DataError(f"{where} cannot be read: {shorten_text(error)}") from error
+    dataset = copy_with_cf_encoding(dataset)
     try:
-        check_attributes(dataset)
-        if schema.is_single_scene(dataset):
+        check_variable_attributes(dataset)
+        if schema.is_of_single_scene(dataset):
             check_motion_variables(dataset)
             return dataset  # which users write by xarray, without a digest
         schema.check_results(dataset)
@@ -207,27 +207,29 @@ def read_dataset(path: Path) -> xr.Dataset:
     return dataset
 
 
-def _check_readable_path(path: Path, where: str) -> None:
+def _check_readable_path(path: Path, file_description: str) -> None:
     """Raise ``DataError`` unless a path is a regular file or a Zarr store.
 
     Opening a pipe could block forever.
     """
     check_path("file", path)
     if not path.exists():
-        raise DataError(f"{where} does not exist. Run the study first, or name another file.")
+        raise DataError(
+            f"{file_description} does not exist. Run the study first, or name another file."
+        )
     if path.is_dir() and not (path / "zarr.json").is_file():
-        raise DataError(f"{where} is a directory, and no Zarr store.")
+        raise DataError(f"{file_description} is a directory, and no Zarr store.")
     for part in path.rglob("*") if path.is_dir() else [path]:
         if not (part.is_file() or part.is_dir()) or (part != path and part.is_symlink()):
-            raise DataError(f"{shorten(part)} is no file, but a pipe, a device or a link.")
+            raise DataError(f"{shorten_text(part)} is no file, but a pipe, a device or a link.")
 
 
-def _check_codecs(path: Path) -> None:
+def _check_zarr_codecs(path: Path) -> None:
     """Refuse a Zarr store with a codec that our stores do not use."""
     for file in path.rglob("zarr.json"):
         about = json.loads(file.read_text())
         for codec in about.get("codecs", []):
-            if codec["name"] not in _ALLOWED_CODECS:
+            if codec["name"] not in _ALLOWED_ZARR_CODECS:
                 raise DataError(
                     f"{path} was not written by rsfstudy: {file.parent.name} is coded by "
                     f"{codec['name']!r}, which may run code."
@@ -239,15 +241,17 @@ def clean_attributes(dataset: xr.Dataset) -> xr.Dataset:
     arrays of two or more.
     """
     clean = dataset.copy()
-    clean.attrs = _clean_mapping(dataset.attrs)
+    clean.attrs = _clean_attribute_mapping(dataset.attrs)
     for name in clean.variables:
-        clean[name].attrs = _clean_mapping(dataset[name].attrs)
+        clean[name].attrs = _clean_attribute_mapping(dataset[name].attrs)
     return clean
 
 
-def _clean_mapping(attrs: Mapping[Any, Any]) -> dict[str, Any]:
+def _clean_attribute_mapping(attributes: Mapping[Any, Any]) -> dict[str, Any]:
     return {
-        str(name): _to_netcdf_value(value) for name, value in attrs.items() if value is not None
+        str(name): _to_netcdf_value(value)
+        for name, value in attributes.items()
+        if value is not None
     }
 
 

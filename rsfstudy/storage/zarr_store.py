@@ -19,18 +19,22 @@ import xarray as xr
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.status import Status
 from rsfstudy.storage.journal import CellColumns, OutputPacking
-from rsfstudy.storage.lattice import build_coordinates, build_variables, root_attributes
+from rsfstudy.storage.lattice import (
+    build_lattice_coordinates,
+    build_lattice_variables,
+    root_attributes,
+)
 from rsfstudy.storage.store import ZARR_OPEN_OPTIONS, open_zarr_store, write_store_digest
 from rsfstudy.study import Study
 
 #: Numbers in one piece, 32 MB of float64: whole rows along the first axis, one at least.
 _NUMBERS_PER_SLAB = 4_000_000
 #: How slabs are written; the metadata are consolidated once, with the reductions.
-_WRITE_OPTIONS: Mapping[str, Any] = {"consolidated": False, "zarr_format": 3}
+_ZARR_WRITE_OPTIONS: Mapping[str, Any] = {"consolidated": False, "zarr_format": 3}
 
 #: What is known of some cells, in row-major order.
-ReadCells = Callable[[slice], CellColumns]
-ReduceLattice = Callable[[xr.Dataset], xr.Dataset]
+ReadCellsFunction = Callable[[slice], CellColumns]
+ReduceLatticeFunction = Callable[[xr.Dataset], xr.Dataset]
 
 
 def check_zarr_installed() -> None:
@@ -40,7 +44,7 @@ def check_zarr_installed() -> None:
         raise InvalidValue("format", "zarr", "needs a package", remedy=remedy)
 
 
-def check_not_existing(path: Path) -> None:
+def check_store_does_not_exist(path: Path) -> None:
     """Refuse to replace a store."""
     if path.exists():
         raise DataError(
@@ -50,7 +54,11 @@ def check_not_existing(path: Path) -> None:
 
 
 def write_store(
-    study: Study, read: ReadCells, provenance: Mapping[str, Any], reduce: ReduceLattice, path: Path
+    study: Study,
+    read_cells: ReadCellsFunction,
+    provenance: Mapping[str, Any],
+    apply_reductions: ReduceLatticeFunction,
+    path: Path,
 ) -> xr.Dataset:
     """Write the lattice of a study slab by slab, then its reductions, and open it.
 
@@ -62,10 +70,10 @@ def write_store(
     beside = path.with_name(f".{path.name}.new")
     try:
         shutil.rmtree(beside, ignore_errors=True)
-        finished = _write_lattice(study, read, beside)
+        finished = _write_lattice(study, read_cells, beside)
         lattice = open_zarr_store(beside)
-        results = reduce(lattice)
-        reductions = _with_object_strings(results.drop_vars(list(lattice.variables)))
+        results = apply_reductions(lattice)
+        reductions = _convert_strings_to_object_dtype(results.drop_vars(list(lattice.variables)))
         about = {**root_attributes(study, finished, provenance), **results.attrs}
         with warnings.catch_warnings():
             # Zarr's format 3 does not specify consolidated metadata yet, but xarray looks for them.
@@ -80,21 +88,27 @@ def write_store(
     return open_zarr_store(path)
 
 
-def _with_object_strings(dataset: xr.Dataset) -> xr.Dataset:
+def _convert_strings_to_object_dtype(dataset: xr.Dataset) -> xr.Dataset:
     """Text of any length, which Zarr has a specification for, in place of that of a fixed one."""
     texts = {n: v.astype(object) for n, v in dataset.variables.items() if v.dtype.kind == "U"}
     return dataset.assign(texts).set_coords([name for name in texts if name in dataset.coords])
 
 
-def _write_lattice(study: Study, read: ReadCells, path: Path) -> int:
+def _write_lattice(study: Study, read_cells: ReadCellsFunction, path: Path) -> int:
     """Write the variables of the lattice; the number of cells that are finished."""
-    width, first, finished = OutputPacking(study.measure).width, study.dimensions[0], 0
+    width, first, finished = (
+        OutputPacking(study.measure).packed_number_count,
+        study.dimensions[0],
+        0,
+    )
     length, *within = study.shape
     row = math.prod(within)  # of cells
     rows = min(length, max(1, _NUMBERS_PER_SLAB // (width * row)))
-    coords = _with_object_strings(xr.Dataset(coords=build_coordinates(study)))
+    coords = _convert_strings_to_object_dtype(xr.Dataset(coords=build_lattice_coordinates(study)))
     # a chunk of the store that is lost reads as pending
-    pending = build_variables(study, CellColumns.pending(1, width), (1,) * len(study.shape))
+    pending = build_lattice_variables(
+        study, CellColumns.build_pending_cells(1, width), (1,) * len(study.shape)
+    )
     encoding = {
         name: {"chunks": (rows, *within, *v.shape[len(study.shape) :]), "fill_value": v.flat[0]}
         for name, (_dims, v, _about) in pending.items()
@@ -102,12 +116,12 @@ def _write_lattice(study: Study, read: ReadCells, path: Path) -> int:
     how: dict[str, Any] = {"mode": "w-", "encoding": encoding}
     for start in range(0, length, rows):
         some = slice(start, min(start + rows, length))
-        columns = read(slice(some.start * row, some.stop * row))
-        slab = build_variables(study, columns, (some.stop - start, *within))
-        coords.isel({first: some}).assign(slab).to_zarr(path, **how, **_WRITE_OPTIONS)
+        columns = read_cells(slice(some.start * row, some.stop * row))
+        slab = build_lattice_variables(study, columns, (some.stop - start, *within))
+        coords.isel({first: some}).assign(slab).to_zarr(path, **how, **_ZARR_WRITE_OPTIONS)
         how = {"append_dim": first}
         back = xr.open_dataset(path, **ZARR_OPEN_OPTIONS)[list(slab)].isel({first: some})
         if not xr.Dataset(slab).equals(back.drop_vars(list(back.coords))):
             raise DataError(f"{path} was not written: what was read back differs.")
-        finished += int((columns.status != int(Status.PENDING)).sum())
+        finished += int((columns.statuses != int(Status.PENDING)).sum())
     return finished

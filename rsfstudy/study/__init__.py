@@ -14,28 +14,28 @@ from rsfstudy._lazy import lazy_exports
 if TYPE_CHECKING:
     from rsfstudy.study.catalogue import load_study
     from rsfstudy.study.cell import Cell, CellChanges
-    from rsfstudy.study.claims import NOT_APPLICABLE, VERDICTS, Claim, build_verdict_table
-    from rsfstudy.study.figure_declarations import DrawFunction, Figure, Panel, figure_name
-    from rsfstudy.study.reductions.base import is_failed, read_quantities
-    from rsfstudy.study.rig_studies import with_rig
+    from rsfstudy.study.claims import NOT_APPLICABLE_VERDICT, VERDICTS, Claim, build_verdict_table
+    from rsfstudy.study.figure_declarations import DrawFunction, Figure, Panel, name_of_figure
+    from rsfstudy.study.reductions.base import failed_cell_mask, read_undocumented_quantities
+    from rsfstudy.study.rig_studies import convert_study_to_rig_units
     from rsfstudy.study.study import Study
     from rsfstudy.study.study_index import STUDIES_PACKAGE, study_names, study_titles
     from rsfstudy.study.user_parts import find_named_user_parts
-    from rsfstudy.study.verdict_table import format_claim_row
+    from rsfstudy.study.verdict_table import format_verdict_row
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
             "study.catalogue": ("load_study",),
             "study.cell": ("Cell", "CellChanges"),
-            "study.claims": ("Claim", "NOT_APPLICABLE", "VERDICTS", "build_verdict_table"),
-            "study.figure_declarations": ("DrawFunction", "Figure", "Panel", "figure_name"),
-            "study.reductions.base": ("is_failed", "read_quantities"),
-            "study.rig_studies": ("with_rig",),
+            "study.claims": ("Claim", "NOT_APPLICABLE_VERDICT", "VERDICTS", "build_verdict_table"),
+            "study.figure_declarations": ("DrawFunction", "Figure", "Panel", "name_of_figure"),
+            "study.reductions.base": ("failed_cell_mask", "read_undocumented_quantities"),
+            "study.rig_studies": ("convert_study_to_rig_units",),
             "study.study": ("Study",),
             "study.study_index": ("STUDIES_PACKAGE", "study_names", "study_titles"),
             "study.user_parts": ("find_named_user_parts",),
-            "study.verdict_table": ("format_claim_row",),
+            "study.verdict_table": ("format_verdict_row",),
         },
     )
 
@@ -45,19 +45,19 @@ __all__ = [
     "Claim",
     "DrawFunction",
     "Figure",
-    "NOT_APPLICABLE",
+    "NOT_APPLICABLE_VERDICT",
     "Panel",
     "STUDIES_PACKAGE",
     "Study",
     "VERDICTS",
     "build_verdict_table",
-    "figure_name",
+    "name_of_figure",
     "find_named_user_parts",
-    "format_claim_row",
-    "is_failed",
+    "format_verdict_row",
+    "failed_cell_mask",
     "load_study",
-    "read_quantities",
+    "read_undocumented_quantities",
     "study_names",
     "study_titles",
-    "with_rig",
+    "convert_study_to_rig_units",
 ]

@@ -20,6 +20,6 @@ class CellChanges(NamedTuple):
     scene_fields: dict[str, Any]
     measure_fields: dict[str, Any]
 
-    def apply_to(self, base: Scene) -> Cell:
+    def build_cell(self, base_scene: Scene) -> Cell:
         """The cell."""
-        return Cell(base.with_(**self.scene_fields), self.measure_fields)
+        return Cell(base_scene.with_(**self.scene_fields), self.measure_fields)

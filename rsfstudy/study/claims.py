@@ -23,21 +23,21 @@ from rsfstudy.rig import SCALES_ATTRIBUTE
 from rsfstudy.status import Status
 from rsfstudy.study.verdict_table import VerdictTable
 
-REPRODUCED = "reproduced"
-DIFFERS = "differs"
-UNDECIDED = "undecided"
-NOT_APPLICABLE = "not applicable"
-VERDICTS = (REPRODUCED, DIFFERS, UNDECIDED, NOT_APPLICABLE)
+REPRODUCED_VERDICT = "reproduced"
+DIFFERS_VERDICT = "differs"
+UNDECIDED_VERDICT = "undecided"
+NOT_APPLICABLE_VERDICT = "not applicable"
+VERDICTS = (REPRODUCED_VERDICT, DIFFERS_VERDICT, UNDECIDED_VERDICT, NOT_APPLICABLE_VERDICT)
 
-RELATIONS = ("equals", "below", "above")
+CLAIM_RELATIONS = ("equals", "below", "above")
 #: Of a table of claims.
-_TABLE_COLUMNS = (
+_VERDICT_TABLE_COLUMNS = (
     *("id", "claim", "source", "relation", "published", "ours"),
     *("tolerance", "reason", "verdict", "expected", "because", "moved"),
 )
 #: Reason of a tolerance of zero where more cannot be asked for.
-INEQUALITY_REASON = "an inequality"
-_EXPECTED_VERDICTS = (REPRODUCED, DIFFERS)
+TOLERANCE_REASON_OF_INEQUALITY = "an inequality"
+_EXPECTED_VERDICTS = (REPRODUCED_VERDICT, DIFFERS_VERDICT)
 _TEXT_FIELDS = (
     *("id", "statement", "source", "variable", "minus_variable", "reason", "because"),
     *("relation", "expected"),
@@ -87,11 +87,11 @@ class Claim:
     where: Mapping[str, Any]
     published: float
     tolerance: float = 0.0
-    reason: str = INEQUALITY_REASON
+    reason: str = TOLERANCE_REASON_OF_INEQUALITY
     relation: str = "equals"
     minus: Mapping[str, Any] = field(default_factory=dict)
     minus_variable: str = ""
-    expected: str = REPRODUCED
+    expected: str = REPRODUCED_VERDICT
     because: str = ""
 
     def __post_init__(self) -> None:
@@ -99,9 +99,9 @@ class Claim:
             if not isinstance(getattr(self, name), str):
                 rule = f"must be a text, in claim {self.id}"
                 raise InvalidValue(name, getattr(self, name), rule)
-        if self.relation not in RELATIONS:
-            raise InvalidValue("relation", self.relation, "is unknown", choices=RELATIONS)
-        if self.relation == "equals" and self.reason == INEQUALITY_REASON:
+        if self.relation not in CLAIM_RELATIONS:
+            raise InvalidValue("relation", self.relation, "is unknown", choices=CLAIM_RELATIONS)
+        if self.relation == "equals" and self.reason == TOLERANCE_REASON_OF_INEQUALITY:
             rule = f"must tell why the tolerance is {self.tolerance}, in claim {self.id}"
             raise InvalidValue("reason", self.reason, rule)
         if self.expected not in _EXPECTED_VERDICTS:
@@ -122,14 +122,14 @@ class Claim:
                     raise InvalidValue(name, value, rule)
 
     @classmethod
-    def below(cls, **claim: Any) -> Claim:
+    def below(cls, **claim_fields: Any) -> Claim:
         """A claim that ours is below the published value; takes what `Claim` does."""
-        return cls(relation="below", **claim)
+        return cls(relation="below", **claim_fields)
 
     @classmethod
-    def above(cls, **claim: Any) -> Claim:
+    def above(cls, **claim_fields: Any) -> Claim:
         """A claim that ours is above the published value; takes what `Claim` does."""
-        return cls(relation="above", **claim)
+        return cls(relation="above", **claim_fields)
 
     def describe(self) -> dict[str, Any]:
         """The claim as plain data."""
@@ -148,7 +148,7 @@ class Claim:
             if name not in coordinates:
                 rule = f"is no coordinate of the results, in claim {self.id}"
                 raise InvalidValue("where", name, rule, choices=sorted(coordinates))
-        if self.verdict(dataset)[1] == NOT_APPLICABLE:
+        if self.verdict(dataset)[1] == NOT_APPLICABLE_VERDICT:
             rule = f"is no place of the lattice, in claim {self.id}"
             raise InvalidValue("where", {**self.where, **self.minus}, rule)
 
@@ -159,24 +159,26 @@ class Claim:
         leaves it undecided.
         """
         try:
-            ours = _select_value(dataset, self.variable, self.where)
+            ours = _select_single_value(dataset, self.variable, self.where)
             if self.minus:
-                ours -= _select_value(dataset, self.minus_variable or self.variable, self.minus)
+                ours -= _select_single_value(
+                    dataset, self.minus_variable or self.variable, self.minus
+                )
         except KeyError:
-            return math.nan, NOT_APPLICABLE
+            return math.nan, NOT_APPLICABLE_VERDICT
         if math.isnan(ours):
-            return ours, UNDECIDED
+            return ours, UNDECIDED_VERDICT
         distance = ours - self.published
         holds = {
             "equals": abs(distance) <= self.tolerance,
             "below": distance < self.tolerance,
             "above": distance > -self.tolerance,
         }[self.relation]
-        return ours, REPRODUCED if holds else DIFFERS
+        return ours, REPRODUCED_VERDICT if holds else DIFFERS_VERDICT
 
 
 def build_verdict_table(
-    dataset: xr.Dataset, claims: list[Claim], overrides: Mapping[str, Any]
+    dataset: xr.Dataset, claims: list[Claim], study_overrides: Mapping[str, Any]
 ) -> VerdictTable:
     """A table of claims, one row each.
 
@@ -186,18 +188,20 @@ def build_verdict_table(
     """
     along = {str(name) for name in dataset.coords if dataset[name].ndim > 0}
     moved_base = [
-        name for name in overrides if name not in along
+        name for name in study_overrides if name not in along
     ] or SCALES_ATTRIBUTE in dataset.attrs
     rows = []
     for claim in claims:
         ours, verdict = claim.verdict(dataset)
-        if moved_base or not _has_changed_dimensions(dataset, claim.variable, overrides):
-            verdict = NOT_APPLICABLE
-        moved = verdict not in (claim.expected, NOT_APPLICABLE)
+        if moved_base or not _has_all_overridden_dimensions(
+            dataset, claim.variable, study_overrides
+        ):
+            verdict = NOT_APPLICABLE_VERDICT
+        moved = verdict not in (claim.expected, NOT_APPLICABLE_VERDICT)
         about = claim.id, claim.statement, claim.source, claim.relation, claim.published, ours
         why = claim.tolerance, claim.reason, verdict, claim.expected, claim.because, moved
         rows.append((*about, *why))
-    return VerdictTable(pd.DataFrame(rows, columns=_TABLE_COLUMNS).astype({"moved": bool}))
+    return VerdictTable(pd.DataFrame(rows, columns=_VERDICT_TABLE_COLUMNS).astype({"moved": bool}))
 
 
 def _is_number(value: object) -> bool:
@@ -205,18 +209,20 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not sys.float_info.max < abs(value) < math.inf
 
 
-def _has_changed_dimensions(
-    dataset: xr.Dataset, variable: str, overrides: Mapping[str, Any]
+def _has_all_overridden_dimensions(
+    dataset: xr.Dataset, variable_name: str, study_overrides: Mapping[str, Any]
 ) -> bool:
     """True if a variable still has every dimension that was changed."""
-    changed = {str(d) for n in overrides if n in dataset.coords for d in dataset[n].dims}
-    return variable not in dataset or changed <= set(dataset[variable].dims)
+    changed = {str(d) for n in study_overrides if n in dataset.coords for d in dataset[n].dims}
+    return variable_name not in dataset or changed <= set(dataset[variable_name].dims)
 
 
-def _select_value(dataset: xr.Dataset, variable: str, where: Mapping[str, Any]) -> float:
+def _select_single_value(
+    dataset: xr.Dataset, variable_name: str, coordinate_values: Mapping[str, Any]
+) -> float:
     """The one number at these coordinate values; KeyError where there is no such place."""
-    values = dataset[variable]
-    for name, wanted in where.items():
+    values = dataset[variable_name]
+    for name, wanted in coordinate_values.items():
         at, text = dataset[name], isinstance(wanted, str)
         along = at.ndim <= 1 and set(at.dims) <= set(values.dims)
         if not along or at.dtype.kind not in ("OUST" if text else "iufb"):
@@ -227,7 +233,7 @@ def _select_value(dataset: xr.Dataset, variable: str, where: Mapping[str, Any]) 
             raise KeyError(name)
         values = values.isel(dict.fromkeys(at.dims, int(matches[0])))
     if values.ndim or values.dtype.kind not in "iufb":
-        raise KeyError(variable)  # more dimensions than the claim speaks of, or no number
-    if variable == "status" and int(values) == int(Status.PENDING):
+        raise KeyError(variable_name)  # more dimensions than the claim speaks of, or no number
+    if variable_name == "status" and int(values) == int(Status.PENDING):
         return math.nan
     return float(values)

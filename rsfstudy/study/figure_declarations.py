@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __getattr__ = renamed_names(__name__)
 
 #: A variable by its name, or a function that computes it; and a text in the same way.
-VariableOrFunction = str | Callable[["xr.Dataset"], "xr.DataArray"]
+VariableNameOrFunction = str | Callable[["xr.Dataset"], "xr.DataArray"]
 TextOrFunction = str | Callable[["xr.Dataset"], str]
 #: `matplotlib.axes.Axes`, for annotations: what workers load must not load matplotlib.
 Axes = Any
@@ -33,7 +33,7 @@ Axes = Any
 DrawFunction = Callable[[Any, Any], Any]
 
 #: Names of the figures that draw any study.
-GENERIC_FIGURES = frozenset(
+GENERIC_FIGURE_NAMES = frozenset(
     module.name for module in pkgutil.iter_modules([str(Path(__file__).parent.parent / "plots")])
 )
 
@@ -94,8 +94,8 @@ class Panel:
         Leave scales, legend and title as marks leave them: a figure of the user's own.
     """
 
-    x: VariableOrFunction = ""
-    y: VariableOrFunction = ""
+    x: VariableNameOrFunction = ""
+    y: VariableNameOrFunction = ""
     hue: Sequence[str] = ()
     facet: Sequence[str] = ()
     isel: Mapping[str, Any] = field(default_factory=dict)
@@ -195,12 +195,12 @@ def reference_line(
     return draw_line
 
 
-def figure_name(plot: Any, study: str) -> str:
+def name_of_figure(plot: Any, study_name: str) -> str:
     """Name of a figure in a declaration: one that draws any study by its name, panels by that of
     their study, others by that of their function or module.
     """
     if isinstance(plot, Figure):
-        return study
+        return study_name
     return plot if isinstance(plot, str) else str(plot.__name__).rpartition(".")[2]
 
 
@@ -214,7 +214,7 @@ def check_figure(plot: Any) -> None:
     if not hasattr(plot, "__name__") or not callable(getattr(plot, "draw", plot)):
         rule = "must be a name, a Figure, or a function or module of yours that draws"
         raise InvalidValue("plot", plot, rule, remedy="Write def name(dataset, axes): ...")
-    name = figure_name(plot, "")
-    if not is_variable_name(name) or name in GENERIC_FIGURES or name in study_names():
+    name = name_of_figure(plot, "")
+    if not is_variable_name(name) or name in GENERIC_FIGURE_NAMES or name in study_names():
         rule = "needs a name of its own, which no figure of rsfstudy has"
         raise InvalidValue("plot", name, rule)

@@ -16,9 +16,9 @@ from rsfstudy.vocabulary import find_quantity
 def study_html(
     heading: str,
     axes: Sequence[Axis],
-    base: Scene,
+    base_scene: Scene,
     measure: Measure,
-    known: Mapping[str, Quantity],
+    known_quantities: Mapping[str, Quantity],
 ) -> str:
     """Format a study as HTML tables of its axes, its fixed fields and its results.
 
@@ -38,10 +38,10 @@ def study_html(
     str
     """
     varied = {name for axis in axes for name in axis.fields}
-    fixed = {name: v for name, v in base.as_dict().items() if name not in varied}
-    shared = quantities_with_values(fixed, base.user_parts)
-    along = [(_axis_quantity(a, known), _format_points(a)) for a in axes]
-    measured = [(find_quantity(name, known), None) for name in measure.variables]
+    fixed = {name: v for name, v in base_scene.as_dict().items() if name not in varied}
+    shared = quantities_with_values(fixed, base_scene.user_parts)
+    along = [(_describe_axis_quantity(a, known_quantities), _format_axis_points(a)) for a in axes]
+    measured = [(find_quantity(name, known_quantities), None) for name in measure.variables]
     return (
         html_quantities_table(along, heading)
         + _html_details("what all cells share", html_quantities_table(shared))
@@ -57,12 +57,12 @@ def _html_details(caption: str, content: HtmlMarkup) -> HtmlMarkup:
     return HtmlMarkup(f"<details><summary>{escape_html(caption)}</summary>{content}</details>")
 
 
-def _axis_quantity(axis: Axis, known: Mapping[str, Quantity]) -> Quantity:
+def _describe_axis_quantity(axis: Axis, known_quantities: Mapping[str, Quantity]) -> Quantity:
     """The quantity along an axis, without symbol and scale where the axis is in units."""
-    about, units = find_quantity(axis.dimension, known), axis.units.get(axis.dimension)
+    about, units = find_quantity(axis.dimension, known_quantities), axis.units.get(axis.dimension)
     return about if units is None else replace(about, symbol="", units=units, scale="")
 
 
-def _format_points(axis: Axis) -> str:
+def _format_axis_points(axis: Axis) -> str:
     """The points of an axis, a long list cut short."""
     return f"{format_list(axis.point_names, ', ')} ({len(axis)})"

@@ -7,32 +7,34 @@ from collections.abc import Hashable, Sequence
 from functools import partial
 from typing import Any
 
-from rsfstudy.axes import Axis, Row, to_plain_value
+from rsfstudy.axes import Axis, AxisRow, to_plain_value
 from rsfstudy.errors import InvalidValue
-from rsfstudy.formatting import format_value, is_list_like
+from rsfstudy.formatting import format_value, is_sequence_of_axis_values
 
 
-def select_points(axis: Axis, points: Sequence[Any]) -> Axis:
+def select_axis_points(axis: Axis, labels_or_numbers: Sequence[Any]) -> Axis:
     """Select points of a zipped axis by label, or of a numbered axis by number.
 
     If the selection contains the first ``n`` samples in order, the axis keeps the record of the
     sampling method.
     """
-    rows: dict[Any, Row] = dict(zip(axis.labels or range(len(axis)), axis.rows, strict=True))
-    for point in points:
+    rows: dict[Any, AxisRow] = dict(zip(axis.labels or range(len(axis)), axis.rows, strict=True))
+    for point in labels_or_numbers:
         if point not in rows:
             rule, choices = "is no point of the axis", axis.labels or ()
             if axis.has_numbered_points:
                 rule += f": they are numbered from 0 to {len(axis) - 1}"
             raise InvalidValue(axis.dimension, point, rule, choices=choices)
     if axis.labels is not None:
-        return Axis(axis.dimension, {label: rows[label] for label in points}, axis.units)
-    first = list(points) == list(range(len(points)))
-    drawn = {**axis.sampling_info, "n": len(points)} if axis.sampling_info and first else {}
-    return axis.with_rows([rows[number] for number in points], axis.units, drawn)
+        return Axis(axis.dimension, {label: rows[label] for label in labels_or_numbers}, axis.units)
+    first = list(labels_or_numbers) == list(range(len(labels_or_numbers)))
+    drawn = (
+        {**axis.sampling_info, "n": len(labels_or_numbers)} if axis.sampling_info and first else {}
+    )
+    return axis.with_rows([rows[number] for number in labels_or_numbers], axis.units, drawn)
 
 
-def replace_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
+def replace_field_values(axis: Axis, field_name: str, values: Sequence[Any]) -> Axis:
     """Replace the values of one field of a zipped or numbered axis.
 
     Parameters
@@ -54,64 +56,70 @@ def replace_values(axis: Axis, name: str, values: Sequence[Any]) -> Axis:
     if axis.has_numbered_points:
         if len(values) != 1:
             rule = f"varies along the axis {axis.dimension}: all of its points take one value"
-            raise InvalidValue(name, values, rule, remedy="Give one value.")
-        return axis.with_rows([{**row, name: values[0]} for row in axis.rows], axis.units)
+            raise InvalidValue(field_name, values, rule, remedy="Give one value.")
+        return axis.with_rows([{**row, field_name: values[0]} for row in axis.rows], axis.units)
     assert axis.labels is not None
     for value in values:
         if not isinstance(value, Hashable):
             rule = "must be a number, a string, True, False or a part"
-            raise InvalidValue(name, value, rule, remedy=f"Write {name}=[first, second].")
+            raise InvalidValue(
+                field_name, value, rule, remedy=f"Write {field_name}=[first, second]."
+            )
     existing = {_point_key(row): label for label, row in zip(axis.labels, axis.rows, strict=True)}
-    others = {_point_key({**row, name: None}) for row in axis.rows if name in row}
-    points: dict[str, Row] = {}
+    others = {_point_key({**row, field_name: None}) for row in axis.rows if field_name in row}
+    points: dict[str, AxisRow] = {}
     for label, row in zip(axis.labels, axis.rows, strict=True):
-        if name not in row:
+        if field_name not in row:
             points[label] = row
             continue
-        for value in map(partial(to_plain_value, name), values):
-            changed = {**row, name: value}
+        for value in map(partial(to_plain_value, field_name), values):
+            changed = {**row, field_name: value}
             if changed in points.values():
                 continue
             new = existing.get(_point_key(changed), "")
             if not new:
-                new = _new_label(label, name, row[name], value, is_unique=len(others) == 1)
+                new = _label_after_override(
+                    label, field_name, row[field_name], value, value_is_unique=len(others) == 1
+                )
                 while new in points or new in axis.labels:
                     new = f"{label}, {new}"
             points[new] = changed
     return Axis(axis.dimension, points, axis.units)
 
 
-def _point_key(row: Row) -> frozenset[tuple[str, Any]]:
+def _point_key(row: AxisRow) -> frozenset[tuple[str, Any]]:
     """Convert the fields and values of a row to a hashable key."""
     return frozenset(row.items())
 
 
-def _new_label(label: str, name: str, old: Any, new: Any, *, is_unique: bool) -> str:
+def _label_after_override(
+    label: str, field_name: str, old_value: Any, new_value: Any, *, value_is_unique: bool
+) -> str:
     """Return the label of a point after the value of one field has changed.
 
     If the label contains the old value, as in ``"imposed, alpha = 0.25"``, the old value is
     replaced. Otherwise, if the new value identifies the point (``is_unique``), the label becomes
     ``"alpha = 0.3"``. In all other cases ``"alpha = 0.3"`` is appended to the label.
     """
-    text = f"{name} = {_format_exact(new)}"
-    stated = rf"(?<!\w){re.escape(name)} = {re.escape(_format_exact(old))}(?![\w.])"
+    text = f"{field_name} = {_format_with_all_digits(new_value)}"
+    stated = rf"(?<!\w){re.escape(field_name)} = {re.escape(_format_with_all_digits(old_value))}(?![\w.])"
     replaced, count = re.subn(stated, lambda _found: text, label)
     if count:
         return replaced
-    return text if is_unique else f"{label}, {text}"
+    return text if value_is_unique else f"{label}, {text}"
 
 
-def _format_exact(value: Any) -> str:
+def _format_with_all_digits(value: Any) -> str:
     """Format a value, with all digits if six digits do not represent a float exactly."""
     short_text = format_value(value)
     is_rounded = isinstance(value, float) and float(short_text) != value
     return repr(value) if is_rounded else short_text
 
 
-def to_plain_values(field: str, value: Any) -> Any:
+def to_plain_values(field_name: str, value: Any) -> Any:
     """A value of a field, or a list of them, as `to_plain_value` gives it."""
     return (
-        [to_plain_value(field, each) for each in value]
-        if is_list_like(value)
-        else to_plain_value(field, value)
+        [to_plain_value(field_name, each) for each in value]
+        if is_sequence_of_axis_values(value)
+        else to_plain_value(field_name, value)
     )

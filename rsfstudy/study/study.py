@@ -15,50 +15,50 @@ from typing import Any
 import numpy as np
 
 from rsfstudy._deprecation import renamed_keywords, renamed_members
-from rsfstudy.axes import Axis, Row, check_storable_text
+from rsfstudy.axes import Axis, AxisRow, check_storable_text
 from rsfstudy.error_boundary import error_boundary, guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.formatting import is_list_like
+from rsfstudy.formatting import is_sequence_of_axis_values
 from rsfstudy.measures import Measure
-from rsfstudy.motion import Accuracy, user_stepper
+from rsfstudy.motion import Accuracy, find_user_stepper
 from rsfstudy.quantities import Quantity
 from rsfstudy.rig import (
-    RATIO_FIELD,
+    RATIO_FIELD_BY_DIMENSIONAL_NAME,
+    LatticeScenesOnRig,
     Rig,
-    RigScenes,
     axis_name_and_units,
-    convert_axis,
-    convert_values,
-    with_rig_value,
+    convert_axis_to_stated_units,
+    convert_values_to_units,
+    replace_rig_quantity,
 )
-from rsfstudy.rig import make_axis as axis_in_units
+from rsfstudy.rig import make_axis_with_units as axis_in_units
 from rsfstudy.slider import (
-    SELECTOR_FIELDS,
+    PART_SELECTING_FIELDS,
     SLOT_NAMES,
     STIFFNESS_FIELDS,
     Scene,
     UserPart,
     find_inapplicable_fields,
-    names_to_parts,
-    scene_fields,
+    replace_names_by_user_parts,
+    scene_field_quantities,
 )
 from rsfstudy.study import checks
 from rsfstudy.study.cell import Cell, CellChanges
 from rsfstudy.study.claims import Claim
-from rsfstudy.study.figure_declarations import check_figure, figure_name
+from rsfstudy.study.figure_declarations import check_figure, name_of_figure
 from rsfstudy.study.html import study_html
-from rsfstudy.study.overrides import replace_values, select_points, to_plain_values
+from rsfstudy.study.overrides import replace_field_values, select_axis_points, to_plain_values
 from rsfstudy.study.reductions.application import Reduction
 from rsfstudy.study.user_parts import find_named_user_parts, user_field_quantities
 
 #: Most bytes of the name of a study: a file name has at most 255, and endings follow.
 _MAX_NAME_BYTES = 200
 #: Fields that decide what fills a slot.
-_SELECTING_FIELDS = frozenset({*SLOT_NAMES, *SELECTOR_FIELDS})
+_FIELDS_THAT_SELECT_PARTS = frozenset({*SLOT_NAMES, *PART_SELECTING_FIELDS})
 #: What states the same as another field does: of slip rates and of the spring.
 _EQUIVALENT_FIELD = {
-    **RATIO_FIELD,
-    **{ratio: name for name, ratio in RATIO_FIELD.items()},
+    **RATIO_FIELD_BY_DIMENSIONAL_NAME,
+    **{ratio: name for name, ratio in RATIO_FIELD_BY_DIMENSIONAL_NAME.items()},
     **dict(zip(STIFFNESS_FIELDS, STIFFNESS_FIELDS[::-1], strict=True)),
 }
 
@@ -140,14 +140,16 @@ class Study:
             raise InvalidValue("overrides", self.overrides, "must map names to values")
         checks.check_types(vars(self))
         if self.rig is not None:
-            object.__setattr__(self, "axes", [convert_axis(axis) for axis in self.axes])
-        checks.check_names(self.measure, self.reductions, self.axes)
+            object.__setattr__(
+                self, "axes", [convert_axis_to_stated_units(axis) for axis in self.axes]
+            )
+        checks.check_name_clashes(self.measure, self.reductions, self.axes)
         checks.check_user_fields(self.measure, self.reductions, self.scene_fields)
         checks.check_axis_fields(self.measure, self.axes, self.scene_fields, self.scene_builder)
         varied = [axis.rows for axis in self.axes if not set(axis.fields) <= self.scene_field_names]
         changes = (self.split_rows(rows)[1] for rows in itertools.product(*varied))
-        checks.check_same_outputs(self.measure, changes)
-        checks.check_distinct(self.axes)
+        checks.check_outputs_do_not_vary(self.measure, changes)
+        checks.check_axes_are_distinct(self.axes)
         for name, value in self.describe().items():
             try:
                 json.dumps(value)
@@ -180,13 +182,13 @@ class Study:
         return (
             *self.measure.code_classes,
             *self.user_parts.values(),
-            *user_stepper(self.accuracy.engine),
+            *find_user_stepper(self.accuracy.engine),
         )
 
     @cached_property
     def scene_fields(self) -> tuple[str, ...]:
         """Fields that its scenes may have: those of every scene, and those of its own parts."""
-        return tuple(scene_fields(self.user_parts.values()))
+        return tuple(scene_field_quantities(self.user_parts.values()))
 
     @cached_property
     def scene_field_names(self) -> frozenset[str]:
@@ -194,18 +196,18 @@ class Study:
         return frozenset({*self.scene_fields, *self.units})
 
     @cached_property
-    def scene_builder(self) -> RigScenes | None:
+    def scene_builder(self) -> LatticeScenesOnRig | None:
         """What makes scenes of axes in units, in a study of a rig."""
-        return RigScenes(self.rig, self.base, self.axes) if self.rig else None
+        return LatticeScenesOnRig(self.rig, self.base, self.axes) if self.rig else None
 
     @cached_property
     def units(self) -> dict[str, str]:
         """Units of the fields of its axes that are in units."""
         return {name: units for axis in self.axes for name, units in axis.units.items()}
 
-    def scene_fields_of_row(self, row: Row) -> Row:
+    def scene_fields_of_row(self, row: AxisRow) -> AxisRow:
         """The fields of a scene that differ from the base where axes have these values."""
-        return self.scene_builder.scene_fields(row) if self.scene_builder else row
+        return self.scene_builder.compute_scene_fields(row) if self.scene_builder else row
 
     @property
     def quantities(self) -> dict[str, Quantity]:
@@ -252,15 +254,15 @@ class Study:
 
     def cell(self, number: int) -> Cell:
         """One cell, by its number in row-major order."""
-        return self._build_cell(self._rows_of_cell(number))
+        return self._build_cell(self._axis_rows_of_cell(number))
 
     def cell_changes(self, number: int) -> CellChanges:
         """What the axes change in one cell, of which no scene is made here."""
-        return self._compute_changes(self._rows_of_cell(number))
+        return self._compute_cell_changes(self._axis_rows_of_cell(number))
 
-    def _rows_of_cell(self, number: int) -> list[Row]:
+    def _axis_rows_of_cell(self, cell_number: int) -> list[AxisRow]:
         """The row of each axis that makes a cell."""
-        places = np.unravel_index(number, self.shape)
+        places = np.unravel_index(cell_number, self.shape)
         return [axis.rows[i] for axis, i in zip(self.axes, places, strict=True)]
 
     def scenes(self) -> Iterator[Scene]:
@@ -276,7 +278,7 @@ class Study:
         at = zip(self.axes, np.unravel_index(cell, self.shape), strict=True)
         return ", ".join(f"{axis.dimension} = {axis.point_names[i]}" for axis, i in at)
 
-    def split_rows(self, rows: Sequence[Row]) -> tuple[dict[str, Any], dict[str, Any]]:
+    def split_rows(self, rows: Sequence[AxisRow]) -> tuple[dict[str, Any], dict[str, Any]]:
         """The fields of the scene, and those of the measure, that rows set."""
         split: tuple[dict[str, Any], dict[str, Any]] = {}, {}
         for row in rows:
@@ -289,29 +291,42 @@ class Study:
         return self.base.as_dict()
 
     @cached_property
-    def _inapplicable_fields(self) -> frozenset[str]:
+    def _fields_without_meaning(self) -> frozenset[str]:
         """Fields without meaning where no axis decides what fills a slot."""
         parts = self.user_parts
-        return find_inapplicable_fields(names_to_parts(self._base_fields, parts), parts.values())
+        return find_inapplicable_fields(
+            replace_names_by_user_parts(self._base_fields, parts), parts.values()
+        )
 
-    def _compute_changes(self, rows: Sequence[Row]) -> CellChanges:
-        given, of_measure = self.split_rows(rows)
+    def _compute_cell_changes(self, axis_rows: Sequence[AxisRow]) -> CellChanges:
+        given, of_measure = self.split_rows(axis_rows)
         of_scene = self.scene_fields_of_row(given)
-        if _SELECTING_FIELDS.isdisjoint(of_scene) and _SELECTING_FIELDS.isdisjoint(given):
-            kept = {n: value for n, value in of_scene.items() if n not in self._inapplicable_fields}
+        if _FIELDS_THAT_SELECT_PARTS.isdisjoint(of_scene) and _FIELDS_THAT_SELECT_PARTS.isdisjoint(
+            given
+        ):
+            kept = {
+                n: value for n, value in of_scene.items() if n not in self._fields_without_meaning
+            }
             return CellChanges(kept, of_measure)
         # a row that states a choice together with a field it makes meaningless must be refused
-        stated = {name for row in rows if not _SELECTING_FIELDS.isdisjoint(row) for name in row}
+        stated = {
+            name
+            for row in axis_rows
+            if not _FIELDS_THAT_SELECT_PARTS.isdisjoint(row)
+            for name in row
+        }
         parts = self.user_parts
-        values = names_to_parts({**self._base_fields, **of_scene}, parts)
+        values = replace_names_by_user_parts({**self._base_fields, **of_scene}, parts)
         meaningless = find_inapplicable_fields(values, parts.values()) - stated
         return CellChanges({n: values[n] for n in of_scene if n not in meaningless}, of_measure)
 
-    def _build_cell(self, rows: Sequence[Row]) -> Cell:
+    def _build_cell(self, axis_rows: Sequence[AxisRow]) -> Cell:
         try:
-            return self._compute_changes(rows).apply_to(self.base)
+            return self._compute_cell_changes(axis_rows).build_cell(self.base)
         except InvalidValue as error:
-            place = ", ".join(f"{name}={value!r}" for row in rows for name, value in row.items())
+            place = ", ".join(
+                f"{name}={value!r}" for row in axis_rows for name, value in row.items()
+            )
             raise error.with_location(f"cell {place}") from error
 
     # ---- other axes ---------------------------------------------------------------------------
@@ -335,66 +350,76 @@ class Study:
         own = [
             name
             for name in given
-            if find_named_user_parts([name], _override_rows(name, given[name]))
+            if find_named_user_parts([name], _rows_of_overridden_field(name, given[name]))
         ]
         selections = [axis.dimension for axis in self.axes if not axis.is_single_field]
         for name in dict.fromkeys([*own, *filter(given.__contains__, selections), *given]):
-            study = study._apply_override(name, given[name])
+            study = study._override_field(name, given[name])
         return replace(study, overrides={**self.overrides, **given})
 
-    def _apply_override(self, name: str, value: Any) -> Study:
-        values = list(value) if is_list_like(value) else [value]
+    def _override_field(self, field_name: str, value: Any) -> Study:
+        values = list(value) if is_sequence_of_axis_values(value) else [value]
         of_rig = self.rig is not None and bool(values)
-        name, units = axis_name_and_units(name, values[0]) if of_rig else (name, None)
+        field_name, units = (
+            axis_name_and_units(field_name, values[0]) if of_rig else (field_name, None)
+        )
         for index, axis in enumerate(self.axes):
-            if changed := self._override_axis(axis, name, values):
+            if changed := self._override_axis(axis, field_name, values):
                 return replace(self, axes=(*self.axes[:index], changed, *self.axes[index + 1 :]))
         of_rig = units is not None
         known = dict.fromkeys((*self.dimensions, *self.scene_fields, *self.measure.plain_fields))
         if (
-            name not in known
+            field_name not in known
             and not of_rig
-            and not find_named_user_parts([name], _override_rows(name, values))
+            and not find_named_user_parts(
+                [field_name], _rows_of_overridden_field(field_name, values)
+            )
         ):
             rule = "is neither an axis nor a field of the scene or of the measure"
-            raise checks.unknown_name_error("override", name, rule, known)
-        checks.check_not_solved_for(self.measure, [name])
-        if is_list_like(value):
-            return replace(self, axes=(self._make_axis(name, values), *self.axes))
+            raise checks.unknown_name_error("override", field_name, rule, known)
+        checks.check_fields_not_solved_for(self.measure, [field_name])
+        if is_sequence_of_axis_values(value):
+            return replace(self, axes=(self._make_axis(field_name, values), *self.axes))
         if self.rig is not None and of_rig:
-            rig, base = with_rig_value(self.rig, self.base, name, value)
+            rig, base = replace_rig_quantity(self.rig, self.base, field_name, value)
             return replace(self, rig=rig, base=base)
-        if name in self.scene_field_names | SLOT_NAMES:
-            changes = names_to_parts({name: value}, self.user_parts)
+        if field_name in self.scene_field_names | SLOT_NAMES:
+            changes = replace_names_by_user_parts({field_name: value}, self.user_parts)
             return replace(self, base=self.base.with_(**changes))
-        return replace(self, measure=self.measure.with_(**{name: value}))
+        return replace(self, measure=self.measure.with_(**{field_name: value}))
 
-    def _override_axis(self, axis: Axis, name: str, values: Sequence[Any]) -> Axis | None:
+    def _override_axis(self, axis: Axis, field_name: str, values: Sequence[Any]) -> Axis | None:
         """An axis with other values, if it is of this field, or of one that states the same."""
-        units = axis.units.get(name, "")
-        if name == axis.dimension:
+        units = axis.units.get(field_name, "")
+        if field_name == axis.dimension:
             return (
-                self._make_axis(name, values, units)
+                self._make_axis(field_name, values, units)
                 if axis.is_single_field
-                else select_points(axis, values)
+                else select_axis_points(axis, values)
             )
-        if name in axis.fields:
-            checks.check_override(self.base, self.user_parts, axis, name, values)
-            return replace_values(
-                axis, name, convert_values(name, values, units) if units else values
+        if field_name in axis.fields:
+            checks.check_override_of_partly_set_field(
+                self.base, self.user_parts, axis, field_name, values
             )
-        if _EQUIVALENT_FIELD.get(name) not in axis.fields:
+            return replace_field_values(
+                axis,
+                field_name,
+                convert_values_to_units(field_name, values, units) if units else values,
+            )
+        if _EQUIVALENT_FIELD.get(field_name) not in axis.fields:
             return None
         if axis.labels is not None:
-            rule = f"states what {_EQUIVALENT_FIELD[name]} does along {axis.dimension}"
-            raise InvalidValue(name, values, rule, remedy=f"Give {_EQUIVALENT_FIELD[name]}.")
-        return self._make_axis(name, values)
+            rule = f"states what {_EQUIVALENT_FIELD[field_name]} does along {axis.dimension}"
+            raise InvalidValue(
+                field_name, values, rule, remedy=f"Give {_EQUIVALENT_FIELD[field_name]}."
+            )
+        return self._make_axis(field_name, values)
 
-    def _make_axis(self, name: str, values: Sequence[Any], units: str = "") -> Axis:
+    def _make_axis(self, field_name: str, values: Sequence[Any], units: str = "") -> Axis:
         """An axis of a field, whose plain numbers are in these units in a study of a rig."""
         if self.rig is None:
-            return Axis(name, values)
-        return axis_in_units(name, values, "" if isinstance(values[0], str) else units)
+            return Axis(field_name, values)
+        return axis_in_units(field_name, values, "" if isinstance(values[0], str) else units)
 
     def describe(self) -> dict[str, Any]:
         """The whole declaration as plain data."""
@@ -409,7 +434,7 @@ class Study:
             "accuracy": asdict(self.accuracy),
             "reductions": [reduction.describe() for reduction in self.reductions],
             "claims": [claim.describe() for claim in self.claims],
-            "plot": figure_name(self.plot, self.name),
+            "plot": name_of_figure(self.plot, self.name),
             "references": list(self.references),
             "overrides": dict(self.overrides),
             **({"laboratory": self.rig.as_dict()} if self.rig else {}),
@@ -420,6 +445,6 @@ class Study:
         return study_html(heading, self.axes, self.base, self.measure, self.quantities)
 
 
-def _override_rows(name: str, value: Any) -> list[Row]:
+def _rows_of_overridden_field(field_name: str, value: Any) -> list[AxisRow]:
     """The rows of a field that is given one value or a list of them."""
-    return [{name: v} for v in (value if is_list_like(value) else [value])]
+    return [{field_name: v} for v in (value if is_sequence_of_axis_values(value) else [value])]

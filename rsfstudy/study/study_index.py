@@ -24,13 +24,13 @@ def study_titles() -> dict[str, str]:
     """
     (place,) = importlib.import_module(STUDIES_PACKAGE).__path__
     files = {name: Path(place, f"{name}.py") for name in study_names()}
-    return {name: _read_title(file.read_bytes()) for name, file in files.items()}
+    return {name: _read_title_from_source(file.read_bytes()) for name, file in files.items()}
 
 
-def _read_title(source: bytes) -> str:
+def _read_title_from_source(source_code: bytes) -> str:
     """The text given as ``title`` to the call whose value is named `study`."""
     # what stands before it need not be parsed, which would take as long again
-    declared = ast.parse(source[source.index(b"\nstudy = ") :]).body[0]
+    declared = ast.parse(source_code[source_code.index(b"\nstudy = ") :]).body[0]
     assert isinstance(declared, ast.Assign)
     assert isinstance(declared.value, ast.Call)
     given = {keyword.arg: keyword.value for keyword in declared.value.keywords}

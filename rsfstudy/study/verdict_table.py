@@ -7,30 +7,39 @@ from typing import Any
 
 import pandas as pd
 
-from rsfstudy.errors import escape_control
+from rsfstudy.errors import escape_control_characters
 from rsfstudy.quantities import html_table
 
-_RELATION_SIGNS = {"equals": "", "below": "< ", "above": "> "}
+_SIGNS_OF_CLAIM_RELATIONS = {"equals": "", "below": "< ", "above": "> "}
 #: Of a line of a terminal, and of an identifier on it, in characters.
-_LINE_WIDTH, _ID_WIDTH = 100, 12
+_TERMINAL_LINE_WIDTH, _CLAIM_ID_WIDTH = 100, 12
 #: What a printed line tells of a claim.
-_PRINTED_COLUMNS = ("id", "claim", "relation", "published", "ours", "tolerance", "verdict", "moved")
+_COLUMNS_PRINTED_ON_TERMINAL = (
+    "id",
+    "claim",
+    "relation",
+    "published",
+    "ours",
+    "tolerance",
+    "verdict",
+    "moved",
+)
 
 
-def format_published_value(claim: dict[Any, Any]) -> str:
+def format_published_value(verdict_row: dict[Any, Any]) -> str:
     """The published value of a claim, with the sign of a bound."""
-    return f"{_RELATION_SIGNS[claim['relation']]}{claim['published']:.6g}"
+    return f"{_SIGNS_OF_CLAIM_RELATIONS[verdict_row['relation']]}{verdict_row['published']:.6g}"
 
 
-def _terminal_row(claim: dict[Any, Any]) -> dict[str, str]:
+def _format_row_for_terminal(verdict_row: dict[Any, Any]) -> dict[str, str]:
     """A claim as a terminal has room for it, by the headings."""
     return {
-        "id": textwrap.shorten(str(claim["id"]), _ID_WIDTH, placeholder="..."),
-        "claim": " ".join(str(claim["claim"]).split()),
-        "published": format_published_value(claim),
-        "ours": f"{claim['ours']:.6g}",
-        "tolerance": f"{claim['tolerance']:.3g}",
-        "verdict": f"{claim['verdict']}{', moved' * bool(claim['moved'])}",
+        "id": textwrap.shorten(str(verdict_row["id"]), _CLAIM_ID_WIDTH, placeholder="..."),
+        "claim": " ".join(str(verdict_row["claim"]).split()),
+        "published": format_published_value(verdict_row),
+        "ours": f"{verdict_row['ours']:.6g}",
+        "tolerance": f"{verdict_row['tolerance']:.3g}",
+        "verdict": f"{verdict_row['verdict']}{', moved' * bool(verdict_row['moved'])}",
     }
 
 
@@ -39,7 +48,7 @@ def _align_columns(rows: list[dict[str, str]]) -> str:
     table = [{name: name for name in rows[0]}, *rows]
     wide = {name: max(len(row[name]) for row in table) for name in rows[0]}
     others = sum(width + 2 for name, width in wide.items() if name != "claim")
-    wide["claim"] = min(wide["claim"], _LINE_WIDTH - others)
+    wide["claim"] = min(wide["claim"], _TERMINAL_LINE_WIDTH - others)
     for row in table:
         row["claim"] = textwrap.shorten(row["claim"], wide["claim"], placeholder=" ...")
     lines = ("  ".join(f"{row[name]:{width}}" for name, width in wide.items()) for row in table)
@@ -54,14 +63,14 @@ class VerdictTable(pd.DataFrame):
         return pd.DataFrame
 
     def __repr__(self) -> str:
-        if self.empty or not set(_PRINTED_COLUMNS) <= set(self):
+        if self.empty or not set(_COLUMNS_PRINTED_ON_TERMINAL) <= set(self):
             return super().__repr__()
-        return escape_control(
-            _align_columns([_terminal_row(row) for row in self.to_dict("records")])
+        return escape_control_characters(
+            _align_columns([_format_row_for_terminal(row) for row in self.to_dict("records")])
         )
 
     def _repr_html_(self) -> str:
-        rows = [format_claim_row(row) for row in self.to_dict("records")]
+        rows = [format_verdict_row(row) for row in self.to_dict("records")]
         return (
             html_table(list(rows[0]), [list(row.values()) for row in rows])
             if rows
@@ -69,17 +78,18 @@ class VerdictTable(pd.DataFrame):
         )
 
 
-def format_claim_row(claim: dict[Any, Any]) -> dict[str, str]:
+def format_verdict_row(verdict_row: dict[Any, Any]) -> dict[str, str]:
     """A claim in words, by headings; where there are several studies, with the name of its own."""
-    reason = f"{claim['tolerance']:.3g}: {claim['reason']}"
-    if claim["because"]:
-        reason += f". It differs because {claim['because']}"
-    of = f"{claim['study']}: " if "study" in claim else ""
+    reason = f"{verdict_row['tolerance']:.3g}: {verdict_row['reason']}"
+    if verdict_row["because"]:
+        reason += f". It differs because {verdict_row['because']}"
+    of = f"{verdict_row['study']}: " if "study" in verdict_row else ""
     return {
-        "id": str(claim["id"]),
-        "claim": f"{of}{claim['claim']}",
-        "published": format_published_value(claim),
-        "ours": "-" if pd.isna(claim["ours"]) else f"{claim['ours']:.6g}",
+        "id": str(verdict_row["id"]),
+        "claim": f"{of}{verdict_row['claim']}",
+        "published": format_published_value(verdict_row),
+        "ours": "-" if pd.isna(verdict_row["ours"]) else f"{verdict_row['ours']:.6g}",
         "tolerance, and why": reason,
-        "verdict": claim["verdict"] + f", expected {claim['expected']}" * bool(claim["moved"]),
+        "verdict": verdict_row["verdict"]
+        + f", expected {verdict_row['expected']}" * bool(verdict_row["moved"]),
     }

@@ -69,7 +69,7 @@ def main(
 
 @click.command()
 @click.argument("study")
-@options.set_option
+@options.set_values_option
 @options.rtol_option
 @options.engine_option
 @options.output_option

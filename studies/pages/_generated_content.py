@@ -30,7 +30,7 @@ from rsfstudy.rig import quantities
 from rsfstudy.slider import field_names, registry
 from rsfstudy.study import catalogue, study_index
 from rsfstudy.study.verdict_table import format_published_value
-from rsfstudy.vocabulary import QUANTITIES, find_quantity
+from rsfstudy.vocabulary import QUANTITY_BY_NAME, find_quantity
 
 #: Modules of the base classes for user-defined parts, measures and reductions, by the name of the
 #: class.
@@ -207,7 +207,7 @@ def scene_fields() -> str:
         Table in Markdown.
     """
     abouts = {about.name: about for about in registry.FIELD_QUANTITIES}
-    defaults = registry.field_defaults()
+    defaults = registry.scene_field_defaults()
     rows = (
         (
             f"`{name}`",
@@ -231,7 +231,7 @@ def _default(name: str, defaults: Mapping[str, Any]) -> object:
 
 def _rule(name: str) -> str:
     """Return the rule for the values of a field."""
-    owner = registry.FIELD_OWNERS.get(name)
+    owner = registry.PART_CLASS_BY_FIELD_NAME.get(name)
     if owner is None:
         return ""
     return (
@@ -257,7 +257,7 @@ def _parts_with(name: str) -> str:
     owners = [
         f"`{part.name}`"
         for slot in registry.SLOTS
-        for part in slot.choices.values()
+        for part in slot.built_in_parts.values()
         if name in field_names(part)
     ]
     return ", ".join(owners)
@@ -277,12 +277,14 @@ def parts() -> str:
 def _slot(slot: registry.Slot) -> str:
     """Format the section of a slot."""
     rows = (
-        (f"`{name}`" + (" (default)" if name == slot.default else ""), first_paragraph(part),
+        (f"`{name}`" + (" (default)" if name == slot.default_part_name else ""), first_paragraph(part),
          equation(part), ", ".join(f"`{own}`" for own in field_names(part)), f"`{SCENES[name]}`")
-        for name, part in slot.choices.items()
+        for name, part in slot.built_in_parts.items()
     )  # fmt: skip
     made = markdown_table(("choice", "what it is", "equation", "its fields", "example"), rows)
-    called = "" if not slot.selectors else " A field of the choice, stated, calls for it."
+    called = (
+        "" if not slot.parts_by_selecting_field else " A field of the choice, stated, calls for it."
+    )
     return f"### {slot.name}\n\n{slot.long_name.capitalize()}.{called}\n\n{made}"
 
 
@@ -542,7 +544,7 @@ def vocabulary() -> str:
             html_unit(about),
             strip_markup(about.long_name),
         )
-        for about in QUANTITIES.values()
+        for about in QUANTITY_BY_NAME.values()
         if about.name not in registry.FIELD_NAMES
     )
     return markdown_table(("name", "symbol", "unit", "meaning"), rows)

@@ -272,7 +272,15 @@ def field_names() -> tuple[str, ...]:
     """Return names that ``--set`` accepts, and a few unknown names."""
     from rsfstudy.slider import registry
 
-    return (*registry.field_defaults(), "case", "sample", "stiffnes", "B_over_a", "rtol", "numbers")
+    return (
+        *registry.scene_field_defaults(),
+        "case",
+        "sample",
+        "stiffnes",
+        "B_over_a",
+        "rtol",
+        "numbers",
+    )
 
 
 def draw_value(command: str, param: click.Parameter, chance: random.Random) -> str:

@@ -118,8 +118,8 @@ def resume_run(path: Path) -> xr.Dataset:
 
 
 def answer_record(path: Path) -> Any:
-    return external.read_answer(
-        path, problem_files.read_problem(problem_files.shipped_problems()[1])
+    return external.read_external_answer(
+        path, problem_files.read_problem(problem_files.shipped_problem_files()[1])
     )
 
 
@@ -288,8 +288,10 @@ def write_valid_files(place: Path) -> dict[str, Any]:
     (place / "record.csv").write_text("\n".join([header, *rows]))
     (place / "record.dat").write_bytes(_xlook(np.full(600, 0.2), moved, stress))
     (place / "protocol.csv").write_text("velocity (um/s),duration (s)\n1,10\n10,20\n0,5\n")
-    shutil.copy(problem_files.shipped_problems()[1], place / "problem.toml")
-    shutil.copy(problem_files.shipped_problems()[1].with_suffix(".csv"), place / "01_answer.csv")
+    shutil.copy(problem_files.shipped_problem_files()[1], place / "problem.toml")
+    shutil.copy(
+        problem_files.shipped_problem_files()[1].with_suffix(".csv"), place / "01_answer.csv"
+    )
     (place / "cases.csv").write_text("a (1),b_over_a (1)\n0.01,1.5\n0.012,1.6\n0.01,2\n")
     (place / "mine.mplstyle").write_text("font.size: 9\naxes.grid: True\nlines.linewidth: 1.5\n")
     (place / "study.txt").write_text("study.py")

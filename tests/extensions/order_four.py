@@ -15,15 +15,15 @@ from rsfstudy.motion.workspace import count_evaluations
 class OrderFour(Stepper):
     name = "order_four"
 
-    def begin(self, motion, space):
+    def begin_regime(self, motion, space):
         system = self.systems[motion.regime]
         self._rate, self._p, self._motion = system.rate_function, system.parameters, motion
-        self._allowed = motion.tolerance * np.array(system.scales)
+        self._allowed = motion.tolerance * np.array(system.unknown_scales)
         self._length = 1e-3
-        space.rates[: space.unknowns] = self.rates(np.array(space.y[: space.unknowns]))
+        space.rates[: space.unknown_count] = self.rates(np.array(space.y[: space.unknown_count]))
 
-    def attempt(self, motion, space, longest):
-        y, first = (np.array(x[: space.unknowns]) for x in (space.y, space.rates))
+    def attempt_step(self, motion, space, longest):
+        y, first = (np.array(x[: space.unknown_count]) for x in (space.y, space.rates))
         length = min(self._length, longest)
         while True:
             towards = length * motion.direction
@@ -40,13 +40,13 @@ class OrderFour(Stepper):
                 break
             length = self._length
         motion.step_length, motion.end = towards, motion.clock + towards
-        space.y_end[: space.unknowns] = new
-        space.rates_at_end[: space.unknowns] = self.rates(new)
+        space.y_end[: space.unknown_count] = new
+        space.rates_at_end[: space.unknown_count] = self.rates(new)
         return length
 
-    def unknowns_at(self, motion, space, clock):
+    def interpolate_unknowns(self, motion, space, clock):
         """By the cubic with the values and rates of both ends."""
-        n, part = space.unknowns, (clock - motion.clock) / motion.step_length
+        n, part = space.unknown_count, (clock - motion.clock) / motion.step_length
         y, new, first, last = (
             np.array(x[:n]) for x in (space.y, space.y_end, space.rates, space.rates_at_end)
         )
@@ -55,8 +55,8 @@ class OrderFour(Stepper):
         bend += part * (new - y - motion.step_length * last)
         space.y_within[:n] = line + part * (1.0 - part) * bend
 
-    def retake(self, motion, space, clock):
-        n = space.unknowns
+    def retake_step(self, motion, space, clock):
+        n = space.unknown_count
         motion.step_length, motion.end = clock - motion.clock, clock
         y, first = np.array(space.y[:n]), np.array(space.rates[:n])
         new = self.halves(y, first, motion.step_length)[0]

@@ -26,8 +26,8 @@ class StressWeakening(SlownessLaw):
     name = "stress_weakening"
     state_effect = staticmethod(stress_state_effect)
 
-    def numbers(self, scene):
-        return (*super().numbers(scene), self.c)
+    def parameter_values(self, scene):
+        return (*super().parameter_values(scene), self.c)
 
 
 study = Study(

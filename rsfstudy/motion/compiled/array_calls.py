@@ -26,57 +26,59 @@ from rsfstudy.motion.recording import (
 )
 from rsfstudy.motion.steppers import order_eight
 
-_FLOAT_POINTER = types.CPointer(types.float64)
+_NUMBA_FLOAT_POINTER_TYPE = types.CPointer(types.float64)
 #: ``function(y, rates, p, result)``: all pointers to numbers, of which some are not read.
-_DOUBLE_POINTER = ir.DoubleType().as_pointer()
-_FUNCTION_TYPE = ir.FunctionType(ir.VoidType(), [_DOUBLE_POINTER] * 4)
+_LLVM_DOUBLE_POINTER_TYPE = ir.DoubleType().as_pointer()
+_LLVM_FUNCTION_TYPE = ir.FunctionType(ir.VoidType(), [_LLVM_DOUBLE_POINTER_TYPE] * 4)
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def _call_address(_context: Any, function: Any, y: Any, rates: Any, p: Any, result: Any) -> Any:
+def _call_function_at_address(
+    _context: Any, function: Any, y: Any, rates: Any, parameters: Any, result: Any
+) -> Any:
     def code(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         function, *pointers = arguments
-        builder.call(builder.inttoptr(function, _FUNCTION_TYPE.as_pointer()), pointers)
+        builder.call(builder.inttoptr(function, _LLVM_FUNCTION_TYPE.as_pointer()), pointers)
         return target.get_dummy_value()
 
-    return types.void(types.int64, *[_FLOAT_POINTER] * 4), code
+    return types.void(types.int64, *[_NUMBA_FLOAT_POINTER_TYPE] * 4), code
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def _data_pointer(_context: Any, array: Any) -> Any:
+def _array_data_pointer(_context: Any, array: Any) -> Any:
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return cgutils.create_struct_proxy(signature.args[0])(context, builder, arguments[0]).data
 
-    return _FLOAT_POINTER(array), code
+    return _NUMBA_FLOAT_POINTER_TYPE(array), code
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def _offset_pointer(_context: Any, pointer: Any, numbers: Any) -> Any:
+def _pointer_moved_by(_context: Any, pointer: Any, item_count: Any) -> Any:
     def code(_target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         pointer, numbers = arguments
         return builder.gep(pointer, [numbers])
 
-    return _FLOAT_POINTER(_FLOAT_POINTER, types.int64), code
+    return _NUMBA_FLOAT_POINTER_TYPE(_NUMBA_FLOAT_POINTER_TYPE, types.int64), code
 
 
-def evaluate(function, y, rates, p, result):
+def evaluate_in_place(function, y, rates, parameters, result):
     """Have a function of the equations fill `result`."""
-    _call_address(function, y, rates, p, result)
+    _call_function_at_address(function, y, rates, parameters, result)
 
 
-def as_pointer(array):
+def array_as_pointer(array):
     """A pointer to the first number of an array, which its caller keeps alive."""
-    return _data_pointer(array)
+    return _array_data_pointer(array)
 
 
-def offset_by(pointer, count):
+def offset_pointer(pointer, item_count):
     """A pointer so many numbers further on."""
-    return _offset_pointer(pointer, count)
+    return _pointer_moved_by(pointer, item_count)
 
 
-def copy_values(source, target, count):
+def copy_values(source, target, item_count):
     """Copy so many numbers."""
-    for i in range(count):
+    for i in range(item_count):
         target[i] = source[i]
 
 
@@ -111,15 +113,15 @@ def interpolate_rows(columns, row_positions, result):
 
 
 #: What stands in place of which function.
-REPLACEMENTS: Mapping[Any, Any] = {
-    array_calls.evaluate: evaluate,
-    array_calls.as_pointer: as_pointer,
-    array_calls.offset_by: offset_by,
+COMPILED_REPLACEMENT_BY_FUNCTION: Mapping[Any, Any] = {
+    array_calls.evaluate_in_place: evaluate_in_place,
+    array_calls.array_as_pointer: array_as_pointer,
+    array_calls.offset_pointer: offset_pointer,
     array_calls.copy_values: copy_values,
     recording.interpolate_rows: interpolate_rows,
-    steppers.begin: order_eight.begin,
-    steppers.attempt: order_eight.attempt,
+    steppers.begin_regime: order_eight.begin_regime,
+    steppers.attempt_step: order_eight.attempt_step,
     steppers.step_to_segment_end: order_eight.step_to_segment_end,
-    steppers.unknowns_at: order_eight.unknowns_at,
-    steppers.retake: order_eight.retake,
+    steppers.interpolate_unknowns: order_eight.interpolate_unknowns,
+    steppers.retake_step: order_eight.retake_step,
 }

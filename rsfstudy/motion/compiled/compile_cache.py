@@ -34,12 +34,12 @@ from numba.core.caching import FunctionCache
 from numba.core.ccallback import CFunc
 from numba.core.sigutils import normalize_signature
 
-from rsfstudy.motion.compiled.array_calls import REPLACEMENTS
+from rsfstudy.motion.compiled.array_calls import COMPILED_REPLACEMENT_BY_FUNCTION
 from rsfstudy.motion.engines import compilation_log
 
-_ENTRY_FILE = "motion.py"
+_CACHE_ENTRY_FILE_NAME = "motion.py"
 #: Modules that are as their version, or that of Python, says.
-_VERSIONED_MODULES = {*sys.stdlib_module_names, "numpy", "numba"}
+_MODULES_IDENTIFIED_BY_VERSION = {*sys.stdlib_module_names, "numpy", "numba"}
 #: Quotients by the numbers of a scene may be products with reciprocals, found once a step; and
 #: products and sums may be rounded together.
 _COMPILER_OPTIONS: Mapping[str, Any] = {
@@ -49,43 +49,49 @@ _COMPILER_OPTIONS: Mapping[str, Any] = {
 }
 _CFUNC_SIGNATURE = numba.types.void(*[numba.types.CPointer(numba.types.float64)] * 4)
 #: Changes where what is kept is laid out or named in another way.
-_CACHE_VERSION = 4
+_CACHE_FORMAT_VERSION = 4
 #: Compiled functions whose addresses are in use.
-_LIVE_CFUNCS: list[Any] = []
+_CFUNCS_KEPT_ALIVE: list[Any] = []
 _logger = logging.getLogger(__name__)
 
 
-def cache_folder() -> Path:
+def compile_cache_folder() -> Path:
     """Folder where compiled motions are kept: the one that the system has for such things."""
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(home) / "rsfstudy" / "compiled"
 
 
-def compute_digest(signature: Any, *functions: Callable[..., Any]) -> str:
+def compute_code_digest(signature: Any, *functions: Callable[..., Any]) -> str:
     """Digest of functions of a signature and of all that they reach, of the compiler, what it is
     allowed, and the processor.
     """
     content = _ContentDigest()
-    content.add((signature, functions))
+    content.add_value((signature, functions))
     processor = llvmlite.binding.get_host_cpu_name(), str(llvmlite.binding.get_host_cpu_features())
-    content.add(
-        (_CACHE_VERSION, numba.__version__, np.__version__, str(config.CPU_NAME), str(config.OPT))
+    content.add_value(
+        (
+            _CACHE_FORMAT_VERSION,
+            numba.__version__,
+            np.__version__,
+            str(config.CPU_NAME),
+            str(config.OPT),
+        )
     )
-    content.add(processor)
-    content.add(
+    content.add_value(processor)
+    content.add_value(
         [(name, sorted(x) if isinstance(x, set) else x) for name, x in _COMPILER_OPTIONS.items()]
     )
-    return content.digest.hexdigest()[:32]
+    return content.sha256_hash.hexdigest()[:32]
 
 
 class _ContentDigest:
     """Digests whatever a compiler can make a constant of."""
 
     def __init__(self) -> None:
-        self.digest = hashlib.sha256()
+        self.sha256_hash = hashlib.sha256()
         self._function_numbers: dict[int, int] = {}
 
-    def add(self, value: Any) -> None:
+    def add_value(self, value: Any) -> None:
         """Add a value, and what it refers to."""
         if isinstance(value, types.FunctionType):
             known = id(value) in self._function_numbers
@@ -94,40 +100,40 @@ class _ContentDigest:
             if not known:
                 self._add_code(value.__code__, value.__globals__)
                 for cell in value.__closure__ or ():
-                    self.add(_replacement_of(cell.cell_contents))
+                    self.add_value(_compiled_replacement_of(cell.cell_contents))
         elif isinstance(value, tuple | list | frozenset):
             parts = sorted(value, key=repr) if isinstance(value, frozenset) else value
             self._add_text(f"{len(value)} together")
             for part in parts:
-                self.add(part)
+                self.add_value(part)
         elif isinstance(value, np.ndarray):
             self._add_text(f"array {value.dtype} {value.shape}")
-            self.digest.update(value.tobytes())
+            self.sha256_hash.update(value.tobytes())
         elif isinstance(value, type):
             members = list(value) if issubclass(value, Enum) else getattr(value, "_fields", ())
             self._add_text(f"class {value.__qualname__} {members}")
         else:
             self._add_text(repr(value))
 
-    def _add_code(self, code: types.CodeType, known: Mapping[str, Any]) -> None:
-        self.digest.update(code.co_code)
-        self.add(code.co_varnames)
+    def _add_code(self, code: types.CodeType, global_values: Mapping[str, Any]) -> None:
+        self.sha256_hash.update(code.co_code)
+        self.add_value(code.co_varnames)
         for constant in code.co_consts:
             if isinstance(constant, types.CodeType):
-                self._add_code(constant, known)
+                self._add_code(constant, global_values)
             else:
-                self.add(constant)
-        for name in _global_names(code):
+                self.add_value(constant)
+        for name in _global_names_read_by(code):
             self._add_text(name)
-            value = _replacement_of(known.get(name))
+            value = _compiled_replacement_of(global_values.get(name))
             if not isinstance(value, types.ModuleType):
-                self.add(value)
-            elif value.__name__.partition(".")[0] not in _VERSIONED_MODULES:
+                self.add_value(value)
+            elif value.__name__.partition(".")[0] not in _MODULES_IDENTIFIED_BY_VERSION:
                 # a compiler takes what is read from a module for a constant
-                self.add([getattr(value, read, None) for read in code.co_names])
+                self.add_value([getattr(value, read, None) for read in code.co_names])
 
     def _add_text(self, text: str) -> None:
-        self.digest.update(text.encode() + b"\0")
+        self.sha256_hash.update(text.encode() + b"\0")
 
 
 def compile_function(function: Callable[..., Any], signature: Any) -> Any:
@@ -141,20 +147,20 @@ def compile_function(function: Callable[..., Any], signature: Any) -> Any:
         dispatcher.compile(signature)
         return dispatcher
 
-    return _load_or_compile(compute_digest(signature, function), compile_for)
+    return _load_or_compile(compute_code_digest(signature, function), compile_for)
 
 
-def compile_cfuncs(functions: Sequence[Callable[..., Any]]) -> tuple[int, ...]:
+def compile_cfunc_addresses(functions: Sequence[Callable[..., Any]]) -> tuple[int, ...]:
     """Addresses of compiled functions of pointers to numbers."""
 
     def compile_for(entry: str) -> list[Any]:
         return [
-            _compile_cfunc(_copy_with_compiled_globals(function, entry), cached=bool(entry))
+            _compile_cfunc(_copy_with_compiled_globals(function, entry), use_cache=bool(entry))
             for function in functions
         ]
 
-    pointers = _load_or_compile(compute_digest(_CFUNC_SIGNATURE, *functions), compile_for)
-    _LIVE_CFUNCS.append(pointers)
+    pointers = _load_or_compile(compute_code_digest(_CFUNC_SIGNATURE, *functions), compile_for)
+    _CFUNCS_KEPT_ALIVE.append(pointers)
     return tuple(pointer.address for pointer in pointers)
 
 
@@ -167,58 +173,58 @@ class _ContentKeyedCache(FunctionCache):  # type: ignore[misc]
         return signature, codegen.magic_tuple()
 
 
-def _compile_cfunc(function: Any, *, cached: bool) -> Any:
+def _compile_cfunc(function: Any, *, use_cache: bool) -> Any:
     """A compiled function of pointers to numbers, kept in the cache or not."""
     compiled = CFunc(
         function, normalize_signature(_CFUNC_SIGNATURE), locals={}, options=dict(_COMPILER_OPTIONS)
     )
-    if cached:
+    if use_cache:
         compiled._cache = _ContentKeyedCache(function)  # type: ignore[attr-defined]
     compiled.compile()
     return compiled
 
 
-def _load_or_compile(name: str, compile_for: Callable[[str], Any]) -> Any:
+def _load_or_compile(entry_name: str, compile_at_path: Callable[[str], Any]) -> Any:
     """Compiled functions, from the folder of that name where it is there and whole."""
-    folder = _entry_folder(name)
+    folder = _cache_entry_folder(entry_name)
     if folder is not None:
         if folder.exists():
             with contextlib.suppress(Exception):  # whatever a cache can be damaged by
-                return compile_for(str(folder / _ENTRY_FILE))
+                return compile_at_path(str(folder / _CACHE_ENTRY_FILE_NAME))
         shutil.rmtree(folder, ignore_errors=True)
     began = time.perf_counter()
-    with compilation_log.context():
+    with compilation_log.context_while_compiling():
         try:
             return (
-                compile_for("")
+                compile_at_path("")
                 if folder is None
-                else _compile_in_temporary_folder(folder, compile_for)
+                else _compile_in_temporary_folder(folder, compile_at_path)
             )
         except OSError:  # nothing can be kept
-            return compile_for("")
+            return compile_at_path("")
         finally:
-            compilation_log.programs += 1
-            compilation_log.seconds += time.perf_counter() - began
+            compilation_log.compiled_program_count += 1
+            compilation_log.total_compilation_seconds += time.perf_counter() - began
 
 
-def _entry_folder(name: str) -> Path | None:
+def _cache_entry_folder(entry_name: str) -> Path | None:
     """The folder of that name; None where there is no cache, or not for this user alone."""
     try:
-        cache = cache_folder()
+        cache = compile_cache_folder()
         cache.parent.parent.mkdir(parents=True, exist_ok=True)
         for folder in (cache.parent, cache):
             folder.mkdir(mode=0o700, exist_ok=True)
-        for folder in (cache.parent, cache, cache / name):
-            if folder.exists() and not _is_private(folder):
-                _warn_not_private(folder)
+        for folder in (cache.parent, cache, cache / entry_name):
+            if folder.exists() and not _is_private_folder(folder):
+                _warn_folder_not_private(folder)
                 return None
     except (OSError, RuntimeError):  # it cannot be made, or the user has no home
         return None
-    return cache / name
+    return cache / entry_name
 
 
 @functools.cache
-def _warn_not_private(folder: Path) -> None:
+def _warn_folder_not_private(folder: Path) -> None:
     _logger.warning(
         "%s: others own it or may write to it, and nothing compiled is kept there or taken from "
         "it. Remove it, or choose another place (XDG_CACHE_HOME).",
@@ -226,7 +232,7 @@ def _warn_not_private(folder: Path) -> None:
     )
 
 
-def _is_private(folder: Path) -> bool:
+def _is_private_folder(folder: Path) -> bool:
     """True if nobody else owns a folder, or a link to it, or may write to it."""
     if not hasattr(os, "geteuid"):  # Windows: no owners, no modes
         return True
@@ -235,14 +241,14 @@ def _is_private(folder: Path) -> bool:
     return owners == {os.geteuid()} and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
-def _compile_in_temporary_folder(folder: Path, compile_for: Callable[[str], Any]) -> Any:
+def _compile_in_temporary_folder(folder: Path, compile_at_path: Callable[[str], Any]) -> Any:
     """Compile in a folder of its own, which is then renamed."""
     aside = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
     try:
-        entry = aside / _ENTRY_FILE
+        entry = aside / _CACHE_ENTRY_FILE_NAME
         entry.write_text("# Stands for a function that rsfstudy has compiled.\n")
         os.utime(entry, (0, 0))  # Numba looks at its age
-        ready = compile_for(str(entry))
+        ready = compile_at_path(str(entry))
         with contextlib.suppress(OSError):  # somebody else was faster
             os.rename(aside, folder)
         return ready
@@ -250,30 +256,34 @@ def _compile_in_temporary_folder(folder: Path, compile_for: Callable[[str], Any]
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def _copy_with_compiled_globals(function: Any, entry: str = "") -> Any:
+def _copy_with_compiled_globals(function: Any, entry_path: str = "") -> Any:
     """A copy of a function whose names stand for compiled functions, as if it stood in a file.
 
     Its own name tells its content: a linker takes functions of one name for one function, wherever
     they come from, and Numba numbers its names anew in each process.
     """
-    named = {name: function.__globals__.get(name) for name in _global_names(function.__code__)}
-    reached = {name: _jit(value) for name, value in named.items() if _is_function(value)}
+    named = {
+        name: function.__globals__.get(name) for name in _global_names_read_by(function.__code__)
+    }
+    reached = {
+        name: _jit_compile_callee(value) for name, value in named.items() if _is_function(value)
+    }
     cells = tuple(
-        types.CellType(_jit(value) if _is_function(value) else value)
+        types.CellType(_jit_compile_callee(value) if _is_function(value) else value)
         for value in (cell.cell_contents for cell in function.__closure__ or ())
     )
-    code = function.__code__.replace(co_filename=entry) if entry else function.__code__
+    code = function.__code__.replace(co_filename=entry_path) if entry_path else function.__code__
     copy = types.FunctionType(
         code, {**function.__globals__, **reached}, function.__name__, None, cells or None
     )
     content = _ContentDigest()
-    content.add(function)
-    copy.__qualname__ = f"{function.__name__}_{content.digest.hexdigest()[:32]}"
+    content.add_value(function)
+    copy.__qualname__ = f"{function.__name__}_{content.sha256_hash.hexdigest()[:32]}"
     return copy
 
 
 @functools.cache
-def _global_names(code: types.CodeType) -> tuple[str, ...]:
+def _global_names_read_by(code: types.CodeType) -> tuple[str, ...]:
     """Names of the globals that a function reads, without those of attributes."""
     reads = (i.argval for i in dis.get_instructions(code) if i.opname == "LOAD_GLOBAL")
     return tuple(dict.fromkeys(reads))
@@ -283,17 +293,17 @@ def _is_function(value: Any) -> bool:
     return isinstance(value, types.FunctionType)
 
 
-def _replacement_of(value: Any) -> Any:
+def _compiled_replacement_of(value: Any) -> Any:
     """Value that the compiler is given for one that a function names."""
-    return REPLACEMENTS.get(value, value) if _is_function(value) else value
+    return COMPILED_REPLACEMENT_BY_FUNCTION.get(value, value) if _is_function(value) else value
 
 
-def _jit(function: Any) -> Any:
+def _jit_compile_callee(function: Any) -> Any:
     """A compiled function that only others call; those of several equations share it."""
-    return _jit_internal(_replacement_of(function))
+    return _jit_compile_callee_cached(_compiled_replacement_of(function))
 
 
 @functools.cache
-def _jit_internal(function: Any) -> Any:
+def _jit_compile_callee_cached(function: Any) -> Any:
     inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return numba.njit(_copy_with_compiled_globals(function), **_COMPILER_OPTIONS, **inner)

@@ -49,17 +49,17 @@ class Stepper(ABC):
         self.systems, self.failure = systems, "no step is long enough"
 
     @abstractmethod
-    def begin(self, motion: Any, space: Any) -> None:
-        """Begin with the unknowns ``space.y`` of the regime ``motion.regime``, at clock zero; fill
-        in their rates, ``space.rates``. Where the loading has a kink, ``motion.next_step_length``
+    def begin_regime(self, motion: Any, workspace: Any) -> None:
+        """Begin with the unknowns ``workspace.y`` of the regime ``motion.regime``, at clock zero; fill
+        in their rates, ``workspace.rates``. Where the loading has a kink, ``motion.next_step_length``
         is that of the step it has cut short; elsewhere it is 0.
         """
 
     @abstractmethod
-    def attempt(self, motion: Any, space: Any, longest: float) -> float:
+    def attempt_step(self, motion: Any, workspace: Any, max_length: float) -> float:
         """Take a step whose local error is allowed, in the direction of ``motion.direction``.
 
-        Fills in ``space.y_end`` and ``space.rates_at_end``, the unknowns at its end and their
+        Fills in ``workspace.y_end`` and ``workspace.rates_at_end``, the unknowns at its end and their
         rates, and ``motion.end`` and ``motion.step_length``, the clock there and the length. Each
         right-hand side is charged by ``workspace.count_evaluations``.
 
@@ -69,42 +69,42 @@ class Stepper(ABC):
             Its length, or `NO_STEP`, or `BUDGET_SPENT`.
         """
 
-    def step_to_segment_end(self, motion: Any, space: Any, length: float) -> float:
+    def step_to_segment_end(self, motion: Any, workspace: Any, approximate_length: float) -> float:
         """Take a step that ends when the segment of loading does, as `attempt` does; of about that
         length. A stepper that cannot returns 0.
         """
         return 0.0
 
     @abstractmethod
-    def unknowns_at(self, motion: Any, space: Any, clock: float) -> None:
-        """Fill in ``space.y_within``, the unknowns at a clock within the step, by dense output."""
+    def interpolate_unknowns(self, motion: Any, workspace: Any, clock: float) -> None:
+        """Fill in ``workspace.y_within``, the unknowns at a clock within the step, by dense output."""
 
     @abstractmethod
-    def retake(self, motion: Any, space: Any, clock: float) -> None:
+    def retake_step(self, motion: Any, workspace: Any, clock: float) -> None:
         """Take the step anew, to end at a clock within it."""
 
 
-def begin(motion, space):
+def begin_regime(motion, workspace):
     """Start the clock of the equations."""
     motion.clock = 0.0
-    space.stepper.begin(motion, space)
+    workspace.stepper.begin_regime(motion, workspace)
 
 
-def attempt(motion, space, longest):
+def attempt_step(motion, workspace, max_length):
     """Length of the step that could be taken; not positive where there is none."""
-    return space.stepper.attempt(motion, space, longest)
+    return workspace.stepper.attempt_step(motion, workspace, max_length)
 
 
-def step_to_segment_end(motion, space, length):
+def step_to_segment_end(motion, workspace, approximate_length):
     """Length of a step that ends when the segment does; 0 where none could be taken."""
-    return space.stepper.step_to_segment_end(motion, space, length)
+    return workspace.stepper.step_to_segment_end(motion, workspace, approximate_length)
 
 
-def unknowns_at(motion, space, clock):
+def interpolate_unknowns(motion, workspace, clock):
     """Fill in the unknowns at a clock within the step."""
-    space.stepper.unknowns_at(motion, space, clock)
+    workspace.stepper.interpolate_unknowns(motion, workspace, clock)
 
 
-def retake(motion, space, clock):
+def retake_step(motion, workspace, clock):
     """Take the step anew, to a clock within it."""
-    space.stepper.retake(motion, space, clock)
+    workspace.stepper.retake_step(motion, workspace, clock)

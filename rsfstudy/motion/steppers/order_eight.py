@@ -9,8 +9,8 @@ import math
 
 from scipy.integrate import DOP853
 
-from rsfstudy.motion.array_calls import evaluate, offset_by
-from rsfstudy.motion.longest_step import LONGEST_STEP
+from rsfstudy.motion.array_calls import evaluate_in_place, offset_pointer
+from rsfstudy.motion.longest_step import MAX_STEP_LENGTH
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper
 from rsfstudy.motion.steppers.unrolled_step import (
     DENSE_ROW_COUNT,
@@ -21,46 +21,49 @@ from rsfstudy.motion.steppers.unrolled_step import (
     TOLERANCE_INDEX,
     TOTAL_STAGE_COUNT,
 )
-from rsfstudy.motion.workspace import count_evaluations, step_rates
+from rsfstudy.motion.workspace import count_evaluations, fill_rates_by_step_clock
 
 #: Weights of the stages of dense output, and of all stages in its rows.
 _EXTRA_WEIGHTS, _DENSE_WEIGHTS = (tuple(x.ravel().tolist()) for x in (DOP853.A_EXTRA, DOP853.D))
 #: Weights of the stages before each stage, of which the last is the end of the step, and in its
 #: errors of fifth and third order.
-_STAGE_WEIGHTS = tuple(
+_RUNGE_KUTTA_STAGE_WEIGHTS = tuple(
     map(tuple, [*DOP853.A[:STAGE_COUNT, :STAGE_COUNT].tolist(), DOP853.B.tolist()])
 )
 _FIFTH_ORDER_WEIGHTS, _THIRD_ORDER_WEIGHTS = tuple(DOP853.E5.tolist()), tuple(DOP853.E3.tolist())
 _SAFETY_FACTOR, _MIN_FACTOR, _MAX_FACTOR, _ERROR_EXPONENT = 0.9, 0.2, 10.0, -1.0 / 8.0
 
 
-def begin(motion, space):
+def begin_regime(motion, workspace):
     """Start the clock of the equations."""
     motion.clock = 0.0
-    evaluate(space.rate, space.y, space.y, space.parameters, space.rates)
+    evaluate_in_place(
+        workspace.fill_rates, workspace.y, workspace.y, workspace.parameters, workspace.rates
+    )
     count_evaluations(motion, 1)
     if motion.next_step_length == 0.0:
         motion.next_step_length = min(
-            select_initial_step_length(space, motion.direction, motion.tolerance), LONGEST_STEP
+            select_initial_step_length(workspace, motion.direction, motion.tolerance),
+            MAX_STEP_LENGTH,
         )
         count_evaluations(motion, 1)
 
 
-def attempt(motion, space, longest):
+def attempt_step(motion, workspace, max_length):
     """Length of the step that could be taken; not positive where there is none."""
     towards = math.nextafter(motion.clock, motion.direction * math.inf)
     shortest = 10.0 * abs(towards - motion.clock)
-    length = max(min(motion.next_step_length, longest), shortest)
+    length = max(min(motion.next_step_length, max_length), shortest)
     rejected = False
-    space.step_block[TOLERANCE_INDEX], motion.time_per_step = motion.tolerance, 0.0
+    workspace.order_eight_step_block[TOLERANCE_INDEX], motion.time_per_step = motion.tolerance, 0.0
     while length >= shortest:
         motion.end = motion.clock + length * motion.direction
         motion.step_length = motion.end - motion.clock
         length = abs(motion.step_length)
-        take_step_of_length(motion, space)
+        take_step_ignoring_error(motion, workspace)
         if motion.evaluations_slow + motion.evaluations_fast > motion.budget:
             return BUDGET_SPENT
-        error = space.step_block[ERROR_INDEX]
+        error = workspace.order_eight_step_block[ERROR_INDEX]
         if error < 1.0:
             motion.next_step_length = increase_step_length(length, error, rejected)
             motion.is_dense = 0
@@ -69,109 +72,122 @@ def attempt(motion, space, longest):
     return NO_STEP
 
 
-def take_step_of_length(motion, space):
+def take_step_ignoring_error(motion, workspace):
     """Take a step of the length that is stated, whatever its error."""
-    space.step_block[LENGTH_INDEX] = motion.step_length
-    evaluate(space.attempt, space.y, space.stages, space.parameters, space.step_block)
+    workspace.order_eight_step_block[LENGTH_INDEX] = motion.step_length
+    evaluate_in_place(
+        workspace.attempt_step,
+        workspace.y,
+        workspace.stage_rates,
+        workspace.parameters,
+        workspace.order_eight_step_block,
+    )
     count_evaluations(motion, STAGE_COUNT)
 
 
-def step_to_segment_end(motion, space, length):
+def step_to_segment_end(motion, workspace, approximate_length):
     """Take a step against time, which is the last unknown, up to when the segment ends; its clock
     runs as time does at its beginning, when it has that length. Returns 0 where its error is too
     large.
     """
-    motion.time_per_step, motion.step_length = space.rates[space.unknowns - 1], length
-    motion.end, motion.is_dense = motion.clock + length, 0
-    error = take_step_at_pace(motion, space)
+    motion.time_per_step, motion.step_length = (
+        workspace.rates[workspace.unknown_count - 1],
+        approximate_length,
+    )
+    motion.end, motion.is_dense = motion.clock + approximate_length, 0
+    error = take_step_with_time_as_clock(motion, workspace)
     count_evaluations(motion, STAGE_COUNT)
     if motion.evaluations_slow + motion.evaluations_fast > motion.budget:
         return BUDGET_SPENT
     if error < 1.0:
         motion.next_step_length = max(
-            motion.next_step_length, increase_step_length(length, error, False)
+            motion.next_step_length, increase_step_length(approximate_length, error, False)
         )
-        return length
-    motion.next_step_length = reduce_step_length(length, error)
+        return approximate_length
+    motion.next_step_length = reduce_step_length(approximate_length, error)
     return 0.0
 
 
-def take_step_at_pace(motion, space):
+def take_step_with_time_as_clock(motion, workspace):
     """Take a step by the clock of a pace; returns its local error over what is allowed."""
     count, y, new, stages, length = (
-        space.unknowns,
-        space.y,
-        space.y_end,
-        space.stages,
+        workspace.unknown_count,
+        workspace.y,
+        workspace.y_end,
+        workspace.stage_rates,
         motion.step_length,
     )
     for s in range(1, STAGE_COUNT + 1):
         for i in range(count):
             together = 0.0
             for j in range(s):
-                together += _STAGE_WEIGHTS[s][j] * stages[j * count + i]
+                together += _RUNGE_KUTTA_STAGE_WEIGHTS[s][j] * stages[j * count + i]
             new[i] = y[i] + length * together
-        step_rates(motion, space, new, offset_by(stages, s * count))
+        fill_rates_by_step_clock(motion, workspace, new, offset_pointer(stages, s * count))
     fifth = third = 0.0
     for i in range(count):
         of_fifth = of_third = 0.0
         for j in range(STAGE_COUNT + 1):
             of_fifth += _FIFTH_ORDER_WEIGHTS[j] * stages[j * count + i]
             of_third += _THIRD_ORDER_WEIGHTS[j] * stages[j * count + i]
-        allowed = motion.tolerance * (space.scales[i] + max(abs(y[i]), abs(new[i])))
+        allowed = motion.tolerance * (workspace.scales[i] + max(abs(y[i]), abs(new[i])))
         fifth += (of_fifth / allowed) * (of_fifth / allowed)
         third += (of_third / allowed) * (of_third / allowed)
     both = fifth + 0.01 * third
     return length * fifth / math.sqrt(both * count) if both != 0.0 else 0.0
 
 
-def retake(motion, space, clock):
+def retake_step(motion, workspace, clock):
     """Take the step anew, to a clock within it."""
     motion.end, motion.step_length, motion.is_dense = clock, clock - motion.clock, 0
     motion.time_per_step = 0.0
-    take_step_of_length(motion, space)
+    take_step_ignoring_error(motion, workspace)
 
 
-def unknowns_at(motion, space, clock):
+def interpolate_unknowns(motion, workspace, clock):
     """Fill in the unknowns at a clock within the step."""
     if not motion.is_dense:
-        prepare_interpolation(motion, space, motion.step_length)
+        prepare_dense_output(motion, workspace, motion.step_length)
         count_evaluations(motion, EXTRA_STAGE_COUNT)
         motion.is_dense = 1
-    interpolate(space, (clock - motion.clock) / motion.step_length)
+    evaluate_dense_output(workspace, (clock - motion.clock) / motion.step_length)
 
 
-def increase_step_length(length, error, rejected):
+def increase_step_length(length, error_over_tolerance, was_rejected_before):
     """Length of the step after one that was accepted with this error."""
     factor = (
-        _MAX_FACTOR if error == 0.0 else min(_MAX_FACTOR, _SAFETY_FACTOR * error**_ERROR_EXPONENT)
+        _MAX_FACTOR
+        if error_over_tolerance == 0.0
+        else min(_MAX_FACTOR, _SAFETY_FACTOR * error_over_tolerance**_ERROR_EXPONENT)
     )
-    return length * (min(1.0, factor) if rejected else factor)
+    return length * (min(1.0, factor) if was_rejected_before else factor)
 
 
-def reduce_step_length(length, error):
+def reduce_step_length(length, error_over_tolerance):
     """Length of the next attempt after one that was rejected; its error may be no number."""
-    factor = _SAFETY_FACTOR * error**_ERROR_EXPONENT
+    factor = _SAFETY_FACTOR * error_over_tolerance**_ERROR_EXPONENT
     return length * (factor if factor > _MIN_FACTOR else _MIN_FACTOR)
 
 
-def select_initial_step_length(space, direction, tolerance):
+def select_initial_step_length(workspace, clock_direction, tolerance):
     """Length of the first step, by two evaluations of the rates."""
-    y, first, count = space.y, space.rates, space.unknowns
+    y, first, count = workspace.y, workspace.rates, workspace.unknown_count
     d0 = d1 = 0.0
     for i in range(count):
-        scale = tolerance * (space.scales[i] + abs(y[i]))
+        scale = tolerance * (workspace.scales[i] + abs(y[i]))
         d0 += (y[i] / scale) * (y[i] / scale)
         d1 += (first[i] / scale) * (first[i] / scale)
     d0, d1 = math.sqrt(d0 / count), math.sqrt(d1 / count)
     trial = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
     for i in range(count):
-        space.y_end[i] = y[i] + trial * direction * first[i]
-    evaluate(space.rate, space.y_end, y, space.parameters, space.y_within)
+        workspace.y_end[i] = y[i] + trial * clock_direction * first[i]
+    evaluate_in_place(
+        workspace.fill_rates, workspace.y_end, y, workspace.parameters, workspace.y_within
+    )
     d2 = 0.0
     for i in range(count):
-        scale = tolerance * (space.scales[i] + abs(y[i]))
-        change = (space.y_within[i] - first[i]) / scale
+        scale = tolerance * (workspace.scales[i] + abs(y[i]))
+        change = (workspace.y_within[i] - first[i]) / scale
         d2 += change * change
     d2 = math.sqrt(d2 / count) / trial
     if d1 <= 1e-15 and d2 <= 1e-15:
@@ -181,46 +197,53 @@ def select_initial_step_length(space, direction, tolerance):
     return min(100.0 * trial, length)
 
 
-def prepare_interpolation(motion, space, length):
+def prepare_dense_output(motion, workspace, step_length):
     """Fill in the rows of dense output, by three more evaluations of the rates."""
-    count, y, stages, rows = space.unknowns, space.y, space.stages, space.dense_rows
+    count, y, stages, rows = (
+        workspace.unknown_count,
+        workspace.y,
+        workspace.stage_rates,
+        workspace.dense_output_rows,
+    )
     for s in range(EXTRA_STAGE_COUNT):
         for i in range(count):
             together = 0.0
             for j in range(STAGE_COUNT + 1 + s):
                 together += _EXTRA_WEIGHTS[s * TOTAL_STAGE_COUNT + j] * stages[j * count + i]
-            space.y_within[i] = y[i] + length * together
-        rates = offset_by(stages, (STAGE_COUNT + 1 + s) * count)
-        step_rates(motion, space, space.y_within, rates)
+            workspace.y_within[i] = y[i] + step_length * together
+        rates = offset_pointer(stages, (STAGE_COUNT + 1 + s) * count)
+        fill_rates_by_step_clock(motion, workspace, workspace.y_within, rates)
     for i in range(count):
-        change = space.y_end[i] - y[i]
+        change = workspace.y_end[i] - y[i]
         first, last = stages[i], stages[STAGE_COUNT * count + i]
         rows[i] = change
-        rows[count + i] = length * first - change
-        rows[2 * count + i] = 2.0 * change - length * (last + first)
+        rows[count + i] = step_length * first - change
+        rows[2 * count + i] = 2.0 * change - step_length * (last + first)
         for r in range(DENSE_ROW_COUNT - 3):
             together = 0.0
             for j in range(TOTAL_STAGE_COUNT):
                 together += _DENSE_WEIGHTS[r * TOTAL_STAGE_COUNT + j] * stages[j * count + i]
-            rows[(3 + r) * count + i] = length * together
+            rows[(3 + r) * count + i] = step_length * together
 
 
-def interpolate(space, fraction):
+def evaluate_dense_output(workspace, step_fraction):
     """Unknowns at a part of a step from its beginning."""
-    for i in range(space.unknowns):
+    for i in range(workspace.unknown_count):
         value = 0.0
         for r in range(DENSE_ROW_COUNT):
-            row = space.dense_rows[(DENSE_ROW_COUNT - 1 - r) * space.unknowns + i]
-            value = (value + row) * (fraction if r % 2 == 0 else 1.0 - fraction)
-        space.y_within[i] = space.y[i] + value
+            row = workspace.dense_output_rows[
+                (DENSE_ROW_COUNT - 1 - r) * workspace.unknown_count + i
+            ]
+            value = (value + row) * (step_fraction if r % 2 == 0 else 1.0 - step_fraction)
+        workspace.y_within[i] = workspace.y[i] + value
 
 
-class OrderEight(Stepper):
+class OrderEightStepper(Stepper):
     """DOP853 in plain Python: every step can be followed with a debugger."""
 
     name = "python"
-    begin = staticmethod(begin)
-    attempt = staticmethod(attempt)
+    begin_regime = staticmethod(begin_regime)
+    attempt_step = staticmethod(attempt_step)
     step_to_segment_end = staticmethod(step_to_segment_end)
-    unknowns_at = staticmethod(unknowns_at)
-    retake = staticmethod(retake)
+    interpolate_unknowns = staticmethod(interpolate_unknowns)
+    retake_step = staticmethod(retake_step)

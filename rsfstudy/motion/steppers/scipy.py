@@ -19,14 +19,14 @@ from scipy.integrate import (
 )
 
 from rsfstudy.motion.layout import SLOW_REGIME
-from rsfstudy.motion.longest_step import LONGEST_STEP
+from rsfstudy.motion.longest_step import MAX_STEP_LENGTH
 from rsfstudy.motion.meter import MotionStopped
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper, order_eight
 from rsfstudy.slider import Equations, Numbers
 from rsfstudy.status import Status
 
 #: SciPy's integrators, by name.
-METHODS: Mapping[str, type[OdeSolver]] = {
+SCIPY_SOLVER_BY_METHOD_NAME: Mapping[str, type[OdeSolver]] = {
     method.__name__: method for method in (DOP853, RK45, RK23, Radau, BDF, LSODA)
 }
 DEFAULT_METHOD = "DOP853"
@@ -36,7 +36,7 @@ class _BudgetExceeded(Exception):
     """The budget is, within a step."""
 
 
-def _float_interpolant(dense_output: Any) -> Callable[[float], Iterable[float]]:
+def _build_float_interpolant(dense_output: Any) -> Callable[[float], Iterable[float]]:
     """The unknowns at a clock by dense output; that of order eight as it says, operation by
     operation, but on floats: arrays of so few numbers take four times as long.
     """
@@ -65,32 +65,35 @@ class SciPyStepper(Stepper):
     def __init__(self, systems: tuple[Equations, ...], methods: Mapping[str, str]) -> None:
         super().__init__(systems, methods)
         names = (methods.get(system.regime, DEFAULT_METHOD) for system in systems)
-        self._methods = [METHODS[name] for name in names]
+        self._methods = [SCIPY_SOLVER_BY_METHOD_NAME[name] for name in names]
         self._solver: Any = None
         self._interpolant: Any = None
         self._max_evaluations = math.inf
 
-    def begin(self, motion: Any, space: Any) -> None:
+    def begin_regime(self, motion: Any, workspace: Any) -> None:
         ends = 0.0, motion.direction * np.inf
         # the longest first step is asked of a trial step, which may leave the domain
-        begin, known = np.array(space.y[: space.unknowns]), motion.next_step_length
+        begin, known = np.array(workspace.y[: workspace.unknown_count]), motion.next_step_length
         first = {"first_step": known} if known else {}
-        self._solver = self._create_solver(motion, space, ends, begin, **first)
-        space.rates[: space.unknowns] = self._current_rates()
+        self._solver = self._create_solver(motion, workspace, ends, begin, **first)
+        workspace.rates[: workspace.unknown_count] = self._current_solver_rates()
 
-    def attempt(self, motion: Any, space: Any, longest: float) -> float:
+    def attempt_step(self, motion: Any, workspace: Any, max_length: float) -> float:
         motion.time_per_step = 0.0
         if self._solver.status == "finished":  # a step that was taken anew
             ends = motion.clock, motion.direction * np.inf
-            begin, length = np.array(space.y[: space.unknowns]), abs(motion.next_step_length)
-            self._solver = self._create_solver(motion, space, ends, begin, first_step=length)
+            begin, length = (
+                np.array(workspace.y[: workspace.unknown_count]),
+                abs(motion.next_step_length),
+            )
+            self._solver = self._create_solver(motion, workspace, ends, begin, first_step=length)
         solver = self._solver
-        solver.max_step = longest
+        solver.max_step = max_length
         if motion.next_step_length and isinstance(
             solver, DOP853
         ):  # it may have been too long for a kink
             solver.h_abs = motion.next_step_length
-        if not self._take_step(motion, solver):
+        if not self._take_solver_step(motion, solver):
             return BUDGET_SPENT
         if solver.status == "failed":
             return NO_STEP
@@ -99,34 +102,36 @@ class SciPyStepper(Stepper):
         motion.end, self._interpolant = float(solver.t), None
         motion.step_length = motion.end - motion.clock
         motion.next_step_length = float(getattr(solver, "h_abs", abs(motion.step_length)))
-        self._store_step_end(space)
+        self._store_step_end(workspace)
         return abs(float(motion.step_length))
 
-    def step_to_segment_end(self, motion: Any, space: Any, length: float) -> float:
+    def step_to_segment_end(self, motion: Any, workspace: Any, approximate_length: float) -> float:
         if not isinstance(self._solver, DOP853):
             return 0.0
         self._interpolant = None
-        taken: float = order_eight.step_to_segment_end(motion, space, length)  # type: ignore[no-untyped-call]
+        taken: float = order_eight.step_to_segment_end(motion, workspace, approximate_length)  # type: ignore[no-untyped-call]
         return taken
 
-    def unknowns_at(self, motion: Any, space: Any, clock: float) -> None:
+    def interpolate_unknowns(self, motion: Any, workspace: Any, clock: float) -> None:
         if motion.time_per_step > 0.0:
-            order_eight.unknowns_at(motion, space, clock)  # type: ignore[no-untyped-call]
+            order_eight.interpolate_unknowns(motion, workspace, clock)  # type: ignore[no-untyped-call]
             return
         if self._interpolant is None:
-            self._interpolant = _float_interpolant(self._solver.dense_output())
+            self._interpolant = _build_float_interpolant(self._solver.dense_output())
         for i, unknown in enumerate(self._interpolant(clock)):
-            space.y_within[i] = unknown
+            workspace.y_within[i] = unknown
 
-    def retake(self, motion: Any, space: Any, clock: float) -> None:
-        begin, motion.time_per_step = np.array(space.y[: space.unknowns]), 0.0
+    def retake_step(self, motion: Any, workspace: Any, clock: float) -> None:
+        begin, motion.time_per_step = np.array(workspace.y[: workspace.unknown_count]), 0.0
         # the clock may round to where the step begins; an integrator wants a way to go
         end = clock if clock != motion.clock else np.nextafter(clock, motion.direction * np.inf)
         length, ends = abs(end - motion.clock), (motion.clock, end)
-        self._solver = solver = self._create_solver(motion, space, ends, begin, first_step=length)
+        self._solver = solver = self._create_solver(
+            motion, workspace, ends, begin, first_step=length
+        )
         clocks, within = [motion.clock], []
         while solver.status == "running":
-            if not self._take_step(motion, solver) or solver.status == "failed":
+            if not self._take_solver_step(motion, solver) or solver.status == "failed":
                 raise MotionStopped(
                     Status.INTEGRATION_FAILED, f"a step cannot be ended: {self.failure}"
                 )
@@ -134,12 +139,17 @@ class SciPyStepper(Stepper):
             within.append(solver.dense_output())
         motion.end, motion.step_length = clock, clock - motion.clock
         self._interpolant = (
-            OdeSolution(clocks, within) if len(within) > 1 else _float_interpolant(within[0])
+            OdeSolution(clocks, within) if len(within) > 1 else _build_float_interpolant(within[0])
         )
-        self._store_step_end(space)
+        self._store_step_end(workspace)
 
     def _create_solver(
-        self, motion: Any, space: Any, ends: tuple[float, float], begin: np.ndarray, **first: float
+        self,
+        motion: Any,
+        workspace: Any,
+        clock_interval: tuple[float, float],
+        initial_unknowns: np.ndarray,
+        **first: float,
     ) -> OdeSolver:
         """An integrator of the regime from one clock to another, whose work is charged."""
         system = self.systems[motion.regime]
@@ -155,22 +165,22 @@ class SciPyStepper(Stepper):
             changes: Numbers = rate_of(tuple(unknowns.tolist()), p)
             return changes
 
-        scales = np.array(space.scales[: space.unknowns])
+        scales = np.array(workspace.scales[: workspace.unknown_count])
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             solver = self._methods[motion.regime](
                 rate,
-                ends[0],
-                begin,
-                ends[1],
+                clock_interval[0],
+                initial_unknowns,
+                clock_interval[1],
                 rtol=motion.tolerance,
                 atol=motion.tolerance * scales,
-                max_step=LONGEST_STEP,
+                max_step=MAX_STEP_LENGTH,
                 **first,
             )
         motion.jacobians += int(solver.njev)
         return solver
 
-    def _take_step(self, motion: Any, solver: OdeSolver) -> bool:
+    def _take_solver_step(self, motion: Any, solver: OdeSolver) -> bool:
         """Take one step; whether the budget is enough for it.
 
         Trial steps may leave the domain, and the solver then rejects them; what it accepts is
@@ -191,14 +201,14 @@ class SciPyStepper(Stepper):
             motion.jacobians += int(solver.njev - known)
         return True
 
-    def _current_rates(self) -> np.ndarray:
+    def _current_solver_rates(self) -> np.ndarray:
         """Rates where the solver stands; most have just computed them."""
         known = getattr(self._solver, "f", None)
         if known is None:
             known = self._solver.fun(self._solver.t, self._solver.y)
         return np.asarray(known, dtype=float)
 
-    def _store_step_end(self, space: Any) -> None:
+    def _store_step_end(self, workspace: Any) -> None:
         """Fill in the end of a step."""
-        space.y_end[: space.unknowns] = self._solver.y
-        space.rates_at_end[: space.unknowns] = self._current_rates()
+        workspace.y_end[: workspace.unknown_count] = self._solver.y
+        workspace.rates_at_end[: workspace.unknown_count] = self._current_solver_rates()

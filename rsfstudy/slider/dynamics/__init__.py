@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from rsfstudy._deprecation import renamed_members
 from rsfstudy.slider.parts import Function, Part, discover_parts
-from rsfstudy.slider.requirements import PART_QUANTITIES
+from rsfstudy.slider.requirements import QUANTITIES_A_PART_MAY_NEED
 from rsfstudy.slider.scene_view import SceneView
 
 
@@ -46,9 +46,9 @@ class Dynamics(Part):
 
     #: Name of the equations of motion between ruptures, as it appears in results.
     regime: ClassVar[str]
-    received_quantities = frozenset(PART_QUANTITIES)
-    slip_rate: ClassVar[Function]
-    rupture_rate: ClassVar[Function | None] = None
+    received_quantities = frozenset(QUANTITIES_A_PART_MAY_NEED)
+    build_slip_rate_functions: ClassVar[Function]
+    build_rupture_rate_function: ClassVar[Function | None] = None
     #: True if slip may reverse in scenes with the regularised friction law.
     allows_reversed_slip: ClassVar[bool] = False
 
@@ -59,9 +59,9 @@ class Dynamics(Part):
         Returns
         -------
         tuple of str
-            ``("slip_rate",)``.
+            ``("build_slip_rate_functions",)``.
         """
-        return ("slip_rate",)
+        return ("build_slip_rate_functions",)
 
     def radiated_stress(self, log_slip_rate: float) -> float:
         r"""Compute the part of the spring stress that seismic waves radiate.

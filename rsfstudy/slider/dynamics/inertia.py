@@ -23,11 +23,11 @@ from rsfstudy.slider.parameter_layout import (
 from rsfstudy.slider.parts import Function, Numbers, flag
 from rsfstudy.slider.scene_functions import velocity_ratios
 from rsfstudy.slider.scene_view import SceneView
-from rsfstudy.slider.states import state_step_function
+from rsfstudy.slider.states import build_state_step_function
 
 #: Upper limit of rates per inertial time. Larger rates occur only in trial steps, because a motion
 #: returns to the slow manifold long before its slip rate relaxes this fast.
-LARGEST_RUPTURE_RATE = 1e30
+MAX_RATE_PER_INERTIAL_TIME = 1e30
 #: Weights of inertia below which the second order, and the derivative of the first order, are
 #: negligible. The third constant is the displacement step of difference quotients, in D_c.
 NEGLIGIBLE_SECOND_ORDER_WEIGHT, NEGLIGIBLE_GROWTH_WEIGHT, DIFFERENCE_STEP = 1e-7, 1e-9, 1e-6
@@ -36,7 +36,7 @@ NEGLIGIBLE_SECOND_ORDER_WEIGHT, NEGLIGIBLE_GROWTH_WEIGHT, DIFFERENCE_STEP = 1e-7
 MIN_VELOCITY_RATIO, MAX_VELOCITY_RATIO = 1e-60, 1e40
 
 
-def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
+def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Function, Function]:
     r"""Return the functions of the slip rate on the slow manifold.
 
     Parameters
@@ -100,8 +100,15 @@ def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
 
     With pore pressure, ``state_contribution`` replaces :math:`d\Psi/ds` in :math:`G`.
     """
-    strength, state_sum, evolutions = friction.strength, friction.state_sum, friction.evolutions
-    contribution, ahead = friction.state_contribution, state_step_function(friction.state_count)
+    strength, state_sum, evolutions = (
+        friction_functions.strength,
+        friction_functions.state_sum,
+        friction_functions.evolutions,
+    )
+    contribution, ahead = (
+        friction_functions.state_contribution,
+        build_state_step_function(friction_functions.state_count),
+    )
 
     def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
         alone = quasi_static_values(spring_stress, psis, p)
@@ -208,7 +215,9 @@ def clamped_inertial_stress(
     return stress if abs(stress) < p[A] else max(-p[A], min(stress, p[A]))
 
 
-def compute_inertia_weight(x: float, slower: float, p: Numbers) -> float:
+def compute_inertia_weight(
+    log_slip_rate: float, load_to_slip_velocity_ratio: float, p: Numbers
+) -> float:
     r"""Compute the weight of inertia.
 
     The weight is the lag of :math:`\ln V` behind its quasi-static value, divided by the derivative
@@ -230,14 +239,14 @@ def compute_inertia_weight(x: float, slower: float, p: Numbers) -> float:
         Weight :math:`W = (K/a) w (w + w_0)`.
     """
     load = p[LOAD_VELOCITY] * p[DYNAMICS]
-    if MIN_VELOCITY_RATIO < slower < MAX_VELOCITY_RATIO:
-        norm = load / slower
+    if MIN_VELOCITY_RATIO < load_to_slip_velocity_ratio < MAX_VELOCITY_RATIO:
+        norm = load / load_to_slip_velocity_ratio
     else:
-        norm = math.exp(min(x + p[DYNAMICS + 1], LARGEST_LOG_SLIP_RATE / 4.0))
+        norm = math.exp(min(log_slip_rate + p[DYNAMICS + 1], LARGEST_LOG_SLIP_RATE / 4.0))
     return p[STIFFNESS] / p[A] * norm * (norm + load)
 
 
-def rupture_rate(friction: FrictionFunctions) -> Function:
+def build_rupture_rate_function(friction_functions: FrictionFunctions) -> Function:
     r"""Return the rate function of the full equations of motion.
 
     The unknowns are :math:`f`, :math:`x = \ln(V/V_*)`, :math:`g` and all states except the first.
@@ -271,8 +280,8 @@ def rupture_rate(friction: FrictionFunctions) -> Function:
         \dot{f} = K (w_0 - w), \quad \dot{x} = \frac{f - g}{K w}, \quad
           S'(g) \, \dot{g} = a \dot{x} + w \frac{d\Psi}{d\delta}.
     """
-    strength, states_at = friction.strength, friction.states_from_strength
-    evolutions, contribution = friction.evolutions, friction.state_contribution
+    strength, states_at = friction_functions.strength, friction_functions.states_from_strength
+    evolutions, contribution = friction_functions.evolutions, friction_functions.state_contribution
 
     def rates(state: Numbers, p: Numbers) -> Numbers:
         spring_stress, x, g, others = state[0], state[1], state[2], state[3:]
@@ -282,19 +291,19 @@ def rupture_rate(friction: FrictionFunctions) -> Function:
             log_norm = math.copysign(LARGEST_LOG_SLIP_RATE, log_norm)
         norm = math.exp(log_norm)
         value, slope, shift, _shift_slope = strength(g, others, p)
-        faster = clamp_rate((spring_stress - g) / (stiffness * norm))
+        faster = clamp_rupture_rate((spring_stress - g) / (stiffness * norm))
         changes = evolutions(x, states_at(value, x, others, p), shift, norm, p)
         return (
-            clamp_rate(stiffness * (p[LOAD_VELOCITY] * p[DYNAMICS] - norm)),
+            clamp_rupture_rate(stiffness * (p[LOAD_VELOCITY] * p[DYNAMICS] - norm)),
             faster,
-            clamp_rate((a * faster + contribution(changes, g, others, p)) / slope),
+            clamp_rupture_rate((a * faster + contribution(changes, g, others, p)) / slope),
             *changes[1:],
         )
 
     return rates
 
 
-def clamp_rate(rate: float) -> float:
+def clamp_rupture_rate(rate: float) -> float:
     """Limit a rate to ``LARGEST_RUPTURE_RATE`` in magnitude.
 
     Parameters
@@ -309,8 +318,8 @@ def clamp_rate(rate: float) -> float:
     """
     return (
         rate
-        if abs(rate) < LARGEST_RUPTURE_RATE
-        else max(min(rate, LARGEST_RUPTURE_RATE), -LARGEST_RUPTURE_RATE)
+        if abs(rate) < MAX_RATE_PER_INERTIAL_TIME
+        else max(min(rate, MAX_RATE_PER_INERTIAL_TIME), -MAX_RATE_PER_INERTIAL_TIME)
     )
 
 
@@ -338,15 +347,15 @@ class Inertia(Dynamics):
     name = "inertia"
     selected_by = "inertia"
     regime = "slow_manifold"
-    slip_rate = staticmethod(slip_rate)
-    rupture_rate = staticmethod(rupture_rate)
+    build_slip_rate_functions = staticmethod(build_slip_rate_functions)
+    build_rupture_rate_function = staticmethod(build_rupture_rate_function)
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that are active."""
         return ("inertia",)
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         r"""Return the time scale of inertia and its logarithm.
 
         See the base class. The time scale is :math:`T V_*/(2 \pi D_c)`.

@@ -10,7 +10,7 @@ from rsfstudy.slider.parameter_layout import A
 from rsfstudy.slider.parts import Function, Numbers
 
 
-def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
+def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Function, Function]:
     r"""Return the functions of the quasi-static slip rate.
 
     Parameters
@@ -36,8 +36,8 @@ def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
 
         a \ln\frac{V}{V_*} = S(f) - \Psi, \quad a \, d\ln V = S'(f) \, df - d\Psi.
     """
-    strength, state_sum = friction.strength, friction.state_sum
-    contribution = friction.state_contribution
+    strength, state_sum = friction_functions.strength, friction_functions.state_sum
+    contribution = friction_functions.state_contribution
 
     def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
         value, _slope, shift, _shift_slope = strength(spring_stress, psis, p)
@@ -58,4 +58,4 @@ class QuasiStatic(Dynamics):
     name = "quasi_static"
     regime = "quasi_static"
     allows_reversed_slip = True
-    slip_rate = staticmethod(slip_rate)
+    build_slip_rate_functions = staticmethod(build_slip_rate_functions)

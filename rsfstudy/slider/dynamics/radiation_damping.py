@@ -15,10 +15,10 @@ from rsfstudy.slider.parts import NON_NEGATIVE, Function, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
 
 _MAX_ITERATIONS = 200
-_STEP_TOLERANCE = 1e-15
+_ROOT_STEP_TOLERANCE = 1e-15
 #: Relative tolerance of the strength for convergence. Small Newton steps are not sufficient,
 #: because slopes are very steep at the lower limit of normal stress, which only trial steps reach.
-_BALANCE_TOLERANCE = 1e-6
+_STRESS_BALANCE_TOLERANCE = 1e-6
 #: Upper limit of ln V. Only trial steps reach the limit, where the radiated stress is 10^300 eta.
 _MAX_LOG_SLIP_RATE = 690.0
 
@@ -46,7 +46,7 @@ def compute_radiated_stress(log_slip_rate: float, damping: float) -> float:
     return damping * math.expm1(log_slip_rate)
 
 
-def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
+def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Function, Function]:
     r"""Return the functions of the slip rate with radiation damping.
 
     Parameters
@@ -77,8 +77,8 @@ def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
     side increases, so the equation has a unique root. If a Newton step leaves the bracket or the
     steps shrink too slowly, the solver bisects the bracket.
     """
-    strength, state_sum = friction.strength, friction.state_sum
-    contribution = friction.state_contribution
+    strength, state_sum = friction_functions.strength, friction_functions.state_sum
+    contribution = friction_functions.state_contribution
 
     def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
         a, damping, psi = p[A], p[DYNAMICS], state_sum(psis)
@@ -100,12 +100,12 @@ def slip_rate(friction: FrictionFunctions) -> tuple[Function, Function]:
             else:
                 high = x
             change = missing / (a + slope * damping * math.exp(x))
-            balanced = abs(missing) <= _BALANCE_TOLERANCE * (1.0 + abs(psi) + a * abs(x))
-            if balanced and abs(change) <= _STEP_TOLERANCE * (1.0 + abs(x)):
+            balanced = abs(missing) <= _STRESS_BALANCE_TOLERANCE * (1.0 + abs(psi) + a * abs(x))
+            if balanced and abs(change) <= _ROOT_STEP_TOLERANCE * (1.0 + abs(x)):
                 return x, g, shift
             # If normal stress is almost zero, slopes are very steep, and Newton steps shrink
             # slowly.
-            slow = abs(change) > 0.5 * abs(before) or abs(change) <= _STEP_TOLERANCE * (
+            slow = abs(change) > 0.5 * abs(before) or abs(change) <= _ROOT_STEP_TOLERANCE * (
                 1.0 + abs(x)
             )
             before = change
@@ -156,14 +156,14 @@ class RadiationDamping(Dynamics):
     name = "radiation_damping"
     selected_by = "radiation_damping"
     regime = "quasi_dynamic"
-    slip_rate = staticmethod(slip_rate)
+    build_slip_rate_functions = staticmethod(build_slip_rate_functions)
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that are active."""
         return ("radiation_damping",)
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the damping coefficient.
 
         See the base class.

@@ -44,7 +44,7 @@ class Fluid(Part):
     """
 
     derived_properties = ("highest_pressure",)
-    defining_methods = frozenset({"auxiliary_rates", "numbers"})
+    defining_methods = frozenset({"auxiliary_rates", "parameter_values"})
     received_quantities = frozenset({SLIP_RATE, PORE_PRESSURE})
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:

@@ -15,7 +15,7 @@ from rsfstudy.slider.parameter_layout import (
     FLUID,
     LARGEST_LOG_SLOWNESS,
 )
-from rsfstudy.slider.parts import Function, Numbers, collect_numbers
+from rsfstudy.slider.parts import Function, Numbers, collect_parameter_values
 from rsfstudy.slider.scene_view import SceneView
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @cache
-def rates_with_boundary_pressure(rates: Function) -> Function:
+def add_boundary_pressure_rate(fluid_auxiliary_rates: Function) -> Function:
     r"""Extend the rates of a fluid by the pressure of the surroundings.
 
     Parameters
@@ -52,13 +52,16 @@ def rates_with_boundary_pressure(rates: Function) -> Function:
     ) -> Numbers:
         time = fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
         own = (*states[1:-1], states[-1] - states[0])
-        return (-p[BOUNDARY_PRESSURE_RATE] * time, *rates(log_slip_rate, own, fraction, p))
+        return (
+            -p[BOUNDARY_PRESSURE_RATE] * time,
+            *fluid_auxiliary_rates(log_slip_rate, own, fraction, p),
+        )
 
     return auxiliary_rates
 
 
 @cache
-def steady_states_with_boundary_pressure(steady_states: Function) -> Function:
+def add_boundary_pressure_steady_state(fluid_auxiliary_steady_states: Function) -> Function:
     """Extend the steady states of a fluid by the surrounding pressure.
 
     Parameters
@@ -74,7 +77,7 @@ def steady_states_with_boundary_pressure(steady_states: Function) -> Function:
     """
 
     def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
-        return (0.0, *steady_states(log_slip_rate, p))
+        return (0.0, *fluid_auxiliary_steady_states(log_slip_rate, p))
 
     return auxiliary_steady_states
 
@@ -121,15 +124,15 @@ class FluidWithBoundaryPressure:
     def auxiliary_rates(self) -> Function:
         """Function that computes the rates of all unknowns."""
         assert self.fluid.auxiliary_rates is not None
-        return rates_with_boundary_pressure(self.fluid.auxiliary_rates)
+        return add_boundary_pressure_rate(self.fluid.auxiliary_rates)
 
     @property
     def auxiliary_steady_states(self) -> Function:
         """Function that returns all unknowns in steady sliding."""
         assert self.fluid.auxiliary_steady_states is not None
-        return steady_states_with_boundary_pressure(self.fluid.auxiliary_steady_states)
+        return add_boundary_pressure_steady_state(self.fluid.auxiliary_steady_states)
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the parameters of the fluid and the rate of the loading.
 
         Parameters
@@ -143,6 +146,6 @@ class FluidWithBoundaryPressure:
             Parameters of the fluid, padded with NaN, and the rate of the surrounding pressure as
             the last element.
         """
-        own = collect_numbers(self.fluid, scene)
+        own = collect_parameter_values(self.fluid, scene)
         between = (math.nan,) * (DYNAMICS - FLUID - 1 - len(own))
-        return (*own, *between, *collect_numbers(self.loading, scene))
+        return (*own, *between, *collect_parameter_values(self.loading, scene))

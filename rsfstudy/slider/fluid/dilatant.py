@@ -17,7 +17,9 @@ from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
+def auxiliary_rates(
+    log_slip_rate: float, states: Numbers, slip_fraction: float, p: Numbers
+) -> Numbers:
     r"""Compute the rates of porosity and pore pressure.
 
     Parameters
@@ -55,8 +57,8 @@ def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: N
     Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171.
     """
     porosity, pressure = states
-    opening = fraction * (p[FLUID] * log_slip_rate - porosity)
-    time = fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+    opening = slip_fraction * (p[FLUID] * log_slip_rate - porosity)
+    time = slip_fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
     return opening, -p[FLUID + 1] * time * pressure - opening
 
 
@@ -167,7 +169,7 @@ class DilatantFluid(Fluid):
         """Names of the effects that are active."""
         return ("dilatancy",)
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the dilatancy and the drainage rate.
 
         See the base class.

@@ -29,7 +29,7 @@ from rsfstudy.slider.parts import (
     flag,
     number,
 )
-from rsfstudy.slider.requirements import LAW_QUANTITIES
+from rsfstudy.slider.requirements import QUANTITIES_RECEIVED_BY_LAWS
 from rsfstudy.slider.scene_view import SceneView
 
 #: Upper limit of exponents in evolution laws. Larger exponents occur only in trial steps that the
@@ -56,7 +56,7 @@ def fast_expm1(exponent: float) -> float:
     return math.expm1(exponent) if abs(exponent) < 0.5 else math.exp(exponent) - 1.0
 
 
-def cutoff_velocity_field() -> Any:
+def declare_cutoff_velocity_field() -> Any:
     """Declare the field ``cutoff_velocity_ratio`` of laws with a cut-off.
 
     Returns
@@ -144,7 +144,7 @@ class LawBase(Part):
 
     derived_properties = ("has_closed_orbits", "scale_free", "relaxation")
     defining_methods = frozenset({"evolution", "evolutions"})
-    received_quantities = LAW_QUANTITIES
+    received_quantities = QUANTITIES_RECEIVED_BY_LAWS
     #: Number of states of the law.
     state_count: ClassVar[int] = 1
     #: True if every orbit around steady sliding is closed at the critical stiffness, provided that
@@ -187,7 +187,7 @@ class LawBase(Part):
         """
         raise TypeError(f"{type(self).__name__} states no b_over_a")
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the parameters that precede the fields of the law in ``p``.
 
         The base class has no such parameters.
@@ -210,7 +210,7 @@ class LawBase(Part):
 
         The value is always positive.
         """
-        return abs(self.b_over_a) or VANISHING_B_OVER_A
+        return abs(self.b_over_a) or B_OVER_A_STANDING_FOR_ZERO
 
     @property
     def depends_on_stress(self) -> bool:
@@ -317,7 +317,7 @@ class Law(LawBase):
 
     b_over_a: float = number(2.0, "$b/a$", "1", "ratio of evolution effect to direct effect")
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return b as the first parameter of the law.
 
         If ``b_over_a`` is zero, the method returns a negligible positive value, because equations
@@ -333,7 +333,7 @@ class Law(LawBase):
         tuple of float
             Evolution effect parameter b.
         """
-        return (scene.a * (self.b_over_a or VANISHING_B_OVER_A),)
+        return (scene.a * (self.b_over_a or B_OVER_A_STANDING_FOR_ZERO),)
 
     @property
     def min_weakening_b_over_a(self) -> float:
@@ -375,16 +375,18 @@ class Law(LawBase):
         least = self.min_weakening_b_over_a
         if self.b_over_a <= least and lacks_critical_stiffness(scene):
             rule = f"must exceed {least:.6g}: without rate weakening there is no critical stiffness"
-            raise self.field_error("b_over_a", rule, STIFFNESS_REMEDY)
+            raise self.field_error("b_over_a", rule, MISSING_CRITICAL_STIFFNESS_REMEDY)
 
 
 #: Value of b/a that replaces zero in equations that divide by b. Its effect on the results is far
 #: smaller than rounding errors.
-VANISHING_B_OVER_A = 1e-60
+B_OVER_A_STANDING_FOR_ZERO = 1e-60
 #: Smallest nonzero b/a. Powers and quotients of smaller values would underflow or overflow.
 MIN_B_OVER_A = 1e-30
 #: Remedy in error messages about a missing critical stiffness.
-STIFFNESS_REMEDY = "Sliding is then stable at every stiffness, or at none: give stiffness itself."
+MISSING_CRITICAL_STIFFNESS_REMEDY = (
+    "Sliding is then stable at every stiffness, or at none: give stiffness itself."
+)
 
 
 def lacks_critical_stiffness(scene: SceneView) -> bool:

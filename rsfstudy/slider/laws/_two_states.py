@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.laws import STIFFNESS_REMEDY, LawBase, lacks_critical_stiffness
+from rsfstudy.slider.laws import (
+    MISSING_CRITICAL_STIFFNESS_REMEDY,
+    LawBase,
+    lacks_critical_stiffness,
+)
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import POSITIVE, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
@@ -15,7 +19,7 @@ from rsfstudy.slider.scene_view import SceneView
 FIRST_B, SECOND_B, FIRST_SHARE, SECOND_SHARE, LENGTH_QUOTIENT = range(LAW, LAW + 5)
 
 
-def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
+def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
     r"""Compute both state variables in steady sliding.
 
     Parameters
@@ -41,8 +45,8 @@ def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
         \Psi_i = c_i \, \mathrm{shift} - b_i \ln\frac{V}{V_*}.
     """
     return (
-        p[FIRST_SHARE] * shift - p[FIRST_B] * log_slip_rate,
-        p[SECOND_SHARE] * shift - p[SECOND_B] * log_slip_rate,
+        p[FIRST_SHARE] * state_shift - p[FIRST_B] * log_slip_rate,
+        p[SECOND_SHARE] * state_shift - p[SECOND_B] * log_slip_rate,
     )
 
 
@@ -112,7 +116,7 @@ class TwoStateLaw(LawBase):
         """Sum of the magnitudes of both evolution effects, divided by a."""
         return abs(self.b1_over_a) + abs(self.b2_over_a)
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the parameters of both states and the length ratio.
 
         See the base class. The parameters of a state are its b and its share of the shift. The last
@@ -149,4 +153,4 @@ class TwoStateLaw(LawBase):
                 f"with b1_over_a = {self.b1_over_a:g} and length_ratio = {self.length_ratio:g} "
                 "gives no critical stiffness"
             )
-            raise self.field_error("b2_over_a", rule, STIFFNESS_REMEDY)
+            raise self.field_error("b2_over_a", rule, MISSING_CRITICAL_STIFFNESS_REMEDY)

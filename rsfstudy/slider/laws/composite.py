@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity_field
+from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, declare_cutoff_velocity_field
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 
 #: Number of Halley iterations. From the initial value in ``lambert_w``, four iterations reach
 #: rounding accuracy.
-HALLEY_STEPS = 4
+HALLEY_ITERATION_COUNT = 4
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
@@ -69,7 +69,7 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     )
 
 
-def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
+def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
     r"""Compute the state variable in steady sliding.
 
     Parameters
@@ -95,10 +95,10 @@ def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
         u \, e^u = e^{-V/V_c}.
     """
     ahead = lambert_w(healing_factor(log_slip_rate, p[LAW + 1]))
-    return (shift + p[LAW] * (ahead - p[LAW + 2] - log_slip_rate),)
+    return (state_shift + p[LAW] * (ahead - p[LAW + 2] - log_slip_rate),)
 
 
-def healing_factor(log_slip_rate: float, log_cutoff: float) -> float:
+def healing_factor(log_slip_rate: float, log_cutoff_velocity: float) -> float:
     r"""Compute the factor that reduces healing at high slip rates.
 
     Parameters
@@ -113,7 +113,7 @@ def healing_factor(log_slip_rate: float, log_cutoff: float) -> float:
     float
         Factor :math:`\exp(-V/V_c)`.
     """
-    return math.exp(-math.exp(clamp_exponent(log_slip_rate - log_cutoff)))
+    return math.exp(-math.exp(clamp_exponent(log_slip_rate - log_cutoff_velocity)))
 
 
 def clamp_exponent(exponent: float) -> float:
@@ -148,7 +148,7 @@ def lambert_w(value: float) -> float:
         Solution w of ``w * exp(w) = value``, computed by Halley's method.
     """
     w = value / (1.0 + value)
-    for _ in range(HALLEY_STEPS):
+    for _ in range(HALLEY_ITERATION_COUNT):
         grown = math.exp(w)
         off = w * grown - value
         w -= off / (grown * (w + 1.0) - 0.5 * (w + 2.0) * off / (w + 1.0))
@@ -166,7 +166,7 @@ class CompositeLaw(Law):
         :math:`V_c`, contacts no longer heal.
     """
 
-    cutoff_velocity_ratio: float = cutoff_velocity_field()
+    cutoff_velocity_ratio: float = declare_cutoff_velocity_field()
 
     name = "composite"
     evolution = staticmethod(evolution)
@@ -179,16 +179,20 @@ class CompositeLaw(Law):
         At :math:`V_*`, the steady friction coefficient decreases with :math:`\ln V` at the rate
         :math:`b - a + b \, u_* V_*/[(1 + u_*) V_c]`.
         """
-        ahead = self._reference_steady_offset()
+        ahead = self._steady_state_offset_at_reference_rate()
         return 1.0 / (1.0 + ahead / ((1.0 + ahead) * self.cutoff_velocity_ratio))
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return b, the logarithm of the cut-off velocity, and the offset.
 
         See the base class. The offset is the value :math:`u_*` in steady sliding at :math:`V_*`.
         """
         logarithm = math.log(self.cutoff_velocity_ratio)
-        return (*super().numbers(scene), logarithm, self._reference_steady_offset())
+        return (
+            *super().parameter_values(scene),
+            logarithm,
+            self._steady_state_offset_at_reference_rate(),
+        )
 
-    def _reference_steady_offset(self) -> float:
+    def _steady_state_offset_at_reference_rate(self) -> float:
         return lambert_w(healing_factor(0.0, math.log(self.cutoff_velocity_ratio)))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, cutoff_velocity_field, fast_expm1
+from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, declare_cutoff_velocity_field, fast_expm1
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
@@ -59,7 +59,7 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     return b * fast_expm1(min(behind, LARGEST_EXPONENT))
 
 
-def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
+def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
     r"""Compute the state variable in steady sliding.
 
     Parameters
@@ -84,7 +84,7 @@ def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
 
         \Theta_{\mathrm{ss}} = b \ln\frac{1 + V_c/V}{1 + V_c/V_*}.
     """
-    return (shift + p[LAW] * steady_state_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]),)
+    return (state_shift + p[LAW] * steady_state_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]),)
 
 
 def steady_state_over_b(
@@ -130,7 +130,7 @@ class CutOffLaw(Law):
         :math:`V_c`, the evolution effect vanishes.
     """
 
-    cutoff_velocity_ratio: float = cutoff_velocity_field()
+    cutoff_velocity_ratio: float = declare_cutoff_velocity_field()
 
     name = "cut_off"
     evolution = staticmethod(evolution)
@@ -146,14 +146,14 @@ class CutOffLaw(Law):
         """
         return 1.0 + 1.0 / self.cutoff_velocity_ratio
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return b and the two velocity fractions.
 
         See the base class. The fractions are :math:`V_c/(V_c + V_*)` and :math:`V_*/(V_c + V_*)`.
         """
-        return (*super().numbers(scene), *self._velocity_fractions())
+        return (*super().parameter_values(scene), *self._cutoff_and_reference_fractions())
 
-    def relaxation(self, rate: float, slip: float) -> float:
+    def relaxation(self, log_slip_rate: float, slip: float) -> float:
         r"""Compute the relaxation of stress at constant slip rate.
 
         Parameters
@@ -176,10 +176,10 @@ class CutOffLaw(Law):
 
             \ln\left[1 + \left(\frac{1 + V_c/V_*}{1 + V_c/V} - 1\right) e^{-\delta/D_c}\right].
         """
-        ahead = -steady_state_over_b(rate, *self._velocity_fractions())
+        ahead = -steady_state_over_b(log_slip_rate, *self._cutoff_and_reference_fractions())
         return math.log(-math.expm1(-slip) + math.exp(ahead - slip))
 
-    def _velocity_fractions(self) -> Numbers:
+    def _cutoff_and_reference_fractions(self) -> Numbers:
         return 1.0 / (1.0 + 1.0 / self.cutoff_velocity_ratio), 1.0 / (
             1.0 + self.cutoff_velocity_ratio
         )

@@ -75,7 +75,7 @@ class LawFamily(Law):
     scale_free = True
     has_closed_orbits = True  # The derivative dh/du = -(1 + eps h) is linear in h.
 
-    def relaxation(self, rate: float, slip: float) -> float:
+    def relaxation(self, log_slip_rate: float, slip: float) -> float:
         r"""Compute the relaxation of stress at constant slip rate.
 
         Parameters
@@ -99,14 +99,14 @@ class LawFamily(Law):
             \frac{1}{\epsilon} \ln\left\{1
               + \left[\left(\frac{V}{V_*}\right)^\epsilon - 1\right] e^{-\delta/D_c}\right\}.
         """
-        power = self.law_exponent * rate
+        power = self.law_exponent * log_slip_rate
         if self.law_exponent == 0.0:
-            return rate * math.exp(-slip)
+            return log_slip_rate * math.exp(-slip)
         return math.log(-math.expm1(-slip) + math.exp(power - slip)) / self.law_exponent
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return b and the exponent of the law.
 
         See the base class.
         """
-        return (*super().numbers(scene), self.law_exponent)
+        return (*super().parameter_values(scene), self.law_exponent)

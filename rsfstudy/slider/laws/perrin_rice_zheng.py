@@ -15,7 +15,7 @@ from rsfstudy.slider.parts import Numbers
 #: Upper limit of the distance from steady sliding. Larger distances occur only in trial steps,
 #: because a motion ends at ln(V/V_*) = 276. The limit also prevents an overflow when the integrator
 #: squares the rate to estimate the first step.
-LARGEST_STEADY_STATE_OFFSET = 300.0
+MAX_STEADY_STATE_OFFSET_OVER_B = 300.0
 
 
 def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
@@ -56,11 +56,11 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     """
     b = p[LAW]
     return -b * math.sinh(
-        max(-LARGEST_EXPONENT, min(state / b + log_slip_rate, LARGEST_STEADY_STATE_OFFSET))
+        max(-LARGEST_EXPONENT, min(state / b + log_slip_rate, MAX_STEADY_STATE_OFFSET_OVER_B))
     )
 
 
-def relaxation(rate: float, slip: float) -> float:
+def relaxation(log_slip_rate: float, slip: float) -> float:
     r"""Compute the relaxation of stress at constant slip rate.
 
     Parameters
@@ -86,9 +86,9 @@ def relaxation(rate: float, slip: float) -> float:
 
     The code uses an equivalent formula that remains accurate for very large velocity steps.
     """
-    small, gone = math.exp(-abs(rate)), -math.expm1(-slip)
+    small, gone = math.exp(-abs(log_slip_rate)), -math.expm1(-slip)
     above, below = 2.0 - gone + small * gone, gone + small * (2.0 - gone)
-    return math.copysign(math.log(above / below), rate)
+    return math.copysign(math.log(above / below), log_slip_rate)
 
 
 @dataclass(frozen=True, kw_only=True)

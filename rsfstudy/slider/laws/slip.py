@@ -46,7 +46,7 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     return -(state + p[LAW] * log_slip_rate)
 
 
-def relaxation(rate: float, slip: float) -> float:
+def relaxation(log_slip_rate: float, slip: float) -> float:
     r"""Compute the relaxation of stress at constant slip rate.
 
     Parameters
@@ -73,7 +73,7 @@ def relaxation(rate: float, slip: float) -> float:
     ----------
     Eq. 17b of doi:10.1007/s11589-014-0098-4, minus its steady value.
     """
-    return rate * math.exp(-slip)
+    return log_slip_rate * math.exp(-slip)
 
 
 @dataclass(frozen=True, kw_only=True)

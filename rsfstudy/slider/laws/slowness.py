@@ -57,7 +57,7 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     return b * fast_expm1(LARGEST_EXPONENT if exponent > LARGEST_EXPONENT else exponent)
 
 
-def relaxation(rate: float, slip: float) -> float:
+def relaxation(log_slip_rate: float, slip: float) -> float:
     r"""Compute the relaxation of stress at constant slip rate.
 
     Parameters
@@ -84,7 +84,7 @@ def relaxation(rate: float, slip: float) -> float:
     ----------
     Eq. 17a of doi:10.1007/s11589-014-0098-4, minus its steady value.
     """
-    return math.log(-math.expm1(-slip) + math.exp(rate - slip))
+    return math.log(-math.expm1(-slip) + math.exp(log_slip_rate - slip))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,7 +16,7 @@ from rsfstudy.slider.parts import Numbers
 
 
 def evolutions(
-    log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
+    log_slip_rate: float, states: Numbers, state_shift: float, slip_fraction: float, p: Numbers
 ) -> Numbers:
     r"""Compute the evolution of both states at constant normal stress.
 
@@ -46,9 +46,9 @@ def evolutions(
 
         L_i \frac{d\Theta_i}{d\delta} = -\left(\Theta_i + b_i \ln\frac{V}{V_*}\right).
     """
-    first = psis[0] - p[FIRST_SHARE] * shift + p[FIRST_B] * log_slip_rate
-    second = psis[1] - p[SECOND_SHARE] * shift + p[SECOND_B] * log_slip_rate
-    return -fraction * first, -fraction * p[LENGTH_QUOTIENT] * second
+    first = states[0] - p[FIRST_SHARE] * state_shift + p[FIRST_B] * log_slip_rate
+    second = states[1] - p[SECOND_SHARE] * state_shift + p[SECOND_B] * log_slip_rate
+    return -slip_fraction * first, -slip_fraction * p[LENGTH_QUOTIENT] * second
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,7 +19,7 @@ from rsfstudy.slider.scene_view import SceneView
 
 
 def evolutions(
-    log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
+    log_slip_rate: float, states: Numbers, state_shift: float, slip_fraction: float, p: Numbers
 ) -> Numbers:
     r"""Compute the evolution of both states at constant normal stress.
 
@@ -58,11 +58,14 @@ def evolutions(
           = b_i \left\{\exp\left[-\left(\frac{\Theta_i}{b_i}
           + \ln\frac{V}{V_*}\right)\right] - 1\right\}.
     """
-    first = (psis[0] - p[FIRST_SHARE] * shift) / p[FIRST_B] + log_slip_rate
-    second = (psis[1] - p[SECOND_SHARE] * shift) / p[SECOND_B] + log_slip_rate
+    first = (states[0] - p[FIRST_SHARE] * state_shift) / p[FIRST_B] + log_slip_rate
+    second = (states[1] - p[SECOND_SHARE] * state_shift) / p[SECOND_B] + log_slip_rate
     return (
-        fraction * p[FIRST_B] * fast_expm1(min(-first, LARGEST_EXPONENT)),
-        fraction * p[LENGTH_QUOTIENT] * p[SECOND_B] * fast_expm1(min(-second, LARGEST_EXPONENT)),
+        slip_fraction * p[FIRST_B] * fast_expm1(min(-first, LARGEST_EXPONENT)),
+        slip_fraction
+        * p[LENGTH_QUOTIENT]
+        * p[SECOND_B]
+        * fast_expm1(min(-second, LARGEST_EXPONENT)),
     )
 
 

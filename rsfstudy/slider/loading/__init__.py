@@ -152,7 +152,7 @@ class Loading(Part):
             If a segment is too short, or if the loading and the fluid both change normal stress.
         """
         if len(self.segments) > 1:
-            self._check_durations()
+            self._check_segment_durations()
         fluid, name = scene.parts.fluid, self.selected_by
         if self.unknowns and fluid.unknowns and not self.of_pressure:
             rule = f"has no meaning for fluid={fluid.name!r}"
@@ -161,7 +161,7 @@ class Loading(Part):
             remedy = "Leave one of them out."
             raise InvalidValue(name or "loading", value, rule, remedy=remedy)
 
-    def _check_durations(self) -> None:
+    def _check_segment_durations(self) -> None:
         """Raise ``InvalidValue`` if a segment is too short."""
         for n, (begins, ends, *_others) in enumerate(self.segment_table):
             if ends - begins < MIN_SEGMENT_DURATION and ends > 0.0:
@@ -191,7 +191,7 @@ class Loading(Part):
         """
         return {"segments": [segment.as_dict() for segment in self.segments]}
 
-    def isolate_segment(self, index: int) -> Loading | Segment:
+    def isolate_segment(self, segment_index: int) -> Loading | Segment:
         """Return the loading of a single segment.
 
         Parameters
@@ -206,9 +206,9 @@ class Loading(Part):
             or if the segment is the first and the loading has unknowns.
         """
         history = self.segments
-        if len(history) == 1 or (self.unknowns and index == 0):
+        if len(history) == 1 or (self.unknowns and segment_index == 0):
             return self
-        return history[index]
+        return history[segment_index]
 
     @property
     def reported_segment_count(self) -> int:
@@ -282,7 +282,7 @@ class Loading(Part):
         return InvalidValue(name, value, f"has no meaning for {of}", remedy=remedy)
 
 
-def load_velocity_field() -> Any:
+def declare_load_velocity_field() -> Any:
     """Declare the field ``load_velocity_ratio`` of a loading.
 
     Returns
@@ -302,7 +302,7 @@ def load_velocity_field() -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoadingAtVelocity(Loading):
+class LoadingWithFinalLoadVelocity(Loading):
     """Base class of the loadings with a load point velocity.
 
     The velocity applies to the whole loading or to its last segment. The default is the reference

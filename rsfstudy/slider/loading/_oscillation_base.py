@@ -9,13 +9,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from rsfstudy.slider.loading import Loading, LoadingAtVelocity, Segment, load_velocity_field
+from rsfstudy.slider.loading import (
+    Loading,
+    LoadingWithFinalLoadVelocity,
+    Segment,
+    declare_load_velocity_field,
+)
 from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLOWNESS, LOADING
 from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
+def auxiliary_rates(
+    log_slip_rate: float, states: Numbers, slip_fraction: float, p: Numbers
+) -> Numbers:
     r"""Compute the rates of the two unknowns of a harmonic oscillation.
 
     Parameters
@@ -49,7 +56,7 @@ def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: N
     each rate. The term vanishes for the exact solution.
     """
     ahead, relief = states
-    turn = p[LOADING] * fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+    turn = p[LOADING] * slip_fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
     over, relative = ahead / p[LOADING + 1], relief / p[LOADING + 1]
     missing = 0.5 * (1.0 - over * over - relative * relative)
     return turn * (relief + missing * ahead), turn * (missing * relief - ahead)
@@ -74,7 +81,7 @@ def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
 
 
 @dataclass(frozen=True, kw_only=True)
-class OscillationBase(LoadingAtVelocity):
+class OscillationBase(LoadingWithFinalLoadVelocity):
     r"""Base class of the oscillations, with two harmonic unknowns.
 
     Parameters
@@ -100,7 +107,7 @@ class OscillationBase(LoadingAtVelocity):
         "D_c/V_*",
         rule=POSITIVE,
     )
-    load_velocity_ratio: float | None = load_velocity_field()
+    load_velocity_ratio: float | None = declare_load_velocity_field()
     oscillation_begin: float | None = number(
         None,
         r"$t_b V_*/D_c$",
@@ -180,15 +187,15 @@ class OscillationBase(LoadingAtVelocity):
         """
         return [True] * len(self.segments)
 
-    def isolate_segment(self, index: int) -> Loading | Segment:
+    def isolate_segment(self, segment_index: int) -> Loading | Segment:
         """Return the loading of a single segment.
 
         See the base class. For the oscillation itself, the method returns a loading that oscillates
         from the start without an end.
         """
         segments = self.segments
-        if index % len(segments) != bool(self.oscillation_begin):
-            return segments[index]
+        if segment_index % len(segments) != bool(self.oscillation_begin):
+            return segments[segment_index]
         if len(segments) == 1:
             return self
         return replace(self, oscillation_begin=None, oscillation_cycles=None)

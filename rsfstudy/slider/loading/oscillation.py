@@ -77,7 +77,7 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
         amplitude, angle = self.oscillation_amplitude, self.initial_phase
         return amplitude * math.cos(angle), -amplitude * math.sin(angle)
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the angular frequency and the amplitude.
 
         See the base class.

@@ -9,13 +9,19 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider.loading import LoadingAtVelocity, Segment, load_velocity_field
+from rsfstudy.slider.loading import (
+    LoadingWithFinalLoadVelocity,
+    Segment,
+    declare_load_velocity_field,
+)
 from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLOWNESS, LOADING
 from rsfstudy.slider.parts import POSITIVE, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
+def auxiliary_rates(
+    log_slip_rate: float, states: Numbers, slip_fraction: float, p: Numbers
+) -> Numbers:
     r"""Compute the rate of the unknown of a ramp.
 
     Parameters
@@ -43,7 +49,7 @@ def auxiliary_rates(log_slip_rate: float, states: Numbers, fraction: float, p: N
 
         \frac{dP}{dt} = -\frac{\Delta\sigma}{t_r}.
     """
-    return (-p[LOADING] * fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS)),)
+    return (-p[LOADING] * slip_fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS)),)
 
 
 def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
@@ -65,7 +71,7 @@ def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
 
 
 @dataclass(frozen=True, kw_only=True)
-class NormalStressRamp(LoadingAtVelocity):
+class NormalStressRamp(LoadingWithFinalLoadVelocity):
     r"""Ramp of imposed normal stress at a steady load point velocity.
 
     The slider slides steadily until the ramp starts. If the driving stress is inclined to the
@@ -107,7 +113,7 @@ class NormalStressRamp(LoadingAtVelocity):
         rule=POSITIVE,
         remedy="A sudden change is normal_stress_step.",
     )
-    load_velocity_ratio: float | None = load_velocity_field()
+    load_velocity_ratio: float | None = declare_load_velocity_field()
 
     name = "ramp"
     selected_by = "normal_stress_ramp"
@@ -131,7 +137,7 @@ class NormalStressRamp(LoadingAtVelocity):
         """
         return (self.normal_stress_ramp,)
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the rate of imposed normal stress.
 
         See the base class.

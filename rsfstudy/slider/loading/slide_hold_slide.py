@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsfstudy.slider.loading import LoadingAtVelocity, Segment, load_velocity_field
+from rsfstudy.slider.loading import (
+    LoadingWithFinalLoadVelocity,
+    Segment,
+    declare_load_velocity_field,
+)
 from rsfstudy.slider.parts import NON_NEGATIVE, number
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlideHoldSlide(LoadingAtVelocity):
+class SlideHoldSlide(LoadingWithFinalLoadVelocity):
     r"""Hold of the load point, followed by reloading.
 
     Parameters
@@ -41,7 +45,7 @@ class SlideHoldSlide(LoadingAtVelocity):
         "D_c/V_*",
         rule=NON_NEGATIVE,
     )
-    load_velocity_ratio: float | None = load_velocity_field()
+    load_velocity_ratio: float | None = declare_load_velocity_field()
 
     name = "slide_hold_slide"
     selected_by = "hold_time"

@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.slider.caching import cached_attribute
-from rsfstudy.slider.loading import LoadingAtVelocity, Segment, load_velocity_field
+from rsfstudy.slider.loading import (
+    LoadingWithFinalLoadVelocity,
+    Segment,
+    declare_load_velocity_field,
+)
 from rsfstudy.slider.parts import number
 
 
 @dataclass(frozen=True, kw_only=True)
-class StepLoading(LoadingAtVelocity):
+class StepLoading(LoadingWithFinalLoadVelocity):
     r"""Step of load velocity, load displacement or normal stress at time zero.
 
     A displacement step changes the spring stress by :math:`k \Delta\delta_0`. Several steps can be
@@ -35,7 +39,7 @@ class StepLoading(LoadingAtVelocity):
         V_{\mathrm{load}}(t) = V_0, \quad \sigma(t) = \sigma_* + \Delta\sigma.
     """
 
-    load_velocity_ratio: float | None = load_velocity_field()
+    load_velocity_ratio: float | None = declare_load_velocity_field()
     displacement_step: float = number(
         0.0, r"$\Delta\delta_0/D_c$", "1", "load point displacement step", "D_c"
     )

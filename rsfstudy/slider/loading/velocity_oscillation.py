@@ -84,7 +84,7 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
         stress = self.stress_amplitude(scene)
         return -stress * math.sin(self.initial_phase), -stress * math.cos(self.initial_phase)
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the parameters of the oscillation.
 
         The parameters are the angular frequency, the stress amplitude and the initial value of the

@@ -37,7 +37,7 @@ class NormalStress(Part):
     """
 
     derived_properties = ("depends_on_shear_stress", "coupling", "min_frictional_stress")
-    defining_methods = frozenset({"normal_stress", "state_effect", "numbers"})
+    defining_methods = frozenset({"normal_stress", "state_effect", "parameter_values"})
     received_quantities = frozenset({SHEAR_STRESS})
     normal_stress: ClassVar[Function | None] = None
 

@@ -14,7 +14,10 @@ from rsfstudy.slider.parts import NON_NEGATIVE, Function, Numbers, number
 
 
 def linker_dieterich_effect(
-    friction: float, ratio: float, change: float, p: Numbers
+    frictional_stress: float,
+    normal_stress_ratio: float,
+    normal_stress_derivative: float,
+    p: Numbers,
 ) -> tuple[float, float]:
     r"""Compute the decrease of the state variable due to normal stress.
 
@@ -52,7 +55,9 @@ def linker_dieterich_effect(
     Linker and Dieterich (1992), J. Geophys. Res. 97, 4923-4940.
     """
     alpha = p[NORMAL_STRESS]
-    return alpha * math.log(ratio), alpha * change / ratio
+    return alpha * math.log(
+        normal_stress_ratio
+    ), alpha * normal_stress_derivative / normal_stress_ratio
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 
 
-def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
+def normal_stress(frictional_stress: float, p: Numbers) -> tuple[float, float]:
     r"""Compute the imposed normal stress.
 
     Parameters
@@ -70,7 +70,7 @@ class ImposedNormalStress(NormalStressWithStateEffect):
         """
         return 0.0, self.alpha
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the coefficient of the effect on the state.
 
         See the base class.

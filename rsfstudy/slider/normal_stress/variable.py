@@ -20,7 +20,7 @@ from rsfstudy.slider.parts import POSITIVE, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
+def normal_stress(frictional_stress: float, p: Numbers) -> tuple[float, float]:
     r"""Compute the normal stress under an inclined driving stress.
 
     Parameters
@@ -49,7 +49,7 @@ def normal_stress(friction: float, p: Numbers) -> tuple[float, float]:
     The change of :math:`\sigma_3` does not affect shear stress.
     """
     cot_phi = p[NORMAL_STRESS + 1]
-    excess = cot_phi * friction + p[IMPOSED_NORMAL_STRESS]
+    excess = cot_phi * frictional_stress + p[IMPOSED_NORMAL_STRESS]
     if not SMALLEST_NORMAL_STRESS_EXCESS <= excess <= LARGEST_NORMAL_STRESS_EXCESS:
         excess = min(max(excess, SMALLEST_NORMAL_STRESS_EXCESS), LARGEST_NORMAL_STRESS_EXCESS)
     return excess, cot_phi
@@ -109,7 +109,7 @@ class VariableNormalStress(NormalStressWithStateEffect):
         """Names of the effects that are active."""
         return ("inclined_driving", *super().effects)
 
-    def numbers(self, scene: SceneView) -> Numbers:
+    def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the coefficient alpha and the cotangent of phi.
 
         See the base class.

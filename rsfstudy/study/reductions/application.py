@@ -15,11 +15,11 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.status import Status
 from rsfstudy.study.reductions.base import (
     Reduction,
-    is_failed,
+    failed_cell_mask,
     mask_failures,
     mask_unusable_values,
     with_propagated_errors,
-    worst_status,
+    worst_status_along_other_dims,
 )
 from rsfstudy.study.reductions.boundaries import Boundary, Inverse
 from rsfstudy.study.reductions.comparisons import (
@@ -37,7 +37,7 @@ from rsfstudy.study.reductions.statistics import (
     StandardDeviation,
     StatusShares,
 )
-from rsfstudy.study.reductions.units import describe_results
+from rsfstudy.study.reductions.units import describe_reduction_results
 from rsfstudy.vocabulary import coverage_content_type, find_quantity
 
 __all__ = [
@@ -62,10 +62,10 @@ __all__ = [
 ]
 
 #: What tells of the quality of a result, by the ends of their names.
-_QUALITY_SUFFIXES = ("error", "stderr", "misfit", "points", "status")
+_SUFFIXES_OF_QUALITY_VARIABLES = ("error", "stderr", "misfit", "points", "status")
 
 
-def _variable_names(dataset: xr.Dataset) -> list[str]:
+def _reduced_variable_names(dataset: xr.Dataset) -> list[str]:
     return list(map(str, dataset.data_vars))
 
 
@@ -82,17 +82,19 @@ def apply_reductions(
     despite_failures : bool
         Leave failed cells out instead of refusing to draw on them; the results say so.
     """
-    lost = int((is_failed(dataset["status"]) & (dataset["status"] != int(Status.PENDING))).sum())
+    lost = int(
+        (failed_cell_mask(dataset["status"]) & (dataset["status"] != int(Status.PENDING))).sum()
+    )
     despite = {"despite": f"{lost} failed cells are left out"} if lost and despite_failures else {}
     drawn: dict[str, xr.DataArray] = {}
     for reduction in reductions:
         if reduction.of not in dataset:
             raise InvalidValue(
-                "of", reduction.of, "is not measured", choices=_variable_names(dataset)
+                "of", reduction.of, "is not measured", choices=_reduced_variable_names(dataset)
             )
         leaves_out = despite and not reduction.uses_failed_cells
         support = mask_failures(dataset) if leaves_out else dataset
-        own = worst_status(support["status"], support[reduction.of].dims)
+        own = worst_status_along_other_dims(support["status"], support[reduction.of].dims)
         if not reduction.uses_failed_cells:
             own = drawn.get(reduction.of, own)
         support = mask_unusable_values(support, reduction.of, own)
@@ -104,22 +106,24 @@ def apply_reductions(
             raise InvalidValue(what, type(found).__name__, rule, remedy=remedy)
         made = with_propagated_errors(reduction, support, found)
         stated = {q.name: q for q in reduction.quantities}
-        quantities = describe_results(reduction, dataset, made)
+        quantities = describe_reduction_results(reduction, dataset, made)
         for name, values in made.data_vars.items():
             if name in dataset:
                 rule = f"would replace {name!r} by what it makes of {reduction.of!r}"
                 raise InvalidValue("reduction", reduction.name, rule)
-            drawn[str(name)] = worst_status(
+            drawn[str(name)] = worst_status_along_other_dims(
                 reduction.support_status(support["status"]), values.dims
             )
-            if bool(is_failed(drawn[str(name)]).any()):
+            if bool(failed_cell_mask(drawn[str(name)]).any()):
                 values.attrs.setdefault("refused", "cells it draws on failed or are missing")
             said = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
             about = find_quantity(str(name), quantities).attributes
             about |= {"coverage_content_type": coverage_content_type(str(name)), **said}
             if str(name) in stated and stated[str(name)].symbol:
                 about["symbol"] = stated[str(name)].symbol
-            if beside := [n for end in _QUALITY_SUFFIXES if (n := f"{name}_{end}") in made]:
+            if beside := [
+                n for end in _SUFFIXES_OF_QUALITY_VARIABLES if (n := f"{name}_{end}") in made
+            ]:
                 about["ancillary_variables"] = " ".join(beside)
             values.attrs = {**about, **despite}
             before = {key: along.attrs for key, along in dataset.coords.items()}

@@ -15,24 +15,24 @@ from rsfstudy.error_boundary import CheckedKeywords, guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.status import Status
-from rsfstudy.vocabulary import QUANTITIES
+from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
-Data = TypeVar("Data", xr.Dataset, xr.DataArray)
+DatasetOrArray = TypeVar("DatasetOrArray", xr.Dataset, xr.DataArray)
 
 #: Derivatives of a result by cells, each with the place of those on some dimensions.
-Derivatives = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
+DerivativesByVariable = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
 
 #: Fields that name what a result is measured in units of, by the end of its name.
-UnitFields = Mapping[str, Sequence[str]]
+UnitFieldsBySuffix = Mapping[str, Sequence[str]]
 
 #: How a result comes by its error, for the attributes of that.
-ERROR_COMMENT = (
+PROPAGATED_ERROR_COMMENT = (
     "errors of the cells it draws on, each times the derivative by it, in absolute value"
 )
 #: Endings of the names of variables that hold statistical errors.
 _STATISTICAL_SUFFIXES = ("_stderr", "_low", "_high", "covariance", "correlation")
 #: Rounding error by which a coordinate value may miss a range and still count as in it.
-COORDINATE_RTOL = 1e-9
+COORDINATE_RANGE_RTOL = 1e-9
 
 
 @renamed_members
@@ -68,7 +68,7 @@ class Reduction(CheckedKeywords):
     long_names: ClassVar[Mapping[str, str]] = {}
     #: What its results are in units of, by what follows `name` in theirs: the variable that a field
     #: names, as `("of",)`, or over that of others, as `("of", "on")`. All others are pure numbers.
-    unit_fields: ClassVar[UnitFields] = {}
+    unit_fields: ClassVar[UnitFieldsBySuffix] = {}
     #: Whether it tells of cells that failed, which all others refuse to draw on.
     uses_failed_cells: ClassVar[bool] = False
 
@@ -96,7 +96,7 @@ class Reduction(CheckedKeywords):
         """
         return status
 
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """Derivatives of the result `name` by the cells that it draws on, 0 by those that have no
         number; none where the errors of cells do not carry over.
 
@@ -117,17 +117,21 @@ class Reduction(CheckedKeywords):
         return {"kind": self.kind, **asdict(self)}
 
 
-def is_failed(status: xr.DataArray) -> xr.DataArray:
+def failed_cell_mask(status: xr.DataArray) -> xr.DataArray:
     """Cells that failed or were not computed."""
     return status >= int(Status.WORK_BUDGET_SPENT)
 
 
-def worst_status(status: xr.DataArray, dims: Collection[Hashable]) -> xr.DataArray:
+def worst_status_along_other_dims(
+    status: xr.DataArray, kept_dimensions: Collection[Hashable]
+) -> xr.DataArray:
     """The worst status along all dimensions but `dims`; failures have the largest codes."""
-    return status.max([d for d in status.dims if d not in dims])
+    return status.max([d for d in status.dims if d not in kept_dimensions])
 
 
-def mask_unusable_values(dataset: xr.Dataset, of: str, status: xr.DataArray) -> xr.Dataset:
+def mask_unusable_values(
+    dataset: xr.Dataset, variable_name: str, status: xr.DataArray
+) -> xr.Dataset:
     """Return a copy of the dataset in which values that must not be used are NaN.
 
     The values of failed cells are replaced by NaN. If ``of`` is a standard error or the bound of a
@@ -141,25 +145,29 @@ def mask_unusable_values(dataset: xr.Dataset, of: str, status: xr.DataArray) -> 
     status : xarray.DataArray
         Status of the cells on which ``of`` depends. The status is added to the result.
     """
-    bad = is_failed(status)
-    if of.endswith(_STATISTICAL_SUFFIXES):
+    bad = failed_cell_mask(status)
+    if variable_name.endswith(_STATISTICAL_SUFFIXES):
         bad = bad | (status == int(Status.ERRORS_NOT_VALID))
-    if bool(bad.any()) and dataset[of].dtype.kind == "f":
-        dataset = dataset.assign({of: dataset[of].where(~bad)})
+    if bool(bad.any()) and dataset[variable_name].dtype.kind == "f":
+        dataset = dataset.assign({variable_name: dataset[variable_name].where(~bad)})
     return dataset.assign(status=status)
 
 
-def is_refused(dataset: xr.Dataset, of: str, *along: str) -> xr.DataArray:
+def refused_result_mask(
+    dataset: xr.Dataset, variable_name: str, *reduced_dimensions: str
+) -> xr.DataArray:
     """True if a result must be refused because a cell failed along these dimensions, or along those
     that `of` does not have.
     """
-    bad = is_failed(dataset["status"])
-    return bad.any([d for d in bad.dims if d in along or d not in dataset[of].dims])
+    bad = failed_cell_mask(dataset["status"])
+    return bad.any(
+        [d for d in bad.dims if d in reduced_dimensions or d not in dataset[variable_name].dims]
+    )
 
 
 def mask_failures(dataset: xr.Dataset) -> xr.Dataset:
     """The dataset with failed cells changed to cells that have an answer but no number."""
-    lost = is_failed(dataset["status"]) & (dataset["status"] != int(Status.PENDING))
+    lost = failed_cell_mask(dataset["status"]) & (dataset["status"] != int(Status.PENDING))
     kept = {
         name: values.where(~lost)
         for name, values in dataset.data_vars.items()
@@ -169,7 +177,7 @@ def mask_failures(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign({**kept, "status": status})
 
 
-def dimension_of_coordinate(dataset: xr.Dataset | xr.DataArray, on: str) -> str:
+def dimension_of_coordinate(dataset: xr.Dataset | xr.DataArray, coordinate_name: str) -> str:
     """The one dimension a coordinate lies along.
 
     Raises
@@ -177,28 +185,34 @@ def dimension_of_coordinate(dataset: xr.Dataset | xr.DataArray, on: str) -> str:
     InvalidValue
         Where `on` is no coordinate along one dimension.
     """
-    if on not in dataset.coords or dataset[on].ndim != 1:
-        choices = [str(n) for n, c in dataset.coords.items() if c.ndim == 1 and n != on]
-        raise InvalidValue("on", on, "must be a coordinate along one dimension", choices=choices)
-    if dataset[on].dtype.kind not in "iuf":
-        raise InvalidValue("on", on, "must be a coordinate of numbers")
-    return str(dataset[on].dims[0])
+    if coordinate_name not in dataset.coords or dataset[coordinate_name].ndim != 1:
+        choices = [
+            str(n) for n, c in dataset.coords.items() if c.ndim == 1 and n != coordinate_name
+        ]
+        raise InvalidValue(
+            "on", coordinate_name, "must be a coordinate along one dimension", choices=choices
+        )
+    if dataset[coordinate_name].dtype.kind not in "iuf":
+        raise InvalidValue("on", coordinate_name, "must be a coordinate of numbers")
+    return str(dataset[coordinate_name].dims[0])
 
 
-def select_range(dataset: Data, on: str, span: tuple[float, float] | None) -> Data:
+def select_coordinate_range(
+    dataset: DatasetOrArray, coordinate_name: str, coordinate_range: tuple[float, float] | None
+) -> DatasetOrArray:
     """The part of a dataset in a range of a coordinate, both ends included; all of what does not
     lie along that coordinate.
     """
-    if span is None or on not in dataset.coords:
+    if coordinate_range is None or coordinate_name not in dataset.coords:
         return dataset
-    values, (lowest, highest) = dataset[on].values, span
-    inside = (values >= lowest - COORDINATE_RTOL * abs(lowest)) & (
-        values <= highest + COORDINATE_RTOL * abs(highest)
+    values, (lowest, highest) = dataset[coordinate_name].values, coordinate_range
+    inside = (values >= lowest - COORDINATE_RANGE_RTOL * abs(lowest)) & (
+        values <= highest + COORDINATE_RANGE_RTOL * abs(highest)
     )
-    return dataset.isel({dimension_of_coordinate(dataset, on): np.flatnonzero(inside)})
+    return dataset.isel({dimension_of_coordinate(dataset, coordinate_name): np.flatnonzero(inside)})
 
 
-def read_quantities(dataset: xr.Dataset) -> dict[str, Quantity]:
+def read_undocumented_quantities(dataset: xr.Dataset) -> dict[str, Quantity]:
     """Quantities that a dataset states for variables that the vocabulary does not hold, or calls
     something else, or holds in other units.
     """
@@ -215,18 +229,18 @@ def read_quantities(dataset: xr.Dataset) -> dict[str, Quantity]:
     }
 
 
-def _is_in_vocabulary(name: str, attrs: Mapping[Any, Any]) -> bool:
-    about = QUANTITIES.get(name)
-    if about is None or attrs["long_name"] != about.long_name:
+def _is_in_vocabulary(variable_name: str, variable_attributes: Mapping[Any, Any]) -> bool:
+    about = QUANTITY_BY_NAME.get(variable_name)
+    if about is None or variable_attributes["long_name"] != about.long_name:
         return False
-    return bool(attrs.get("units", about.units) == about.units)
+    return bool(variable_attributes.get("units", about.units) == about.units)
 
 
 # ---- numerical errors ----------------------------------------------------------------------------
 
 
 def with_propagated_errors(
-    reduction: Reduction, dataset: xr.Dataset, made: xr.Dataset
+    reduction: Reduction, dataset: xr.Dataset, reduction_results: xr.Dataset
 ) -> xr.Dataset:
     """The results of a reduction with ``<name>_error``, what the errors of its cells make of them;
     added to the error that the reduction has of its own.
@@ -246,9 +260,9 @@ def with_propagated_errors(
         The results.
     """
     of, name = f"{reduction.of}_error", f"{reduction.name}_error"
-    if of not in dataset or reduction.name not in made:
-        return made
-    result = made[reduction.name]
+    if of not in dataset or reduction.name not in reduction_results:
+        return reduction_results
+    result = reduction_results[reduction.name]
     errors = dataset[of] + sys.float_info.epsilon * abs(dataset[reduction.of])
     parts = []
     for derivative, place in reduction.derivatives(dataset):
@@ -256,10 +270,13 @@ def with_propagated_errors(
         felt = felt.where(derivative != 0.0, 0.0)  # a cell without a number may have no error
         parts.append(felt.sum([d for d in felt.dims if d not in result.dims], skipna=False))
     if not parts:
-        return made
+        return reduction_results
     error = sum(parts[1:], start=parts[0]).where(result.notnull()).transpose(*result.dims)
     about = {key: result.attrs[key] for key in ("refused",) if key in result.attrs}
-    comment = ERROR_COMMENT
-    if name in made:
-        error, comment = error + made[name], f"{made[name].attrs['comment']}; and {ERROR_COMMENT}"
-    return made.assign({name: error.assign_attrs(comment=comment, **about)})
+    comment = PROPAGATED_ERROR_COMMENT
+    if name in reduction_results:
+        error, comment = (
+            error + reduction_results[name],
+            f"{reduction_results[name].attrs['comment']}; and {PROPAGATED_ERROR_COMMENT}",
+        )
+    return reduction_results.assign({name: error.assign_attrs(comment=comment, **about)})

@@ -12,17 +12,17 @@ from scipy.interpolate import PchipInterpolator
 
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.quantities import Quantity
-from rsfstudy.study.reductions._crossing import MIN_SAMPLES, CrossingStatus, find_crossing
+from rsfstudy.study.reductions._crossing import MIN_SAMPLES_OF_CURVE, CrossingStatus, find_crossing
 from rsfstudy.study.reductions.base import (
-    Derivatives,
+    DerivativesByVariable,
     Reduction,
-    UnitFields,
+    UnitFieldsBySuffix,
     dimension_of_coordinate,
-    is_refused,
+    refused_result_mask,
 )
 
 #: Change of ln(value) by which derivatives of an interpolant are taken.
-_LOG_STEP = 1e-6
+_LOG_STEP_OF_DERIVATIVES = 1e-6
 
 
 @guard_methods
@@ -50,7 +50,7 @@ class Boundary(Reduction):
     on: str = ""
     level: float = 0.5
     kind: ClassVar[str] = "boundary"
-    unit_fields: ClassVar[UnitFields] = {"": ("on",)}
+    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("on",)}
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Bracket the boundary along the dimension of `on`, for each point of the others.
@@ -64,7 +64,7 @@ class Boundary(Reduction):
             Where `on` is no coordinate along one dimension.
         """
         dimension = dimension_of_coordinate(dataset, self.on)
-        values = dataset[self.of].where(~is_refused(dataset, self.of, dimension))
+        values = dataset[self.of].where(~refused_result_mask(dataset, self.of, dimension))
         if f"{self.of}_error" in dataset:
             values = values.where(~(abs(values - self.level) <= dataset[f"{self.of}_error"]))
         stable, unstable, crossings = self.bracket(values)
@@ -85,7 +85,7 @@ class Boundary(Reduction):
         """
         dimension = dimension_of_coordinate(values, self.on)
         edges: tuple[xr.DataArray, ...] = xr.apply_ufunc(
-            self._bracket_1d,
+            self._bracket_along_coordinate,
             values,
             values[self.on].astype(float),
             input_core_dims=[[dimension], [dimension]],
@@ -94,12 +94,14 @@ class Boundary(Reduction):
         )
         return edges
 
-    def _bracket_1d(self, values: np.ndarray, on: np.ndarray) -> tuple[float, float, float]:
+    def _bracket_along_coordinate(
+        self, values: np.ndarray, coordinate: np.ndarray
+    ) -> tuple[float, float, float]:
         """Ends of the bracket next to the first change of the answer, and the number of changes."""
-        order = [i for i in np.argsort(on) if not np.isnan(values[i])]
+        order = [i for i in np.argsort(coordinate) if not np.isnan(values[i])]
         if not order:
             return np.nan, np.nan, np.nan
-        says_yes, at = values[order] > self.level, on[order]
+        says_yes, at = values[order] > self.level, coordinate[order]
         changes = np.flatnonzero(says_yes[1:] != says_yes[:-1])
         if changes.size == 0:
             end = (np.nan, at[0]) if says_yes[0] else (at[-1], np.nan)
@@ -145,7 +147,7 @@ class Inverse(Reduction):
     uncertainty: float | Mapping[str, float] = 0.0
     along: str = ""
     kind: ClassVar[str] = "inverse"
-    unit_fields: ClassVar[UnitFields] = {"": ("on",)}
+    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("on",)}
 
     @property
     def quantities(self) -> Sequence[Quantity]:
@@ -162,15 +164,15 @@ class Inverse(Reduction):
             If ``on`` is not a one-dimensional coordinate.
         """
         dimension = dimension_of_coordinate(dataset, self.on)
-        if dataset.sizes[dimension] < MIN_SAMPLES:
+        if dataset.sizes[dimension] < MIN_SAMPLES_OF_CURVE:
             return xr.Dataset()
-        values = dataset[self.of].where(~is_refused(dataset, self.of, dimension))
+        values = dataset[self.of].where(~refused_result_mask(dataset, self.of, dimension))
         crossing, error, verdict = xr.apply_ufunc(
-            _invert_1d,
+            _invert_along_coordinate,
             values,
             dataset[self.on].astype(float),
-            self._value_per_label(dataset, self.levels),
-            self._value_per_label(dataset, self.uncertainty),
+            self._select_value_for_each_label(dataset, self.levels),
+            self._select_value_for_each_label(dataset, self.uncertainty),
             input_core_dims=[[dimension], [dimension], [], []],
             output_core_dims=[[], [], []],
             vectorize=True,
@@ -185,21 +187,21 @@ class Inverse(Reduction):
             }
         )
 
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """Those of the interpolant by its points, over its slope."""
         dimension = dimension_of_coordinate(dataset, self.on)
         by_cells = xr.apply_ufunc(
-            _position_derivatives,
+            _crossing_position_derivatives,
             dataset[self.of],
             dataset[self.on].astype(float),
-            self._value_per_label(dataset, self.levels),
+            self._select_value_for_each_label(dataset, self.levels),
             input_core_dims=[[dimension], [dimension], []],
             output_core_dims=[[dimension]],
             vectorize=True,
         )
         return [(by_cells, {})]
 
-    def _value_per_label(
+    def _select_value_for_each_label(
         self, dataset: xr.Dataset, values: float | Mapping[str, float]
     ) -> xr.DataArray:
         if not isinstance(values, Mapping):
@@ -209,10 +211,10 @@ class Inverse(Reduction):
         return xr.DataArray(stated, {self.along: labels}, self.along)
 
 
-def _invert_1d(
-    values: np.ndarray, on: np.ndarray, level: float, uncertainty: float
+def _invert_along_coordinate(
+    values: np.ndarray, coordinate: np.ndarray, level: float, uncertainty: float
 ) -> tuple[float, float, float]:
-    x, y, _places = _log_points(values, on)
+    x, y, _places = _log_coordinate_and_values(values, coordinate)
     if np.isnan(level) or level <= 0.0:
         return np.nan, np.nan, float(CrossingStatus.OUT_OF_REACH)
     found = find_crossing(x, y, np.log(level))
@@ -225,9 +227,11 @@ def _invert_1d(
     return place, error, float(found.status)
 
 
-def _position_derivatives(values: np.ndarray, on: np.ndarray, level: float) -> np.ndarray:
+def _crossing_position_derivatives(
+    values: np.ndarray, coordinate: np.ndarray, level: float
+) -> np.ndarray:
     """Derivatives of the place where the level is reached by all values; 0 where there is none."""
-    x, y, places = _log_points(values, on)
+    x, y, places = _log_coordinate_and_values(values, coordinate)
     slopes = np.zeros(values.size)
     if np.isnan(level) or level <= 0.0:
         return slopes
@@ -235,14 +239,18 @@ def _position_derivatives(values: np.ndarray, on: np.ndarray, level: float) -> n
     if np.isnan(fine):
         return slopes
     # each value moved in turn: the interpolant is smooth in them, but for kinks
-    moved = PchipInterpolator(x, y + _LOG_STEP * np.eye(x.size), axis=1)(fine)
+    moved = PchipInterpolator(x, y + _LOG_STEP_OF_DERIVATIVES * np.eye(x.size), axis=1)(fine)
     rise = float(PchipInterpolator(x, y)(fine, 1)) or np.nan  # at a flat end errors have no bound
-    slopes[places] = (moved - np.log(level)) / _LOG_STEP / rise * np.exp(fine) / values[places]
+    slopes[places] = (
+        (moved - np.log(level)) / _LOG_STEP_OF_DERIVATIVES / rise * np.exp(fine) / values[places]
+    )
     return slopes
 
 
-def _log_points(values: np.ndarray, on: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _log_coordinate_and_values(
+    values: np.ndarray, coordinate: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Logarithms of the coordinate, ascending, and of the values; and which points they are of."""
-    places = np.flatnonzero(np.isfinite(values) & (values > 0.0) & (on > 0.0))
-    places = places[np.argsort(on[places])]
-    return np.log(on[places]), np.log(values[places]), places
+    places = np.flatnonzero(np.isfinite(values) & (values > 0.0) & (coordinate > 0.0))
+    places = places[np.argsort(coordinate[places])]
+    return np.log(coordinate[places]), np.log(values[places]), places

@@ -12,15 +12,15 @@ from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import CLOSED_FORMS
 from rsfstudy.study.reductions.base import (
-    Derivatives,
+    DerivativesByVariable,
     Reduction,
-    UnitFields,
+    UnitFieldsBySuffix,
     dimension_of_coordinate,
-    is_refused,
-    select_range,
+    refused_result_mask,
+    select_coordinate_range,
 )
 
-ArrayPair = tuple[xr.DataArray, xr.DataArray]
+ValueAndReferenceDerivatives = tuple[xr.DataArray, xr.DataArray]
 
 
 @guard_methods
@@ -43,14 +43,16 @@ class Difference(Reduction):
     along: str = ""
     reference: str | float = ""
     kind: ClassVar[str] = "difference"
-    unit_fields: ClassVar[UnitFields] = {"": ("of",)}
+    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("of",)}
     formula: ClassVar[str] = "{of} less {reference}"
 
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
         """The comparison: of - of_reference."""
         return values - reference
 
-    def partial_derivatives(self, values: xr.DataArray, reference: xr.DataArray) -> ArrayPair:
+    def partial_derivatives(
+        self, values: xr.DataArray, reference: xr.DataArray
+    ) -> ValueAndReferenceDerivatives:
         """Derivatives of the comparison by the value and by the reference: 1 and -1."""
         return xr.ones_like(values), -xr.ones_like(values)
 
@@ -69,7 +71,7 @@ class Difference(Reduction):
         note = self.formula.format(of=self.of, reference=f"its value at {place}")
         return xr.Dataset({self.name: compared.assign_attrs(comment=note)})
 
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """By the cell and by the reference; where they are one, the result is the same whatever it
         is.
         """
@@ -85,14 +87,16 @@ class RelativeDifference(Difference):
     """Difference of a variable below its value at a reference point: ``1 - of/of_reference``."""
 
     kind: ClassVar[str] = "relative_difference"
-    unit_fields: ClassVar[UnitFields] = {}
+    unit_fields: ClassVar[UnitFieldsBySuffix] = {}
     formula: ClassVar[str] = "1 - {of} over {reference}"
 
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
         """1 - of/of_reference."""
         return 1.0 - values / reference
 
-    def partial_derivatives(self, values: xr.DataArray, reference: xr.DataArray) -> ArrayPair:
+    def partial_derivatives(
+        self, values: xr.DataArray, reference: xr.DataArray
+    ) -> ValueAndReferenceDerivatives:
         """-1/of_reference and of/of_reference^2."""
         return -xr.ones_like(values) / reference, values / reference**2
 
@@ -117,39 +121,41 @@ class Range(Reduction):
     over: str = ""
     within: tuple[float, float] | None = None
     kind: ClassVar[str] = "range"
-    unit_fields: ClassVar[UnitFields] = {"": ("of",)}
+    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("of",)}
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
         """The points in range."""
-        return select_range(status, self.over, self.within)
+        return select_coordinate_range(status, self.over, self.within)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Reduce along the dimension; nothing where fewer than two points are in range."""
-        dimension, support = self._select_support(dataset)
+        dimension, support = self._select_points_in_range(dataset)
         if support.sizes[dimension] < 2:
             return xr.Dataset()
         of = support[self.of].reset_coords(drop=True)
-        known = ~is_refused(support, self.of, dimension) & (of.notnull().sum(dimension) > 1)
+        known = ~refused_result_mask(support, self.of, dimension) & (
+            of.notnull().sum(dimension) > 1
+        )
         found = (of.max(dimension) - of.min(dimension)).where(known)
         span = "" if self.within is None else " from {:g} to {:g}".format(*self.within)
         note = f"largest less least {self.of} over {self.over}{span}"
         return xr.Dataset({self.name: found.assign_attrs(comment=note)})
 
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """1 by the cell that, within its error, may be the largest, -1 by that which may be the
         least: the sizes of both count.
         """
-        dimension, support = self._select_support(dataset)
+        dimension, support = self._select_points_in_range(dataset)
         values, errors = support[self.of], support[f"{self.of}_error"]
         number = support[dimension].copy(data=np.arange(support.sizes[dimension]))
         reaches = [(sign * values + errors.fillna(np.inf)).fillna(-np.inf) for sign in (1.0, -1.0)]
         return [((number == reach.argmax(dimension)).astype(float), {}) for reach in reaches]
 
-    def _select_support(self, dataset: xr.Dataset) -> tuple[str, xr.Dataset]:
+    def _select_points_in_range(self, dataset: xr.Dataset) -> tuple[str, xr.Dataset]:
         """The dimension, and the points in range."""
         along = self.over in dataset[self.of].dims
         dimension = self.over if along else dimension_of_coordinate(dataset, self.over)
-        return dimension, select_range(dataset, self.over, self.within)
+        return dimension, select_coordinate_range(dataset, self.over, self.within)
 
 
 @guard_methods
@@ -169,7 +175,7 @@ class ClosedFormRatio(Reduction):
 
     form: str = ""
     kind: ClassVar[str] = "over_closed_form"
-    unit_fields: ClassVar[UnitFields] = {"_closed_form": ("of",)}
+    unit_fields: ClassVar[UnitFieldsBySuffix] = {"_closed_form": ("of",)}
 
     def __post_init__(self) -> None:
         if self.form not in CLOSED_FORMS:
@@ -178,20 +184,20 @@ class ClosedFormRatio(Reduction):
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compare in every cell; nothing where the lattice lacks a field of the formula."""
         form = CLOSED_FORMS[self.form]
-        if not all(name in dataset.coords for name in form.fields):
+        if not all(name in dataset.coords for name in form.scene_field_names):
             return xr.Dataset()
         exact = self._evaluate_closed_form(dataset)
-        note = f"{form.formula}: {form.source}"
+        note = f"{form.formula}: {form.literature_citation}"
         ratio = (dataset[self.of] / exact).assign_attrs(comment=f"{self.of} over {note}")
         beside = {f"{self.name}_closed_form": exact.assign_attrs(comment=note)}
         return xr.Dataset({self.name: ratio, **beside})
 
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """One over the closed form."""
         return [(1.0 / self._evaluate_closed_form(dataset), {})]
 
     def _evaluate_closed_form(self, dataset: xr.Dataset) -> xr.DataArray:
         form = CLOSED_FORMS[self.form]
-        fields = [dataset[name].astype(float) for name in form.fields]
+        fields = [dataset[name].astype(float) for name in form.scene_field_names]
         exact: xr.DataArray = xr.apply_ufunc(form.function, *fields, vectorize=True)
         return exact

@@ -10,12 +10,12 @@ import xarray as xr
 
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.study.reductions.base import (
-    Derivatives,
+    DerivativesByVariable,
     Reduction,
-    UnitFields,
+    UnitFieldsBySuffix,
     dimension_of_coordinate,
-    is_refused,
-    select_range,
+    refused_result_mask,
+    select_coordinate_range,
 )
 
 
@@ -45,7 +45,7 @@ class LinearFit(Reduction):
     parameter_count: ClassVar[int] = 2
     formula: ClassVar[str] = "{of} = constant + {name} * {on}"
     kind: ClassVar[str] = "linear_fit"
-    unit_fields: ClassVar[UnitFields] = {"": ("of", "on"), "_misfit": ("of",)}
+    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("of", "on"), "_misfit": ("of",)}
 
     def centre_values(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """Values as they enter a fit through the origin: less their mean, which takes care of the
@@ -55,7 +55,7 @@ class LinearFit(Reduction):
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
         """The points in range."""
-        return select_range(status, self.on, self.within)
+        return select_coordinate_range(status, self.on, self.within)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Fit along the dimension of `on`, for each point of the others; nothing where no point is
@@ -67,10 +67,10 @@ class LinearFit(Reduction):
             Where `on` is no coordinate along one dimension.
         """
         dimension = dimension_of_coordinate(dataset, self.on)
-        support = select_range(dataset, self.on, self.within)
+        support = select_coordinate_range(dataset, self.on, self.within)
         if support.sizes[dimension] == 0:
             return xr.Dataset()
-        x, y = self._centred_points(support)
+        x, y = self._centred_fit_coordinates(support)
         count = y.notnull().sum(dimension)
         slope = (x * y).sum(dimension) / (x**2).sum(dimension)
         misfit = y - slope * x
@@ -78,7 +78,7 @@ class LinearFit(Reduction):
         spread = (misfit**2).sum(dimension) / freedom.where(freedom > 0)
         error = (spread / (x**2).sum(dimension)) ** 0.5
         largest = abs(misfit).max(dimension)
-        known = (count >= self.parameter_count) & ~is_refused(support, self.of, dimension)
+        known = (count >= self.parameter_count) & ~refused_result_mask(support, self.of, dimension)
         found = {
             "": slope.where(known),
             "_stderr": error.where(known),
@@ -91,19 +91,23 @@ class LinearFit(Reduction):
         result = self.results(f"least squares of {law} over {span}", found)
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
 
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """The weights of least squares."""
-        x, _y = self._centred_points(select_range(dataset, self.on, self.within))
+        x, _y = self._centred_fit_coordinates(
+            select_coordinate_range(dataset, self.on, self.within)
+        )
         return [((x / (x**2).sum(dimension_of_coordinate(dataset, self.on))).fillna(0.0), {})]
 
-    def _centred_points(self, support: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
+    def _centred_fit_coordinates(
+        self, selected_points: xr.Dataset
+    ) -> tuple[xr.DataArray, xr.DataArray]:
         """Both coordinates of the points as they enter a fit through the origin; NaN for those
         without a number.
         """
-        dimension, of = dimension_of_coordinate(support, self.on), support[self.of]
+        dimension, of = dimension_of_coordinate(selected_points, self.on), selected_points[self.of]
         # sums over arrays with another memory layout differ in the last bit
         of = of.copy(data=np.ascontiguousarray(of.values))
-        x = self.transform_abscissa(support[self.on].astype(float))
+        x = self.transform_abscissa(selected_points[self.on].astype(float))
         y = self.transform_ordinate(of).where(x.notnull())
         return self.centre_values(x.where(y.notnull()), dimension), self.centre_values(y, dimension)
 
@@ -146,7 +150,7 @@ class SemilogFit(LinearFit):
     """
 
     kind: ClassVar[str] = "decade_fit"
-    unit_fields: ClassVar[UnitFields] = {"": ("of",)}
+    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("of",)}
     formula: ClassVar[str] = "{of} = constant + {name} * log10({on})"
 
     def transform_abscissa(self, on: xr.DataArray) -> xr.DataArray:
@@ -163,15 +167,15 @@ class PowerLaw(SemilogFit):
     """
 
     kind: ClassVar[str] = "power_law"
-    unit_fields: ClassVar[UnitFields] = {}
+    unit_fields: ClassVar[UnitFieldsBySuffix] = {}
     formula: ClassVar[str] = "log10({of}) = constant + {name} * log10({on})"
 
     def transform_ordinate(self, values: xr.DataArray) -> xr.DataArray:
         """The decimal logarithm."""
         return self.transform_abscissa(values)
 
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """The weights of least squares, over ``ln(10) of``."""
-        of = select_range(dataset[self.of], self.on, self.within)
+        of = select_coordinate_range(dataset[self.of], self.on, self.within)
         ((weights, place),) = super().derivatives(dataset)
         return [((weights / (np.log(10.0) * of)).where(weights != 0.0, 0.0), place)]

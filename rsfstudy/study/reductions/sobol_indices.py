@@ -13,13 +13,13 @@ import xarray as xr
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
-from rsfstudy.study.reductions.base import Reduction, is_refused
+from rsfstudy.study.reductions.base import Reduction, refused_result_mask
 
 #: How often samples are drawn anew from themselves, how many such at a time, and from which seed.
-_RESAMPLES, _RESAMPLES_PER_BATCH, _RESAMPLING_SEED = 400, 25, 2010
+_BOOTSTRAP_RESAMPLES, _RESAMPLES_PER_BATCH, _RESAMPLING_SEED = 400, 25, 2010
 #: Ends of the confidence interval.
 _INTERVAL_QUANTILES = (0.025, 0.975)
-_INDEX_NAMES = ("first_order", "total")
+_SOBOL_INDEX_NAMES = ("first_order", "total")
 
 
 @guard_methods
@@ -57,7 +57,7 @@ class SobolIndices(Reduction):
         return (about, *(Quantity(n, "", "1", text) for n, text in self._result_descriptions()))
 
     def _result_descriptions(self) -> Iterator[tuple[str, str]]:
-        for order in _INDEX_NAMES:
+        for order in _SOBOL_INDEX_NAMES:
             text = f"{order.replace('_', '-')} Sobol index of {self.of.replace('_', ' ')}"
             yield f"{self.name}_{order}", text
             for end in ("low", "high"):
@@ -74,14 +74,14 @@ class SobolIndices(Reduction):
         inputs = self._sampled_inputs(dataset)
         of, d = dataset[self.of].transpose(..., self.over), len(inputs)
         others = of.dims[:-1]
-        bad = is_refused(dataset, self.of, self.over) | of.isnull().any(self.over)
-        found = np.full((*of.shape[:-1], len(_INDEX_NAMES), 3, d), np.nan)
+        bad = refused_result_mask(dataset, self.of, self.over) | of.isnull().any(self.over)
+        found = np.full((*of.shape[:-1], len(_SOBOL_INDEX_NAMES), 3, d), np.nan)
         for place in np.ndindex(*of.shape[:-1]):
             values = of.values[place]
             if not bool(bad.isel(dict(zip(others, place, strict=True)))) and np.ptp(values) > 0.0:
                 found[place] = _indices_with_intervals(values.reshape(-1, d + 2).T)
         lost = int(of.isnull().sum())
-        about = {"comment": f"samples drawn anew {_RESAMPLES} times for the intervals"}
+        about = {"comment": f"samples drawn anew {_BOOTSTRAP_RESAMPLES} times for the intervals"}
         if lost:
             about["refused"] = (
                 f"{lost} of {of.size} cells have no number, and the indices need all: narrower "
@@ -93,7 +93,7 @@ class SobolIndices(Reduction):
         return xr.Dataset(
             {
                 next(names): ((*others, "input"), found[..., result, end, :], about)
-                for result in range(len(_INDEX_NAMES))
+                for result in range(len(_SOBOL_INDEX_NAMES))
                 for end in range(3)
             },
             {**{n: c for n, c in of.coords.items() if self.over not in c.dims}, "input": inputs},
@@ -113,7 +113,7 @@ class SobolIndices(Reduction):
         return inputs
 
 
-def _indices_with_intervals(points: np.ndarray) -> np.ndarray:
+def _indices_with_intervals(sample_values: np.ndarray) -> np.ndarray:
     """First-order and total indices with the ends of their intervals.
 
     Parameters
@@ -125,23 +125,23 @@ def _indices_with_intervals(points: np.ndarray) -> np.ndarray:
     -------
     ndarray, shape (2, 3, inputs)
     """
-    random, count = np.random.default_rng(_RESAMPLING_SEED), points.shape[1]
+    random, count = np.random.default_rng(_RESAMPLING_SEED), sample_values.shape[1]
     resampled = []
-    for _ in range(_RESAMPLES // _RESAMPLES_PER_BATCH):
+    for _ in range(_BOOTSTRAP_RESAMPLES // _RESAMPLES_PER_BATCH):
         again = random.integers(count, size=(_RESAMPLES_PER_BATCH, count))
-        resampled.append(_saltelli_indices(points[:, again]))
+        resampled.append(_saltelli_indices(sample_values[:, again]))
     ends = np.quantile(np.concatenate(resampled, axis=1), _INTERVAL_QUANTILES, axis=1)
-    best = _saltelli_indices(points[:, None, :])[:, 0]
+    best = _saltelli_indices(sample_values[:, None, :])[:, 0]
     return np.stack([best, *ends], axis=1)
 
 
-def _saltelli_indices(values: np.ndarray) -> np.ndarray:
+def _saltelli_indices(sample_values: np.ndarray) -> np.ndarray:
     """Indices of first order and total, of shape (2, sets, inputs), of several sets of values of
     shape (2 + inputs, sets, points).
     """
     from scipy.stats import sobol_indices  # takes as long to load as the package
 
-    parts = {"f_A": values[0], "f_B": values[1], "f_AB": values[2:]}
-    found = sobol_indices(func=parts, n=values.shape[-1])
-    shape = values.shape[1], len(values) - 2
+    parts = {"f_A": sample_values[0], "f_B": sample_values[1], "f_AB": sample_values[2:]}
+    found = sobol_indices(func=parts, n=sample_values.shape[-1])
+    shape = sample_values.shape[1], len(sample_values) - 2
     return np.stack([found.first_order.reshape(shape), found.total_order.reshape(shape)])

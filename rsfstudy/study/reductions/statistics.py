@@ -22,12 +22,17 @@ from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.status import Status
-from rsfstudy.study.reductions.base import Derivatives, Reduction, UnitFields, is_refused
+from rsfstudy.study.reductions.base import (
+    DerivativesByVariable,
+    Reduction,
+    UnitFieldsBySuffix,
+    refused_result_mask,
+)
 from rsfstudy.study.reductions.units import find_varying_scale
 
 
 @dataclass(frozen=True)
-class _Statistic(Reduction):
+class _SampleStatistic(Reduction):
     """A statistic over samples; members say which.
 
     Parameters
@@ -46,7 +51,7 @@ class _Statistic(Reduction):
         "_stderr": "standard error, by sampling, of {name}",
         "_points": "samples with a number for {name}",
     }
-    unit_fields: ClassVar[UnitFields] = {"": ("of",), "_stderr": ("of",)}
+    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("of",), "_stderr": ("of",)}
     #: What it is, in words.
     description: ClassVar[str]
 
@@ -65,9 +70,9 @@ class _Statistic(Reduction):
         InvalidValue
             Where `of` does not lie along it.
         """
-        of, why = _sampled_variable(self, dataset), ""
+        of, why = _select_sampled_variable(self, dataset), ""
         count = of.notnull().sum(self.over)
-        bad = is_refused(dataset, self.of, self.over)
+        bad = refused_result_mask(dataset, self.of, self.over)
         if varied := find_varying_scale(dataset, of.attrs.get("scale", ""), {self.over}):
             bad, why = xr.ones_like(bad), f"{self.of} is in units of {varied}, which varies"
         elif bool(bad.any()):
@@ -83,19 +88,21 @@ class _Statistic(Reduction):
         return self.results(f"{self.description} of {self.of} over {self.over}", found)
 
 
-def standard_deviation(of: xr.DataArray, over: str, ddof: int = 1) -> xr.DataArray:
+def standard_deviation(
+    values: xr.DataArray, sample_dimension: str, degrees_of_freedom_lost: int = 1
+) -> xr.DataArray:
     """Compute the standard deviation of samples, with n - ddof degrees of freedom.
 
     The result is NaN if there are no more than ``ddof`` samples.
     """
     with warnings.catch_warnings():  # older versions of xarray let it through
         warnings.filterwarnings("ignore", "Degrees of freedom", RuntimeWarning)
-        return of.std(over, ddof=ddof)
+        return values.std(sample_dimension, ddof=degrees_of_freedom_lost)
 
 
 @guard_methods
 @dataclass(frozen=True)
-class Mean(_Statistic):
+class Mean(_SampleStatistic):
     """Mean over samples."""
 
     kind: ClassVar[str] = "mean"
@@ -106,15 +113,15 @@ class Mean(_Statistic):
         count = of.notnull().sum(self.over)
         return of.mean(self.over), standard_deviation(of, self.over) / count**0.5
 
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """1/n."""
-        has = _sampled_variable(self, dataset).notnull()
+        has = _select_sampled_variable(self, dataset).notnull()
         return [(has / has.sum(self.over), {})]
 
 
 @guard_methods
 @dataclass(frozen=True)
-class StandardDeviation(_Statistic):
+class StandardDeviation(_SampleStatistic):
     """Standard deviation over samples, of three at least.
 
     References
@@ -139,9 +146,9 @@ class StandardDeviation(_Statistic):
         scatter = standard_deviation(without, self.over, 0) * (count - 1.0) ** 0.5
         return standard_deviation(of, self.over), scatter
 
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """(y - mean)/((n - 1) sd)."""
-        of = _sampled_variable(self, dataset)
+        of = _select_sampled_variable(self, dataset)
         freedom = of.notnull().sum(self.over) - 1
         by = (of - of.mean(self.over)) / (freedom * standard_deviation(of, self.over))
         return [(by.fillna(0.0), {})]
@@ -149,7 +156,7 @@ class StandardDeviation(_Statistic):
 
 @guard_methods
 @dataclass(frozen=True)
-class Quantile(_Statistic):
+class Quantile(_SampleStatistic):
     """Quantile over samples, between neighbours by their distance; its standard error is half the
     distance of the quantiles a standard deviation of the binomial above and below.
 
@@ -193,7 +200,7 @@ class Quantile(_Statistic):
         found, beside = super().__call__(dataset), f"{self.of}_error"
         if beside not in dataset:
             return found
-        of, at = _sampled_variable(self, dataset), xr.DataArray(self.level)
+        of, at = _select_sampled_variable(self, dataset), xr.DataArray(self.level)
         errors = dataset[beside].reset_coords(drop=True)
         errors = (errors + sys.float_info.epsilon * abs(of)).fillna(np.inf)
         low, high = (
@@ -206,13 +213,17 @@ class Quantile(_Statistic):
         return found.assign({f"{self.name}_error": error})
 
 
-def _interpolated_quantile(of: xr.DataArray, over: str, level: xr.DataArray) -> xr.DataArray:
+def _interpolated_quantile(
+    values: xr.DataArray, sample_dimension: str, quantile_level: xr.DataArray
+) -> xr.DataArray:
     """A quantile: between the two samples whose ranks are beside it, by their distance."""
-    place = of.get_axis_num(over)
-    ranks = of.copy(data=np.argsort(np.argsort(of.values, axis=place), axis=place).astype(float))
-    at = level.clip(0.0, 1.0) * (of.notnull().sum(over) - 1)
-    weights = (1.0 - abs(ranks - at)).clip(min=0.0).where(of.notnull(), 0.0)
-    return (weights * of.where(weights > 0.0, 0.0)).sum(over)
+    place = values.get_axis_num(sample_dimension)
+    ranks = values.copy(
+        data=np.argsort(np.argsort(values.values, axis=place), axis=place).astype(float)
+    )
+    at = quantile_level.clip(0.0, 1.0) * (values.notnull().sum(sample_dimension) - 1)
+    weights = (1.0 - abs(ranks - at)).clip(min=0.0).where(values.notnull(), 0.0)
+    return (weights * values.where(weights > 0.0, 0.0)).sum(sample_dimension)
 
 
 @guard_methods
@@ -249,7 +260,7 @@ class StatusShares(Reduction):
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Count along the dimension of the samples."""
-        _sampled_variable(self, dataset)
+        _select_sampled_variable(self, dataset)
         status = dataset["status"].reset_coords(drop=True)
         statuses = [status for status in Status if status is not Status.PENDING]
         codes = xr.DataArray(
@@ -279,13 +290,15 @@ class Logarithm(Reduction):
         note = {"comment": f"natural logarithm of {self.of} in its unit"}
         return xr.Dataset({self.name: logarithm.drop_attrs(deep=False).assign_attrs(note)})
 
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """One over the variable."""
         of = dataset[self.of]
         return [((1.0 / of.where(of > 0.0)).fillna(0.0), {})]
 
 
-def _sampled_variable(reduction: _Statistic | StatusShares, dataset: xr.Dataset) -> xr.DataArray:
+def _select_sampled_variable(
+    reduction: _SampleStatistic | StatusShares, dataset: xr.Dataset
+) -> xr.DataArray:
     """What is reduced, without the coordinates beside its dimensions, which sums would carry."""
     of = dataset[reduction.of].reset_coords(drop=True)
     if reduction.over not in of.dims:

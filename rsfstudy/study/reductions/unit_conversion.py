@@ -11,8 +11,8 @@ import xarray as xr
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
-from rsfstudy.rig import read_scales, unit_factor, variable_scale
-from rsfstudy.study.reductions.base import Derivatives, Reduction
+from rsfstudy.rig import find_scale_of_variable, read_si_scales, unit_factor
+from rsfstudy.study.reductions.base import DerivativesByVariable, Reduction
 
 
 @guard_methods
@@ -41,12 +41,12 @@ class InUnits(Reduction):
         values = (dataset[self.of] * self._scale_factor(dataset)).drop_attrs(deep=False)
         return xr.Dataset({self.name: values.assign_attrs(about)})
 
-    def derivatives(self, dataset: xr.Dataset) -> Derivatives:
+    def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """The scale."""
         return [(self._scale_factor(dataset) * xr.ones_like(dataset[self.of]), {})]
 
     def _scale_factor(self, dataset: xr.Dataset) -> xr.DataArray:
-        scale = variable_scale(dataset[self.of], read_scales(dataset))
+        scale = find_scale_of_variable(dataset[self.of], read_si_scales(dataset))
         if scale is None:
             raise InvalidValue("of", self.of, "is a pure number, in no units of a rig")
         return xr.DataArray(scale.factor / float(unit_factor(self.name, self.units, scale.units)))

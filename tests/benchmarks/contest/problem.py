@@ -18,16 +18,16 @@ from typing import Any
 import numpy as np
 
 from rsfstudy import Scene
-from rsfstudy.limit_cycles.cycle_search import CycleSearch
-from rsfstudy.limit_cycles.cycles import _event_specifications, iterate_cycles
+from rsfstudy.limit_cycles.cycle_search import LimitCycleSearch
+from rsfstudy.limit_cycles.cycles import _cycle_event_specifications, iterate_cycles
 from rsfstudy.motion.accuracy import MIN_RTOL, Accuracy
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
 from rsfstudy.motion.integrate import integrate_events
 from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.slider.dynamics.inertia import DIFFERENCE_STEP, NEGLIGIBLE_SECOND_ORDER_WEIGHT
 from rsfstudy.slider.equations import RUPTURE_REGIME, equations_between_ruptures
-from rsfstudy.slider.point import Point
-from rsfstudy.slider.scene_functions import PATH_LOG_RATE_SCALE
+from rsfstudy.slider.point import MotionPoint
+from rsfstudy.slider.scene_functions import LOG_RATE_PER_PATH_LENGTH
 
 BUDGET = 10**9
 #: Places of the numbers of a scene.
@@ -58,7 +58,7 @@ class Problem:
     """
 
     scene: Scene
-    begin: Point
+    begin: MotionPoint
     p: tuple[float, ...]
     initial_spring_stress_rate: float
     interval: float
@@ -86,8 +86,8 @@ class Problem:
 def cycle_problem(scene: Scene) -> Problem:
     """The cycle of a scene, without marks."""
     tight = Accuracy(MIN_RTOL, budget=BUDGET, engine="compiled")
-    approach = CycleSearch(scene, tight, meter("compiled"))
-    if not approach.run(300):
+    approach = LimitCycleSearch(scene, tight, meter("compiled"))
+    if not approach.follow_until_converged(300):
         raise ValueError(f"no limit cycle: {scene}")
     begin = approach.cycles[-1].end_point
     truth = next(iterate_cycles(scene, tight, meter("compiled"), begin))
@@ -96,7 +96,7 @@ def cycle_problem(scene: Scene) -> Problem:
     assert coupling is not None
     mass, load, log_load = scene.inertial_time, scene.load_velocity, scene.log_load_velocity
     common = scene.a, scene.b, scene.mu_star, scene.stiffness, load, log_load
-    slow = equations_between_ruptures(scene, clock=True)
+    slow = equations_between_ruptures(scene, with_time=True)
     passing = slow.evaluate_rates((begin.spring_stress, *begin.psis, 0.0))[-1]
     return Problem(
         scene=scene,
@@ -118,7 +118,7 @@ def with_marks(it: Problem, rtol: float) -> Problem:
         scene,
         allowed,
         meter("compiled"),
-        _event_specifications(scene.log_load_velocity),
+        _cycle_event_specifications(scene.log_load_velocity),
         start=it.begin,
         with_time=True,
     )
@@ -144,7 +144,7 @@ def with_marks(it: Problem, rtol: float) -> Problem:
     )
 
 
-def stretch_lengths(scene: Scene, accuracy: Accuracy, begin: Point) -> list[float]:
+def stretch_lengths(scene: Scene, accuracy: Accuracy, begin: MotionPoint) -> list[float]:
     """How long the path is in each of the three stretches of a cycle."""
     lengths, regime, load = list[float](), "", scene.log_load_velocity
     watches = rise("log_slip_rate", load), approach_to_steady_state(2.0)
@@ -238,7 +238,7 @@ def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _i
         share = 1.0 / (1.0 + slower)
         loading = p[STIFFNESS] * (slower - 1.0) * share
         evolving = evolution(x, psi - shift, p) * share
-        slant = (loading - evolving) / (PATH_LOG_RATE_SCALE * p[A])
+        slant = (loading - evolving) / (LOG_RATE_PER_PATH_LENGTH * p[A])
         part = 1.0 / sqrt(1.0 + slant * slant)
         return part * loading, part * evolving, part * slower * share / p[LOAD]
 
@@ -249,7 +249,7 @@ def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _i
         faster = clamped((f - g) / (p[STIFFNESS] * norm), -1e30, 1e30)
         changes = evolution(x, value - p[A] * x - shift, p) * norm
         loading = p[STIFFNESS] * (p[LOAD] * p[MASS] - norm)
-        slant = faster / PATH_LOG_RATE_SCALE
+        slant = faster / LOG_RATE_PER_PATH_LENGTH
         part = 1.0 / sqrt(1.0 + slant * slant)
         return part * loading, part * faster, part * (p[A] * faster + changes) / slope
 
