@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from rsfstudy.rig.rig import Rig as Rig
     from rsfstudy.rig.table_files import read_table as read_table
     from rsfstudy.slider.loading import Segment as Segment
-    from rsfstudy.slider.protocols import protocol as protocol
     from rsfstudy.slider.scene import Scene as Scene
+    from rsfstudy.slider.user_loadings import protocol as protocol
     from rsfstudy.study.claims import Claim as Claim
     from rsfstudy.study.figure_declarations import Figure as Figure
     from rsfstudy.study.figure_declarations import Panel as Panel
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 _LAZY_EXPORTS = {
     "slider.scene": ("Scene",),
     "slider.loading": ("Segment",),
-    "slider.protocols": ("protocol",),
+    "slider.user_loadings": ("protocol",),
     "rig.rig": ("Rig",),
     "rig.record_files": ("read_record",),
     "rig.table_files": ("read_table",),

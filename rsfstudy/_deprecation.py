@@ -213,7 +213,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "IMPOSED": "IMPOSED_NORMAL_STRESS",
         "RECHARGE": "BOUNDARY_PRESSURE_RATE",
     },
-    "rsfstudy.slider.assembly:SceneBase": {
+    "rsfstudy.slider.scene_assembly:SceneBase": {
         "under": "with_segment",
         "acting": "segment_scene",
         "chains": "continuous_segments",
@@ -231,7 +231,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "functions": "equation_functions",
         "numbers": "parameter_values",
     },
-    "rsfstudy.slider.point:MotionPoint": {
+    "rsfstudy.slider.motion_point:MotionPoint": {
         "growth": "log_slip_rate_derivative",
         "friction": "frictional_stress",
         "imbalance": "steady_state_offset",
@@ -267,11 +267,11 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "switch_correction": "max_inertia_correction",
         "remaining_slip": "max_remaining_slip",
     },
-    "rsfstudy.motion.meter": {
+    "rsfstudy.motion.work_meter": {
         "Halt": "MotionStopped",
         "Meter": "WorkMeter",
     },
-    "rsfstudy.motion.meter:WorkMeter": {
+    "rsfstudy.motion.work_meter:WorkMeter": {
         "spent": "evaluations",
         "check": "check_budget",
         "settle": "charge_new_work",
@@ -317,7 +317,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "work": "evaluation_count",
         "evaluations": "evaluation_count",
     },
-    "rsfstudy.motion.driver:PythonMotionState": {
+    "rsfstudy.motion.motion_driver:PythonMotionState": {
         "lasts": "end_time",
         "taken": "step_length",
         "finer": "step_limit_factor",

@@ -257,7 +257,7 @@ def _is_number_of_type(value: object, number_type: type) -> bool:
 def _is_matching_container(
     value: object, container_type: Any, item_annotations: tuple[Any, ...], nesting_levels: int
 ) -> bool:
-    """Return True if a value is a container of type ``origin`` with matching items."""
+    """Return True if a value is a container of type ``container_type`` with matching items."""
     if not isinstance(container_type, type) or issubclass(container_type, type):
         return isinstance(value, type)
     if container_type in (Callable, typing.get_origin(Callable[..., Any])):

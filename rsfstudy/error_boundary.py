@@ -50,9 +50,9 @@ def error_boundary(
     ----------
     function : callable
         A public function or method.
-    is_inner : bool
+    is_called_internally : bool
         If True, also guard calls from within rsfstudy.
-    passed : tuple of type
+    unchanged_exceptions : tuple of type
         Exceptions that are not converted. By default these are errors of rsfstudy, warnings, and
         the exception with which a debugger quits.
 
@@ -135,7 +135,7 @@ def _wrap_in_error_boundary(
 ) -> Callable[P, T]:
     """Wrap a function in the error boundary.
 
-    If ``is_strict`` is True, NumPy numbers are converted to Python numbers, which files can hold,
+    If ``is_constructor`` is True, NumPy numbers are converted to Python numbers, which files can hold,
     and the arguments are also checked against their annotations. The check follows the call,
     because the errors that the function itself raises are more specific.
     """

@@ -82,13 +82,13 @@ def coverage_content_type(variable_name: str) -> str:
 def find_quantity(
     variable_name: str, extra_quantities: Mapping[str, Quantity] = MappingProxyType({})
 ) -> Quantity:
-    """Look a quantity up, deriving ``<name>_error`` and its like from ``<name>``.
+    """Look a quantity up, deriving ``<variable_name>_error`` and its like from ``<variable_name>``.
 
     Names that neither `extra_quantities` nor the vocabulary holds describe themselves.
 
     Parameters
     ----------
-    name : str
+    variable_name : str
     extra_quantities : mapping of str to Quantity
         What a study says of its own numbers.
     """

@@ -14,8 +14,6 @@ import numpy as np
 
 from rsfstudy import Accuracy, Scene, Segment
 from rsfstudy.errors import InvalidValue
-from rsfstudy.limit_cycles.cycle_search import StickSlipSequence, follow_to_periodic_orbit
-from rsfstudy.limit_cycles.cycles import LN10, Cycle, more_events_remedy
 from rsfstudy.limit_cycles.limit_cycle import (
     EVENTS_PER_PERIOD_OUTPUT,
     INDEX_OF_PEAK_OUTPUT,
@@ -25,12 +23,14 @@ from rsfstudy.limit_cycles.limit_cycle import (
     outcome_of_aperiodic_motion,
     status_from_output_errors,
 )
+from rsfstudy.limit_cycles.limit_cycle_search import StickSlipSequence, follow_to_periodic_orbit
 from rsfstudy.limit_cycles.return_map import (
     DIFFERENCE_STEP_OVER_LOG_RATE_RANGE,
     PeriodicOrbit,
     ReturnMap,
     section_vector_at,
 )
+from rsfstudy.limit_cycles.stick_slip_cycles import LN10, Cycle, more_events_remedy
 from rsfstudy.measure_base import check_loading_lets_motion_settle
 from rsfstudy.measures import Measure, Outcome, Output, Quantity, Status
 from rsfstudy.motion import WorkMeter, estimate_error

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 from rsfstudy import Accuracy, Scene, Segment
 from rsfstudy.errors import InvalidValue
-from rsfstudy.limit_cycles.cycle_search import LimitCycleSearch
+from rsfstudy.limit_cycles.limit_cycle_search import LimitCycleSearch
 from rsfstudy.limit_cycles.return_map import ReturnMap
 from rsfstudy.measures import Measure, Outcome, Output, Status
 from rsfstudy.motion import (

@@ -24,12 +24,12 @@ from rsfstudy.fitting import (
     scene_to_parameters,
     strip_window_number,
 )
+from rsfstudy.fitting.confidence_intervals import LikelihoodProfile, student_t_multiplier
 from rsfstudy.fitting.fit_problem import FitProblem
 from rsfstudy.fitting.fit_solution import FitSolution
-from rsfstudy.fitting.intervals import LikelihoodProfile, student_t_multiplier
+from rsfstudy.fitting.fit_validity_checks import find_validity_problems
 from rsfstudy.fitting.joint_model import JointModel, add_window_numbers
 from rsfstudy.fitting.noise import check_noise_name
-from rsfstudy.fitting.validity import find_validity_problems
 from rsfstudy.fitting.window_model import ParameterValues, WindowModel, check_fields_positive
 from rsfstudy.measures import Measure, Outcome, Output, OutputValue, Quantity, Status
 from rsfstudy.motion import WorkMeter

@@ -23,7 +23,7 @@ from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study, history
 from rsfstudy.measures import Measure, Outcome, Output, Status
 from rsfstudy.motion import MOTION_VARIABLES, Recording, WorkMeter, estimate_error, integrate_events
 from rsfstudy.slider import SampledHistory
-from rsfstudy.slider.sampled_history import TIME_COLUMN
+from rsfstudy.slider.sampled_loading import TIME_COLUMN
 from rsfstudy.study.figure_declarations import Axes, horizontal_line
 
 #: Initial perturbation of spring stress relative to ``a``, sampling interval in D_c/V_*, and

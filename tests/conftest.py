@@ -16,8 +16,8 @@ from hypothesis import HealthCheck, settings
 from matplotlib.mathtext import MathTextParser
 
 from rsfstudy import Scene
-from rsfstudy.execution import clusters, provenance, workers
-from rsfstudy.motion import integrate
+from rsfstudy.execution import clusters, provenance, worker_pool
+from rsfstudy.motion import event_integration
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.events import (
@@ -29,7 +29,7 @@ from rsfstudy.motion.events import (
     maximum,
     rise,
 )
-from rsfstudy.motion.meter import MotionStopped, WorkMeter
+from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
 
 settings.register_profile(
     "default", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
@@ -84,7 +84,7 @@ def follow_until(
     and the end of each step; and what else is watched for.
     """
     meter, watches = WorkMeter(budget), (*watches, STEP_END_EVENT)
-    for event in integrate.integrate_events(
+    for event in event_integration.integrate_events(
         scene, Accuracy(rtol, budget), meter, watches, with_time=True
     ):
         if until(event):
@@ -104,7 +104,7 @@ def reaches_instability_norm(scene: Scene, rtol: float = 1e-8, peaks: float = ma
     )
     accuracy, meter = Accuracy(rtol, engine=COMPILED), WorkMeter(200_000, engine=COMPILED)
     with contextlib.suppress(MotionStopped):  # slip that dies out, or that decays for ever
-        for event in integrate.integrate_events(scene, accuracy, meter, watches):
+        for event in event_integration.integrate_events(scene, accuracy, meter, watches):
             # a step may pass the norm and come back
             if event.kind is EventKind.RISE or event.point.log_slip_rate >= norm:
                 return True
@@ -122,8 +122,8 @@ def cot_phi(scene: Scene) -> float:
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
     """However long workers take to start, no test gives them up."""
-    monkeypatch.setattr(workers, "WARN_AFTER_SECONDS_WITHOUT_WORKER", math.inf)
-    monkeypatch.setattr(workers, "GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER", math.inf)
+    monkeypatch.setattr(worker_pool, "WARN_AFTER_SECONDS_WITHOUT_WORKER", math.inf)
+    monkeypatch.setattr(worker_pool, "GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER", math.inf)
 
 
 @pytest.fixture(autouse=True, scope="session")

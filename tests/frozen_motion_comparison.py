@@ -19,8 +19,8 @@ from frozen_scenes import MOTIONS, Motion, Track
 from rsfstudy import Scene
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.motion.events import EventKind
-from rsfstudy.motion.meter import MotionStopped
-from rsfstudy.slider.point import MotionPoint
+from rsfstudy.motion.work_meter import MotionStopped
+from rsfstudy.slider.motion_point import MotionPoint
 
 FROZEN_EVENTS_FILE = Path(__file__).with_name("frozen_events.json")
 

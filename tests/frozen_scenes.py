@@ -15,6 +15,7 @@ import numpy as np
 
 from rsfstudy import Scene, protocol
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.event_integration import integrate_events, iterate_events_of_equations
 from rsfstudy.motion.events import (
     EventKind,
     EventSpecification,
@@ -24,9 +25,8 @@ from rsfstudy.motion.events import (
     minimum,
     rise,
 )
-from rsfstudy.motion.integrate import integrate_events, iterate_events_of_equations
-from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.recording import MOTION_VARIABLES, Recording
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.slider.equations import equations_at_imposed_slip_rate, equations_between_ruptures
 
 #: Rows of a motion that are kept, and what those without end may cost.

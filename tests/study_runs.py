@@ -27,15 +27,15 @@ from rsfstudy import Axis, Scene, Study
 from rsfstudy.cli import command_line, commands  # noqa: F401
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import DataError, IncompleteWarning
-from rsfstudy.execution import cells, plan
+from rsfstudy.execution import cell_computation, cell_plan
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.slider.point import MotionPoint
-from rsfstudy.study import catalogue
-from rsfstudy.study.cell import Cell
+from rsfstudy.motion.event_integration import integrate_events
+from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.slider.motion_point import MotionPoint
+from rsfstudy.study import study_loader
 from rsfstudy.study.claims import Claim
+from rsfstudy.study.lattice_cell import Cell
 
 SMALL_STUDY = Study(
     name="small",
@@ -100,7 +100,7 @@ def example_claim(**fields) -> Claim:
 
 def cell_key(scene, measure) -> bytes:
     """Name of a cell that is planned alone."""
-    return plan.compute_cell_key(scene, measure)
+    return cell_plan.compute_cell_key(scene, measure)
 
 
 def run_with_failures(*words, **options) -> xr.Dataset:
@@ -114,14 +114,14 @@ def run_with_failures(*words, **options) -> xr.Dataset:
 @contextlib.contextmanager
 def record_computed_cells() -> Iterator[list[Cell]]:
     """The cells that are computed meanwhile, in this process."""
-    asked, computed = list[Cell](), cells.compute_cell
+    asked, computed = list[Cell](), cell_computation.compute_cell
 
     def counted(task, cell, **options):
         asked.append(cell)
         return computed(task, cell, **options)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cells, "compute_cell", counted)
+        patch.setattr(cell_computation, "compute_cell", counted)
         yield asked
 
 
@@ -201,7 +201,7 @@ COMPILED_ONLY_STUDIES = (
 
 def reduced_study(name: str) -> Study:
     """Return a study, or a part of it with fewer points and the claims about these points."""
-    study, points = catalogue.load_study(name), REDUCED_AXES.get(name, {})
+    study, points = study_loader.load_study(name), REDUCED_AXES.get(name, {})
     if name in COMPILED_ONLY_STUDIES:
         study = replace(study, accuracy=replace(study.accuracy, engine=COMPILED))
     if kinds := points.get("process"):

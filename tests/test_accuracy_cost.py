@@ -18,15 +18,15 @@ from rsfstudy import Scene
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.integrate import iterate_events_of_equations
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.event_integration import iterate_events_of_equations
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.steppers.scipy import SCIPY_SOLVER_BY_METHOD_NAME
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.reductions import apply_reductions
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider.equations import equations_between_ruptures
 from rsfstudy.status import Status
-from rsfstudy.study import catalogue
+from rsfstudy.study import study_loader
 
 SCENE = Scene(law="slowness", normal_stress="constant", load_velocity_ratio=20.0)
 PEAK = 8.853655123157110332821499968933
@@ -142,7 +142,7 @@ def test_a_reference_computed_anew():
 @pytest.mark.parametrize(("name", "within"), [("critical_step", 0.15), ("limit_cycle", 0.4)])
 def test_the_work_a_user_is_told_is_the_work_it_takes(name, within):
     """The table of cycles is that of another one."""
-    problems = catalogue.load_study("accuracy_cost").measure.problems
+    problems = study_loader.load_study("accuracy_cost").measure.problems
     problem = next(p for p in problems if p.measure.name == name)
     measure = problem.measure
     typical = measure(problem.scene, Accuracy()).rhs_evaluations

@@ -21,7 +21,7 @@ from rsfstudy.errors import DataError, InvalidValue, RunError
 from rsfstudy.reductions import LinearFit
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
-from rsfstudy.storage import store
+from rsfstudy.storage import dataset_files
 
 #: It has all that a file can have, and costs next to nothing.
 TINY = Study(
@@ -113,7 +113,7 @@ def sealed(dataset, path: Path) -> str:
     """Written as by someone who meant it: the digest is right."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of xarray, on what it writes
-        store.write_dataset(dataset, path)
+        dataset_files.write_dataset(dataset, path)
     return str(path)
 
 

@@ -15,8 +15,8 @@ from study_runs import SMALL_STUDY, run, run_command
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.slider.registry import FIELD_NAMES
-from rsfstudy.study import catalogue
+from rsfstudy.slider.part_registry import FIELD_NAMES
+from rsfstudy.study import study_loader
 
 #: Anything a user, a JSON file or a notebook may put where a value is asked for.
 ODD = st.one_of(
@@ -139,7 +139,7 @@ def test_any_study_file_is_taken_or_refused(tmp_path_factory, text):
     path = tmp_path_factory.mktemp("file") / "mine.py"
     path.write_text(text, errors="surrogatepass")
     with pytest.raises(InvalidValue, match="mine"):
-        catalogue.load_study(str(path))
+        study_loader.load_study(str(path))
 
 
 # ---- where results go ---------------------------------------------------------------------------
@@ -148,6 +148,6 @@ def test_any_study_file_is_taken_or_refused(tmp_path_factory, text):
 @pytest.mark.parametrize("output", ["/dev/null/results", "/proc/results"])
 def test_an_output_that_cannot_be_written(output, monkeypatch):
     """Told before any cell is computed."""
-    monkeypatch.setattr("rsfstudy.execution.cells.compute_cell", None)
+    monkeypatch.setattr("rsfstudy.execution.cell_computation.compute_cell", None)
     with pytest.raises(DataError, match=f"cannot use {output}.*Choose another --output"):
         run(output=output)

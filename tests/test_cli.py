@@ -11,10 +11,10 @@ from study_runs import SMALL_STUDY as LATTICE
 from study_runs import call_main, example_claim, named_results
 
 import rsfstudy
-from rsfstudy.cli import assignments
+from rsfstudy.cli import assignment_parsing
 from rsfstudy.motion import engine_factory
-from rsfstudy.storage import store
-from rsfstudy.study import catalogue, study_index
+from rsfstudy.storage import dataset_files
+from rsfstudy.study import study_index, study_loader
 
 NAME = "rate_step_boundary"
 SMALL = ["--serial", "--set", "b_over_a=2,3,5"]
@@ -62,7 +62,7 @@ def test_check_all_checks_what_is_there_and_names_what_is_not(results):
 def test_check_fails_when_a_verdict_moves(tmp_path, tmp_path_factory):
     moved, _path = named_results(NAME, tmp_path_factory)
     moved["zeta"] = moved["zeta"] + 0.5
-    store.write_dataset(moved, tmp_path / "moved.nc")
+    dataset_files.write_dataset(moved, tmp_path / "moved.nc")
     checked = call_main("check", tmp_path / "moved.nc")
     assert checked.returncode == 1
     assert "differs, expected reproduced" in checked.stdout
@@ -98,7 +98,7 @@ def test_other_lattices_run_check_and_plot_and_say_what_they_are(settings, tmp_p
 def test_a_claim_that_is_named_must_apply(tmp_path):
     """Of claim C6 the slope is left out with cells of its support, the value at b/a = 2 is not."""
     dataset = rsfstudy.run(NAME, workers=0, output=None, progress=False, b_over_a=[2, 3])
-    store.write_dataset(dataset, tmp_path / "few.nc")
+    dataset_files.write_dataset(dataset, tmp_path / "few.nc")
     everything = call_main("check", tmp_path / "few.nc")
     assert everything.returncode == 0
     assert "2 of 6 claims checked: 2 reproduced, 4 not applicable" in everything.stdout
@@ -134,7 +134,7 @@ def test_list_and_show():
     ],
 )
 def test_settings(text, values):
-    assert assignments.parse_axis_assignment(text, ())[1] == values
+    assert assignment_parsing.parse_axis_assignment(text, ())[1] == values
 
 
 def test_a_label_may_hold_commas_and_colons(tmp_path):
@@ -144,7 +144,7 @@ def test_a_label_may_hold_commas_and_colons(tmp_path):
     )
     assert ran.returncode == 0, ran.stderr
     assert rsfstudy.open("hard_cases", tmp_path).hard_case.values.tolist() == [label]
-    several = assignments.parse_axis_assignment(
+    several = assignment_parsing.parse_axis_assignment(
         f"hard_case={label},other , {label}", (label, "rigid")
     )
     assert several == ("hard_case", [label, "other", label])
@@ -167,7 +167,7 @@ def catalogued(monkeypatch):
     """Puts studies in the place of the named ones."""
 
     def named(*studies):
-        by_name, load = {study.name: study for study in studies}, catalogue.load_study
+        by_name, load = {study.name: study for study in studies}, study_loader.load_study
         replace_everywhere(monkeypatch, study_index.study_names, lambda: tuple(by_name))
         replace_everywhere(monkeypatch, load, lambda name: by_name.get(name) or load(name))
 
@@ -213,7 +213,7 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
 @pytest.fixture
 def without_numba(monkeypatch):
     """As where Numba is not installed."""
-    monkeypatch.setitem(sys.modules, "rsfstudy.motion.compiled.machine", None)
+    monkeypatch.setitem(sys.modules, "rsfstudy.motion.compiled.numba_backend", None)
     engine_factory.import_compiled_engine.cache_clear()
     yield
     engine_factory.import_compiled_engine.cache_clear()

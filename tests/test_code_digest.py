@@ -20,7 +20,7 @@ from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Outcome
 from rsfstudy.reductions import Reduction
 from rsfstudy.status import Status
-from rsfstudy.study import catalogue, study_index
+from rsfstudy.study import study_index, study_loader
 from rsfstudy.study.study_index import STUDIES_PACKAGE
 
 HELPER = """
@@ -103,7 +103,7 @@ def study_in(place, *, helper=HELPER, measure=MEASURE):
     place.mkdir(exist_ok=True)
     (place / "helper.py").write_text(helper)
     (place / "mine.py").write_text(measure)
-    return catalogue.load_study(str(place / "mine.py"))
+    return study_loader.load_study(str(place / "mine.py"))
 
 
 def digest(study):
@@ -237,7 +237,7 @@ def physics_of(study):
 
 def with_measures_of_their_own():
     """Modules of named studies that hold the measure of their study."""
-    loaded = [catalogue.load_study(name) for name in study_index.study_names()]
+    loaded = [study_loader.load_study(name) for name in study_index.study_names()]
     homes = {study.name: type(study.measure).__module__ for study in loaded}
     return [
         sys.modules[home] for name, home in homes.items() if home == f"{STUDIES_PACKAGE}.{name}"
@@ -338,7 +338,7 @@ def test_the_digest_of_the_physics_is_that_of_its_files():
 @pytest.mark.parametrize("name", ["triggering", "hard_cases"])
 def test_cached_properties_of_a_study_do_not_change_its_digest(name):
     """One process may have used the measures and scenes of a study, and another may not."""
-    study = catalogue.load_study(name)
+    study = study_loader.load_study(name)
     fresh = code_digest.digest_physics_and_measures("", study.measure.code_classes)
     values = [
         value

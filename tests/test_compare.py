@@ -14,7 +14,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.reductions import LinearFit
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
-from rsfstudy.storage import store
+from rsfstudy.storage import dataset_files
 
 NUMBER = "critical_stiffness"
 RATIOS = [1.5, 2.0, 2.5, 3.0]
@@ -165,7 +165,7 @@ def files(two, tmp_path, monkeypatch):
     second["status"][1, 0] = int(Status.NO_STEADY_STATE)
     places = tmp_path / "first.nc", tmp_path / "second.nc"
     for dataset, place in zip((first, second.isel(b_over_a=[0, 1])), places, strict=True):
-        store.write_dataset(dataset, place)
+        dataset_files.write_dataset(dataset, place)
     return places
 
 

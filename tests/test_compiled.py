@@ -17,17 +17,17 @@ from study_runs import COMPILED_ONLY_STUDIES, SMALL_STUDY, reduced_study, run
 
 from rsfstudy import Scene, critical_step, limit_cycle, simulate
 from rsfstudy.errors import DataError, IncompleteWarning, InvalidValue
-from rsfstudy.execution.plan import CellPlan
+from rsfstudy.execution.cell_plan import CellPlan
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.compiled import compile_cache, machine
+from rsfstudy.motion.compiled import compile_cache, numba_backend
 from rsfstudy.motion.engines import COMPILED, ENGINES, compilation_log
 from rsfstudy.slider.equations import equations_between_ruptures
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.status import Status
-from rsfstudy.study import catalogue
+from rsfstudy.study import study_loader
 
 CYCLE = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
 
@@ -40,7 +40,7 @@ def test_a_recording_is_the_same_however_few_rows_a_call_may_fill(rows, monkeypa
     """Regimes change in the middle of a table, and at its last rows."""
     scene, accuracy = Scene(**CYCLE), Accuracy(rtol=1e-3, engine=COMPILED)
     whole = LimitCycle(phases=50)(scene, accuracy)
-    monkeypatch.setattr("rsfstudy.motion.driver._RECORDING_ROWS", rows)
+    monkeypatch.setattr("rsfstudy.motion.motion_driver._RECORDING_ROWS", rows)
     pieces = LimitCycle(phases=50)(scene, accuracy)
     assert np.array_equal(whole.values["shear_stress"], pieces.values["shear_stress"])
     assert whole.values["recurrence_interval"] == pieces.values["recurrence_interval"]
@@ -48,7 +48,7 @@ def test_a_recording_is_the_same_however_few_rows_a_call_may_fill(rows, monkeypa
 
 def test_hard_cases_come_out():
     """All that break ordinary codes, held against their answers."""
-    study = catalogue.load_study("hard_cases")
+    study = study_loader.load_study("hard_cases")
     ended = run(study, engine=COMPILED)
     assert (ended["status"] == int(Status.OK)).all()
 
@@ -79,7 +79,7 @@ class Tabulated(Law):
 def test_a_part_that_cannot_be_compiled_is_named_with_the_line():
     line = tabulated.__code__.co_firstlineno + 1
     with pytest.raises(InvalidValue, match=rf"the part .*tabulated.*test_compiled.py, line {line}"):
-        machine.compile_equations_of_scene(Scene(law=Tabulated), with_time=True)
+        numba_backend.compile_equations_of_scene(Scene(law=Tabulated), with_time=True)
     assert (
         simulate(Scene(law=Tabulated, stiffness=0.01, hold_time=1.0), duration=1.0).attrs["status"]
         == "ok"
@@ -144,7 +144,7 @@ def test_a_file_says_which_engine_and_cells_are_not_mixed(tmp_path):
 )
 def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
     """By what their measure says of time."""
-    wanted, addresses = list[tuple[str, ...]](), machine.compiled_function_addresses
+    wanted, addresses = list[tuple[str, ...]](), numba_backend.compiled_function_addresses
 
     def asked(equations):
         wanted.append((equations.regime, *equations.unknown_names))
@@ -152,9 +152,9 @@ def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
 
     study = reduced_study(name)
     scene = CellPlan(study).example_scenes[0]
-    monkeypatch.setattr(machine, "compiled_function_addresses", asked)
+    monkeypatch.setattr(numba_backend, "compiled_function_addresses", asked)
     for clock in study.measure.needs_time:
-        machine.compile_equations_of_scene(scene, with_time=clock)
+        numba_backend.compile_equations_of_scene(scene, with_time=clock)
     prepared = set(wanted)
     wanted.clear()
     study.measure(scene, study.accuracy)
@@ -195,7 +195,7 @@ def test_other_processes_find_equations_again(tmp_path):
     asks = (
         "from rsfstudy import Scene\n"
         "from rsfstudy.critical_steps.critical_path import CriticalPath\n"
-        "from rsfstudy.motion.compiled.machine import compiled_function_addresses\n"
+        "from rsfstudy.motion.compiled.numba_backend import compiled_function_addresses\n"
         "from rsfstudy.motion.engines import compilation_log\n"
         "from rsfstudy.slider.equations import equations_between_ruptures\n"
         "scene = Scene(normal_stress='constant')\n"
@@ -279,7 +279,7 @@ def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeyp
     for law in ("perrin_rice_zheng", "slip", "perrin_rice_zheng", "slip"):
         monkeypatch.setattr(FunctionIdentity, "_unique_ids", itertools.count(10**7))
         compile_cache._jit_compile_callee_cached.cache_clear()
-        monkeypatch.setattr(machine, "_COMPILED_ADDRESS_CACHE", {})
+        monkeypatch.setattr(numba_backend, "_COMPILED_ADDRESS_CACHE", {})
         equations = equations_between_ruptures(
             Scene(law=law, normal_stress="constant"), with_time=False
         )
@@ -288,7 +288,7 @@ def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeyp
             (ctypes.c_double * len(equations.parameters))(*equations.parameters),
         )
         result = (ctypes.c_double * 2)()
-        function(machine.compiled_function_addresses(equations)[0])(y, y, p, result)
+        function(numba_backend.compiled_function_addresses(equations)[0])(y, y, p, result)
         assert list(result) == pytest.approx(list(equations.evaluate_rates(state)), rel=1e-12)
 
 

@@ -15,15 +15,15 @@ from rsfstudy import Scene
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import PYTHON, SCIPY
-from rsfstudy.motion.integrate import iterate_events_of_equations
-from rsfstudy.motion.meter import MotionStopped, WorkMeter
+from rsfstudy.motion.event_integration import iterate_events_of_equations
+from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
 from rsfstudy.slider.equations import (
     Equations,
     equations_against_displacement,
     equations_between_ruptures,
 )
+from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.point import MotionPoint
 from rsfstudy.slider.scene_functions import displacement_per_path_length
 from rsfstudy.status import Status
 

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from study_runs import SMALL_STUDY, call_main, run
 
-from rsfstudy.cli import cost
-from rsfstudy.execution.plan import CellPlan
+from rsfstudy.cli import cost_estimates
+from rsfstudy.execution.cell_plan import CellPlan
 from rsfstudy.motion.accuracy import Accuracy
 
 FILE = "small.cells.sqlite"
 
 
 def words(study, output):
-    return cost.describe_study_cost(CellPlan(study), output)
+    return cost_estimates.describe_study_cost(CellPlan(study), output)
 
 
 @pytest.fixture(scope="module")
@@ -67,13 +67,13 @@ MANY = SMALL_STUDY.with_(b_over_a=np.linspace(1.5, 3.0, 1500))
 
 
 def test_the_compiled_engine_is_named_where_it_would_save_a_minute(tmp_path):
-    assert cost.estimate_cost(CellPlan(MANY))[1] > 60.0
-    advice = cost.compiled_engine_hint(CellPlan(MANY), tmp_path)
+    assert cost_estimates.estimate_cost(CellPlan(MANY))[1] > 60.0
+    advice = cost_estimates.compiled_engine_hint(CellPlan(MANY), tmp_path)
     assert advice == "--engine compiled is about 10 times faster here"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cost, "_COMPILED_SPEEDUP_BY_MEASURE", {"limit_cycle": 30})
-        assert cost.compiled_engine_hint(CellPlan(MANY), tmp_path).endswith(
+        patch.setattr(cost_estimates, "_COMPILED_SPEEDUP_BY_MEASURE", {"limit_cycle": 30})
+        assert cost_estimates.compiled_engine_hint(CellPlan(MANY), tmp_path).endswith(
             "as a rule: about 30 times with limit_cycle"
         )
     (tmp_path / FILE).touch()  # its cells would all be computed anew
-    assert cost.compiled_engine_hint(CellPlan(MANY), tmp_path) == ""
+    assert cost_estimates.compiled_engine_hint(CellPlan(MANY), tmp_path) == ""

@@ -15,16 +15,16 @@ from time_domain_reference import TimeDomainMotion
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.critical_steps import critical_step, forward_motion
+from rsfstudy.critical_steps import critical_step, motion_after_step
 from rsfstudy.critical_steps.critical_path import CriticalPath, scalar_function_for_engine
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.slow_manifold import slow_manifold_relative_error
+from rsfstudy.critical_steps.slow_manifold_accuracy import slow_manifold_relative_error
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.motion.roots import build_root_finder
+from rsfstudy.motion.root_finding import build_root_finder
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.slider.equations import equations_between_ruptures, quasi_static_log_slip_rate
-from rsfstudy.slider.point import MotionPoint
+from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.status import Status
 
 RATE, DISPLACEMENT, FALL = "load_velocity_ratio", "displacement_step", "normal_stress_step"
@@ -246,7 +246,7 @@ def test_paths_on_the_slow_manifold_agree_with_motions_of_the_full_equations(cas
     without = found(scene.with_(inertia=False), rtol=1e-8)[0]
     values = {}
     for heavy in (False, True):
-        for module in (critical_step, forward_motion):
+        for module in (critical_step, motion_after_step):
             monkeypatch.setattr(
                 module, "inertia_matters_below_norm", lambda *_scene, heavy=heavy: heavy
             )
@@ -324,14 +324,14 @@ def test_an_orbit_that_grows_slowly_is_known_to_reach_the_norm_in_a_few_leaps():
     """Leaps that had to be shortened each time would take ten times the work."""
     slowly = {"law": "slowness", "b_over_a": 2.46, "phi": 82.8, "alpha": 0.129}
     scene = Scene(**slowly, stiffness_ratio=0.998, load_velocity_ratio=0.16, instability_norm=3e-4)
-    assert forward_motion.motion_reaches_norm(scene, Accuracy(1e-6), WorkMeter(15_000))
+    assert motion_after_step.motion_reaches_norm(scene, Accuracy(1e-6), WorkMeter(15_000))
 
 
 def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
     """k = k_cr, constant normal stress: without mass it peaks at 10^87 V_*."""
     scene = Scene(law="slowness", load_velocity_ratio=200.0, instability_norm=10.0, **CONSTANT)
     for inertia in (False, True):
-        reached = forward_motion.motion_reaches_norm(
+        reached = motion_after_step.motion_reaches_norm(
             scene.with_(inertia=inertia), Accuracy(1e-6), WorkMeter(500_000)
         )
         assert reached is not inertia
@@ -344,9 +344,9 @@ def test_a_limit_cycle_below_the_norm_is_not_leapt_over():
     for load, peak in ((0.25, 9.57), (0.3, 8.49)):
         scene = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=load)
         assert peak < scene.log_instability_rate
-        assert not forward_motion.motion_reaches_norm(scene, Accuracy(1e-6), WorkMeter(500_000))
+        assert not motion_after_step.motion_reaches_norm(scene, Accuracy(1e-6), WorkMeter(500_000))
     low = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=0.15)
-    assert forward_motion.motion_reaches_norm(low, Accuracy(1e-6), WorkMeter(500_000))
+    assert motion_after_step.motion_reaches_norm(low, Accuracy(1e-6), WorkMeter(500_000))
 
 
 def test_a_spent_budget_is_a_failure_with_a_name():

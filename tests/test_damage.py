@@ -15,7 +15,7 @@ from test_altered_files import TINY
 
 import rsfstudy
 from rsfstudy.errors import DataError
-from rsfstudy.storage import content_digest, schema, store
+from rsfstudy.storage import content_digest, dataset_files, schema
 
 #: With many claims the declaration is so long that HDF5 keeps no checksum of it.
 STUDY = replace(
@@ -118,7 +118,7 @@ def test_a_number_that_another_program_changed_is_refused_with_the_remedy(writte
 def test_a_dataset_that_is_written_again_gets_a_digest_of_its_own(written, tmp_path):
     dataset = xr.load_dataset(written)
     dataset["critical_stiffness"][0, 0] += 1e-9
-    store.write_dataset(dataset, tmp_path / "again.nc")
+    dataset_files.write_dataset(dataset, tmp_path / "again.nc")
     (tmp_path / "tiny.nc").write_bytes(cut(tmp_path / "again.nc"))
     with pytest.warns(UserWarning, match="has no digest"):
         rsfstudy.open(tmp_path / "tiny.nc")
@@ -126,13 +126,13 @@ def test_a_dataset_that_is_written_again_gets_a_digest_of_its_own(written, tmp_p
 
 def test_a_damaged_motion_is_refused(tmp_path):
     motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=1.0, rtol=1e-3)
-    store.write_dataset(motion, tmp_path / "whole.nc")
+    dataset_files.write_dataset(motion, tmp_path / "whole.nc")
     content = bytearray(cut(tmp_path / "whole.nc"))
     place = content.index(motion["slip"].values[-3:].tobytes())
     content[place + 3] ^= 1
     (tmp_path / "motion.nc").write_bytes(content)
     with pytest.raises(DataError, match=r"slip is not what was written"):
-        store.read_dataset(tmp_path / "motion.nc")
+        dataset_files.read_dataset(tmp_path / "motion.nc")
     shutil.copy(tmp_path / "whole.nc", tmp_path / "motion.nc")
-    again = store.read_dataset(tmp_path / "motion.nc")
+    again = dataset_files.read_dataset(tmp_path / "motion.nc")
     xr.testing.assert_identical(again, motion.assign_attrs(layout=schema.FILE_LAYOUT_VERSION))

@@ -15,7 +15,7 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantities import Output
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.rig.quantities import derive_scene_fields_from_rig
+from rsfstudy.rig.rig_quantities import derive_scene_fields_from_rig
 from rsfstudy.status import Status
 
 #: Where boundaries have closed forms that the norm does not show in.

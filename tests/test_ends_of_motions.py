@@ -10,18 +10,18 @@ from study_runs import start_point
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.critical_steps.forward_motion import motion_reaches_norm
+from rsfstudy.critical_steps.motion_after_step import motion_reaches_norm
 from rsfstudy.errors import IncompleteWarning, NoResultWarning
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, rise
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import MotionStopped, WorkMeter
 from rsfstudy.motion.regime_switching import (
     CONTINUES,
     find_termination_status,
     margin_to_termination,
 )
+from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
 from rsfstudy.status import Status
 
 ENGINES = (SCIPY, COMPILED)

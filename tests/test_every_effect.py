@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, maximum
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import laws, stability, steady_state
 from rsfstudy.slider.equations import (

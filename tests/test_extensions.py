@@ -24,7 +24,7 @@ from rsfstudy import Axis, Scene, Study, limit_cycle, plots
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.slider import laws, parameter_layout, registry
+from rsfstudy.slider import laws, parameter_layout, part_registry
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.loading.step import StepLoading
@@ -32,11 +32,13 @@ from rsfstudy.slider.normal_stress import NormalStress
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import flag, number
 from rsfstudy.status import Status
-from rsfstudy.study import catalogue
+from rsfstudy.study import study_loader
 from rsfstudy.study.figure_declarations import Figure, Panel
 
 #: Fields of every scene; others are among its values only if they are stated.
-PLAIN = tuple(name for name in registry.FIELD_NAMES if name not in registry.FIELDS_OMITTED_IF_NONE)
+PLAIN = tuple(
+    name for name in part_registry.FIELD_NAMES if name not in part_registry.FIELDS_OMITTED_IF_NONE
+)
 EXAMPLES = sorted((Path(__file__).parent / "extensions").glob("*.py"))
 #: One cell of each.
 PLACES = {
@@ -101,7 +103,7 @@ def test_one_cell_and_all_cells_are_as_on_the_workers(name, outside):
 )
 def test_its_motions_are_the_same_compiled(name, outside):
     """As ours are held to frozen events: SciPy's stepper takes the same steps but for rounding."""
-    *_others, scene = catalogue.load_study(str(outside[name].study)).scenes()
+    *_others, scene = study_loader.load_study(str(outside[name].study)).scenes()
     stepped = {"rest_time": 30.0} if name == "hold_and_reload" else {"load_velocity_ratio": 2.0}
     scene = scene.with_(**stepped)
     motion = Motion({"a": scene.a}, until=300.0, rtol=1e-8)
@@ -127,7 +129,7 @@ def test_what_it_says_of_itself_is_in_the_file_and_on_the_figure(outside):
 
 def test_what_has_no_meaning_in_a_cell_is_left_out(outside):
     """As alpha at constant normal stress: the cells without it are one."""
-    study = catalogue.load_study(str(outside["saturating_law"].study))
+    study = study_loader.load_study(str(outside["saturating_law"].study))
     dataset = run(study, law=["slip", "saturating"], stiffness_ratio=[0.8])
     assert dataset.sizes == {"law": 2, "sharpness": 3, "stiffness_ratio": 1}
     slip, own = dataset.critical_displacement.squeeze("stiffness_ratio").transpose("law", ...)
@@ -148,7 +150,7 @@ def test_a_stepper_of_a_users_own(outside):
     for step in found.dataset.critical_velocity_ratio:
         b_over_a = float(step.b_over_a)
         assert float(step) == pytest.approx(1.0 + 1.0 / (b_over_a - 1.0), abs=bias[b_over_a])
-    stepper = catalogue.load_study(str(found.study))
+    stepper = study_loader.load_study(str(found.study))
     assert stepper.accuracy.engine == "order_four"
     scene = stepper.base.with_(inertia=True, stiffness_ratio=0.8, load_velocity_ratio=2.0)
     ours, theirs = (limit_cycle(scene, rtol=1e-5, engine=by) for by in ("order_four", "scipy"))
@@ -163,7 +165,7 @@ def test_a_hold_and_a_reload(outside):
     of t peaks at b ln(t) - a b ln(K/b)/(K - b); what is left out of both goes as 1/t.
     """
     found = outside["hold_and_reload"]
-    study = catalogue.load_study(str(found.study))
+    study = study_loader.load_study(str(found.study))
     scene, hold = study.base, found.dataset.rest_time
     a, b, stiffness, ratio = scene.a, scene.b, scene.stiffness, scene.stiffness_ratio
     limit = -a * ratio * math.log(ratio) / (ratio - 1.0)
@@ -216,7 +218,7 @@ def test_a_measure_a_reduction_and_a_figure(outside):
     seconds = base.a / (base.stiffness * base.reference_rate)
     np.testing.assert_allclose(times * times.load_velocity_ratio, seconds, rtol=1e-14)
     np.testing.assert_allclose(outside["power_law"].dataset.exponent, 1.0, rtol=1e-12)
-    study = catalogue.load_study(str(outside["own_figure"].study))
+    study = study_loader.load_study(str(outside["own_figure"].study))
     drawn = plots.draw_figure(outside["own_figure"].dataset, study.plot).axes[0]
     assert drawn.get_ylabel() == "Angle (degrees)"
 
@@ -250,7 +252,7 @@ def test_without_the_study_file(outside, tmp_path, monkeypatch):
 
 
 def test_a_process_that_does_not_know_the_parts_opens_their_results(outside, monkeypatch):
-    for slot in registry.SLOTS:
+    for slot in part_registry.SLOTS:
         monkeypatch.setitem(vars(slot), "user_parts", {})
     dataset = rsfstudy.open(outside["saturating_law"].file)
     assert dataset.attrs["id"] == "saturating_laws"

@@ -23,11 +23,11 @@ from study_runs import (
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.cli import assignments, printing
+from rsfstudy.cli import assignment_parsing, printed_reports
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RunError
-from rsfstudy.execution import clusters, runner, workers
-from rsfstudy.execution.plan import CellBatchIterator
+from rsfstudy.execution import clusters, study_run, worker_pool
+from rsfstudy.execution.cell_plan import CellBatchIterator
 from rsfstudy.reductions import LinearFit, apply_reductions
 from rsfstudy.reporting import tables
 from rsfstudy.status import Status
@@ -86,7 +86,7 @@ def test_a_cell_that_goes_wrong(fault, gone_wrong, capsys):
         cells = dataset.sel(fault=fault)
         only_one_failed(cells, status)
         assert message in cells.message.values[1]
-        assert printing.print_failures(cells) == 1
+        assert printed_reports.print_failures(cells) == 1
         assert status in capsys.readouterr().out
 
 
@@ -138,7 +138,7 @@ def test_a_cell_that_computes_for_ever(sturdy, monkeypatch):
     """
     client, log = sturdy
     monkeypatch.setattr(
-        workers, "_MAX_WORKER_DEATHS_PER_CELL", 1
+        worker_pool, "_MAX_WORKER_DEATHS_PER_CELL", 1
     )  # a worker takes seconds to start
     dataset = lost(faulty_study("spins in C", at=(2.5,)), client=client, time_limit=0.5)
     only_one_failed(dataset, "time_limit_spent")
@@ -157,7 +157,7 @@ def test_a_time_limit_is_one_of_cpu_time():
     """Whatever the clock says, before and after."""
     script = """
 import collections, itertools, time
-from rsfstudy.execution import cells
+from rsfstudy.execution import cell_computation as cells
 cells.WALL_TIME_FACTOR = 1e6
 with cells._cpu_time_limits.enforced(0.1):
     time.sleep(1.5)
@@ -183,7 +183,7 @@ def test_if_everything_fails_at_the_start_the_run_stops_and_says_why(fault, tmp_
         run(faulty_study(fault, cells=100), output=tmp_path)
     partial = rsfstudy.open(tmp_path / "faulty.partial.nc")
     tried = partial.status != int(Status.PENDING)
-    assert runner._MAX_FAILURES_WITHOUT_SUCCESS <= int(tried.sum()) < 100
+    assert study_run._MAX_FAILURES_WITHOUT_SUCCESS <= int(tried.sum()) < 100
     assert not (tmp_path / "faulty.nc").exists()
 
 
@@ -258,7 +258,9 @@ def test_cells_with_awkward_labels_alone(tmp_path):
         words = shlex.split(
             tables.format_recompute_command(dataset, str(tmp_path / "awkward.nc"), place)
         )
-        cells = dict(assignments.parse_cell_coordinate(text) for text in words if "=" in text)
+        cells = dict(
+            assignment_parsing.parse_cell_coordinate(text) for text in words if "=" in text
+        )
         scene, _outcome = rsfstudy.recompute_cell(tmp_path / "awkward.nc", cells)
         assert (scene.b_over_a, scene.inertia) == (2.0 + number, True)
 
@@ -317,7 +319,7 @@ def test_workers_that_never_come(monkeypatch):
         "WARN_AFTER_SECONDS_WITHOUT_WORKER": 0.2,
         "GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER": 0.4,
     }.items():
-        monkeypatch.setattr(workers, name, seconds)
+        monkeypatch.setattr(worker_pool, name, seconds)
     with (
         LocalCluster(n_workers=0, **QUIET_CLUSTER_OPTIONS) as cluster,
         Client(cluster) as client,

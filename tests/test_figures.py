@@ -22,7 +22,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.plots import _style, _text
 from rsfstudy.quantities import Quantity
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.storage import store
+from rsfstudy.storage import dataset_files
 from rsfstudy.study import study_index
 
 MM = 25.4
@@ -349,7 +349,7 @@ def test_a_font_that_is_missing_is_named_once(tmp_path, monkeypatch):
     sheet = tmp_path / "mine.mplstyle"
     sheet.write_text("font.family: No Such Font\n")
     file = tmp_path / "lattice.nc"
-    store.write_dataset(lattice(RATES), file)
+    dataset_files.write_dataset(lattice(RATES), file)
     ran = call_main("plot", file, "--style", sheet)
     said = " ".join(ran.stderr.split())
     assert (ran.returncode, said.count("Font family 'No Such Font' not found")) == (0, 1)
@@ -384,7 +384,7 @@ BEGINS = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     path = tmp_path_factory.mktemp("results") / "mine.nc"
-    store.write_dataset(lattice(ANGLES, RATES), path)
+    dataset_files.write_dataset(lattice(ANGLES, RATES), path)
     return path
 
 

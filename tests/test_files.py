@@ -21,9 +21,9 @@ from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.execution.provenance import read_git_commit_and_state
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
-from rsfstudy.storage import rebuild, schema, store
-from rsfstudy.storage.journal import CellJournal, OutputPacking
-from rsfstudy.study import catalogue, study_index
+from rsfstudy.storage import dataset_files, rebuild_from_file, schema
+from rsfstudy.storage.cell_journal import CellJournal, OutputPacking
+from rsfstudy.study import study_index, study_loader
 
 
 def dataset(value=1.0) -> xr.Dataset:
@@ -39,7 +39,7 @@ def test_attributes_netcdf_would_change_are_made_plain(tmp_path):
     odd = dataset().assign_attrs(
         none=None, flag=True, table={"a": 1}, one=[3.0], several=(1, 2), empty=[]
     )
-    store.write_dataset(odd, tmp_path / "odd.nc")
+    dataset_files.write_dataset(odd, tmp_path / "odd.nc")
     attrs = xr.load_dataset(tmp_path / "odd.nc").attrs
     assert "none" not in attrs
     assert (attrs["flag"], attrs["table"], attrs["one"]) == ("true", '{"a": 1}', 3.0)
@@ -47,7 +47,7 @@ def test_attributes_netcdf_would_change_are_made_plain(tmp_path):
 
 
 def test_coordinates_and_flags_carry_no_fill_value(tmp_path):
-    store.write_dataset(dataset(), tmp_path / "plain.nc")
+    dataset_files.write_dataset(dataset(), tmp_path / "plain.nc")
     with xr.open_dataset(tmp_path / "plain.nc") as back:
         assert back.flag.dtype == np.int8
         assert "_FillValue" not in back.x.encoding
@@ -56,23 +56,23 @@ def test_coordinates_and_flags_carry_no_fill_value(tmp_path):
 
 def test_a_reader_with_the_old_file_open_keeps_its_data(tmp_path):
     path = tmp_path / "trial.nc"
-    store.write_dataset(dataset(1.0), path)
+    dataset_files.write_dataset(dataset(1.0), path)
     with xr.open_dataset(path) as reader:
-        store.write_dataset(dataset(2.0), path)
+        dataset_files.write_dataset(dataset(2.0), path)
         assert float(reader.v.sum()) == 3.0
     assert float(xr.load_dataset(path).v.sum()) == 6.0
 
 
 def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
     path = tmp_path / "trial.nc"
-    store.write_dataset(dataset(1.0), path)
+    dataset_files.write_dataset(dataset(1.0), path)
 
     def full(*_args, **_kwargs):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(xr.Dataset, "to_netcdf", full)
     with pytest.raises(DataError, match="No space left.*Nothing was replaced"):
-        store.write_dataset(dataset(2.0), path)
+        dataset_files.write_dataset(dataset(2.0), path)
     monkeypatch.undo()
     assert os.listdir(tmp_path) == ["trial.nc"]
     assert float(xr.load_dataset(path).v.sum()) == 3.0
@@ -81,10 +81,10 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypat
 def test_what_reads_back_differently_is_not_put_in_place(tmp_path, monkeypatch):
     path = tmp_path / "trial.nc"
     monkeypatch.setattr(
-        store, "encoding_without_fill_values", lambda _d: {"v": {"dtype": "float32"}}
+        dataset_files, "encoding_without_fill_values", lambda _d: {"v": {"dtype": "float32"}}
     )
     with pytest.raises(DataError, match="what was read back differs"):
-        store.write_dataset(dataset(0.1), path)
+        dataset_files.write_dataset(dataset(0.1), path)
     assert os.listdir(tmp_path) == []
 
 
@@ -195,7 +195,7 @@ def test_what_another_program_saved_is_read_and_told(small, tmp_path):
 
 def test_a_file_of_a_later_version_is_told_for_what_it_is(small, tmp_path):
     later = xr.load_dataset(small).assign_attrs(layout=schema.FILE_LAYOUT_VERSION + 1)
-    store.write_dataset(later, tmp_path / "later.nc")
+    dataset_files.write_dataset(later, tmp_path / "later.nc")
     with pytest.raises(
         DataError, match=f"layout is 3, and this version .* reads 1 to {schema.FILE_LAYOUT_VERSION}"
     ):
@@ -209,7 +209,7 @@ def test_opening_a_file_runs_no_code(small, tmp_path, monkeypatch):
     dataset = xr.load_dataset(small)
     declared = json.loads(dataset.attrs["declaration"])
     declared["measure"]["name"] = declared["plot"] = "evil"
-    store.write_dataset(
+    dataset_files.write_dataset(
         dataset.assign_attrs(declaration=json.dumps(declared)), tmp_path / "trap.nc"
     )
     rsfstudy.open(tmp_path / "trap.nc")
@@ -259,9 +259,11 @@ def test_git_tells_the_commit_and_whether_it_was_clean(tmp_path):
 
 @pytest.mark.parametrize("name", study_index.study_names())
 def test_every_declaration_restores_its_study(name):
-    study = catalogue.load_study(name)
+    study = study_loader.load_study(name)
     described = json.loads(json.dumps(study.describe()))
-    restored = rebuild.study_from_declaration(schema.parse_declaration(described), study.user_parts)
+    restored = rebuild_from_file.study_from_declaration(
+        schema.parse_declaration(described), study.user_parts
+    )
     assert json.loads(json.dumps(restored.describe())) == described
     assert restored.size == study.size
     # of thousands of cells some, which have all points of every axis
@@ -271,9 +273,9 @@ def test_every_declaration_restores_its_study(name):
 
 def test_measures_and_reductions_in_the_files_of_studies_are_found_by_their_names():
     """In a process that has loaded no study."""
-    described = [catalogue.load_study(name).describe() for name in ("effects", "coverage")]
+    described = [study_loader.load_study(name).describe() for name in ("effects", "coverage")]
     asked = (
-        "import json, sys; from rsfstudy.storage import schema as contents, rebuild as restore\n"
+        "import json, sys; from rsfstudy.storage import schema as contents, rebuild_from_file as restore\n"
         "for plain in json.load(sys.stdin):\n"
         "    study = restore.study_from_declaration(contents.parse_declaration(plain), {})\n"
         "    print(*(type(p).__name__ for p in (study.measure, study.reductions[0])))"
@@ -287,7 +289,7 @@ def test_measures_and_reductions_in_the_files_of_studies_are_found_by_their_name
     )
     assert ran.stdout == "EffectCost RelativeDifference\nCoverage CoverageStatistics\n"
     with pytest.raises(InvalidValue, match="Did you mean 'effect_cost'"):
-        rebuild.rebuild_measure({"name": "effect_costs"}, "")
+        rebuild_from_file.rebuild_measure({"name": "effect_costs"}, "")
 
 
 def test_a_rerun_reproduces_every_number(small):
@@ -310,7 +312,9 @@ def test_a_rerun_shows_what_differs(small, tmp_path):
     other["critical_velocity_ratio"][0, 0] += 1e-9
     about = json.loads(other.attrs["provenance"])
     about["fingerprint"]["scipy"] = "0.1"
-    store.write_dataset(other.assign_attrs(provenance=json.dumps(about)), tmp_path / "other.nc")
+    dataset_files.write_dataset(
+        other.assign_attrs(provenance=json.dumps(about)), tmp_path / "other.nc"
+    )
     table = rsfstudy.rerun(tmp_path / "other.nc", workers=0, progress=False).set_index("variable")
     changed = table.loc["critical_velocity_ratio"]
     assert changed["values"] - changed["identical"] == 1
@@ -327,7 +331,9 @@ def test_a_cell_computed_by_other_code_says_so(small, tmp_path):
     other = xr.load_dataset(small)
     about = json.loads(other.attrs["provenance"])
     about["fingerprint"]["physics"] = "older"
-    store.write_dataset(other.assign_attrs(provenance=json.dumps(about)), tmp_path / "other.nc")
+    dataset_files.write_dataset(
+        other.assign_attrs(provenance=json.dumps(about)), tmp_path / "other.nc"
+    )
     place = {"case": "constant", "b_over_a": "2.5"}
     with pytest.warns(UserWarning, match="physics: older then, .* now"):
         rsfstudy.recompute_cell(tmp_path / "other.nc", place)

@@ -16,7 +16,7 @@ from rsfstudy.cli import export_files
 from rsfstudy.errors import DataError
 from rsfstudy.execution import provenance
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
-from rsfstudy.storage import store
+from rsfstudy.storage import dataset_files
 
 SCENE = Scene(stiffness_ratio=0.5, load_velocity_ratio=10.0, inertia=True)
 RIG = ("--normal-stress", "5 MPa", "--slip-distance", "10 um", "--reference-velocity", "1 um/s")
@@ -34,8 +34,8 @@ def place(tmp_path_factory):
         assert "stiffness is 0.5 of the critical" in ran.stdout
         assert "Events faster than 100 V_*" in ran.stdout
     asked = rsfstudy.simulate(SCENE, times=[1.0, 2.0], engine="compiled")
-    store.write_dataset(asked, place / "asked.nc")
-    store.write_dataset(
+    dataset_files.write_dataset(asked, place / "asked.nc")
+    dataset_files.write_dataset(
         rsfstudy.limit_cycle(SCENE, rtol=1e-3, engine="compiled"), place / "cycle.nc"
     )
     return place
@@ -72,7 +72,7 @@ def test_commands_take_files_of_motions(place, tmp_path, name):
 def test_a_motion_that_differs_is_told(place, tmp_path):
     motion = xr.load_dataset(place / "plain.nc")
     motion["slip"] = motion["slip"] * (1.0 + 1e-9)
-    store.write_dataset(motion, tmp_path / "other.nc")
+    dataset_files.write_dataset(motion, tmp_path / "other.nc")
     table = rsfstudy.rerun(tmp_path / "other.nc").set_index("variable")
     assert table.loc["slip", "identical"] < table.loc["slip", "values"]
     assert table.loc["shear_stress", "identical"] == table.loc["shear_stress", "values"]

@@ -11,7 +11,7 @@ from synthetic_records import EXACT_PARAMETERS, FIT_OPTIONS
 
 import rsfstudy
 from rsfstudy.errors import InvalidValue
-from rsfstudy.fitting.averaging import AveragingCorrelation, apply_running_mean
+from rsfstudy.fitting.averaged_noise_correlation import AveragingCorrelation, apply_running_mean
 from rsfstudy.fitting.filters import FILTER_KINDS, LOW_PASS_ORDERS, Filter
 from rsfstudy.status import Status
 

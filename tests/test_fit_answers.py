@@ -20,11 +20,11 @@ from synthetic_records import (
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.fitting.load_point_errors import shift_steps_by_their_errors
+from rsfstudy.fitting.load_point_noise import shift_steps_by_their_errors
 from rsfstudy.fitting.record import loading_history
 from rsfstudy.fitting.window_model import STEP_SHIFT_IN_STANDARD_DEVIATIONS, WindowModel
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 
 WHITE = {**FIT_OPTIONS, "noise": "white", "laws": ["slowness"]}
 #: The true parameters where they are not looked for.

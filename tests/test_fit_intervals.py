@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from rsfstudy.fitting import intervals
+from rsfstudy.fitting import confidence_intervals
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
 from rsfstudy.fitting.window_model import QUICK_DIFFERENCE_SCHEME, DifferenceScheme, ParameterValues
 
@@ -96,9 +96,9 @@ def by_hand(model: Relaxation, b: float) -> float:
 
 def test_intervals_end_where_the_likelihood_has_fallen() -> None:
     model, search, found = fit(25.0)
-    far = intervals.student_t_multiplier(found, intervals.CONFIDENCE_LEVEL)
+    far = confidence_intervals.student_t_multiplier(found, confidence_intervals.CONFIDENCE_LEVEL)
     b = found.parameter_values["b"]
-    low, high = intervals.confidence_interval(search, found, "b")
+    low, high = confidence_intervals.confidence_interval(search, found, "b")
     # squared distances are off by a fifth, to first order, where a parabola is nearly one
     for end, slack in ((low, 0.25), (high, 0.06)):
         fallen = (by_hand(model, end) - by_hand(model, b)) / found.noise_sd**2

@@ -25,7 +25,7 @@ from rsfstudy.fitting.window_model import (
     WindowModel,
 )
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 
 ENOUGH = 10**9
 

@@ -28,7 +28,7 @@ from rsfstudy.fitting.joint_model import JointModel
 from rsfstudy.fitting.window_model import WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 
 ENOUGH = 10**9
 SHARED = ("a", "b", "slip_distance")

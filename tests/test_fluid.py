@@ -15,10 +15,10 @@ from test_steady import PLAIN
 from rsfstudy import Scene, simulate
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINES
+from rsfstudy.motion.event_integration import integrate_events, iterate_events_of_equations
 from rsfstudy.motion.events import EventKind, maximum
-from rsfstudy.motion.integrate import integrate_events, iterate_events_of_equations
-from rsfstudy.motion.meter import WorkMeter
 from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLES, Recording
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import (

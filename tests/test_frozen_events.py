@@ -17,7 +17,7 @@ from frozen_scenes import MOTIONS
 from rsfstudy import Scene
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import EventKind
-from rsfstudy.slider.registry import SLOTS
+from rsfstudy.slider.part_registry import SLOTS
 
 #: What numbers may differ by, relative to what `telling.largest_differences` says. Last bits are
 #: another CPU's own (its exponentials, the order of its sums, whether it fuses multiplication and

@@ -16,17 +16,17 @@ from study_runs import named_results
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.limit_cycles.cycles import iterate_cycles
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
+from rsfstudy.limit_cycles.stick_slip_cycles import iterate_cycles
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.status import Status
-from rsfstudy.study import catalogue
+from rsfstudy.study import study_loader
 
-STUDY = catalogue.load_study("hard_cases")
+STUDY = study_loader.load_study("hard_cases")
 PROBLEMS = dict(zip(STUDY.axes[0].labels, STUDY.measure.problems, strict=True))
 
 

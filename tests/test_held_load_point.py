@@ -11,9 +11,9 @@ from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.critical_steps.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import fall, maximum
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.status import Status
 
 DISPLACEMENT, FALL = "displacement_step", "normal_stress_step"

@@ -27,8 +27,8 @@ from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.motion import engines
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.event_integration import integrate_events
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.responses.step_response import StepResponse
 
 PLAIN = {"normal_stress": "constant", "stiffness": 0.02, "a": 0.01, "b_over_a": 1.4}

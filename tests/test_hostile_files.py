@@ -21,8 +21,8 @@ from test_files import LAYOUT
 import rsfstudy
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.referee import problem_files
-from rsfstudy.storage import store
-from rsfstudy.storage.journal import CellJournal, read_timings
+from rsfstudy.storage import dataset_files
+from rsfstudy.storage.cell_journal import CellJournal, read_timings
 
 LONG = 130_000
 
@@ -145,7 +145,7 @@ def tiny() -> xr.Dataset:
 def test_attributes_of_the_wrong_kind_are_refused(name, attributes, rule, tiny, tmp_path) -> None:
     dataset = tiny.copy()
     dataset[name].attrs.update(attributes)
-    store.write_dataset(dataset, tmp_path / "tiny.nc")
+    dataset_files.write_dataset(dataset, tmp_path / "tiny.nc")
     with pytest.raises(DataError, match=f"tiny.nc: .*{rule}"):
         rsfstudy.open(tmp_path / "tiny.nc")
     for command in ("show", "plot"):
@@ -157,18 +157,18 @@ def test_attributes_of_the_wrong_kind_are_refused(name, attributes, rule, tiny, 
 def test_attributes_of_a_motion_are_checked(tmp_path: Path) -> None:
     motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=1.0, rtol=1e-3)
     motion["slip"].attrs["long_name"] = 5
-    store.write_dataset(motion, tmp_path / "motion.nc")
+    dataset_files.write_dataset(motion, tmp_path / "motion.nc")
     with pytest.raises(DataError, match="slip.long_name is 5, and must be a text"):
-        store.read_dataset(tmp_path / "motion.nc")
+        dataset_files.read_dataset(tmp_path / "motion.nc")
 
 
 def test_texts_along_a_motion_are_refused(tmp_path: Path) -> None:
     motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=1.0, rtol=1e-3)
     size = motion["slip"].size
     motion["shear_stress"] = (motion["slip"].dims, np.array(["x"] * size, dtype=object))
-    store.write_dataset(motion, tmp_path / "motion.nc")
+    dataset_files.write_dataset(motion, tmp_path / "motion.nc")
     with pytest.raises(DataError, match="shear_stress is .*, and must be numbers"):
-        store.read_dataset(tmp_path / "motion.nc")
+        dataset_files.read_dataset(tmp_path / "motion.nc")
 
 
 @pytest.mark.parametrize("name", ["normal_stress_ratio", "frictional_stress", "time"])
@@ -179,7 +179,7 @@ def test_a_motion_without_a_variable_that_is_drawn_names_it(name: str) -> None:
 
 
 def test_a_lattice_with_the_same_point_twice_is_refused(tiny, tmp_path: Path) -> None:
-    store.write_dataset(tiny.isel(load_velocity_ratio=[0, 0, 2]), tmp_path / "tiny.nc")
+    dataset_files.write_dataset(tiny.isel(load_velocity_ratio=[0, 0, 2]), tmp_path / "tiny.nc")
     with pytest.raises(DataError, match="load_velocity_ratio has the same value more than once"):
         rsfstudy.open(tmp_path / "tiny.nc")
 

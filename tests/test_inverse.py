@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from rsfstudy.reductions import Inverse, apply_reductions
-from rsfstudy.study.reductions._crossing import CrossingStatus
+from rsfstudy.study.reductions._level_crossing import CrossingStatus
 
 OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW = (float(verdict) for verdict in CrossingStatus)
 

@@ -15,7 +15,7 @@ from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.plots._motion import plot_motion
 from rsfstudy.slider.loading import Segment
-from rsfstudy.slider.registry import FIELD_QUANTITIES
+from rsfstudy.slider.part_registry import FIELD_QUANTITIES
 
 SIGMA, D_C, V = 5e6, 1e-5, 1e-6
 RIG = Rig(

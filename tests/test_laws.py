@@ -10,13 +10,15 @@ from rsfstudy.named_studies._normal_stress_transient import NormalStressTransien
 
 from rsfstudy import Scene, simulate
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.monotone_approach import build_single_state_evolution_function
+from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
+    build_single_state_evolution_function,
+)
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import laws, steady_state

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import rsfstudy
 from rsfstudy import slider
-from rsfstudy.execution import cells
-from rsfstudy.study import catalogue, study_index
+from rsfstudy.execution import cell_computation
+from rsfstudy.study import study_index, study_loader
 
 ROOT = Path(rsfstudy.__file__).parent
 
@@ -149,7 +149,7 @@ def test_the_guide_to_the_physics_names_modules_that_are_there():
 def test_studies_load_nothing_that_draws():
     """A worker that is given a cell of any of them has no matplotlib."""
     asked = (
-        "import sys; from rsfstudy.study import catalogue, study_index as names\n"
+        "import sys; from rsfstudy.study import study_loader as catalogue, study_index as names\n"
         "for name in names.study_names(): catalogue.load_study(name)\n"
         "print(*{'matplotlib'} & set(sys.modules))"
     )
@@ -160,12 +160,12 @@ def test_studies_load_nothing_that_draws():
 def test_a_worker_loads_nothing_more_for_a_measure_in_the_file_of_a_study(tmp_path):
     """It is sent what the measure draws on, and not what declares, reduces and draws."""
     for name in study_index.study_names():
-        study = catalogue.load_study(name)
-        task = cells.CellTask(study.base, study.measure, study.accuracy)
-        (tmp_path / name).write_bytes(cells.serialize_task(task))
+        study = study_loader.load_study(name)
+        task = cell_computation.CellTask(study.base, study.measure, study.accuracy)
+        (tmp_path / name).write_bytes(cell_computation.serialize_task(task))
     heavy = {"xarray", "pandas", "matplotlib", "netCDF4", "numba"}
     asked = (
-        "import pathlib, pickle, sys, rsfstudy.execution.cells\n"
+        "import pathlib, pickle, sys, rsfstudy.execution.cell_computation\n"
         f"sent = [file.read_bytes() for file in pathlib.Path({str(tmp_path)!r}).iterdir()]\n"
         "print(len([pickle.loads(task) for task in sent]))\n"
         f"print(*{heavy} & set(sys.modules))"

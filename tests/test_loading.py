@@ -9,9 +9,9 @@ from rsfstudy import Scene, simulate
 from rsfstudy.errors import IncompleteWarning
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, fall, maximum, minimum, rise
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import MotionStopped, WorkMeter
+from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider.loading import Loading, Segment

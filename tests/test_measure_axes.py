@@ -23,11 +23,11 @@ import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
-from rsfstudy.execution.plan import CellPlan
+from rsfstudy.execution.cell_plan import CellPlan
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
-from rsfstudy.storage import rebuild, schema
-from rsfstudy.storage.lattice import build_lattice_coordinates
+from rsfstudy.storage import rebuild_from_file, schema
+from rsfstudy.storage.lattice_datasets import build_lattice_coordinates
 
 BOTH = study_of(
     "both",
@@ -175,7 +175,9 @@ def test_claims_and_selection_reach_a_place_on_the_axis():
 def test_the_file_alone_reproduces_its_cells(tmp_path):
     found = run(BOTH, output=tmp_path).sel(direction="down", b_over_a=3.0)
     file = tmp_path / "both.nc"
-    restored = rebuild.study_from_declaration(schema.read_declaration(rsfstudy.open(file)), {})
+    restored = rebuild_from_file.study_from_declaration(
+        schema.read_declaration(rsfstudy.open(file)), {}
+    )
     assert restored.describe() == BOTH.describe()
     xr.testing.assert_identical(
         xr.Dataset(coords=build_lattice_coordinates(restored)),

@@ -12,7 +12,9 @@ from conftest import cot_phi
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.critical_steps.monotone_approach import build_single_state_evolution_function
+from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
+    build_single_state_evolution_function,
+)
 from rsfstudy.slider.equations import build_friction_relation
 
 PAGE = (Path(__file__).parent.parent / "studies" / "MISPRINTS.md").read_text()

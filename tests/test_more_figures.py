@@ -11,9 +11,9 @@ from rsfstudy import Axis, Panel, Scene, Study, plots
 from rsfstudy.errors import DataError
 from rsfstudy.plots import _text, lines
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.rig.scales import UnitScale, apply_scales_to_dataset
+from rsfstudy.rig.dataset_scales import UnitScale, apply_scales_to_dataset
 from rsfstudy.status import Status
-from rsfstudy.study import catalogue
+from rsfstudy.study import study_loader
 
 
 def test_the_picture_of_a_motion_is_printable():
@@ -41,7 +41,7 @@ def test_a_title_is_broken_where_the_figure_would_cut_it(tmp_path_factory):
 
 def test_an_added_axis_lays_out_what_a_panel_shows_one_point_of():
     """The panel is at the first law; of two laws it is drawn twice, with the curves of each."""
-    study = catalogue.load_study("rate_step_boundary")
+    study = study_loader.load_study("rate_step_boundary")
     narrow = {"b_over_a": [1.5, 2.0, 3.0], "case": ["constant normal stress"]}
     dataset = run(study.with_(**narrow, law=["slip", "slowness"]), rtol=1e-3)
     slip, slowness = plots.draw_figure(dataset).axes

@@ -10,8 +10,8 @@ from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.fluid.dilatant import DilatantFluid
 from rsfstudy.slider.laws import Law
+from rsfstudy.slider.needed_quantities import QUANTITIES_A_PART_MAY_NEED, quantities_known_to_part
 from rsfstudy.slider.parameter_layout import LAW, MU_STAR, A
-from rsfstudy.slider.requirements import QUANTITIES_A_PART_MAY_NEED, quantities_known_to_part
 
 
 def evolution(log_slip_rate, state, p):

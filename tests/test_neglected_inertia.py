@@ -7,12 +7,12 @@ import pytest
 
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import maximum
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.motion.neglected_inertia import estimate_neglected_inertia_error
+from rsfstudy.motion.neglected_inertia_error import estimate_neglected_inertia_error
 from rsfstudy.motion.recording import REGIME_COLUMN, Recording
-from rsfstudy.responses._readings import growth_rate_along_path
+from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.responses._motion_readings import growth_rate_along_path
 from rsfstudy.responses.healing import Healing
 from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.slider.equations import RUPTURE_REGIME

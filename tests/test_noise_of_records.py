@@ -13,7 +13,11 @@ from scipy.stats import chi2
 from rsfstudy.fitting import noise as noises
 from rsfstudy.fitting.noise import NoiseModel
 from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quantum
-from rsfstudy.fitting.sampling_runs import SamplingRun, find_level_changes, find_sampling_runs
+from rsfstudy.fitting.uniform_sampling_runs import (
+    SamplingRun,
+    find_level_changes,
+    find_sampling_runs,
+)
 
 #: Coefficients of an autoregressive process of third order, with a pair of complex roots.
 AR3 = -np.real(np.poly([0.8, 0.5 + 0.4j, 0.5 - 0.4j]))[1:]

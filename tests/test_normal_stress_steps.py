@@ -11,10 +11,10 @@ from scipy.optimize import brentq
 from study_runs import start_point
 
 from rsfstudy import Scene
-from rsfstudy.critical_steps.forward_motion import motion_reaches_norm
+from rsfstudy.critical_steps.motion_after_step import motion_reaches_norm
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.initial_points import initial_point
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 
 
 @given(

@@ -15,7 +15,7 @@ import rsfstudy
 from rsfstudy.execution import provenance
 from rsfstudy.status import Status
 from rsfstudy.storage import schema
-from rsfstudy.study import catalogue
+from rsfstudy.study import study_loader
 
 #: Written by rsfstudy 0.1.0 before files named their layout: a study with its journal and as a
 #: store, a named one narrowed by --set, one with failed cells, and a motion.
@@ -45,7 +45,7 @@ def test_results_open_check_and_plot(name, older, tmp_path):
 
 def test_a_range_was_a_spread():
     narrow = {"law": "slip", "normal_stress": "constant", "load_velocity_ratio": [0.5, 2.0]}
-    dataset = run(catalogue.load_study("rigid_response").with_(**narrow), rtol=1e-3)
+    dataset = run(study_loader.load_study("rigid_response").with_(**narrow), rtol=1e-3)
     ranged = dataset.rsf.study.reductions
     described = json.loads(dataset.attrs["declaration"])
     spread = described["reductions"][1]
@@ -92,7 +92,7 @@ def test_a_run_goes_on(older, tmp_path, monkeypatch):
         (text,) = db.execute("SELECT json FROM fingerprint").fetchone()
         now = json.dumps({**json.loads(text), **provenance.run_fingerprint(study)}, sort_keys=True)
         db.execute("UPDATE fingerprint SET json = ?", (now,))
-    monkeypatch.setattr("rsfstudy.execution.cells.compute_cell", None)
+    monkeypatch.setattr("rsfstudy.execution.cell_computation.compute_cell", None)
     resumed = run(study, output=tmp_path)
     assert np.array_equal(
         resumed.critical_stiffness, rsfstudy.open(older / "tiny.nc").critical_stiffness

@@ -13,7 +13,7 @@ from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.responses.step_response import StepResponse
-from rsfstudy.slider import registry
+from rsfstudy.slider import part_registry
 from rsfstudy.slider.fluid.dilatant import DilatantFluid
 from rsfstudy.slider.normal_stress.variable import VariableNormalStress
 from rsfstudy.slider.parameter_layout import NORMAL_STRESS
@@ -38,8 +38,8 @@ def test_orbits_of_another_law_need_not_close_at_critical_stiffness():
 
 def test_a_part_owns_its_fields():
     """Each is described once, by the part."""
-    described = {quantity.name for quantity in registry.FIELD_QUANTITIES}
-    assert described == set(registry.FIELD_NAMES)
+    described = {quantity.name for quantity in part_registry.FIELD_QUANTITIES}
+    assert described == set(part_registry.FIELD_NAMES)
     assert Scene(inertia=True, radiation_damping=0.0).inertia is True
     assert Scene(normal_stress="constant", alpha=None).alpha is None
 
@@ -50,7 +50,7 @@ def half_as_strong(friction, ratio, change, p):
 
 def test_every_part_states_its_equation():
     """In its own docstring or in those of its functions: the page of names shows them."""
-    for part in registry.PART_CLASS_BY_FIELD_NAME.values():
+    for part in part_registry.PART_CLASS_BY_FIELD_NAME.values():
         functions = (one.__func__ for one in vars(part).values() if isinstance(one, staticmethod))
         stated = " ".join(inspect.getdoc(one) or "" for one in (part, *functions))
         assert part.name == "slider" or re.search(r"\.\. math::\n\n +[^\n]+", stated), part

@@ -8,17 +8,17 @@ from rsfstudy.named_studies._bifurcation import Bifurcation
 
 from rsfstudy import Scene
 from rsfstudy.limit_cycles import return_map
-from rsfstudy.limit_cycles.cycle_search import LimitCycleSearch, follow_to_periodic_orbit
-from rsfstudy.limit_cycles.cycles import Cycle
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
+from rsfstudy.limit_cycles.limit_cycle_search import LimitCycleSearch, follow_to_periodic_orbit
 from rsfstudy.limit_cycles.return_map import (
     ReturnMap,
     multiply_cycle_derivatives,
     section_vector_at,
 )
+from rsfstudy.limit_cycles.stick_slip_cycles import Cycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.slider.stability import linear_growth_rates
 from rsfstudy.status import Status
 

@@ -16,13 +16,13 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINES
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, maximum
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.slider import loading
-from rsfstudy.slider.protocols import Protocol
+from rsfstudy.slider.user_loadings import Protocol
 from rsfstudy.status import Status
 
 STIFF = {"law": "slowness", "normal_stress": "constant", "stiffness_ratio": 3.0}

@@ -30,8 +30,8 @@ from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.fitting.record import Record
 from rsfstudy.referee.problem_files import shipped_problem_files
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.slider.registry import FIELD_NAMES
-from rsfstudy.storage import journal
+from rsfstudy.slider.part_registry import FIELD_NAMES
+from rsfstudy.storage import cell_journal
 from rsfstudy.study.claims import Claim
 
 JUNK = [
@@ -359,7 +359,7 @@ def test_a_journal_of_other_things_is_refused(change, place, tmp_path):
     with contextlib.closing(sqlite3.connect(kept)) as db, db:
         db.executescript(change)
     answered(lambda: run(LATTICE, output=tmp_path))
-    answered(lambda: journal.read_timings(kept))
+    answered(lambda: cell_journal.read_timings(kept))
 
 
 def test_a_store_with_a_link_is_refused(tmp_path):

@@ -12,9 +12,9 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 
 IMPOSED = {"law": "slowness", "normal_stress": "imposed", "alpha": 0.3, "stiffness_ratio": 3.0}
 SLIDERS = {

@@ -13,11 +13,11 @@ from rsfstudy import Scene, protocol, simulate
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import Event, EventKind
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.motion.readings import resample_motion_along_path
+from rsfstudy.motion.recorded_motion_readings import resample_motion_along_path
 from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLES, Recording
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.status import Status
 

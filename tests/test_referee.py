@@ -21,7 +21,7 @@ from study_runs import call_main
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.referee import external, reference
+from rsfstudy.referee import external_answers, reference_answers
 from rsfstudy.referee.answer_comparison import (
     DEFAULT_REQUIRED_DIGITS,
     AnswerComparison,
@@ -88,13 +88,13 @@ def test_files_of_problems_hold_all_that_they_are_asked_for(number):
 # ---- ours ----------------------------------------------------------------------------------------
 
 
-def told_of(table: reference.AnswerTable) -> dict[str, external.ReportedQuantity]:
-    return {name: external.ReportedQuantity(values, 0.0) for name, values in table.items()}
+def told_of(table: reference_answers.AnswerTable) -> dict[str, external_answers.ReportedQuantity]:
+    return {name: external_answers.ReportedQuantity(values, 0.0) for name, values in table.items()}
 
 
 def digits_of_ours(number: int, rtol: float, engine: str) -> AnswerComparison:
     problem, answer = known_answer(of(number), shipped_problem_files()[number].with_suffix(".csv"))
-    table = reference.compute_answer(problem, Accuracy(rtol, 5_000_000, engine=engine))
+    table = reference_answers.compute_answer(problem, Accuracy(rtol, 5_000_000, engine=engine))
     return compare_answers(problem, answer, told_of(table), 1.0)
 
 
@@ -202,7 +202,7 @@ def test_conventions_of_the_problem_explain_a_difference(number, changes, explan
         other = replace(problem, **changes)
     else:
         other = replace(problem, parameters={**problem.parameters, **changes})
-    table = reference.compute_answer(other, Accuracy(1e-8, engine=COMPILED))
+    table = reference_answers.compute_answer(other, Accuracy(1e-8, engine=COMPILED))
     found = compare_answers(
         *known_answer(problem, shipped_problem_files()[number].with_suffix(".csv")),
         told_of(table),
@@ -303,7 +303,9 @@ def test_shear_stress_tells_friction_where_normal_stress_changes(number, tmp_pat
     }[number]
     header = [h.replace("friction (1)", "shear_stress (Pa)") for h in problem.column_headings]
     columns = [told[n] * (sigma if n == "friction" else 1.0) for n in problem.column_names]
-    found = external.read_external_answer(write(tmp_path / "mine.csv", header, columns), problem)
+    found = external_answers.read_external_answer(
+        write(tmp_path / "mine.csv", header, columns), problem
+    )
     answer = known_answer(problem, shipped_problem_files()[number].with_suffix(".csv"))
     assert compare_answers(*answer, found, DEFAULT_REQUIRED_DIGITS).agreeing_digits > 11.0
 
@@ -313,7 +315,9 @@ def test_shear_stress_beside_what_is_asked_for_is_left_alone(tmp_path):
     told = told_by_second_way(13)
     header = [*of(13).column_headings, "shear_stress (Pa)"]
     columns = [*(told[name] for name in of(13).column_names), told["slip_rate"]]
-    found = external.read_external_answer(write(tmp_path / "13.csv", header, columns), of(13))
+    found = external_answers.read_external_answer(
+        write(tmp_path / "13.csv", header, columns), of(13)
+    )
     assert [*found] == [*of(13).column_names]
 
 
@@ -347,7 +351,7 @@ def test_what_is_no_answer_is_refused(spoil, error, tmp_path):
     header, columns = spoil(of(1).column_headings, [told[name] for name in of(1).column_names])
     file = write(tmp_path / "01.csv", header, columns)
     with pytest.raises(InvalidValue, match=re.escape(error)):
-        external.read_external_answer(file, of(1))
+        external_answers.read_external_answer(file, of(1))
 
 
 def test_files_and_problems_that_are_not_there_are_said_so():

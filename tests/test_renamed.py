@@ -21,14 +21,14 @@ from rsfstudy._deprecation import (
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.fitting.record import Record
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion import layout
-from rsfstudy.motion.driver import PythonMotionState
+from rsfstudy.motion import array_layout
 from rsfstudy.motion.events import maximum
+from rsfstudy.motion.motion_driver import PythonMotionState
 from rsfstudy.quantities import Output
 from rsfstudy.reductions import Reduction
-from rsfstudy.slider.assembly import SceneBase
 from rsfstudy.slider.laws import LawBase
 from rsfstudy.slider.parts import Part
+from rsfstudy.slider.scene_assembly import SceneBase
 from rsfstudy.status import Status
 
 NAMES = [(place, former) for place, table in RENAMED.items() for former in table]
@@ -49,7 +49,7 @@ def member_names(kind: type) -> set[str]:
     """Return the names of the members of a class, and of the fields of its instances."""
     names = {*dir(kind), *(name for base in kind.__mro__ for name in inspect.get_annotations(base))}
     names |= set(dir(Scene)) if kind is SceneBase else set()
-    names |= set(layout.MOTION_STATE_DTYPE.names) if kind is PythonMotionState else set()
+    names |= set(array_layout.MOTION_STATE_DTYPE.names) if kind is PythonMotionState else set()
     return names | (OF_SOME_SLOTS if kind is Part else set())
 
 

@@ -19,7 +19,7 @@ from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
 from rsfstudy.plots import _style
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
-from rsfstudy.storage import store
+from rsfstudy.storage import dataset_files
 
 #: The page at some width, in CSS pixels: of a phone and of a desk.
 FRAME = '<iframe src="{}" style="width:{}px;height:900px;border:0"></iframe>'
@@ -73,7 +73,7 @@ def written(tmp_path_factory):
     other = fine.copy(deep=True)
     other["status"][0, 1], other["message"][0, 1] = int(Status.INTEGRATION_FAILED), EVIL
     other["critical_stiffness"][0, 1] = 7.0  # the claim moves
-    store.write_dataset(other, place / "failed here.nc")
+    dataset_files.write_dataset(other, place / "failed here.nc")
     motion = rsfstudy.simulate(
         Scene(load_velocity_ratio=2.0, normal_stress="constant"), duration=0.1
     )
@@ -167,7 +167,7 @@ def test_it_tells_answers_that_are_none_and_draws_what_is_in_other_units(tmp_pat
     study = Study(name="one", title="One", base=Scene(), axes=axes, measure=LinearStability())
     found = run(study)
     found.rsf.to_si(normal_stress=5e6, slip_distance=1e-5).to_netcdf(tmp_path / "si.nc")
-    store.write_dataset(
+    dataset_files.write_dataset(
         found.assign(status=found.status * 0 + Status.LOCKED), tmp_path / "locked.nc"
     )
     scene = Scene(law="slowness", inertia=True, stiffness_ratio=0.8, load_velocity_ratio=2.0)

@@ -29,9 +29,9 @@ from study_runs import (
 
 import rsfstudy
 from rsfstudy.errors import DataError, RunError
-from rsfstudy.execution import cells
+from rsfstudy.execution import cell_computation
 from rsfstudy.status import Status
-from rsfstudy.storage import journal
+from rsfstudy.storage import cell_journal
 
 CELLS = 30
 
@@ -284,8 +284,12 @@ def test_a_longer_and_denser_axis_computes_only_new_cells(tmp_path):
 
 def test_two_runs_at_a_time_are_refused(tmp_path, monkeypatch):
     """The second, begun while the first computes a cell, is told; the first is not disturbed."""
-    monkeypatch.setattr(journal, "_LOCK_TIMEOUT", 0.1)
-    study, computed, refused = faulty_study(cells=CELLS), cells.compute_cell, list[bool]()
+    monkeypatch.setattr(cell_journal, "_LOCK_TIMEOUT", 0.1)
+    study, computed, refused = (
+        faulty_study(cells=CELLS),
+        cell_computation.compute_cell,
+        list[bool](),
+    )
 
     def meanwhile(*words, **options):
         for fresh in (False, True) if not refused else ():
@@ -294,7 +298,7 @@ def test_two_runs_at_a_time_are_refused(tmp_path, monkeypatch):
                 run(study, output=tmp_path, fresh=fresh)
         return computed(*words, **options)
 
-    monkeypatch.setattr(cells, "compute_cell", meanwhile)
+    monkeypatch.setattr(cell_computation, "compute_cell", meanwhile)
     have_same_numbers(run(study, output=tmp_path), uninterrupted())
     assert refused == [False, True]
     have_same_numbers(rsfstudy.open("faulty", tmp_path), uninterrupted())

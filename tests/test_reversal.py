@@ -10,10 +10,10 @@ from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, maximum, minimum
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import WorkMeter
-from rsfstudy.responses._readings import friction_quantity_for_events
+from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.responses._motion_readings import friction_quantity_for_events
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import build_friction_relation

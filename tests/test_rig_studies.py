@@ -15,7 +15,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import SLIP_MODES, LimitCycle
 from rsfstudy.reporting import summaries
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.study import catalogue, rig_studies
+from rsfstudy.study import studies_on_rig, study_loader
 
 STATED = {
     "normal_stress": "5 MPa",
@@ -305,9 +305,9 @@ OPTIONS = [
 
 def test_a_study_of_no_rig_is_put_on_one(tmp_path):
     """Axes are in units then, what they hold is what they held; new values are in units."""
-    studied = catalogue.load_study("slide_hold_slide")
+    studied = study_loader.load_study("slide_hold_slide")
     rig = Rig(**{n: v for n, v in STATED.items() if n != "stiffness"})
-    there = rig_studies.convert_study_to_rig_units(studied, rig)
+    there = studies_on_rig.convert_study_to_rig_units(studied, rig)
     assert [axis.units for axis in there.axes[1:]] == [{"stiffness": "MPa/um"}, {"hold_time": "s"}]
     # what is fitted is what was: D_c/V_* is 10 s
     assert [fit.within for fit in there.reductions] == [(1e5, 1e9)] * 2
@@ -332,9 +332,9 @@ def test_what_a_rig_states_of_its_dynamics_takes_the_place_of_that_of_a_study():
     scales = {n: v for n, v in STATED.items() if n != "stiffness"}
     radiates = Rig(**scales, shear_modulus="30 GPa", density="2700 kg/m^3")
     swings = Rig(**scales, period="10 ms")
-    study = catalogue.load_study("limit_cycles")
+    study = study_loader.load_study("limit_cycles")
     damped = replace(study, base=study.base.with_(inertia=False, radiation_damping=1e-4))
     for before, rig, mass in ((study, radiates, False), (damped, swings, True)):
-        there = rig_studies.convert_study_to_rig_units(before, rig).base
+        there = studies_on_rig.convert_study_to_rig_units(before, rig).base
         assert there.has_mass is mass
         assert (there.radiation_damping == 0.0) is mass

@@ -14,7 +14,7 @@ from study_runs import HANG_TIMEOUT, SMALL_STUDY, USER_MEASURE_SOURCE, have_same
 from rsfstudy import Scene, Study
 from rsfstudy.api import study_runs
 from rsfstudy.errors import InvalidValue, RunError
-from rsfstudy.execution import plan, runner, workers
+from rsfstudy.execution import cell_plan, study_run, worker_pool
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.status import Status
@@ -25,7 +25,7 @@ def test_serial_workers_and_any_grouping_give_identical_bits(cluster, monkeypatc
     have_same_numbers(run(client=cluster), serial)
     for size in (1, 4, 100):
         monkeypatch.setattr(
-            plan.CellBatchIterator, "compute_next_batch_size", lambda _self, size=size: size
+            cell_plan.CellBatchIterator, "compute_next_batch_size", lambda _self, size=size: size
         )
         have_same_numbers(run(client=cluster), serial)
         have_same_numbers(run(), serial)
@@ -154,16 +154,18 @@ def test_accuracy_reaches_the_cells():
 
 def test_runs_share_processes_that_are_started_once(monkeypatch, tmp_path):
     """When the first cell is needed; a worker that dies is started again among them."""
-    started, start = [], workers.start_local_cluster
+    started, start = [], worker_pool.start_local_cluster
     monkeypatch.setattr(
-        workers, "start_local_cluster", lambda n, file: (started.append(file), start(n, file))[1]
+        worker_pool,
+        "start_local_cluster",
+        lambda n, file: (started.append(file), start(n, file))[1],
     )
-    with workers.WorkerPool(1, log_path=tmp_path / "workers.log") as where:
+    with worker_pool.WorkerPool(1, log_path=tmp_path / "workers.log") as where:
 
         def ran(name, fault=""):
             study = replace(faulty_study(fault, (3.0,) if fault else ()), name=name)
             results = study_runs.prepare_run_with_progress(
-                study, runner.OutputOptions(output=tmp_path), where, False
+                study, study_run.OutputOptions(output=tmp_path), where, False
             )()
             return [Status(code).name for code in results["status"].values]
 
@@ -184,17 +186,17 @@ def test_processes_that_are_lost_are_started_anew(monkeypatch, tmp_path):
     def mapper(task, batches):
         if lost:
             raise RunError("the Dask scheduler is lost")
-        yield from workers.compute_serially(task, batches)
+        yield from worker_pool.compute_serially(task, batches)
 
     def start(_processes, file):
         started.append(file)
         return contextlib.nullcontext()
 
-    monkeypatch.setattr(workers, "start_local_cluster", start)
-    monkeypatch.setattr(workers, "make_dask_batch_mapper", lambda *_where: mapper)
-    with workers.WorkerPool(1, log_path=tmp_path / "workers.log") as where:
+    monkeypatch.setattr(worker_pool, "start_local_cluster", start)
+    monkeypatch.setattr(worker_pool, "make_dask_batch_mapper", lambda *_where: mapper)
+    with worker_pool.WorkerPool(1, log_path=tmp_path / "workers.log") as where:
         begin = study_runs.prepare_run_with_progress(
-            faulty_study(), runner.OutputOptions(output=tmp_path), where, False
+            faulty_study(), study_run.OutputOptions(output=tmp_path), where, False
         )
         with pytest.raises(RunError, match="is lost"):
             begin()

@@ -16,7 +16,7 @@ import rsfstudy
 from rsfstudy import Axis, Rig, Scene, Study, plots
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning, InvalidValue
-from rsfstudy.execution import cells
+from rsfstudy.execution import cell_computation
 from rsfstudy.reductions import (
     Logarithm,
     Mean,
@@ -28,7 +28,7 @@ from rsfstudy.reductions import (
 )
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
-from rsfstudy.storage import rebuild
+from rsfstudy.storage import rebuild_from_file
 from rsfstudy.study.reductions.unit_conversion import InUnits
 
 RECORDS = Path(uncertain_recurrence.__file__).parent / "records"
@@ -70,7 +70,7 @@ def test_fields_are_functions_of_what_is_drawn():
     how = json.loads(found["sample"].attrs["drawn"])
     assert (how["method"], how["n"], how["seed"]) == ("sobol", 8, 3)
     assert how["of"]["ln_a"].startswith("norm(")
-    again = rebuild.rebuild_study(found)
+    again = rebuild_from_file.rebuild_study(found)
     assert again.axes[1].describe() == samples.describe()
     assert list(again.scenes()) == list(study(Axis("law", ["slip", "slowness"]), samples).scenes())
 
@@ -139,7 +139,7 @@ def test_the_rows_of_a_table_are_cases(table):
     found = run(study(Axis.cases(table)))
     assert found["case"].values.tolist() == [0, 1, 2]
     np.testing.assert_allclose(found["critical_stiffness"], [0.005, 0.0048, 0.005], rtol=1e-7)
-    assert rebuild.rebuild_study(found).axes[0].rows == Axis("case", TABLE).rows
+    assert rebuild_from_file.rebuild_study(found).axes[0].rows == Axis("case", TABLE).rows
 
 
 def _with_units(tmp_path):
@@ -167,7 +167,7 @@ def test_a_table_in_units_of_a_rig(tmp_path):
         assert [scene.a for scene in scenes] == [0.01, 0.012]
         found = run(declared)
         assert found["slip_distance"].attrs["units"] in ("um", "m")
-        assert rebuild.rebuild_study(found).describe() == declared.describe()
+        assert rebuild_from_file.rebuild_study(found).describe() == declared.describe()
 
 
 # ---- from a fit ----------------------------------------------------------------------------------
@@ -195,7 +195,7 @@ def test_the_estimates_that_uncertain_recurrence_states(fitted):
 
 
 def test_a_sample_beyond_what_is_meaningful_is_told_before_work_starts(monkeypatch):
-    monkeypatch.setattr(cells, "compute_cell", None)
+    monkeypatch.setattr(cell_computation, "compute_cell", None)
     drawn = {"a": norm(0.01, 0.01), "mu_star": norm(0.6, 0.3)}
     sampled = study(Axis("law", ["slip", "slowness"]), Axis.samples(drawn, 64, 1))
     rows = sampled.axes[1].rows

@@ -14,7 +14,7 @@ from study_runs import SMALL_STUDY, have_same_numbers, run
 import rsfstudy
 from rsfstudy import plots
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.execution import plan
+from rsfstudy.execution import cell_plan
 from rsfstudy.storage import zarr_store
 
 
@@ -32,7 +32,7 @@ def test_the_driver_needs_less_than_a_kilobyte_a_cell(format):
 
 def test_few_batches_wait_on_the_scheduler(cluster, monkeypatch):
     """However many cells: what waits there fills its memory."""
-    monkeypatch.setattr(plan.CellBatchIterator, "compute_next_batch_size", lambda _self: 1)
+    monkeypatch.setattr(cell_plan.CellBatchIterator, "compute_next_batch_size", lambda _self: 1)
     waiting, most = set(), []
     submit = cluster.submit
 
@@ -49,11 +49,12 @@ def test_few_batches_wait_on_the_scheduler(cluster, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("seconds", "size"), [(0.1, 3), (60.0, 1), (1e-6, plan.MAX_BATCH_SIZE), (np.nan, 1), (0.0, 1)]
+    ("seconds", "size"),
+    [(0.1, 3), (60.0, 1), (1e-6, cell_plan.MAX_BATCH_SIZE), (np.nan, 1), (0.0, 1)],
 )
 def test_batches_are_sized_by_what_finished_cells_took(seconds, size):
     """A fraction of a second each, and small enough to lose."""
-    batches = plan.CellBatchIterator(None, np.arange(100_000), worker_count=2)
+    batches = cell_plan.CellBatchIterator(None, np.arange(100_000), worker_count=2)
     assert batches.compute_next_batch_size() == 1
     batches.record_time(seconds)
     assert batches.compute_next_batch_size() == size
@@ -62,7 +63,7 @@ def test_batches_are_sized_by_what_finished_cells_took(seconds, size):
 @pytest.mark.parametrize("count", [0, 1, 2, 10, 999, 1000])
 def test_the_first_cells_are_a_sample_of_all(count):
     """Every cell once, and no two neighbours one after the other in a long list."""
-    order = plan.order_cells_by_golden_section(np.arange(count))
+    order = cell_plan.order_cells_by_golden_section(np.arange(count))
     assert sorted(order) == list(range(count))
     if count >= 10:
         assert (np.abs(np.diff(order)) > 1).all()

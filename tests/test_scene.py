@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 import rsfstudy
 from rsfstudy import Axis, Scene
-from rsfstudy.slider import hints, laws
+from rsfstudy.slider import field_name_hints, laws
+from rsfstudy.slider.part_registry import FIELD_NAMES
 from rsfstudy.slider.parts import number
-from rsfstudy.slider.registry import FIELD_NAMES
 
 
 def test_a_field_of_a_users_own_may_bear_any_name():
@@ -27,11 +27,11 @@ def test_a_field_of_a_users_own_may_bear_any_name():
 
 
 def test_every_synonym_leads_to_a_field_or_law_that_is_there():
-    for name, remedy in hints._HINT_BY_WRONG_FIELD_NAME.items():
+    for name, remedy in field_name_hints._HINT_BY_WRONG_FIELD_NAME.items():
         assert name not in FIELD_NAMES
         if remedy.startswith("Write "):
             assert re.match(r"Write (\w+)", remedy)[1] in FIELD_NAMES
-    assert set(hints._LAW_NAME_BY_ALIAS.values()) <= set(laws.BUILT_IN_PARTS)
+    assert set(field_name_hints._LAW_NAME_BY_ALIAS.values()) <= set(laws.BUILT_IN_PARTS)
 
 
 def test_a_scene_cannot_be_changed():

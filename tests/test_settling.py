@@ -13,9 +13,9 @@ from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measure_base.settling_checks import steady_sliding_is_linearly_stable
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import MotionStopped, WorkMeter
+from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
 from rsfstudy.quantities import Quantity
 from rsfstudy.responses._recorded_motion import flag_of_settled_friction
 from rsfstudy.responses.step_response import StepResponse

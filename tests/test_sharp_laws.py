@@ -8,7 +8,7 @@ from scipy.special import lambertw
 
 from rsfstudy import Scene
 from rsfstudy.slider import stability
-from rsfstudy.slider.law_slopes import compute_state_evolution_derivatives
+from rsfstudy.slider.evolution_derivatives import compute_state_evolution_derivatives
 from rsfstudy.slider.laws import Law
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import POSITIVE, Numbers, number

@@ -22,8 +22,8 @@ from rsfstudy.reporting import tables
 from rsfstudy.reporting.tables import build_scene_answer_table, format_rounded_to_error
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
-from rsfstudy.storage import rebuild, store
-from rsfstudy.study import catalogue
+from rsfstudy.storage import dataset_files, rebuild_from_file
+from rsfstudy.study import study_loader
 from rsfstudy.study.claims import Claim, build_verdict_table
 from rsfstudy.study.verdict_table import VerdictTable
 
@@ -109,13 +109,15 @@ def test_texts_of_strangers_stay_texts():
 
 def test_the_accessor_shows_numbers_and_verdicts():
     """One line stands for claims of which none applies."""
-    declared = catalogue.load_study("linear_stability")
+    declared = study_loader.load_study("linear_stability")
     few = run(declared.with_(b_over_a=2.0, phi=[40]), rtol=1e-3).rsf._repr_html_()
     assert "11 claims not checked: other values or units have no published numbers" in few
     done = run(declared, rtol=1e-3)
     shown = rows(done.rsf._repr_html_())
     assert ["id", "claim", "published", "ours", "tolerance, and why", "verdict"] in shown
-    values = {f"{value:.8g}" for value in done[rebuild.find_primary_output(done)].values.flat}
+    values = {
+        f"{value:.8g}" for value in done[rebuild_from_file.find_primary_output(done)].values.flat
+    }
     assert len([row for row in shown if values & set(row)]) > 10
     scene = Scene(load_velocity_ratio=2.0, normal_stress="constant")
     motion = rsfstudy.simulate(scene, duration=0.1)
@@ -142,7 +144,7 @@ def map_of_stiffness():
 
 def told_of(dataset, tmp_path, monkeypatch) -> str:
     monkeypatch.setenv("COLUMNS", "120")
-    store.write_dataset(dataset, tmp_path / "it.nc")
+    dataset_files.write_dataset(dataset, tmp_path / "it.nc")
     return call_main("show", tmp_path / "it.nc").stdout
 
 

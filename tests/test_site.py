@@ -23,7 +23,7 @@ from rsfstudy.cli.command_line import cli
 from rsfstudy.fitting.fit_measure import Fit
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measure_base.elasticities import Elasticities
-from rsfstudy.slider import registry
+from rsfstudy.slider import part_registry
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
@@ -119,7 +119,7 @@ def examples():
 
 
 def test_examples_make_what_they_stand_beside(examples):
-    for slot in registry.SLOTS:
+    for slot in part_registry.SLOTS:
         for name, part in slot.built_in_parts.items():
             scene = eval(examples["SCENES"][name], {"Scene": rsfstudy.Scene})
             assert isinstance(getattr(scene.parts, slot.name), part)

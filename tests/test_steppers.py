@@ -14,13 +14,12 @@ from conftest import STEP_END_EVENT
 from scipy.integrate import DOP853, RK45, Radau, solve_ivp
 
 from rsfstudy import Scene
-from rsfstudy.motion import layout
+from rsfstudy.motion import array_layout
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import PYTHON, SCIPY
-from rsfstudy.motion.inplace import build_in_place_functions, build_unpack_function
-from rsfstudy.motion.integrate import integrate_events, iterate_events_of_equations
-from rsfstudy.motion.loop import advance_to_step_end
-from rsfstudy.motion.meter import MotionStopped, WorkMeter
+from rsfstudy.motion.event_integration import integrate_events, iterate_events_of_equations
+from rsfstudy.motion.in_place_functions import build_in_place_functions, build_unpack_function
+from rsfstudy.motion.motion_loop import advance_to_step_end
 from rsfstudy.motion.steppers import Stepper, unrolled_step
 from rsfstudy.motion.steppers.order_eight import OrderEightStepper
 from rsfstudy.motion.steppers.scipy import (
@@ -28,6 +27,7 @@ from rsfstudy.motion.steppers.scipy import (
     SciPyStepper,
     _build_float_interpolant,
 )
+from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
 from rsfstudy.motion.workspace import Workspace, create_workspace, workspace_size
 from rsfstudy.slider.equations import (
     Equations,
@@ -154,7 +154,7 @@ def begun(
     stepper = kind((equations,), {equations.regime: method})
     n, states = len(y), equations.state_count
     given = {"tolerance": tolerance, "budget": 10**6, "direction": 1.0, "end_time": math.inf}
-    motion = SimpleNamespace(**{**dict.fromkeys(layout.MOTION_STATE_DTYPE.names, 0), **given})
+    motion = SimpleNamespace(**{**dict.fromkeys(array_layout.MOTION_STATE_DTYPE.names, 0), **given})
     arrays = (workspace_size(n, states, 0), 2 * n, n)
     block, unknowns, scales = (memoryview(np.zeros(numbers)) for numbers in arrays)
     unknowns[:n], scales[:] = np.array(y, dtype=float), np.array(equations.unknown_scales)

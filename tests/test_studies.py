@@ -19,7 +19,7 @@ from study_runs import named_results, reduced_study
 import rsfstudy
 from rsfstudy import plots
 from rsfstudy.status import Status
-from rsfstudy.study import catalogue, study_index
+from rsfstudy.study import study_index, study_loader
 
 FLAGS = {"slip_mode", "status", "regime", "inertia", "regularised"}
 
@@ -32,7 +32,7 @@ def result(request, tmp_path_factory):
 
 def test_the_study_is_named_as_its_file(result):
     dataset, path = result
-    assert catalogue.load_study(path.stem).name == path.stem == dataset.attrs["id"]
+    assert study_loader.load_study(path.stem).name == path.stem == dataset.attrs["id"]
 
 
 def test_every_cell_is_answered(result):
@@ -202,7 +202,7 @@ def test_the_declaration_in_the_file_is_the_study(result):
 
 def test_every_number_carries_status_error_and_work(result):
     dataset, _path = result
-    headline = catalogue.load_study(result[1].stem).measure.primary_output
+    headline = study_loader.load_study(result[1].stem).measure.primary_output
     for name in (headline, f"{headline}_error", "status", "rhs_evaluations", "wall_time"):
         assert name in dataset
     ok = dataset.status == int(Status.OK)
@@ -213,7 +213,7 @@ def test_every_number_carries_status_error_and_work(result):
 def test_what_is_reduced_carries_the_errors_of_its_cells(result):
     """A number has an error wherever what it was made of has."""
     dataset, path = result
-    for reduction in catalogue.load_study(path.stem).reductions:
+    for reduction in study_loader.load_study(path.stem).reductions:
         if reduction.name not in dataset or f"{reduction.of}_error" not in dataset:
             continue
         if reduction.uses_failed_cells:  # a count of statuses

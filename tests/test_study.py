@@ -13,14 +13,14 @@ import rsfstudy
 from rsfstudy import Axis, Claim, Scene, Study, check
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import InvalidValue
-from rsfstudy.execution import cells
-from rsfstudy.execution.plan import CellPlan
+from rsfstudy.execution import cell_computation
+from rsfstudy.execution.cell_plan import CellPlan
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.parts import number
-from rsfstudy.storage.lattice import build_lattice_coordinates
-from rsfstudy.study import catalogue, study_index
+from rsfstudy.storage.lattice_datasets import build_lattice_coordinates
+from rsfstudy.study import study_index, study_loader
 
 CASES = {
     "constant": {"normal_stress": "constant"},
@@ -150,7 +150,7 @@ def test_a_new_value_does_not_take_the_place_of_a_point_with_its_name():
     "values", [[0.25], [0.56], [0.25, 0.56], [0.56, 0.25], [0.56, 0.3], [np.float64(0.56), 0.3]]
 )
 def test_labels_of_existing_points_do_not_depend_on_the_list_of_values(values):
-    (axis, _other) = catalogue.load_study("rate_step_boundary").with_(alpha=values).axes
+    (axis, _other) = study_loader.load_study("rate_step_boundary").with_(alpha=values).axes
     assert axis.labels == ("constant normal stress", *(f"alpha = {value}" for value in values))
     assert [row.get("alpha") for row in axis.rows] == [None, *values]
 
@@ -218,15 +218,17 @@ def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
     """What is sent are the name of each cell and what it changes of scene and measure; of large
     lattices, a sample of the cells.
     """
-    study = MIXED if name == "mixed" else catalogue.load_study(name)
+    study = MIXED if name == "mixed" else study_loader.load_study(name)
     plan = CellPlan(study)
     numbers = np.unique(np.linspace(0, study.size - 1, 72).astype(int))
-    task = cells.CellTask(study.base, study.measure, study.accuracy)
-    monkeypatch.setattr(cells, "_load_cell_task", lambda _sent: task)
-    monkeypatch.setattr(cells, "_FINISHED_CELLS_HANDOVER_INTERVAL", np.inf)
+    task = cell_computation.CellTask(study.base, study.measure, study.accuracy)
+    monkeypatch.setattr(cell_computation, "_load_cell_task", lambda _sent: task)
+    monkeypatch.setattr(cell_computation, "_FINISHED_CELLS_HANDOVER_INTERVAL", np.inf)
     monkeypatch.setattr(task.output_packing, "pack_cell", lambda *finished: finished)
-    monkeypatch.setattr(cells, "compute_cell", lambda _task, cell: (cell, 0.0))
-    found = pickle.loads(cells.compute_batch(b"", cells.pack_cell_batch(plan, numbers)))
+    monkeypatch.setattr(cell_computation, "compute_cell", lambda _task, cell: (cell, 0.0))
+    found = pickle.loads(
+        cell_computation.compute_batch(b"", cell_computation.pack_cell_batch(plan, numbers))
+    )
     for place, (key, cell, _seconds) in zip(numbers.tolist(), found, strict=True):
         scene, changes = study.cell(place)
         assert plan.keys[place].tobytes() == key

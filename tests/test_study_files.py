@@ -12,7 +12,7 @@ from rsfstudy import Axis
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.reductions import Reduction
-from rsfstudy.study import catalogue
+from rsfstudy.study import study_loader
 
 DECLARATION = """
 from rsfstudy import Axis, Scene, Study
@@ -48,7 +48,7 @@ def written(tmp_path, text: str) -> str:
 )
 def test_what_is_wrong_with_a_file_is_told(tmp_path, text, complaint):
     with pytest.raises(InvalidValue) as refused:
-        catalogue.load_study(written(tmp_path, text))
+        study_loader.load_study(written(tmp_path, text))
     assert complaint in str(refused.value)
 
 
@@ -56,16 +56,16 @@ def test_a_file_that_is_named_without_its_suffix_is_told(tmp_path, monkeypatch):
     written(tmp_path, DECLARATION)
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InvalidValue, match="There is a file mine.py here: name it mine.py"):
-        catalogue.load_study("mine")
+        study_loader.load_study("mine")
 
 
 def test_a_file_may_have_helpers_beside_it_and_not_the_name_of_a_named_study(tmp_path):
     (tmp_path / "my_angles.py").write_text("angles = [55, 65]")
     helped = "from my_angles import angles\n" + DECLARATION.replace("[55, 65]", "angles")
-    assert catalogue.load_study(written(tmp_path, helped)).size == 2
+    assert study_loader.load_study(written(tmp_path, helped)).size == 2
     taken = DECLARATION.replace('"mine"', '"stress_drop"')
     with pytest.raises(InvalidValue, match="the name of a named study"):
-        catalogue.load_study(written(tmp_path, taken))
+        study_loader.load_study(written(tmp_path, taken))
 
 
 @dataclass(frozen=True)

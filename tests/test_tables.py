@@ -9,13 +9,13 @@ from test_shown import rows as of_html
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.api import study_runs
-from rsfstudy.cli import printing, table_layout
+from rsfstudy.cli import printed_reports, table_layout
 from rsfstudy.formatting import format_overrides
 from rsfstudy.measures import Outcome
 from rsfstudy.reporting import tables
 from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import Status
-from rsfstudy.study import catalogue, study_index
+from rsfstudy.study import study_index, study_loader
 
 WIDTHS = (40, 80)
 
@@ -55,7 +55,7 @@ def test_results_of_every_study(name, printed, tmp_path_factory):
     shown = [
         tables.build_primary_output_table(dataset),
         *tables.reduction_tables(dataset),
-        printing.build_contents_table(dataset),
+        printed_reports.build_contents_table(dataset),
     ]
     shown += [tables.claims_table(study_runs.check(dataset))]
     for table in (table for table in shown if table.rows):
@@ -68,8 +68,8 @@ def test_results_of_every_study(name, printed, tmp_path_factory):
 def test_declarations_of_every_study(width, printed, tmp_path):
     """The points of their axes are there, each in one piece."""
     for name in study_index.study_names():
-        study = catalogue.load_study(name)
-        lines = printed(width, printing.print_study_declaration, study, tmp_path)
+        study = study_loader.load_study(name)
+        lines = printed(width, printed_reports.print_study_declaration, study, tmp_path)
         for axis in study.axes:
             shown = (
                 axis.point_names
@@ -131,7 +131,7 @@ def test_a_cell_is_told_in_a_line_for_each_number_beside_that_of_its_file(printe
     orbit, other = np.linspace(0.0, 2.0, 400), np.linspace(0.0, 3.0, 400)
     there = xr.Dataset({"interval": 1.5, "orbit": ("phase", other)})
     now = Outcome(Status.OK, {"interval": 1.5, "orbit": orbit})
-    told = printed(80, printing.print_recomputed_cell, Scene(), now, there)
+    told = printed(80, printed_reports.print_recomputed_cell, Scene(), now, there)
     lines = [" ".join(line.split()) for line in told]
     assert "interval 1.5 same" in lines
     assert "orbit 400 values, 0 to 2 400 values, 0 to 3" in lines

@@ -14,9 +14,9 @@ from time_domain_reference import TimeDomainMotion, rows_to_columns
 from rsfstudy import Scene, simulate
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINES, PYTHON, SCIPY
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import fall, maximum, minimum, rise
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 
 CONSTANT, IMPOSED = {"normal_stress": "constant"}, {"normal_stress": "imposed", "alpha": 0.3}
 INCLINED = {"normal_stress": "variable", "phi": 65.0, "alpha": 0.3}

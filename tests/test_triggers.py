@@ -9,16 +9,16 @@ from rsfstudy.named_studies._critical_triggers import TRIGGERS, Triggers
 
 from rsfstudy import Scene
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.monotone_approach import (
+from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
     monotone_rise_events,
     rises_monotonically_to_load_rate,
 )
 from rsfstudy.critical_steps.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, maximum
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.status import Status
 
 #: Waves carry away all that the spring gives: to follow V up to V_0 takes 4,000,000 right-hand

@@ -17,7 +17,7 @@ from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Rig, Scene, Study
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.quantities import Output
 from rsfstudy.reductions import LinearFit, ProportionalFit, Reduction
 from rsfstudy.responses.linear_stability import LinearStability

@@ -11,7 +11,7 @@ from synthetic_records import EXACT_PARAMETERS, deviation_in_stderrs
 
 import rsfstudy
 from rsfstudy.errors import InvalidValue
-from rsfstudy.fitting.linear_portion import find_start_of_linear_friction
+from rsfstudy.fitting.linear_friction_before_step import find_start_of_linear_friction
 from rsfstudy.fitting.record import Record
 from rsfstudy.status import STATUS_LABELS
 

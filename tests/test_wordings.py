@@ -36,10 +36,10 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.quantities import Output
 from rsfstudy.reductions import Reduction
 from rsfstudy.rig.units import convert_to_si
+from rsfstudy.slider.part_registry import PART_CLASS_BY_FIELD_NAME, SLOTS
 from rsfstudy.slider.parts import VALUE_RULES, field_names, is_boolean_field
-from rsfstudy.slider.registry import PART_CLASS_BY_FIELD_NAME, SLOTS
 from rsfstudy.slider.slider_parameters import SliderParameters
-from rsfstudy.study import catalogue
+from rsfstudy.study import study_loader
 from rsfstudy.study.claims import Claim
 from rsfstudy.study.study_index import study_names
 
@@ -176,7 +176,7 @@ RIG = Rig(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um
 def known() -> dict[str, Any]:
     """What calls are made of: what is public, every measure and reduction, and a few words."""
     for name in study_names():
-        catalogue.load_study(name)
+        study_loader.load_study(name)
     kinds = [*members(Measure), *members(Reduction)]
     return (
         {name: getattr(rsfstudy, name) for name in rsfstudy.__all__}

@@ -253,7 +253,7 @@ class Accessor:
             each: orbits within cells are left out. Of another answer for one scene, its numbers in
             one row. What never changes is in ``attrs["constant"]``.
         """
-        from rsfstudy.api.export import to_dataframe
+        from rsfstudy.api.dataset_export import to_dataframe
 
         self._require_rsfstudy_dataset()
         return to_dataframe(self._dataset)

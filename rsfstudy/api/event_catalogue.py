@@ -22,7 +22,7 @@ from rsfstudy.fitting import (
     Record,
     read_drops,
 )
-from rsfstudy.netcdf import copy_with_cf_encoding
+from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.rig import convert_to_si, read_table, unit_factor
 
 #: What quantities are measured in: as these variables, by their scales.

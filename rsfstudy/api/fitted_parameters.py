@@ -11,7 +11,7 @@ import xarray as xr
 from rsfstudy.errors import InvalidValue
 from rsfstudy.execution import provenance_attributes
 from rsfstudy.fitting import LOGARITHMIC_PARAMETERS, fitted_fields
-from rsfstudy.netcdf import copy_with_cf_encoding
+from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.reporting import split_fits
 from rsfstudy.rig import Rig
 from rsfstudy.slider import Scene

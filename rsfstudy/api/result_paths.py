@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rsfstudy.defaults import OUTPUT_DIRECTORY
 from rsfstudy.errors import DataError, InvalidValue, shorten_text
-from rsfstudy.paths import check_path
+from rsfstudy.path_checks import check_path
 from rsfstudy.study import load_study, study_names
 
 

@@ -36,7 +36,7 @@ from rsfstudy.motion import (
     recorded_load_point_displacement,
     rise,
 )
-from rsfstudy.netcdf import copy_with_cf_encoding
+from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.parts import SEGMENT_START, SEGMENT_VELOCITY
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, SampledHistory, Scene, UserLoading

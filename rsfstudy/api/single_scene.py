@@ -22,7 +22,7 @@ from rsfstudy.motion import (
     Accuracy,
     check_engine_is_usable,
 )
-from rsfstudy.netcdf import copy_with_cf_encoding
+from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.rig import convert_dataset_units, convert_to_si, read_si_scales
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status

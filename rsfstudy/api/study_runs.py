@@ -13,7 +13,7 @@ import pandas as pd
 import xarray as xr
 
 from rsfstudy._deprecation import renamed_keywords
-from rsfstudy.api import export
+from rsfstudy.api import dataset_export
 from rsfstudy.api.progress import compile_scenes_with_notice, show_progress
 from rsfstudy.api.result_paths import find_results, output_directory
 from rsfstudy.defaults import CELL_TIME_LIMIT, OUTPUT_DIRECTORY
@@ -22,7 +22,7 @@ from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning, sh
 from rsfstudy.execution import OutputOptions, WorkerPool, prepare_study_run, run_fingerprint
 from rsfstudy.measures import Outcome
 from rsfstudy.motion import COMPILED, check_engine_is_usable
-from rsfstudy.netcdf import copy_with_cf_encoding
+from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.quantities import html_table
 from rsfstudy.reporting import incomplete_notes, note_on_norms_near_load_velocity
 from rsfstudy.slider import Scene, with_scene_field_signature
@@ -254,7 +254,7 @@ def plot(
         ``{"font.size": 9, "figure.figsize": (3.5, 2.6)}``, which is one column of a journal in
         inches. All colours and line styles come from ``axes.prop_cycle``. Unknown settings are
         rejected.
-    own : function or module, optional
+    user_figure : function or module, optional
         What draws it, where that is not part of rsfstudy: what ``Study(plot=...)`` was given.
 
     Returns
@@ -332,7 +332,7 @@ def rerun(
     if is_of_single_scene(theirs):
         if study is not None:
             load_study(str(study))  # for the parts of its scene
-        return export.rerun_motion(theirs)
+        return dataset_export.rerun_motion(theirs)
     declared = rebuild_study(theirs, study)
     place = output_directory(output)
     if place is not None:

@@ -134,10 +134,10 @@ class Axis:
             For an impossible number, correlation or distribution; and where Sobol indices are asked
             for of quantities that depend on each other.
         """
-        from rsfstudy.axes import samples  # loads scipy.stats
+        from rsfstudy.axes import axis_samples  # loads scipy.stats
 
-        drawn, how = samples.draw_samples(distribution, n, seed, method, covariance)
-        return cls(dimension, samples.compute_field_values(drawn, fields), units, how)
+        drawn, how = axis_samples.draw_samples(distribution, n, seed, method, covariance)
+        return cls(dimension, axis_samples.compute_field_values(drawn, fields), units, how)
 
     @classmethod
     def cases(
@@ -159,10 +159,10 @@ class Axis:
         fields, units, dimension
             As in `samples`.
         """
-        from rsfstudy.axes import samples
+        from rsfstudy.axes import axis_samples
 
-        columns, stated = samples.read_table_columns_and_units(table)
-        made = samples.compute_field_values(columns, fields)
+        columns, stated = axis_samples.read_table_columns_and_units(table)
+        made = axis_samples.compute_field_values(columns, fields)
         kept = {n: text for n, text in stated.items() if made.get(n) is columns[n]}
         return cls(dimension, made, kept | dict(units or {}))
 

@@ -62,9 +62,9 @@ def _parse_number_or_text(
     _context: click.Context, _option: click.Parameter, text: str | None
 ) -> Any:
     """A number in units of records, or a text with units."""
-    from rsfstudy.cli import assignments
+    from rsfstudy.cli import assignment_parsing
 
-    return None if text is None else assignments.parse_number_or_text(text)
+    return None if text is None else assignment_parsing.parse_number_or_text(text)
 
 
 def _comma_list_option(

@@ -28,12 +28,12 @@ from rsfstudy.api import (
     prepare_run_with_progress,
     write_report,
 )
-from rsfstudy.cli import assignments, printing
+from rsfstudy.cli import assignment_parsing, printed_reports
 from rsfstudy.cli.console import stderr_console, stdout_console
-from rsfstudy.cli.cost import format_duration, missing_packages
+from rsfstudy.cli.cost_estimates import format_duration, missing_packages
 from rsfstudy.cli.export_files import to_csv, to_mat
 from rsfstudy.cli.options import CommandOptions
-from rsfstudy.cli.printing import EXIT_STATUS_FAILED, EXIT_STATUS_OK, RunSummary
+from rsfstudy.cli.printed_reports import EXIT_STATUS_FAILED, EXIT_STATUS_OK, RunSummary
 from rsfstudy.defaults import FIGURE_FORMATS, OUTPUT_DIRECTORY
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError
@@ -57,13 +57,13 @@ _UNIT_OPTION_NAMES = ("stress", "length", "time")
 def show(options: CommandOptions) -> int:
     """Show a study, or a results file."""
     if Path(options.name).suffix not in _SUFFIXES_OF_RESULTS_FILES:
-        printing.print_study_declaration(
+        printed_reports.print_study_declaration(
             _build_study_from_options(options.name, options), options.output
         )
         return EXIT_STATUS_OK
     if options.settings or options.rtol is not None or options.rig_option_texts:
         raise click.UsageError("a results file is shown as it is, without --set, --rtol or a rig")
-    return printing.print_results_summary(
+    return printed_reports.print_results_summary(
         _read_results_file(Path(options.name), options.study), options.name
     )
 
@@ -86,7 +86,9 @@ def run(options: CommandOptions) -> int:
         ]
         advice = not (options.every or options.quiet)
         for study in studies:
-            printing.print_expected_cost(study, options.output, options.rtol is not None, advice)
+            printed_reports.print_expected_cost(
+                study, options.output, options.rtol is not None, advice
+            )
         if options.every:
             return _run_studies_in_turn(ready, options, left_out)
         return (
@@ -103,8 +105,8 @@ def _run_study(
     file = options.output / f"{study.name}.{_FILE_SUFFIX_BY_FORMAT[options.format]}"
     own = None if isinstance(study.plot, str) else study.plot
     drawn = _save_figure(dataset, _default_figure_path(file, options), options, own)
-    end = printing.summarise_run(dataset, study.name, time.monotonic() - began, bool(drawn))
-    (printing.print_short_run_report if options.every else printing.print_run_report)(
+    end = printed_reports.summarise_run(dataset, study.name, time.monotonic() - began, bool(drawn))
+    (printed_reports.print_short_run_report if options.every else printed_reports.print_run_report)(
         dataset, end, [file, *drawn]
     )
     return end
@@ -143,14 +145,14 @@ def _run_studies_in_turn(
                     )
                 )
     finally:
-        printing.print_run_summaries([*ends, *summaries_of_skipped])
+        printed_reports.print_run_summaries([*ends, *summaries_of_skipped])
     return EXIT_STATUS_FAILED if any(end.colour == "red" for end in ends) else EXIT_STATUS_OK
 
 
 def rerun(options: CommandOptions) -> int:
     """Compute a results file anew, or one cell of it."""
     if options.place:
-        place = dict(map(assignments.parse_cell_coordinate, options.place))
+        place = dict(map(assignment_parsing.parse_cell_coordinate, options.place))
         try:
             with warnings.catch_warnings(record=True, action="always") as caught:
                 scene, outcome = recompute_cell(options.file, place, study=options.study)
@@ -162,7 +164,7 @@ def rerun(options: CommandOptions) -> int:
         results = open_results(options.file)
         index = np.unravel_index(find_cell_number(results, place), results["status"].shape)
         there = results.isel(dict(zip(results["status"].dims, index, strict=True)))
-        return printing.print_recomputed_cell(
+        return printed_reports.print_recomputed_cell(
             scene, outcome, there, [str(one.message) for one in caught]
         )
     with _open_worker_pool(options) as where:
@@ -170,7 +172,7 @@ def rerun(options: CommandOptions) -> int:
             "progress": not options.quiet
         }
         table = rerun_file(options.file, workers=where.process_count, client=where.client, **asked)
-    return printing.print_rerun_agreement(table)
+    return printed_reports.print_rerun_agreement(table)
 
 
 def report(options: CommandOptions) -> int:
@@ -188,7 +190,7 @@ def compare(options: CommandOptions) -> int:
     """Compare two results files."""
     files = [find_results(name, options.output) for name in (options.first, options.second)]
     datasets = [open_results(file) for file in files]
-    return printing.print_comparison(files, datasets, compare_results(*datasets))
+    return printed_reports.print_comparison(files, datasets, compare_results(*datasets))
 
 
 def check(options: CommandOptions) -> int:
@@ -203,7 +205,7 @@ def check(options: CommandOptions) -> int:
             stdout_console.print(f"{name}: not run yet", style="red")
             status = EXIT_STATUS_FAILED
     return (
-        max(status, printing.print_claims_and_failed_cells(datasets, options.claims))
+        max(status, printed_reports.print_claims_and_failed_cells(datasets, options.claims))
         if datasets
         else status
     )
@@ -219,7 +221,7 @@ def plot(options: CommandOptions) -> int:
         place = target or _default_figure_path(beside, options)
         if is_of_single_scene(dataset):
             drawing = dataset.rsf.plot(against=options.against)
-            printing.write_figure(drawing, place, options.style)
+            printed_reports.write_figure(drawing, place, options.style)
             drawn = [place]
         else:
             own = None if options.variable else _load_user_figure(dataset, options.study)
@@ -278,7 +280,7 @@ def _build_study_from_options(study_name: str, options: CommandOptions) -> Study
     taken = {"load_velocity", *(["stiffness"] * bool(varied & {"stiffness", "stiffness_ratio"}))}
     if {*stated} - taken and study.rig is None:
         rig = {name: text for name, text in stated.items() if name not in taken}
-        study = convert_study_to_rig_units(study, assignments.parse_rig(rig))
+        study = convert_study_to_rig_units(study, assignment_parsing.parse_rig(rig))
         study = replace(study, overrides={**study.overrides, **rig})
         stated = {name: text for name, text in stated.items() if name in taken}
     in_si = {
@@ -286,7 +288,7 @@ def _build_study_from_options(study_name: str, options: CommandOptions) -> Study
         **{name: about.si_units for name, about in RIG_QUANTITIES.items()},
     }
     texts = {n: t if parse_number(t) is None else f"{t} {in_si[n]}" for n, t in stated.items()}
-    changes = texts | assignments.parse_overrides(study, options.settings)
+    changes = texts | assignment_parsing.parse_overrides(study, options.settings)
     return apply_overrides_to_study(
         study, changes, **options.select_options("rtol", "engine", "budget")
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rsfstudy.cli import assignments, printing
+from rsfstudy.cli import assignment_parsing, printed_reports
 from rsfstudy.cli.console import stdout_console
 from rsfstudy.cli.options import CommandOptions
 from rsfstudy.errors import InvalidValue
@@ -23,14 +23,14 @@ def problems(options: CommandOptions) -> int:
     """Write all problems."""
     count = write_problems(options.directory)
     stdout_console.print(f"wrote {count} problems into {options.directory}")
-    return printing.EXIT_STATUS_OK
+    return printed_reports.EXIT_STATUS_OK
 
 
 def verify(options: CommandOptions) -> int:
     """Hold files against answers; FAILED where one does not pass."""
     if math.isnan(options.digits):  # which click finds in every range
         raise InvalidValue("--digits", options.digits, "must be a number, from 1 to 12")
-    columns = assignments.parse_column_assignments(options.columns)
+    columns = assignment_parsing.parse_column_assignments(options.columns)
     problem = options.problem or ""
     found = [compare_file(file, problem, columns, options.digits) for file in options.files]
     for file, one in zip(options.files, found, strict=True):
@@ -39,9 +39,9 @@ def verify(options: CommandOptions) -> int:
     if options.figure is not None:
         _draw_agreement(found, options.figure)
     return (
-        printing.EXIT_STATUS_OK
+        printed_reports.EXIT_STATUS_OK
         if all(one.has_required_digits for one in found)
-        else printing.EXIT_STATUS_FAILED
+        else printed_reports.EXIT_STATUS_FAILED
     )
 
 
@@ -77,4 +77,4 @@ def _draw_agreement(comparisons: list[AnswerComparison], figure_path: Path) -> N
                 digits.setdefault(one.quantity_name, []).append((at, one.agreeing_digits))
     with style_context(None):
         drawn = draw_agreement(digits, label, comparisons[0].required_digits)
-    printing.write_figure(drawn, figure_path)
+    printed_reports.write_figure(drawn, figure_path)

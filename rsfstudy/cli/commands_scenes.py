@@ -11,7 +11,7 @@ from rsfstudy import Rig, Scene, plot_motion, read_record
 from rsfstudy import fit as fit_record_fit
 from rsfstudy import simulate as simulated
 from rsfstudy.api import BEYOND_NORM_ATTRIBUTE_NAME
-from rsfstudy.cli import assignments, printing, table_layout
+from rsfstudy.cli import assignment_parsing, printed_reports, table_layout
 from rsfstudy.cli.console import stdout_console
 from rsfstudy.cli.options import CommandOptions
 from rsfstudy.error_boundary import check_regular_file
@@ -50,30 +50,30 @@ def simulate(options: CommandOptions) -> int:
     motion = motion.assign_attrs(provenance_attributes(options.command_line))
     _write_motion_and_figure(motion, laboratory, options)
     if motion.attrs["status"] != Status.OK.label:
-        return printing.EXIT_STATUS_FAILED
+        return printed_reports.EXIT_STATUS_FAILED
     return (
         _UNPHYSICAL_EXIT_STATUS
         if BEYOND_NORM_ATTRIBUTE_NAME in motion.attrs
-        else printing.EXIT_STATUS_OK
+        else printed_reports.EXIT_STATUS_OK
     )
 
 
 def _build_scene_and_rig(options: CommandOptions) -> tuple[Scene, Rig | None]:
     """The scene, and the rig if one is stated."""
-    fields, rig = assignments.parse_fields(options.settings), options.rig_option_texts
+    fields, rig = assignment_parsing.parse_fields(options.settings), options.rig_option_texts
     if (velocity := rig.pop("load_velocity", None)) is not None:
-        fields["load_velocity"] = assignments.parse_number_or_text(velocity)
-    laboratory = assignments.parse_rig(rig) if rig else None
+        fields["load_velocity"] = assignment_parsing.parse_number_or_text(velocity)
+    laboratory = assignment_parsing.parse_rig(rig) if rig else None
     if options.protocol_file is not None:
-        fields["loading"] = assignments.read_loading_file(options.protocol_file, laboratory)
+        fields["loading"] = assignment_parsing.read_loading_file(options.protocol_file, laboratory)
     elif "loading" in fields:
-        fields["loading"] = assignments.parse_loading_file(fields["loading"], laboratory)
+        fields["loading"] = assignment_parsing.parse_loading_file(fields["loading"], laboratory)
     return (laboratory.scene(**fields) if laboratory else Scene(**fields)), laboratory
 
 
 def _parse_duration(text: str | None, rig: Rig | None) -> float | None:
     """In D_c/V_*."""
-    time = None if text is None else assignments.parse_number_or_text(text)
+    time = None if text is None else assignment_parsing.parse_number_or_text(text)
     if time is not None and rig is not None:
         return rig.dimensionless(time, name="--duration")
     if isinstance(time, str):
@@ -90,7 +90,7 @@ def _write_motion_and_figure(motion: xr.Dataset, rig: Rig | None, options: Comma
         return
     data = options.output.with_suffix(".nc")
     write_dataset(rig.in_units(motion, **DISPLAY_BASE_UNITS) if rig else motion, data)
-    printing.write_figure(plot_motion(motion, rig, against=options.against), options.output)
+    printed_reports.write_figure(plot_motion(motion, rig, against=options.against), options.output)
     if not options.quiet:
         found = [motion, motion.rsf.events()]
         if rig:
@@ -104,7 +104,7 @@ def fit(options: CommandOptions) -> int:
     """Fit records, print the parameters, draw the fits and write them."""
     data = options.output.with_suffix(".nc")
     _check_output_may_be_replaced(data, is_fit, "fit")
-    columns = assignments.parse_column_assignments(options.columns)
+    columns = assignment_parsing.parse_column_assignments(options.columns)
     stress = options.normal_stress
     about = {"normal_stress": stress, "stiffness": options.stiffness}
     records = [read_record(path, columns, **about) for path in options.records]
@@ -115,14 +115,14 @@ def fit(options: CommandOptions) -> int:
         steps=[_parse_step_number(text) for text in options.steps],
         command=options.command_line,
         **options.select_options(*_OPTIONS_PASSED_TO_FIT),
-        **assignments.parse_fields(options.settings),
+        **assignment_parsing.parse_fields(options.settings),
     )
     dataset = write_dataset(dataset, data)
     save_figure(dataset, options.output)
     for piece in build_summary_pieces(dataset):
         table_layout.print_summary_piece(piece)
     stdout_console.print(f"wrote {options.output} and {data}", soft_wrap=True)
-    return printing.exit_status_of_dataset(dataset)
+    return printed_reports.exit_status_of_dataset(dataset)
 
 
 def _parse_step_number(text: str) -> int:
@@ -152,7 +152,7 @@ def _print_steps(record: Record) -> None:
 
 
 def _format_normal_stresses_of_step(step: LoadingStep, is_shown: bool) -> dict[str, str]:
-    """Format the normal stresses of a step in MPa if ``listed`` is True."""
+    """Format the normal stresses of a step in MPa if ``is_shown`` is True."""
     stresses = {"sigma0 (MPa)": step.stress_before, "sigma1 (MPa)": step.stress_after}
     return {heading: f"{of * 1e-6:.6g}" for heading, of in stresses.items() if is_shown}
 

@@ -20,7 +20,7 @@ from rsfstudy.defaults import CELL_TIME_LIMIT, FIGURE_FORMATS, OUTPUT_DIRECTORY
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion import ENGINES
-from rsfstudy.paths import check_path
+from rsfstudy.path_checks import check_path
 
 F = TypeVar("F", bound=Callable[..., Any])
 

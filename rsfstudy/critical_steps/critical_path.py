@@ -66,25 +66,25 @@ class CriticalPath(NamedTuple):
 
     Parameters
     ----------
-    log_norm_rate : float
+    log_slip_rate_at_norm : float
         Logarithm ln(V/V_*) at the norm.
     min_frictional_stress : float
         Frictional stress at which the normal stress vanishes, in units of sigma_*.
-    radiated_stress : float
+    radiated_stress_at_norm : float
         Stress that seismic waves radiate at the norm, in units of sigma_*.
-    initial_state : tuple of float
+    unknowns_after_step : tuple of float
         Spring stress and states immediately after the step.
     parameters : tuple of float
         Numbers of the scene.
     solve_tangency : callable
         Function ``(x, weakest, p) -> (g, Psi)``. See ``_build_tangency_solver``.
     evaluate_point : callable
-        Function ``(state, p) -> Point``.
-    driver : MotionDriver
+        Function ``(state, p) -> MotionPoint``.
+    motion_driver : MotionDriver
         Driver that integrates the path.
     engine : str
         Name of the engine of the driver.
-    is_planar : bool
+    has_single_state : bool
         True if the scene has one state. Scenes with several states have no critical path.
     """
 
@@ -183,9 +183,9 @@ class CriticalPath(NamedTuple):
         ----------
         tolerance : float
             Local error tolerance of the integration.
-        meter : WorkMeter
+        work_meter : WorkMeter
             Counter of right-hand-side evaluations.
-        crossing : tuple of str and float
+        crossing_quantity_and_level : tuple of str and float
             Quantity and level that define the start.
         is_start : callable
             Function that returns True if a point at this level is the start of the requested step.
@@ -256,7 +256,7 @@ class CriticalPath(NamedTuple):
         ----------
         tolerance : float
             Local error tolerance of the integration.
-        meter : WorkMeter
+        work_meter : WorkMeter
             Counter of right-hand-side evaluations.
 
         Returns
@@ -287,7 +287,7 @@ class CriticalPath(NamedTuple):
         ----------
         tolerance : float
             Local error tolerance of the integration.
-        meter : WorkMeter
+        work_meter : WorkMeter
             Counter of right-hand-side evaluations.
 
         Returns
@@ -309,7 +309,7 @@ class CriticalPath(NamedTuple):
         ----------
         tolerance : float
             Local error tolerance of the integration.
-        meter : WorkMeter
+        work_meter : WorkMeter
             Counter of right-hand-side evaluations.
 
         Returns
@@ -394,7 +394,7 @@ def _build_tangency_solver(friction_functions: FrictionFunctions) -> Function:
 
 @cache
 def build_point_evaluator(rate_function: Function, point_function: Function) -> Function:
-    """``(state, p) -> Point``."""
+    """``(state, p) -> MotionPoint``."""
 
     def at(state: Numbers, p: Numbers) -> MotionPoint:
         now: MotionPoint = point_function(state, rate_function(state, p), p)

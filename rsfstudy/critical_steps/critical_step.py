@@ -20,19 +20,19 @@ from typing import Any, ClassVar
 
 from scipy.optimize import toms748
 
-from rsfstudy.critical_steps import forward_motion
+from rsfstudy.critical_steps import motion_after_step
+from rsfstudy.critical_steps.critical_path_solution import (
+    StepBoundary,
+    find_boundary_by_critical_path,
+    find_boundary_by_limit_cycle,
+)
 from rsfstudy.critical_steps.loading_checks import (
     check_loading_is_single_step,
     outcome_if_norm_is_below_load_velocity,
     slow_norm_warning,
 )
-from rsfstudy.critical_steps.path_solution import (
-    StepBoundary,
-    find_boundary_by_critical_path,
-    find_boundary_by_limit_cycle,
-)
-from rsfstudy.critical_steps.shooting import StepFamily
-from rsfstudy.critical_steps.slow_manifold import inertia_matters_below_norm
+from rsfstudy.critical_steps.shooting_steps import StepFamily
+from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
 from rsfstudy.critical_steps.step_types import DisplacementSteps, NormalStressSteps, RateSteps
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
@@ -48,7 +48,7 @@ STEP_FAMILY_BY_QUANTITY: Mapping[str, type[StepFamily]] = {
     "normal_stress_step": NormalStressSteps,
 }
 STEP_DIRECTIONS = ("up", "down")
-#: Aliases of the quantities in ``STEP_FAMILIES``, which are names of scene fields.
+#: Aliases of the quantities in ``STEP_FAMILY_BY_QUANTITY``, which are names of scene fields.
 QUANTITY_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
 #: Largest relative accuracy of a boundary at which a limit cycle touches the norm.
@@ -225,13 +225,13 @@ class CriticalStep(Measure):
             rate = 0.0 if self.of == "load_velocity_ratio" else steps.scene.load_velocity
             return outcome_if_norm_is_below_load_velocity(scene, rate)
         below = (
-            not forward_motion.may_have_closed_orbits(scene)
-            or forward_motion.stiffness_ratio_after_step(scene) < 1.0
+            not motion_after_step.may_have_closed_orbits(scene)
+            or motion_after_step.stiffness_ratio_after_step(scene) < 1.0
         )
         if (
             below
-            and forward_motion.has_frictional_damping_only(scene)
-            and forward_motion.is_neutrally_stable(
+            and motion_after_step.has_frictional_damping_only(scene)
+            and motion_after_step.is_neutrally_stable(
                 steps.scene_with_step(steps.max_size), 10.0 * accuracy.rtol
             )
         ):
@@ -352,7 +352,7 @@ class CriticalStep(Measure):
         unstable = smallest
         while unstable <= largest + 1e-9:
             try:
-                if forward_motion.motion_reaches_norm(
+                if motion_after_step.motion_reaches_norm(
                     step_family.scene_with_step(math.exp(unstable)), accuracy, work_meter
                 ):
                     break
@@ -395,7 +395,7 @@ class CriticalStep(Measure):
 
         def excess(log_size: float) -> float:
             nonlocal stable, unstable
-            found = forward_motion.motion_excess_over_norm(
+            found = motion_after_step.motion_excess_over_norm(
                 step_family.scene_with_step(math.exp(log_size)), accuracy, work_meter
             )
             if found >= 0.0:
@@ -470,7 +470,7 @@ def _excess_after_step_of_size(
     The result is None if the motion cannot continue.
     """
     try:
-        return forward_motion.motion_excess_over_norm(
+        return motion_after_step.motion_excess_over_norm(
             step_family.scene_with_step(step_size), accuracy, work_meter
         )
     except MotionStopped as halt:
@@ -503,14 +503,14 @@ def _bracket_critical_log_size(
     finds no bracket.
     """
     middle = math.log(size_guess)
-    reached = forward_motion.motion_reaches_norm(
+    reached = motion_after_step.motion_reaches_norm(
         step_family.scene_with_step(size_guess), accuracy, work_meter
     )
     inner, reach = middle, 1e-4
     while reach < 1.5:
         outer = middle - reach if reached else min(middle + reach, math.log(step_family.max_size))
         if (
-            forward_motion.motion_reaches_norm(
+            motion_after_step.motion_reaches_norm(
                 step_family.scene_with_step(math.exp(outer)), accuracy, work_meter
             )
             != reached

@@ -1,6 +1,6 @@
 """Peak slip rate of a motion with a held load point.
 
-The main function is ``peak_excess``. Spring stress can only decrease while the load point is held.
+The main function is ``peak_log_rate_excess_over_norm``. Spring stress can only decrease while the load point is held.
 With one state, the first peak of ln V is also the last peak. At the peak, friction weakens with
 slip. The weakening decreases after the peak, so ln V has no minimum.
 
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from rsfstudy.critical_steps.slow_manifold import inertia_matters_below_norm
+from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
 from rsfstudy.motion import (
     Accuracy,
     Event,
@@ -62,7 +62,7 @@ def peak_log_rate_excess_over_norm(
         Scene with a held load point.
     accuracy : Accuracy
         Requested accuracy.
-    meter : WorkMeter
+    work_meter : WorkMeter
         Counter of right-hand-side evaluations.
 
     Returns

@@ -10,13 +10,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.forward_motion import (
+from rsfstudy.critical_steps.motion_after_step import (
     is_linearly_stable,
     may_have_closed_orbits,
     motion_reaches_norm,
     stability_margin,
 )
-from rsfstudy.critical_steps.shooting import (
+from rsfstudy.critical_steps.shooting_steps import (
     INERTIA_TOLERANCE_FRACTION,
     LOCAL_TOLERANCE_OF_FIRST_ROOT,
     LOG_RATE_MARGIN_FOR_INERTIA,

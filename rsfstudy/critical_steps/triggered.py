@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy.critical_steps.forward_motion import is_neutrally_stable, motion_reaches_norm
 from rsfstudy.critical_steps.loading_checks import (
     check_loading_is_single_step,
     outcome_if_norm_is_below_load_velocity,
     slow_norm_warning,
 )
+from rsfstudy.critical_steps.motion_after_step import is_neutrally_stable, motion_reaches_norm
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import Accuracy, WorkMeter

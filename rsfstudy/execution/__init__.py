@@ -10,15 +10,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy import lazy_exports
+from rsfstudy._lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from rsfstudy.execution.cell_plan import CellPlan, estimate_cost
     from rsfstudy.execution.clusters import connect_to_cluster
-    from rsfstudy.execution.plan import CellPlan, estimate_cost
     from rsfstudy.execution.preparation import prepare_study_run
     from rsfstudy.execution.provenance import provenance_attributes, run_fingerprint
-    from rsfstudy.execution.runner import OutputOptions, ProgressCallback
-    from rsfstudy.execution.workers import WorkerPool
+    from rsfstudy.execution.study_run import OutputOptions, ProgressCallback
+    from rsfstudy.execution.worker_pool import WorkerPool
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,

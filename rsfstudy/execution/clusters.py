@@ -103,7 +103,7 @@ def _ignore_unknown_names_in_unregister(unregister: Callable[..., None]) -> Any:
 
 
 def _tolerate_lost_resource_tracker() -> None:
-    """Install ``_unregister_safely`` for the lifetime of the process.
+    """Install ``_ignore_unknown_names_in_unregister`` for the lifetime of the process.
 
     The wrapper must stay installed, because semaphores are released whenever they are
     garbage-collected.
@@ -120,9 +120,9 @@ def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
 
     Parameters
     ----------
-    workers : int
+    worker_count : int
         How many.
-    log : Path
+    log_path : Path
         Where they write errors.
 
     Raises

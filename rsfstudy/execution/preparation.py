@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from rsfstudy.execution.cells import CellTask, compute_serially, serialize_task
+from rsfstudy.execution.cell_computation import CellTask, compute_serially, serialize_task
 from rsfstudy.execution.provenance import code_fingerprint
-from rsfstudy.execution.runner import OutputOptions, StudyRun
-from rsfstudy.execution.workers import WorkerPool
+from rsfstudy.execution.study_run import OutputOptions, StudyRun
+from rsfstudy.execution.worker_pool import WorkerPool
 from rsfstudy.motion import find_user_stepper
 from rsfstudy.study import Study
 

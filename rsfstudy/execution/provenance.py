@@ -57,7 +57,7 @@ def code_fingerprint(engine: str = SCIPY, user_classes: Iterable[object] = ()) -
     Parameters
     ----------
     engine : str
-    used : iterable of type
+    user_classes : iterable of type
         The classes of the measure, and parts and a stepper of the user's own.
     """
     return {
@@ -99,7 +99,7 @@ def collect_provenance(study: Study, command_line: str) -> dict[str, Any]:
     Parameters
     ----------
     study : Study
-    command : str
+    command_line : str
         What the user typed.
     """
     return {
@@ -123,7 +123,7 @@ def provenance_attributes(command_line: str) -> dict[str, str]:
 
     Parameters
     ----------
-    command : str
+    command_line : str
         What the user typed, or called.
     """
     when = datetime.now(UTC).isoformat(timespec="seconds")

@@ -74,7 +74,7 @@ class RedirectStderrPlugin(WorkerPlugin):
 
     Parameters
     ----------
-    log : Path
+    log_path : Path
     """
 
     log_path: Path

@@ -10,19 +10,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy import lazy_exports
+from rsfstudy._lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from rsfstudy.fitting.drop_detection import MIN_SAMPLES, Detection
     from rsfstudy.fitting.drop_measurements import read_drops
     from rsfstudy.fitting.filters import LOW_PASS_ORDERS, MEAN, TRAILING_MEAN, Filter
     from rsfstudy.fitting.fit_measure import Fit
+    from rsfstudy.fitting.fit_validity_checks import describe_whiteness
+    from rsfstudy.fitting.fit_window import FitWindow
     from rsfstudy.fitting.joint_model import fitted_fields, split_window_number, strip_window_number
     from rsfstudy.fitting.record import RECORD_COLUMNS, Record
-    from rsfstudy.fitting.stress_drops import EVENT_QUANTITIES, EventNumbers
-    from rsfstudy.fitting.validity import describe_whiteness
+    from rsfstudy.fitting.stress_drop_fits import EVENT_QUANTITIES, EventNumbers
     from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
-    from rsfstudy.fitting.window import FitWindow
     from rsfstudy.fitting.window_model import (
         LOGARITHMIC_PARAMETERS,
         PARAMETERS,

@@ -55,11 +55,11 @@ class DropCandidate(NamedTuple):
 
     Parameters
     ----------
-    start, end : float
+    start_time, end_time : float
         Times between which stress decreases, at the resolution of the window.
-    window : float
+    window_duration : float
         Length of the window in units of time.
-    difference_stderr : float
+    mean_difference_stderr : float
         Standard error of the difference between two window means.
     correlation_factor : float
         Factor by which the correlation of the noise increases the standard error of a mean.
@@ -175,7 +175,7 @@ def window_mean_decreases(values: np.ndarray, window_samples: int) -> np.ndarray
     ----------
     values : ndarray, shape (samples,)
         Samples.
-    window : int
+    window_samples : int
         Length of each window in samples.
 
     Returns
@@ -266,7 +266,7 @@ class _WindowMeanDifferences:
     ----------
     stress : ndarray, shape (samples,)
         Shear stresses of the samples.
-    window : int
+    window_samples : int
         Window length in samples.
     looks : float
         Detection threshold in standard deviations, which accounts for the number of tested windows
@@ -316,7 +316,7 @@ class _WindowMeanDifferences:
 
         Parameters
         ----------
-        indices : ndarray of int
+        sample_indices : ndarray of int
             Indices of samples.
 
         Returns
@@ -340,7 +340,7 @@ class _WindowMeanDifferences:
 
         Parameters
         ----------
-        longer_scales : list of _WindowScale
+        longer_windows : list of _WindowScale
             Differences for longer windows. Drops with a clearly higher score for a longer window
             are skipped.
 

@@ -60,7 +60,7 @@ class FittedStressDrop(NamedTuple):
 
     Parameters
     ----------
-    start, end : float
+    start_time, end_time : float
         Times at which stress is highest and lowest.
     stress_before, stress_after : float
         Highest and lowest stress.
@@ -95,13 +95,13 @@ class _ThreeLineFits(NamedTuple):
 
     Parameters
     ----------
-    pairs : ndarray, shape (pairs, 2)
+    corner_time_pairs : ndarray, shape (pairs, 2)
         Times at which the lines meet.
     coefficients : ndarray, shape (pairs, 4)
-        Coefficients (see ``_fit_lines``).
+        Coefficients (see ``_fit_three_lines``).
     inverse_normal_matrix : ndarray, shape (pairs, 4, 4)
         Inverse of the normal matrix.
-    residual_squares : ndarray, shape (pairs,)
+    residual_sums_of_squares : ndarray, shape (pairs,)
         Sum of squared residuals.
     """
 
@@ -138,9 +138,9 @@ def fit_drop(
         Times and shear stresses of the samples, in any units.
     candidate : Candidate
         Detected drop.
-    limits : (float, float)
+    neighbour_limits : (float, float)
         End of the previous drop, and start of the next drop.
-    noise : float
+    noise_sd : float
         Standard deviation of the noise.
 
     Returns

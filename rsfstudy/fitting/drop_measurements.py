@@ -21,7 +21,7 @@ from rsfstudy.fitting.drop_detection import (
     window_mean_decreases,
 )
 from rsfstudy.fitting.drop_fit import STDERRS_PER_95_PERCENT_HALF_WIDTH
-from rsfstudy.fitting.stress_drops import EventNumbers, FittedDropCandidate, find_drops
+from rsfstudy.fitting.stress_drop_fits import EventNumbers, FittedDropCandidate, find_drops
 
 #: Smallest excess of slip during the drops, in standard deviations and as a fraction of the
 #: displacement around the drops.
@@ -33,11 +33,11 @@ class DropSampleIndices(NamedTuple):
 
     Parameters
     ----------
-    start : int
+    start_index : int
         Index of the first sample in the drop.
-    end : int
+    end_index : int
         Index of the first sample after the drop.
-    window : int
+    window_sample_count : int
         Number of samples before and after the drop that are averaged.
     """
 
@@ -51,11 +51,11 @@ class DropMeasurements(NamedTuple):
 
     Parameters
     ----------
-    rows : list of EventNumbers
+    event_rows : list of EventNumbers
         Properties of each drop.
     detection : Detection
         Result of the detection.
-    is_slip : bool
+    displacement_shows_slip : bool
         False if the displacement was checked, and is not faster during the drops than around them.
     """
 
@@ -122,7 +122,7 @@ def displacement_follows_drops(
     ----------
     times, displacement : ndarray, shape (samples,)
         Times and displacements of the samples.
-    locations : sequence of DropIndices
+    drop_sample_indices : sequence of DropIndices
         Locations of the drops.
 
     Returns
@@ -165,9 +165,9 @@ def locate_drop(
     ----------
     times : ndarray, shape (samples,)
         Times of the samples.
-    found : FittedCandidate
+    fitted_candidate : FittedCandidate
         Fitted drop.
-    limits : (float, float)
+    neighbour_limits : (float, float)
         End of the previous drop, and start of the next drop.
 
     Returns
@@ -201,11 +201,11 @@ def measure_drop(
         Times and shear stresses of the samples.
     displacement : ndarray, shape (samples,), or None
         Displacement of the samples. If None, slip and slip rate are not computed.
-    found : FittedCandidate
+    fitted_candidate : FittedCandidate
         Fitted drop.
-    location : DropIndices
+    sample_indices : DropIndices
         Location of the drop.
-    limits : (float, float)
+    neighbour_limits : (float, float)
         End of the previous drop, and start of the next drop.
 
     Returns

@@ -17,20 +17,12 @@ import numpy as np
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import posterior
-from rsfstudy.fitting.averaging_detection import detect_unspecified_filter
+from rsfstudy.fitting.confidence_intervals import confidence_interval
+from rsfstudy.fitting.filter_detection import detect_unspecified_filter
 from rsfstudy.fitting.filters import Filter
+from rsfstudy.fitting.fit_outputs import fit_outputs
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
-from rsfstudy.fitting.intervals import confidence_interval
-from rsfstudy.fitting.joint_model import (
-    JointModel,
-    add_window_numbers,
-    is_per_window_parameter,
-    strip_window_number,
-)
-from rsfstudy.fitting.noise import WHITE_NOISE_NAME, check_noise_name, ljung_box_p_value
-from rsfstudy.fitting.outputs import fit_outputs
-from rsfstudy.fitting.record import RECORD_COLUMNS, Record
-from rsfstudy.fitting.validity import (
+from rsfstudy.fitting.fit_validity_checks import (
     MIN_STATISTICAL_NOISE_SD,
     describe_asymmetric_intervals,
     describe_load_point_noise,
@@ -40,12 +32,20 @@ from rsfstudy.fitting.validity import (
     find_validity_problems,
     is_rounding_too_coarse,
 )
-from rsfstudy.fitting.window import (
+from rsfstudy.fitting.fit_window import (
     LOADING_KINDS,
     FitWindow,
     compute_stiffness_factors,
     guess_parameters,
 )
+from rsfstudy.fitting.joint_model import (
+    JointModel,
+    add_window_numbers,
+    is_per_window_parameter,
+    strip_window_number,
+)
+from rsfstudy.fitting.noise import WHITE_NOISE_NAME, check_noise_name, ljung_box_p_value
+from rsfstudy.fitting.record import RECORD_COLUMNS, Record
 from rsfstudy.fitting.window_model import (
     PARAMETERS_OF_SOME_LAWS_ONLY,
     check_fields_positive,

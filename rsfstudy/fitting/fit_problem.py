@@ -104,9 +104,9 @@ class FitProblem:
     ----------
     model : JointModel
         Model of the windows.
-    values : mapping of str to float
+    coordinates_to_values : mapping of str to float
         Values of all parameters. The values of the free parameters are the initial guess.
-    free : sequence of str
+    free_parameters : sequence of str
         Names of the free parameters.
     noise : str
         Noise model (see ``rsfstudy.fitting.noise.fit_noise``).
@@ -115,7 +115,7 @@ class FitProblem:
     ----------
     lower_bounds, upper_bounds : ndarray, shape (parameters,)
         Bounds of the coordinates of the free parameters.
-    quantum : float
+    friction_rounding_quantum : float
         Quantum to which friction is rounded, or 0 if friction is not rounded.
     has_converged : bool
         True if the last search converged.
@@ -170,7 +170,7 @@ class FitProblem:
 
         Parameters
         ----------
-        x : ndarray, shape (parameters,)
+        coordinates : ndarray, shape (parameters,)
             Coordinates of the free parameters.
 
         Returns
@@ -186,7 +186,7 @@ class FitProblem:
 
         Parameters
         ----------
-        values : mapping of str to float
+        coordinates_to_values : mapping of str to float
             Values of all parameters.
 
         Returns
@@ -203,7 +203,7 @@ class FitProblem:
 
         Parameters
         ----------
-        values : mapping of str to float
+        coordinates_to_values : mapping of str to float
             Values of all parameters.
         require_stable : bool, default: False
             If True, the motion is not computed if the stiffness is below the critical stiffness.
@@ -317,7 +317,7 @@ class FitProblem:
 
         Parameters
         ----------
-        x : ndarray, shape (parameters,)
+        initial_coordinates : ndarray, shape (parameters,)
             Initial coordinates.
         noise : NoiseModel
             Noise that whitens the residuals.
@@ -326,7 +326,7 @@ class FitProblem:
 
         Returns
         -------
-        x : ndarray, shape (parameters,)
+        initial_coordinates : ndarray, shape (parameters,)
             Coordinates at the minimum.
         jacobian : ndarray, shape (rows, parameters)
             Derivatives at the minimum.
@@ -494,7 +494,7 @@ class FitProblem:
 
         Parameters
         ----------
-        name : str
+        parameter_name : str
             Name of a free parameter.
 
         Returns
@@ -531,9 +531,9 @@ def _has_converged(
 
     Parameters
     ----------
-    change : ndarray, shape (parameters,)
+    last_coordinate_change : ndarray, shape (parameters,)
         Last change of the coordinates.
-    whitened : ndarray, shape (rows, parameters + 1)
+    whitened_jacobian : ndarray, shape (rows, parameters + 1)
         Whitened derivatives, followed by the whitened residuals.
     tolerance : float
         Largest change, as a fraction of the standard error.

@@ -20,18 +20,18 @@ class FitSolution:
 
     Parameters
     ----------
-    values : dict of {str: float}
+    parameter_values : dict of {str: float}
         Values of all parameters, including the fixed parameters.
-    free : tuple of str
+    free_parameters : tuple of str
         Names of the free parameters.
-    covariance : ndarray, shape (parameters, parameters)
+    coordinate_covariance : ndarray, shape (parameters, parameters)
         Covariance matrix of the coordinates of the free parameters.
-    noise_covariance : ndarray, shape (parameters, parameters)
+    noise_caused_covariance : ndarray, shape (parameters, parameters)
         Contribution of the friction noise to the covariance matrix. The noise of load point
         displacement contributes the rest.
     numerical_errors : dict of {str: float}
         Numerical errors of the free parameters.
-    noise : NoiseModel
+    noise_model : NoiseModel
         Noise of the record.
     noise_sd : float
         Standard deviation of the noise.
@@ -45,16 +45,16 @@ class FitSolution:
         Whitened residuals divided by their standard deviation.
     jacobian : ndarray, shape (rows, parameters)
         Derivatives of the fitted friction with respect to the coordinates.
-    by_loading : ndarray, shape (rows, errors)
+    loading_error_sensitivity : ndarray, shape (rows, errors)
         Changes of friction by one standard error of the times and velocities of the steps.
     aic : float
         Akaike information criterion of the fit, including the noise model. Smaller values are
         better.
-    unidentified : tuple of str
+    unidentified_parameters : tuple of str
         Names of the free parameters that the record does not constrain.
     ols_residual_rms : float
         Root mean square of the residuals of the ordinary least-squares fit.
-    quantum : float
+    friction_rounding_quantum : float
         Quantum to which friction is rounded, or 0 if friction is not rounded.
     """
 
@@ -122,7 +122,7 @@ class FitSolution:
 
         Parameters
         ----------
-        name : str
+        parameter_name : str
             Name of a free parameter.
 
         Returns
@@ -148,9 +148,9 @@ def compute_aic(
         Whitened residuals without outliers.
     noise : NoiseModel
         Noise that whitened the residuals.
-    parameters : int
+    parameter_count : int
         Number of parameters of the model.
-    count : int
+    row_count : int
         Number of rows, including outliers.
 
     Returns

@@ -38,7 +38,7 @@ def is_per_window_parameter(parameter_name: str) -> bool:
 
     Parameters
     ----------
-    name : str
+    parameter_name : str
         Name of the parameter, with or without a window number.
 
     Returns
@@ -54,9 +54,9 @@ def add_window_numbers(parameter_names: Sequence[str], window_count: int) -> tup
 
     Parameters
     ----------
-    names : sequence of str
+    parameter_names : sequence of str
         Names of the parameters without window numbers.
-    windows : int
+    window_count : int
         Number of windows.
 
     Returns
@@ -200,7 +200,7 @@ class JointModel:
 
         Parameters
         ----------
-        name : str
+        parameter_name : str
             Name of the parameter, with or without a window number.
 
         Returns
@@ -217,7 +217,7 @@ class JointModel:
 
         Parameters
         ----------
-        name : str
+        parameter_name : str
             Name of the step time, with or without a window number.
 
         Returns
@@ -304,10 +304,10 @@ class JointModel:
         ----------
         values : mapping of str to float
             Values of all parameters.
-        free : sequence of str
+        free_parameters : sequence of str
             Names of the free parameters, with window numbers.
         difference_scheme : (float, int), optional
-            Step size and order of the finite differences. The default is ``FINE_DIFFERENCES``.
+            Step size and order of the finite differences. The default is ``ACCURATE_DIFFERENCE_SCHEME``.
 
         Returns
         -------

@@ -37,8 +37,8 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.fitting.averaging import AveragingCorrelation
-from rsfstudy.fitting.sampling_runs import (
+from rsfstudy.fitting.averaged_noise_correlation import AveragingCorrelation
+from rsfstudy.fitting.uniform_sampling_runs import (
     SamplingRun,
     count_processes,
     find_level_changes,
@@ -68,7 +68,7 @@ def check_noise_name(noise_name: str) -> None:
 
     Parameters
     ----------
-    name : str
+    noise_name : str
         Name of the noise model, such as "white", "ar" or "ar2".
 
     Raises
@@ -97,13 +97,13 @@ class NoiseModel:
 
     Parameters
     ----------
-    runs : tuple of SamplingRun
+    sampling_runs : tuple of SamplingRun
         Runs of rows with the same process and noise level.
     partial_autocorrelations : ndarray, shape (processes, order)
         Partial autocorrelations of each process.
-    level_sds : ndarray, shape (levels,)
+    noise_level_standard_deviations : ndarray, shape (levels,)
         Standard deviation of each noise level, relative to the first level.
-    kept_mask : ndarray of bool, shape (rows,), optional
+    non_outlier_mask : ndarray of bool, shape (rows,), optional
         Mask that is False for outliers, which are excluded. By default, all rows are kept.
     averaging_correlation : AveragingCorrelation, optional
         Correlation due to averaging, which is removed before the correlation of the process.
@@ -280,7 +280,7 @@ def fit_noise(
 
     Parameters
     ----------
-    name : str
+    noise_name : str
         Noise model: "white" for white noise, "ar" for the autoregressive order that minimises the
         AIC, or "ar1", "ar2" and so on for a fixed order.
     time : ndarray, shape (rows,)
@@ -289,9 +289,9 @@ def fit_noise(
         Residuals of the fit.
     jacobian : ndarray, shape (rows, parameters)
         Derivatives of the model with respect to the parameters.
-    kept_mask : ndarray of bool, shape (rows,), optional
+    non_outlier_mask : ndarray of bool, shape (rows,), optional
         Mask that is False for outliers. By default, all rows are kept.
-    min_sd : float, default: 0.0
+    min_noise_sd : float, default: 0.0
         Lower bound of the standard deviation of a noise level, such as the rounding error.
     averaging_time : float, default: 0.0
         Averaging time of friction in s, or 0 if friction was not averaged.
@@ -362,15 +362,15 @@ def guess_noise_by_moments(
 
     Parameters
     ----------
-    name : str
+    noise_name : str
         Noise model (see ``fit_noise``).
     time : ndarray, shape (rows,)
         Times in s.
     residuals : ndarray, shape (rows,)
         Residuals of the fit.
-    kept_mask : ndarray of bool, shape (rows,), optional
+    non_outlier_mask : ndarray of bool, shape (rows,), optional
         Mask that is False for outliers. By default, all rows are kept.
-    min_sd : float, default: 0.0
+    min_noise_sd : float, default: 0.0
         Lower bound of the standard deviation of a noise level.
     averaging_time : float, default: 0.0
         Averaging time of friction in s, or 0 if friction was not averaged.
@@ -379,7 +379,7 @@ def guess_noise_by_moments(
     -------
     noise : NoiseModel
         Noise of the record.
-    min_sd : float
+    min_noise_sd : float
         Lower bound of the standard deviation of a noise level, relative to the first level.
     """
     if non_outlier_mask is not None:

@@ -62,7 +62,7 @@ def find_non_outlier_mask(
         Residuals of a fit.
     model_friction : ndarray, shape (rows,)
         Fitted friction.
-    quantum : float
+    rounding_quantum : float
         Quantum to which friction is rounded.
 
     Returns

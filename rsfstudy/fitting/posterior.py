@@ -44,7 +44,7 @@ def check_sampling_is_possible(draw_count: int) -> None:
 
     Parameters
     ----------
-    draws : int
+    draw_count : int
         Number of draws.
 
     Raises
@@ -77,14 +77,14 @@ def sample_posterior_coordinates(
         Problem with the model of the record.
     solution : FitSolution
         Solution of the problem, with a finite covariance matrix.
-    draws : int
+    draw_count : int
         Number of draws.
     seed : int, default: 0
         Seed of the random number generator.
 
     Returns
     -------
-    draws : ndarray, shape (draws, parameters)
+    draw_count : ndarray, shape (draws, parameters)
         Coordinates of the free parameters.
     autocorrelation_time : float
         Longest autocorrelation time of the chain in steps.
@@ -158,7 +158,7 @@ def sample_posterior_parameters(
         Problem with the model of the record.
     solution : FitSolution
         Solution of the problem.
-    draws : int
+    draw_count : int
         Number of draws.
 
     Returns

@@ -26,7 +26,7 @@ from rsfstudy.fitting.stress_steps import (
     set_stress_levels,
 )
 from rsfstudy.fitting.velocity_steps import LoadingStep, detect_velocity_steps
-from rsfstudy.netcdf import copy_with_cf_encoding
+from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.quantities import Quantity, is_variable_name
 
 #: Columns of a record with their symbols, units and meanings. The normal stress is optional.
@@ -299,9 +299,9 @@ def loading_history(
     ----------
     record : Record
         Record with the steps and the rows.
-    start, end : float
+    start_time, end_time : float
         Times in s.
-    from_rows : bool
+    use_recorded_rows : bool
         If True, each row begins a segment, and the recorded displacement is replaced by the closest
         displacement that never decreases. If False, the load point velocity and the normal stress
         are constant between the steps, and change at a constant rate during a step.
@@ -315,7 +315,7 @@ def loading_history(
     Raises
     ------
     InvalidValue
-        If ``from_rows`` is True and the record has no rows between the two times.
+        If ``use_recorded_rows`` is True and the record has no rows between the two times.
     """
     steps = find_steps_between(record, start_time, end_time)
     if use_recorded_rows:
@@ -337,13 +337,13 @@ def find_steps_between(record: Record, start_time: float, end_time: float) -> li
     ----------
     record : Record
         Record with the steps.
-    start, end : float
+    start_time, end_time : float
         Times in s.
 
     Returns
     -------
     list of LoadingStep
-        Steps that begin after ``start`` and end before ``end``.
+        Steps that begin after ``start_time`` and end before ``end_time``.
     """
     return [
         step for step in record.loading_steps if start_time < step.start and step.end < end_time
@@ -355,7 +355,7 @@ def stepwise_loading(start_time: float, steps: Sequence[LoadingStep]) -> np.ndar
 
     Parameters
     ----------
-    start : float
+    start_time : float
         Start of the first segment in s.
     steps : sequence of LoadingStep
         Steps in order of time.
@@ -412,9 +412,9 @@ def _build_loading_from_rows(
     ----------
     record : Record
         Part of a record.
-    first_velocity : float
+    initial_velocity : float
         Load point velocity of the first segment in um/s.
-    stress_before : float
+    initial_normal_stress : float
         Normal stress in Pa before the first step, by which the normal stress is divided. If NaN,
         the normal stress of the first row is used.
 

@@ -47,7 +47,7 @@ class StressStep(NamedTuple):
 
     Parameters
     ----------
-    start, end : float
+    start_time, end_time : float
         Times in s at which the change begins and ends.
     stress_before, stress_after : float
         Normal stresses in Pa before and after the change.
@@ -64,7 +64,7 @@ def find_stress_steps(time: np.ndarray, normal_stress: np.ndarray) -> list[Stres
 
     Parameters
     ----------
-    time, stress : ndarray, shape (rows,)
+    time, normal_stress : ndarray, shape (rows,)
         Times in s and normal stresses in Pa.
 
     Returns
@@ -104,7 +104,7 @@ def _median_stress_before_and_after(
 ) -> tuple[float, float]:
     """Compute the median normal stress before and after a change.
 
-    The argument ``reach`` is the number of rows in each median.
+    The argument ``median_row_count`` is the number of rows in each median.
     """
     first, last = change_rows.start + window_rows, change_rows.stop - window_rows
     before, after = (
@@ -161,11 +161,11 @@ def merge_stress_into_velocity_steps(
 
     Parameters
     ----------
-    steps : sequence of LoadingStep
+    velocity_steps : sequence of LoadingStep
         Steps of load point velocity.
     stress_steps : sequence of StressStep
         Steps of normal stress.
-    velocity : float
+    default_velocity : float
         Load point velocity in um/s that is used if there are no steps of load point velocity.
 
     Returns

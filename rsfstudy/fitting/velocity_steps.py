@@ -202,7 +202,7 @@ class RunningLineFitSums:
 
         Parameters
         ----------
-        i, j : int or ndarray of int
+        start_row, stop_row : int or ndarray of int
             First row of the range, and row after the last row.
 
         Returns
@@ -224,7 +224,7 @@ class RunningLineFitSums:
 
         Parameters
         ----------
-        i, j : int or ndarray of int
+        start_row, stop_row : int or ndarray of int
             First row of the range, and row after the last row.
 
         Returns
@@ -242,7 +242,7 @@ class RunningLineFitSums:
 
         Parameters
         ----------
-        i, j : int or ndarray of int
+        start_row, stop_row : int or ndarray of int
             First row of the range, and row after the last row.
 
         Returns
@@ -257,7 +257,7 @@ class RunningLineFitSums:
 
         Parameters
         ----------
-        i, j : int
+        start_row, stop_row : int
             First row of the range, and row after the last row.
 
         Returns
@@ -359,15 +359,15 @@ def split_rows_into_segments(
     ----------
     residual_squares : callable
         Function that returns the sum of squared residuals of the rows i to j.
-    first, last : int
+    first_row, last_row : int
         First row of the range that is split, and row after the last row.
-    variance : float
+    variance_of_noise : float
         Noise variance.
 
     Returns
     -------
     set of int
-        First row of each segment, and ``last``.
+        First row of each segment, and ``last_row``.
     """
     open_parts, found = [(first_row, last_row)], {first_row, last_row}
     while open_parts:

@@ -16,7 +16,7 @@ def ljung_box_p_value(whitened_residuals: np.ndarray, autoregressive_order: int)
     ----------
     whitened_residuals : ndarray, shape (rows,)
         Whitened residuals.
-    order : int
+    autoregressive_order : int
         Number of estimated autoregressive coefficients, which is subtracted from the degrees of
         freedom.
 

@@ -162,7 +162,7 @@ def check_fields_positive(instance: object, *field_names: str) -> None:
     ----------
     instance : object
         Object with the attributes.
-    *names : str
+    *field_names : str
         Names of the attributes.
 
     Raises
@@ -186,15 +186,15 @@ class WindowModel:
     time, displacement, friction : ndarray, shape (rows,)
         Times of the rows in s, load point displacement from the first step in um, and recorded
         friction.
-    loading : ndarray, shape (segments, 4)
+    loading_segments : ndarray, shape (segments, 4)
         Loading history (see ``rsfstudy.fitting.record.loading_history``).
     accuracy : Accuracy
         Accuracy of the simulated motions.
     meter : WorkMeter
         Counter of right-hand-side evaluations.
-    shifted_loadings : sequence of ndarray, optional
+    loadings_with_shifted_steps : sequence of ndarray, optional
         Loading histories with shifted steps (see
-        ``rsfstudy.fitting.load_point_errors.shift_steps``).
+        ``rsfstudy.fitting.load_point_noise.shift_steps_by_their_errors``).
     filter : Filter, optional
         Filter that was applied to friction before it was recorded.
     """
@@ -226,7 +226,7 @@ class WindowModel:
 
         Parameters
         ----------
-        name : str
+        parameter_name : str
             Name of the parameter.
 
         Returns
@@ -345,7 +345,7 @@ class WindowModel:
         Parameters
         ----------
         values : mapping of str to float
-            Values of all parameters. The coefficient ``trend<n>`` has the unit um^-n.
+            Values of all parameters. The coefficient ``compute_friction_trend<n>`` has the unit um^-n.
 
         Returns
         -------
@@ -396,11 +396,11 @@ class WindowModel:
         ----------
         values : mapping of str to float
             Values of all parameters.
-        free : sequence of str
+        free_parameters : sequence of str
             Names of the free parameters.
         difference_scheme : (float, int), optional
             Step size relative to the scale of the parameter, and order of the finite difference.
-            The default is ``FINE_DIFFERENCES``.
+            The default is ``ACCURATE_DIFFERENCE_SCHEME``.
 
         Returns
         -------
@@ -468,7 +468,7 @@ class WindowModel:
     ) -> np.ndarray:
         """Compute a second-order finite difference.
 
-        The difference is one-sided if the parameter is within ``margin_steps`` steps of the end of
+        The difference is one-sided if the parameter is within ``steps_from_domain_end`` steps of the end of
         its domain.
         """
         low, high = _PARAMETER_DOMAINS.get(parameter_name, (-math.inf, math.inf))
@@ -584,9 +584,9 @@ def shift_parameter(
     ----------
     values : mapping of str to float
         Values of all parameters.
-    name : str
+    parameter_name : str
         Name of the parameter to shift.
-    change : float
+    coordinate_change : float
         Change of the parameter, or of its logarithm for parameters in ``LOGARITHMIC_PARAMETERS``.
 
     Returns
@@ -607,9 +607,9 @@ def parameter_to_coordinate(parameter_name: str, parameter_value: float) -> floa
 
     Parameters
     ----------
-    name : str
+    parameter_name : str
         Name of the parameter.
-    value : float
+    parameter_value : float
         Value of the parameter.
 
     Returns
@@ -628,7 +628,7 @@ def coordinate_to_parameter(parameter_name: str, coordinate: float) -> float:
 
     Parameters
     ----------
-    name : str
+    parameter_name : str
         Name of the parameter.
     coordinate : float
         Coordinate of the search.
@@ -646,9 +646,9 @@ def parameter_derivative_by_coordinate(parameter_name: str, parameter_value: flo
 
     Parameters
     ----------
-    name : str
+    parameter_name : str
         Name of the parameter.
-    value : float
+    parameter_value : float
         Value of the parameter.
 
     Returns

@@ -23,13 +23,18 @@ import numpy as np
 
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.limit_cycles.cycle_search import (
+from rsfstudy.limit_cycles.limit_cycle_search import (
     LimitCycleSearch,
     StickSlipSequence,
     follow_to_periodic_orbit,
 )
-from rsfstudy.limit_cycles.cycles import LN10, Cycle, more_events_remedy, recorded_rows_of_cycles
 from rsfstudy.limit_cycles.return_map import PeriodicOrbit, ReturnMap
+from rsfstudy.limit_cycles.stick_slip_cycles import (
+    LN10,
+    Cycle,
+    more_events_remedy,
+    recorded_rows_of_cycles,
+)
 from rsfstudy.measure_base import (
     Outcome,
     RecordingMeasure,
@@ -392,7 +397,7 @@ def status_from_output_errors(
         Requested accuracy.
     orbit : Orbit
         Orbit with the main results.
-    errors : ndarray
+    output_errors : ndarray
         Error estimates of the main results.
     outputs : slice, optional
         Main results to check. By default, all main results are checked.

@@ -1,7 +1,7 @@
 r"""Periodic orbits, computed as fixed points of a return map.
 
-The main methods are ``ReturnMap.find_orbit``, which searches for an orbit, and
-``ReturnMap.refine``, which computes a known orbit with another accuracy.
+The main methods are ``ReturnMap.find_periodic_orbit``, which searches for an orbit, and
+``ReturnMap.refine_orbit``, which computes a known orbit with another accuracy.
 
 A cycle extends from one rise of V through V_0 to the next. The slip rate is known at a rise, so
 spring stress and the states determine the motion. With inertia, the spring stress also includes the
@@ -41,7 +41,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
-from rsfstudy.limit_cycles.cycles import (
+from rsfstudy.limit_cycles.stick_slip_cycles import (
     MIN_LOG_SLIP_RATE_RANGE,
     PRIMARY_OUTPUTS_PER_CYCLE,
     Cycle,
@@ -79,15 +79,15 @@ class PeriodicOrbit:
     ----------
     cycles : tuple of Cycle
         Successive cycles.
-    derivatives : tuple of ndarray
+    cycle_derivatives : tuple of ndarray
         Derivatives of each cycle, of shape (1 + states + results, 1 + states). The rows are the
         section at the end of the cycle and the main results. The columns are the section at the
         beginning of the cycle.
-    section_correction : ndarray, shape (1 + states,)
+    start_section_correction : ndarray, shape (1 + states,)
         Vector from the section at which the cycles begin to the section of the closed orbit.
     accuracy : Accuracy
         Accuracy with which the cycles were computed.
-    evaluations : int
+    evaluation_count : int
         Number of right-hand-side evaluations.
     recording : Recording, optional
         Recording along the cycles. The recording may extend beyond the end of the cycles.
@@ -194,7 +194,7 @@ def multiply_cycle_derivatives(cycle_derivatives: Sequence[np.ndarray]) -> np.nd
 
     Parameters
     ----------
-    slopes : sequence of ndarray
+    cycle_derivatives : sequence of ndarray
         Derivatives of each cycle.
 
     Returns
@@ -292,9 +292,9 @@ class ReturnMap:
 
         Parameters
         ----------
-        start : ndarray, shape (1 + states,)
+        start_section : ndarray, shape (1 + states,)
             Section at which the first cycle begins.
-        count : int
+        cycle_count : int
             Number of cycles.
         recording : Recording, optional
             Recording to which the motion is added.
@@ -302,7 +302,7 @@ class ReturnMap:
         Returns
         -------
         list of Cycle
-            Successive cycles. The list is shorter than ``count`` if the motion settles, stays close
+            Successive cycles. The list is shorter than ``cycle_count`` if the motion settles, stays close
             to unstable steady sliding, or cannot continue. Unstable steady sliding is a fixed point
             of the map, but not a cycle.
         """
@@ -331,7 +331,7 @@ class ReturnMap:
 
         Parameters
         ----------
-        start : ndarray, shape (1 + states,)
+        start_section : ndarray, shape (1 + states,)
             Section at which the cycle begins.
 
         Returns
@@ -349,17 +349,17 @@ class ReturnMap:
 
         Parameters
         ----------
-        start : ndarray, shape (1 + states,)
+        start_section : ndarray, shape (1 + states,)
             Section at which the first cycle begins.
-        count : int
+        cycle_count : int
             Number of cycles.
-        scale : float
+        state_scale : float
             Magnitude of the states, which determines the step of the differences.
 
         Returns
         -------
         tuple of ndarray
-            Derivatives of each cycle. The tuple is shorter than ``count`` if the motion does not
+            Derivatives of each cycle. The tuple is shorter than ``cycle_count`` if the motion does not
             complete all cycles.
         """
         found, step = (
@@ -441,15 +441,15 @@ class ReturnMap:
 
         Parameters
         ----------
-        start : ndarray, shape (1 + states,)
+        start_section : ndarray, shape (1 + states,)
             Section at which the search starts.
-        count : int
+        cycle_count : int
             Number of cycles of the orbit. The period of the orbit that is found may be a divisor of
             this number.
         log_slip_rate_range : float
             Range of ln V.
         max_distance : float, default: 0.1
-            Largest distance of the orbit from ``start``, relative to ``a`` times the range of ln V.
+            Largest distance of the orbit from ``start_section``, relative to ``a`` times the range of ln V.
 
         Returns
         -------
@@ -505,7 +505,7 @@ class ReturnMap:
     ) -> PeriodicOrbit | None:
         r"""Solve for a periodic orbit with a given number of cycles.
 
-        The number of cycles is the number of arrays in ``slopes``.
+        The number of cycles is the number of arrays in ``cycle_derivatives``.
 
         Returns
         -------

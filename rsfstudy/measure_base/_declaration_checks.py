@@ -26,7 +26,7 @@ def check_declared_work(typical_work: object, expected_work: Callable[[Accuracy]
 
     Parameters
     ----------
-    work : object
+    typical_work : object
         Typical number of right-hand-side evaluations.
     expected_work : callable
         Function that returns the expected number of evaluations at an accuracy.
@@ -49,7 +49,7 @@ def check_measure_description(measure_name: str, describe: Callable[[], Mapping[
 
     Parameters
     ----------
-    measure : str
+    measure_name : str
         Name of the measure.
     describe : callable
         Function that returns the description as a dictionary.
@@ -109,11 +109,11 @@ def check_output_value(
 
     Parameters
     ----------
-    declared : mapping of str to tuple of str
+    dimensions_by_output : mapping of str to tuple of str
         Inner dimensions of each declared result.
     coordinates : mapping of str to ndarray
         Coordinate values of each inner dimension.
-    name : str
+    output_name : str
         Name of the result.
     value : object
         Value of the result.
@@ -149,20 +149,20 @@ def check_field_value(
 
     Parameters
     ----------
-    name : str
+    field_name : str
         Name of the field.
     value : object
         New value.
-    current : int, float, str or bool
+    current_value : int, float, str or bool
         Present value, which must have the same type as the new value.
-    is_integer : bool
+    must_be_integer : bool
         True if the field holds an integer. The new value may still be a float, because axes store
         integers as floats.
 
     Returns
     -------
     int, float, str or bool
-        The new value, as an integer if ``is_integer`` is True.
+        The new value, as an integer if ``must_be_integer`` is True.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def check_evaluation_count(evaluation_count: Any) -> int:
 
     Parameters
     ----------
-    spent : object
+    evaluation_count : object
         Number of evaluations.
 
     Returns

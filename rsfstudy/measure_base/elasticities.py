@@ -274,15 +274,15 @@ class Elasticities(Measure):
         ----------
         scene : Scene
             Scene at which the derivative is computed.
-        name : str
+        parameter_name : str
             Name of the parameter.
-        centre : _LogValue
+        central_value : _LogValue
             Value at the scene itself.
-        step : float
+        log_step : float
             Largest step of ln p.
         accuracies : sequence of Accuracy
             Accuracy for each step.
-        meter : WorkMeter
+        work_meter : WorkMeter
             Counter of right-hand-side evaluations.
 
         Returns
@@ -329,13 +329,13 @@ class Elasticities(Measure):
         ----------
         scene : Scene
             Scene before the change.
-        name : str
+        parameter_name : str
             Name of the parameter.
         log_change : float
             Change of ln p.
         accuracy : Accuracy
             Requested accuracy.
-        meter : WorkMeter
+        work_meter : WorkMeter
             Counter of right-hand-side evaluations.
 
         Returns
@@ -389,11 +389,11 @@ def _central_difference(
 
     Parameters
     ----------
-    centre : _LogValue
+    central_value : _LogValue
         Value at the scene itself.
-    neighbours : sequence of _LogValue or None
+    neighbouring_values : sequence of _LogValue or None
         Values at the points of ``_STENCIL``, or None for missing values.
-    step : float
+    log_step : float
         Step of ln p.
 
     Returns

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy import lazy_exports
+from rsfstudy._lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from rsfstudy.motion.accuracy import (
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
         Accuracy,
         estimate_error,
     )
-    from rsfstudy.motion.driver import MotionDriver, iterate_events_of_equations
     from rsfstudy.motion.engine_factory import check_engine_is_usable, import_compiled_engine
     from rsfstudy.motion.engines import (
         COMPILED,
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
         is_engine_installed,
         register_user_steppers,
     )
+    from rsfstudy.motion.event_integration import integrate_events
     from rsfstudy.motion.events import (
         Event,
         EventKind,
@@ -52,15 +52,9 @@ if TYPE_CHECKING:
         restart_point,
         slow_manifold_point,
     )
-    from rsfstudy.motion.integrate import integrate_events
-    from rsfstudy.motion.meter import (
-        MIN_LOCAL_TOLERANCE,
-        MotionStopped,
-        WorkMeter,
-        larger_budget_remedy,
-    )
-    from rsfstudy.motion.neglected_inertia import estimate_neglected_inertia_error
-    from rsfstudy.motion.readings import (
+    from rsfstudy.motion.motion_driver import MotionDriver, iterate_events_of_equations
+    from rsfstudy.motion.neglected_inertia_error import estimate_neglected_inertia_error
+    from rsfstudy.motion.recorded_motion_readings import (
         recorded_friction_coefficient,
         recorded_load_point_displacement,
         resample_motion_along_path,
@@ -75,7 +69,13 @@ if TYPE_CHECKING:
         recorded_row,
     )
     from rsfstudy.motion.regime_switching import inertia_matters_at
-    from rsfstudy.motion.roots import build_root_finder
+    from rsfstudy.motion.root_finding import build_root_finder
+    from rsfstudy.motion.work_meter import (
+        MIN_LOCAL_TOLERANCE,
+        MotionStopped,
+        WorkMeter,
+        larger_budget_remedy,
+    )
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,

@@ -148,12 +148,12 @@ def estimate_error(
 
     Parameters
     ----------
-    value, refined : float
+    value, refined_value : float
         Results of the first run, and of the refined one.
-    floor : float
+    relative_error_floor : float
         Relative error that chance may hide: a small part of the accuracy asked for, measured by the
         study coverage.
-    scale : float, optional
+    error_scale : float, optional
         What that error is relative to, where the number itself may come near zero.
     """
     value = float(value)

@@ -63,7 +63,7 @@ def import_compiled_engine() -> Any:
         Where Numba is not installed.
     """
     try:
-        return importlib.import_module("rsfstudy.motion.compiled.machine")
+        return importlib.import_module("rsfstudy.motion.compiled.numba_backend")
     except ImportError as error:
         rule = f"needs Numba, which cannot be imported ({error})"
         remedy = "Install it: pip install 'rsfstudy[fast]'."

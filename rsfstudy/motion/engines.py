@@ -78,10 +78,10 @@ class CompilationLog:
 
     Attributes
     ----------
-    programs : int
-    seconds : float
+    compiled_program_count : int
+    total_compilation_seconds : float
         Time it took.
-    context : callable
+    context_while_compiling : callable
         Gives the context in which to compile: whoever limits or measures time leaves it out.
     """
 

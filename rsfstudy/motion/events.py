@@ -13,7 +13,7 @@ each with its time, slip and point. A measure can request the following events:
                                 in the last segment of loading, unless normal stress still changes
                                 or steady sliding is unstable.
 
-Each requested event may end the motion. The available quantities are the attributes of a ``Point``.
+Each requested event may end the motion. The available quantities are the attributes of a ``MotionPoint``.
 The attribute ``apparent_friction`` is the friction coefficient that a rig measures. Extrema are
 available for ``log_slip_rate``, ``spring_stress`` and ``apparent_friction``.
 
@@ -145,7 +145,7 @@ class Event(NamedTuple):
         What the slider does then.
     regime : str
         The equations in use.
-    evaluations : int
+    evaluation_count : int
         Right-hand sides spent so far.
     clock : float
         Clock of those equations, since they have been in use: length along the path, or slip of a

@@ -10,7 +10,7 @@ import math
 from scipy.optimize import newton
 
 from rsfstudy.motion import regime_switching
-from rsfstudy.motion.meter import MotionStopped
+from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.parts import Segment
 from rsfstudy.slider import (
     MotionPoint,

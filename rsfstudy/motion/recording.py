@@ -44,7 +44,7 @@ class Recording:
 
     Attributes
     ----------
-    regimes : list of str
+    regime_names : list of str
         Those of the motion, as they came.
     sample_times : ndarray, optional
         Times at which to record, in D_c/V_*, or slips in D_c of a rigid slider; they must not fall.

@@ -9,7 +9,7 @@ import math
 from typing import NamedTuple
 
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import MotionStopped
+from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.slider import (
     LARGEST_LOG_SLIP_RATE,
     STOPPED_LOG_SLIP_RATE,
@@ -36,9 +36,9 @@ class SwitchThresholds(NamedTuple):
 
     Attributes
     ----------
-    max_norm : float
+    max_slip_rate_norm : float
         Slip rate norm w at which to leave the slow manifold, which is a series in (K/a) w**2.
-    max_correction : float
+    max_inertia_correction : float
         Change of ln V by inertia up to which the slow manifold may be used.
     max_remaining_slip : float
         Slip in D_c that may remain when the full equations hand back.

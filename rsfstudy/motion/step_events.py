@@ -7,8 +7,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from rsfstudy.motion.array_calls import offset_pointer
-from rsfstudy.motion.layout import (
+from rsfstudy.motion.array_layout import (
     APPARENT_FRICTION,
     APPARENT_FRICTION_RATE,
     EVENT_CLOCK,
@@ -47,6 +46,7 @@ from rsfstudy.motion.layout import (
     STEADY_STATE_DISTANCE,
     STEADY_STATE_OFFSET,
 )
+from rsfstudy.motion.array_operations import offset_pointer
 from rsfstudy.motion.recording import (
     FIRST_STATE_COLUMN,
     REGIME_COLUMN,
@@ -57,14 +57,14 @@ from rsfstudy.motion.regime_switching import (
     compute_inertia_weight_at_mismatch,
     margin_to_termination,
 )
-from rsfstudy.motion.roots import build_root_finder
-from rsfstudy.motion.steppers import interpolate_unknowns
-from rsfstudy.motion.steps import (
+from rsfstudy.motion.root_finding import build_root_finder
+from rsfstudy.motion.step_integration import (
     evaluate_point_at_clock,
     time_at_step_begin,
     time_at_step_end,
     time_since_regime_start,
 )
+from rsfstudy.motion.steppers import interpolate_unknowns
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS, B
 
 #: What is read off a step beside event specifications: how far the regime is from being left, time

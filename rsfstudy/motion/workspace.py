@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from rsfstudy._deprecation import renamed_members
-from rsfstudy.motion.array_calls import copy_values, evaluate_in_place, offset_pointer
-from rsfstudy.motion.layout import FIRST_STATE, FUNCTIONS_PER_REGIME, SLOW_REGIME
+from rsfstudy.motion.array_layout import FIRST_STATE, FUNCTIONS_PER_REGIME, SLOW_REGIME
+from rsfstudy.motion.array_operations import copy_values, evaluate_in_place, offset_pointer
 from rsfstudy.motion.regime_switching import SwitchThresholds
 from rsfstudy.motion.steppers.unrolled_step import (
     DENSE_ROW_COUNT,
@@ -26,13 +26,13 @@ class Workspace(NamedTuple):
 
     Attributes
     ----------
-    unknowns : int
+    unknown_count : int
         How many unknowns there are.
     y, y_end : array
         Unknowns at the beginning of a step, and at its end.
     rates, rates_at_end : array
         Their rates there.
-    stages, step_block, scales, dense_rows : array
+    stage_rates, order_eight_step_block, scales, dense_output_rows : array
         Of a step of order eight: its stages, of which the rates there are the first and the last;
         its block (see `steppers.unrolled`), and of this the scales of the unknowns and the rows of
         dense output.
@@ -42,15 +42,15 @@ class Workspace(NamedTuple):
         Columns of the points at the beginning of the step, at its end, and within it.
     event_clocks : array
         Clocks at which events happen within a step.
-    rate, point, attempt, balance : function
+    fill_rates, fill_point, attempt_step, fill_balance : function
         The equations (see `inplace`).
-    specs : array
+    event_specs : array
         Event specifications, one row of numbers after the other.
-    spec_count : int
+    event_spec_count : int
         How many rows.
     parameters, parameters_before : array
         The numbers of the scene, and what they were before the last kink.
-    limits : SwitchThresholds
+    switch_thresholds : SwitchThresholds
         When to change between the regimes; none is read where there is no mass.
     stepper : object
         What takes the steps.

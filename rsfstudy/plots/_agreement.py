@@ -32,7 +32,7 @@ def draw_agreement(
         For each quantity, pairs of an x value and the number of digits that agree.
     label : str
         Label of the x axis. The first letter is capitalised.
-    enough : float
+    required_digits : float
         Number of digits that is required to pass. The figure shows this number as a dashed line.
 
     Returns

@@ -72,7 +72,7 @@ def is_numeric_variable(variable: xr.DataArray) -> bool:
 
     Parameters
     ----------
-    values : xarray.DataArray
+    variable : xarray.DataArray
         Variable of a dataset.
 
     Returns
@@ -88,9 +88,9 @@ def read_flag_words(variable: xr.DataArray) -> dict[float, str]:
 
     Parameters
     ----------
-    values : xarray.DataArray
+    variable : xarray.DataArray
         Variable of a dataset. The flags are described by the CF attributes ``flag_values`` and
-        ``flag_meanings``.
+        ``read_flag_words``.
 
     Returns
     -------
@@ -278,7 +278,7 @@ def set_log_scale(axes: Axes, axis_name: str) -> None:
     ----------
     axes : matplotlib.axes.Axes
         Axes to change.
-    which : {"x", "y"}
+    axis_name : {"x", "y"}
         Axis that gets the log scale.
     """
     axes.set(**{f"{axis_name}scale": "log"})
@@ -308,11 +308,11 @@ def set_ticks_with_point_names(
     ----------
     axis : matplotlib.axis.Axis
         Axis to label.
-    names : list of str
+    point_names : list of str
         Names of the points.
-    width : int
+    max_line_characters : int
         Maximum number of characters per line of a label.
-    most : int, default: 45
+    max_ticks : int, default: 45
         Maximum number of labels. If there are more names, some names are omitted at regular
         intervals.
     """

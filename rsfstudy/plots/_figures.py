@@ -116,7 +116,7 @@ def draw_figure(
         Results of a study. The dataset needs the variable ``status`` along the dimensions of the
         lattice, the variables that the figure displays, and the attributes that ``rsfstudy.run``
         adds.
-    own : callable, module, Figure or str, optional
+    user_figure : callable, module, Figure or str, optional
         User-defined figure: a function ``draw(dataset, axes)``, a module with a function ``draw``,
         or an ``rsfstudy.Figure``. A string selects a generic figure of maps or lines. The default
         is the figure that the study declares.
@@ -136,7 +136,7 @@ def draw_figure(
     Raises
     ------
     InvalidValue
-        If the declaration of the study contains an unknown figure, if ``own`` cannot draw, if the
+        If the declaration of the study contains an unknown figure, if ``user_figure`` cannot draw, if the
         variable is missing or not numeric, or if a style is invalid.
     DataError
         If the dataset has no declaration, or if x and y of a curve have different sizes.
@@ -362,7 +362,7 @@ def save_figure(
         Results of a study, with the variables and attributes that ``draw_figure`` needs.
     path : Path
         Path of the file. The suffix ``.png``, ``.pdf`` or ``.svg`` determines the format.
-    own : callable, module, Figure or str, optional
+    user_figure : callable, module, Figure or str, optional
         User-defined figure, as for ``draw_figure``.
     variable : str, optional
         Name of a variable to draw instead of the declared figure, as for ``draw_figure``.
@@ -423,9 +423,9 @@ def render_figure(figure: Figure, image_format: str) -> bytes:
 
     Parameters
     ----------
-    drawn : matplotlib.figure.Figure
+    figure : matplotlib.figure.Figure
         Figure to render.
-    form : {"png", "pdf", "svg"}
+    image_format : {"png", "pdf", "svg"}
         Format of the image.
 
     Returns

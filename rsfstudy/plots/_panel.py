@@ -1,7 +1,7 @@
 """Drawing of the panels of a figure.
 
 The function ``expand_facets`` creates one panel per facet, and ``draw_panel`` draws the curves,
-labels and title of a panel. After all panels are drawn, ``finalize_panels`` applies common scales
+labels and title of a panel. After all panels are drawn, ``finalize_scales_and_legends`` applies common scales
 and adds legends.
 """
 
@@ -117,9 +117,9 @@ def select_panel_at_extra_dims(
     ----------
     panel : Panel
         Panel without facets.
-    where : mapping of str to int
+    point_indices : mapping of str to int
         Index of the point along each additional dimension.
-    said : str
+    title_suffix : str
         Description of the point, which is appended to the title.
 
     Returns
@@ -195,7 +195,7 @@ def finalize_scales_and_legends(panels: Sequence[Panel], axes_of_panels: Sequenc
     ----------
     panels : sequence of Panel
         All panels of the figure.
-    axes_of : sequence of matplotlib.axes.Axes
+    axes_of_panels : sequence of matplotlib.axes.Axes
         Axes of the panels, in the same order.
     """
     pairs = [(p, axes) for p, axes in zip(panels, axes_of_panels, strict=True) if not p.is_custom]
@@ -223,7 +223,7 @@ def iterate_curves_and_styles(
     ----------
     panel : Panel
         Panel with the axes ``hue``.
-    part : xarray.Dataset
+    panel_data : xarray.Dataset
         Part of the dataset that the panel displays.
 
     Yields

@@ -50,7 +50,7 @@ def style_context(user_styles: Any = None) -> Iterator[None]:
 
     Parameters
     ----------
-    over : path, str, dict or list, optional
+    user_styles : path, str, dict or list, optional
         A style sheet (a file with the suffix ``.mplstyle``), the name of a style in
         ``matplotlib.style.available``, a dictionary of matplotlib settings, or a list of such
         styles. Later styles override earlier styles. By default, only the style sheet of rsfstudy
@@ -188,19 +188,19 @@ def figure_size(
 
     Parameters
     ----------
-    columns : int
+    panel_columns : int
         Number of columns of panels. A figure with one column of panels is as wide as one column of
         a journal page, and any other figure is as wide as the page.
-    rows : int
+    panel_rows : int
         Number of rows of panels.
-    height : float, optional
+    panel_height_mm : float, optional
         Height of a panel in mm. The default is the figure height of the current style.
 
     Returns
     -------
     width : float
         Width of the figure in inches.
-    height : float
+    panel_height_mm : float
         Height of the figure in inches.
     """
     width, usual = rcParams["figure.figsize"]
@@ -265,7 +265,7 @@ def add_panel_letters(panel_axes: Sequence[Axes]) -> None:
 
     Parameters
     ----------
-    panels : sequence of matplotlib.axes.Axes
+    panel_axes : sequence of matplotlib.axes.Axes
         Panels in the order of their letters.
     """
     for panel, text in zip(panel_axes, itertools.cycle(string.ascii_lowercase), strict=False):
@@ -312,7 +312,7 @@ def add_legend(axes: Axes, legend_columns: int = 2, title: str | None = None) ->
     ----------
     axes : matplotlib.axes.Axes
         Axes that the legend describes.
-    columns : int, default: 2
+    legend_columns : int, default: 2
         Maximum number of columns of the legend. Fewer columns are used if the legend would be wider
         than the panel.
     title : str, optional
@@ -444,7 +444,7 @@ def merge_common_legends(figure: Figure, panel_axes: Sequence[Axes]) -> None:
     ----------
     figure : matplotlib.figure.Figure
         Figure that contains the panels.
-    panels : sequence of matplotlib.axes.Axes
+    panel_axes : sequence of matplotlib.axes.Axes
         Panels of the figure.
     """
     named = {panel: _legend_entries(panel) for panel in panel_axes if panel.get_legend()}
@@ -476,7 +476,7 @@ def enlarge_for_legends(figure: Figure, panel_rows: Sequence[Sequence[Axes]]) ->
     ----------
     figure : matplotlib.figure.Figure
         Figure that contains the panels.
-    rows : sequence of sequence of matplotlib.axes.Axes
+    panel_rows : sequence of sequence of matplotlib.axes.Axes
         Panels in each row of the figure.
     """
     beside = [[legend for panel in row if (legend := panel.get_legend())] for row in panel_rows]

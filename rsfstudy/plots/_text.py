@@ -122,7 +122,7 @@ def wrap_text(text: str, max_line_characters: int) -> str:
     ----------
     text : str
         Text, which may contain mathtext.
-    width : int
+    max_line_characters : int
         Maximum number of visible characters per line. A longer word or formula has its own line.
 
     Returns
@@ -169,9 +169,9 @@ def format_quantity_axis_label(quantity: Quantity, max_line_characters: int = 45
 
     Parameters
     ----------
-    about : Quantity
+    quantity : Quantity
         Quantity along the axis.
-    width : int, default: 45
+    max_line_characters : int, default: 45
         Maximum number of visible characters per line.
 
     Returns
@@ -217,7 +217,7 @@ def quantity_symbol(quantity: Quantity) -> str:
 
     Parameters
     ----------
-    about : Quantity
+    quantity : Quantity
         Quantity of a dataset.
 
     Returns
@@ -268,7 +268,7 @@ def format_with_error(value: float, error: float, max_decimals: int | None = Non
         Value to format.
     error : float
         Error of the value, for example its standard error.
-    most : int, optional
+    max_decimals : int, optional
         Maximum number of decimal places. If the error is too small for these decimal places, the
         error is omitted. By default the error is always included.
 
@@ -300,7 +300,7 @@ def format_slope(row: xr.Dataset, name: str, max_decimals: int | None = None) ->
         the variable ``<name>_error`` is optional.
     name : str
         Name of the slope.
-    most : int, optional
+    max_decimals : int, optional
         Maximum number of decimal places. If the error is too small for these decimal places, the
         error is omitted. By default the error is always included.
 

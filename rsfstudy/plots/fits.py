@@ -103,7 +103,7 @@ def _iterate_fits_with_law(
     """Iterate over the fits of a record.
 
     Each item contains the results of a fit, the description of the law, and the index of the law.
-    If ``first`` is True, only the fits of the first step are included.
+    If ``only_first_step`` is True, only the fits of the first step are included.
     """
     steps = range(1 if only_first_step else dataset.sizes.get("step", 1))
     for number in range(dataset.sizes["law"]):

@@ -117,11 +117,11 @@ def draw_map(
 
     Parameters
     ----------
-    name : str
+    variable_name : str
         Name of the variable.
-    plane : tuple of (str, str)
+    map_dimensions : tuple of (str, str)
         Names of the y axis and the x axis.
-    scale : tuple of (matplotlib.colors.Normalize, sequence of float), or None
+    colour_scale : tuple of (matplotlib.colors.Normalize, sequence of float), or None
         Colour scale and contour levels. For a variable with flags, the flag values replace the
         contour levels. If the value is None, the scale is computed from the values of the map.
     dataset : xarray.Dataset
@@ -211,7 +211,7 @@ def draw_contours(axes: Axes, values: xr.DataArray, contour_levels: Sequence[flo
         Axes to draw on.
     values : xarray.DataArray, shape (ny, nx)
         Values of the variable, with coordinates for both dimensions.
-    levels : sequence of float
+    contour_levels : sequence of float
         Values of the variable at the contours.
     """
     y, x = (values[dimension].values for dimension in values.dims)
@@ -266,11 +266,11 @@ def _hatch_statuses(
     ----------
     axes : matplotlib.axes.Axes
         Axes to draw on.
-    at : tuple of (ndarray, ndarray)
+    cell_edges : tuple of (ndarray, ndarray)
         Edges of the cells along x and along y.
     status : ndarray, shape (ny, nx)
         Status codes of the cells.
-    unknown : ndarray of bool, shape (ny, nx)
+    missing_mask : ndarray of bool, shape (ny, nx)
         True for the cells to be hatched.
     """
     for hatch, code in zip(_HATCHES, np.unique(status[missing_mask]), strict=False):

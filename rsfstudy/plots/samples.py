@@ -162,12 +162,12 @@ def draw_histogram(
 
     Parameters
     ----------
-    name : str
+    variable_name : str
         Name of the variable.
-    by : sequence of str
+    colour_dimension : sequence of str
         Dimensions whose points have separate histograms.
     dataset : xarray.Dataset
-        Dataset with the variable and with coordinates for the dimensions ``by``.
+        Dataset with the variable and with coordinates for the dimensions ``colour_dimension``.
     axes : matplotlib.axes.Axes
         Axes to draw on.
     """

@@ -15,10 +15,10 @@ import numpy as np
 
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.motion import COMPILED, SCIPY, Accuracy, is_engine_installed
-from rsfstudy.referee import reference
-from rsfstudy.referee.external import ReportedQuantity
+from rsfstudy.referee import reference_answers
+from rsfstudy.referee.external_answers import ReportedQuantity
 from rsfstudy.referee.problem_files import BenchmarkProblem
-from rsfstudy.referee.reference import AnswerTable
+from rsfstudy.referee.reference_answers import AnswerTable
 from rsfstudy.rig import read_table
 
 #: Default number of digits that is required to pass.
@@ -60,15 +60,15 @@ class QuantityAgreement:
 
     Parameters
     ----------
-    quantity : str
+    quantity_name : str
         Name of the quantity.
-    digits : float
+    agreeing_digits : float
         Number of digits to which all rows agree, limited to the digits of the known answer.
-    worst_row : int
+    least_agreeing_row : int
         Index of the row with the largest difference.
     first_failing_row : int or None
         Index of the first row with fewer digits than required, or None if there is no such row.
-    agrees_as_written : bool
+    agrees_to_written_digits : bool
         True if all rows agree within the rounding error of the written values.
     relative_differences : ndarray, shape (n,)
         Relative difference of each row.
@@ -90,7 +90,7 @@ class AnswerComparison:
     ----------
     problem : BenchmarkProblem
         Problem that the answers belong to.
-    agreements : tuple of Agreement
+    quantity_agreements : tuple of Agreement
         Agreement of each quantity.
     required_digits : float
         Number of digits that is required to pass.
@@ -157,7 +157,7 @@ def known_answer(
     ----------
     problem : BenchmarkProblem
         Problem to be answered.
-    path : Path or None
+    answer_path : Path or None
         File of the known answer. If the value is None, rsfstudy computes the answer with two
         tolerances.
 
@@ -179,8 +179,8 @@ def known_answer(
         return problem, {name: column.values for name, column in table.items()}
     engine = COMPILED if is_engine_installed(COMPILED) else SCIPY
     rough, fine = (
-        reference.compute_answer(
-            problem, Accuracy(rtol, reference.ANSWER_EVALUATION_BUDGET, engine=engine)
+        reference_answers.compute_answer(
+            problem, Accuracy(rtol, reference_answers.ANSWER_EVALUATION_BUDGET, engine=engine)
         )
         for rtol in _REFERENCE_RTOLS
     )
@@ -326,8 +326,8 @@ def _iterate_possible_explanations(
         )
     for words, other in _iterate_reformulated_problems(problem):
         try:
-            table = reference.compute_answer(
-                other, Accuracy(_EXPLANATION_RTOL, reference.ANSWER_EVALUATION_BUDGET)
+            table = reference_answers.compute_answer(
+                other, Accuracy(_EXPLANATION_RTOL, reference_answers.ANSWER_EVALUATION_BUDGET)
             )
         except RsfStudyError:
             continue

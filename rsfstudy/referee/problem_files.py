@@ -33,7 +33,7 @@ from rsfstudy.motion import (
     slow_manifold_point,
 )
 from rsfstudy.parts import Segment
-from rsfstudy.paths import check_path
+from rsfstudy.path_checks import check_path
 from rsfstudy.rig import Rig, convert_to_si
 from rsfstudy.slider import (
     Scene,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.referee.answer_comparison import AnswerComparison, compare_answers, known_answer
-from rsfstudy.referee.external import read_external_answer
+from rsfstudy.referee.external_answers import read_external_answer
 from rsfstudy.referee.problem_files import read_problem, shipped_problem_files
 
 

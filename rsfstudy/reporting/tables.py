@@ -61,7 +61,7 @@ class TextTable:
         Each a row, by the headings.
     caption : str
         What it shows.
-    wrappable : collection of str
+    wrappable_columns : collection of str
         Headings of columns whose texts may be broken between words; no other is.
     colours : sequence of str
         Colour of the last cell of each row.
@@ -442,8 +442,8 @@ def select_thinned_points(
 
     Parameters
     ----------
-    sizes : mapping of str to int
-    most : int
+    dimension_sizes : mapping of str to int
+    max_cells : int
         The longest dimensions are thinned first.
     """
     kept = {dimension: min(size, max_cells) for dimension, size in dimension_sizes.items()}

@@ -38,21 +38,21 @@ class RecordedMotion(NamedTuple):
 
     Parameters
     ----------
-    segment_starts : list of Event
+    segment_start_events : list of Event
         Beginnings of this segment and of all later segments.
-    friction_before_starts : list of float
+    friction_before_segments : list of float
         Friction coefficient immediately before each beginning. With inertia, the motion approaches
         the slow manifold after a beginning within the inertial time, and the value immediately
         after the beginning is the value on the slow manifold.
-    peak : Event or None
+    peak_event : Event or None
         Requested extremum, or None if the motion has no extremum.
     last_event : Event
         Last event of the motion.
-    rows : ndarray, shape (n, columns)
+    recorded_rows : ndarray, shape (n, columns)
         Recorded samples. The columns are documented in ``rsfstudy.motion.recording``.
     neglected_inertia_error : ndarray, shape (n,)
         Error of ln V up to each row that is caused by neglected inertia. See
-        ``rsfstudy.motion.neglected_inertia``.
+        ``rsfstudy.motion.neglected_inertia_error``.
     """
 
     segment_start_events: list[Event]
@@ -106,7 +106,7 @@ def record_motion_of_segment(
         Scene of the motion.
     accuracy : Accuracy
         Requested accuracy.
-    meter : WorkMeter
+    work_meter : WorkMeter
         Counter of right-hand-side evaluations.
     specifications : sequence of EventSpecification
         Specification of the extremum, followed by other events that may end the motion.
@@ -174,9 +174,9 @@ def path_relative_to_start(
 
     Parameters
     ----------
-    start : Event
+    start_event : Event
         Beginning of the record.
-    path : mapping of str to ndarray
+    path_variables : mapping of str to ndarray
         Quantities along the record.
 
     Returns
@@ -210,7 +210,7 @@ def estimate_error_at_instant(
     ----------
     value : float
         Result of the first run.
-    refined : float
+    refined_value : float
         Result of the refined run.
     friction_derivative : float
         Derivative of the result with respect to the friction coefficient from which the result is
@@ -252,13 +252,13 @@ def estimate_errors_at_instants(
 ) -> dict[str, float]:
     """Estimate the errors of several results that are read at single instants.
 
-    The function ``estimate_instant_error`` documents the estimate.
+    The function ``estimate_error_at_instant`` documents the estimate.
 
     Parameters
     ----------
     values : mapping of str to float
         Results of the first run by name.
-    refined : mapping of str to float
+    refined_values : mapping of str to float
         Results of the refined run by name.
     friction_derivatives : mapping of str to float
         Derivatives of the results with respect to the friction coefficient.

@@ -32,7 +32,7 @@ from rsfstudy.motion import (
 )
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
-from rsfstudy.responses._readings import (
+from rsfstudy.responses._motion_readings import (
     distance_from_steady_sliding,
     friction_quantity_for_events,
     growth_rate_along_path,
@@ -302,7 +302,7 @@ def _record_hold_and_reloading(
     """Record a motion from the state before the hold to the peak of friction.
 
     If there is no peak, the record ends when friction has settled or when the next segment begins.
-    If ``until`` is finite, the record ends at this time, or earlier if the motion cannot continue
+    If ``end_time`` is finite, the record ends at this time, or earlier if the motion cannot continue
     after the peak.
     """
     peak, settled = (

@@ -266,7 +266,7 @@ def compute_jacobian(equations: Equations, unknowns: tuple[float, ...]) -> np.nd
     ----------
     equations : Equations
         Equations of motion.
-    state : tuple of float
+    unknowns : tuple of float
         Unknowns at which the Jacobian is computed.
 
     Returns

@@ -246,7 +246,7 @@ class RigidResponse(Measure):
         Returns
         -------
         distance : float
-            Slip at which the stress passes ``level``.
+            Slip at which the stress passes ``stress_level``.
         stress_left : float
             Stress after a slip of D_c.
         rows : ndarray, shape (points, 3)

@@ -34,7 +34,10 @@ from rsfstudy.motion import (
 )
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
-from rsfstudy.responses._readings import distance_from_steady_sliding, friction_quantity_for_events
+from rsfstudy.responses._motion_readings import (
+    distance_from_steady_sliding,
+    friction_quantity_for_events,
+)
 from rsfstudy.responses._recorded_motion import (
     RecordedMotion,
     estimate_errors_at_instants,

@@ -9,18 +9,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy import lazy_exports
+from rsfstudy._lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from rsfstudy.rig.quantities import (
-        RATIO_FIELD_BY_DIMENSIONAL_NAME,
-        RIG_QUANTITIES,
-        in_display_units,
-        is_friction_stiffness,
+    from rsfstudy.rig.axes_with_units import (
+        axis_name_and_units,
+        convert_axis_to_stated_units,
+        convert_values_to_units,
+        make_axis_with_units,
     )
-    from rsfstudy.rig.rig import Rig
-    from rsfstudy.rig.rig_scenes import LatticeScenesOnRig, put_on_rig, replace_rig_quantity
-    from rsfstudy.rig.scales import (
+    from rsfstudy.rig.dataset_scales import (
         DIMENSIONLESS_PREFIX,
         DISPLAY_BASE_UNITS,
         SCALES_ATTRIBUTE,
@@ -32,13 +30,15 @@ if TYPE_CHECKING:
         read_si_scales,
         slip_rate_from_log,
     )
-    from rsfstudy.rig.table_files import Column, read_table
-    from rsfstudy.rig.unit_axes import (
-        axis_name_and_units,
-        convert_axis_to_stated_units,
-        convert_values_to_units,
-        make_axis_with_units,
+    from rsfstudy.rig.rig import Rig
+    from rsfstudy.rig.rig_quantities import (
+        RATIO_FIELD_BY_DIMENSIONAL_NAME,
+        RIG_QUANTITIES,
+        in_display_units,
+        is_friction_stiffness,
     )
+    from rsfstudy.rig.rig_scenes import LatticeScenesOnRig, put_on_rig, replace_rig_quantity
+    from rsfstudy.rig.table_files import Column, read_table
     from rsfstudy.rig.units import convert_to_si, expand_range, parse_number, unit_factor
 else:
     __getattr__, __dir__ = lazy_exports(

@@ -13,7 +13,7 @@ import pandas as pd
 from rsfstudy.error_boundary import check_regular_file, error_boundary
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.fitting import RECORD_COLUMNS, Record
-from rsfstudy.rig.quantities import is_friction_stiffness
+from rsfstudy.rig.rig_quantities import is_friction_stiffness
 from rsfstudy.rig.table_files import (
     HEADING_PATTERN,
     Column,

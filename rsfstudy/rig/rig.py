@@ -16,8 +16,14 @@ from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import HtmlTableMixin, Quantity
-from rsfstudy.rig import unit_axes
-from rsfstudy.rig.quantities import (
+from rsfstudy.rig import axes_with_units
+from rsfstudy.rig.dataset_scales import (
+    UnitScale,
+    build_scales_of_rig,
+    convert_dataset_units,
+    read_si_scales,
+)
+from rsfstudy.rig.rig_quantities import (
     AXIS_NAME_BY_RIG_NAME,
     RATIO_FIELD_BY_DIMENSIONAL_NAME,
     RIG_QUANTITIES,
@@ -28,12 +34,6 @@ from rsfstudy.rig.quantities import (
     convert_rig_value_to_si,
     derive_scene_fields_from_rig,
     find_si_units_of_field,
-)
-from rsfstudy.rig.scales import (
-    UnitScale,
-    build_scales_of_rig,
-    convert_dataset_units,
-    read_si_scales,
 )
 from rsfstudy.rig.units import convert_to_si
 from rsfstudy.slider import Protocol, Scene, protocol, with_scene_field_signature
@@ -167,7 +167,7 @@ class Rig(HtmlTableMixin):
 
     def axis(self, dimension: str, values: Any, units: Mapping[str, str] | None = None) -> Axis:
         """An axis of a study of this rig, in the units stated; see
-        `rsfstudy.rig.unit_axes.make_axis`.
+        `rsfstudy.rig.axes_with_units.make_axis`.
 
         Parameters
         ----------
@@ -181,7 +181,7 @@ class Rig(HtmlTableMixin):
         units : mapping of str to str, optional
             Of columns of a table that do not state them; SI units by default.
         """
-        return unit_axes.make_axis_with_units(dimension, values, units or "")
+        return axes_with_units.make_axis_with_units(dimension, values, units or "")
 
     def protocol(
         self, segments: Sequence[Segment | Mapping[str, Any]], name: str = "protocol"

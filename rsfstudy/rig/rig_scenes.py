@@ -11,7 +11,10 @@ import numpy as np
 
 from rsfstudy.axes import Axis, AxisRow, classify_rows_by_fields
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.quantities import (
+from rsfstudy.rig.axes_with_units import factor_to_si, make_axis_with_units
+from rsfstudy.rig.dataset_scales import DIMENSIONLESS_PREFIX, build_scales_of_rig
+from rsfstudy.rig.rig import Rig, compute_instability_norm
+from rsfstudy.rig.rig_quantities import (
     AXIS_NAME_BY_RIG_NAME,
     DISPLAY_UNIT_BY_SI_UNIT,
     RATIO_FIELD_BY_DIMENSIONAL_NAME,
@@ -25,9 +28,6 @@ from rsfstudy.rig.quantities import (
     is_dimensionless_field_with_scale,
     is_friction_stiffness,
 )
-from rsfstudy.rig.rig import Rig, compute_instability_norm
-from rsfstudy.rig.scales import DIMENSIONLESS_PREFIX, build_scales_of_rig
-from rsfstudy.rig.unit_axes import factor_to_si, make_axis_with_units
 from rsfstudy.rig.units import multiply_exactly
 from rsfstudy.slider import Scene
 
@@ -43,7 +43,7 @@ class LatticeScenesOnRig:
     ----------
     rig : Rig
         What is fixed.
-    base : Scene
+    base_scene : Scene
         A scene of it.
     axes : sequence of Axis
 
@@ -97,7 +97,7 @@ class LatticeScenesOnRig:
 
         Parameters
         ----------
-        row : mapping of str to value, or to ndarray of float
+        axis_row : mapping of str to value, or to ndarray of float
         """
         units, rig = self.units, self.compute_rig_quantities(axis_row)
         here, found = scale_factors_of_rig(rig), {}
@@ -245,9 +245,9 @@ def replace_rig_quantity(
     Parameters
     ----------
     rig : Rig
-    base : Scene
+    base_scene : Scene
         A scene of the rig.
-    name : str
+    quantity_name : str
         Name of the quantity, as on an axis in units.
     value : object
         Value of the quantity, as on such an axis.

@@ -62,7 +62,7 @@ def check_heading_length(heading: str) -> None:
 def check_heading_lengths(headings: Iterable[str], file_description: str) -> None:
     """Check the length of all headings of a file.
 
-    Errors report ``place`` and the number of the column.
+    Errors report ``file_description`` and the number of the column.
     """
     for column, heading in enumerate(headings, start=1):
         try:
@@ -99,7 +99,7 @@ def parse_column_spec(column_choice: Any, headings: Collection[str]) -> ColumnSp
 
     Parameters
     ----------
-    told : str or sequence
+    column_choice : str or sequence
         Heading, units, scale and offset; or a text such as ``lp (um) * 0.1 + 5``, with or without
         units in brackets, whether or not the heading in the file contains them.
     headings : collection of str

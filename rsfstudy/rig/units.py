@@ -91,9 +91,9 @@ def expand_range(argument_name: str, text: str, range_text: str) -> list[float] 
 
     Parameters
     ----------
-    name, text : str
+    argument_name, text : str
         What errors name.
-    values : str
+    range_text : str
     """
     *before, last = range_text.split(":")
     last, _, units = last.strip().partition(" ")
@@ -127,7 +127,7 @@ def convert_to_si(quantity_name: str, value: Any, units: str) -> float:
 
     Parameters
     ----------
-    name : str
+    quantity_name : str
         What it is the value of.
     value : float, str or pint.Quantity
         A plain number is in SI units already; a text is one number and one unit, as in "5 MPa",

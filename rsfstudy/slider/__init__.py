@@ -48,11 +48,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy import lazy_exports
+from rsfstudy._lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from rsfstudy.slider.assembly import find_inapplicable_fields, replace_field_values
-    from rsfstudy.slider.caching import cached_attribute, cached_per_scene
     from rsfstudy.slider.closed_forms import (
         CLOSED_FORMS,
         effective_friction,
@@ -76,15 +74,13 @@ if TYPE_CHECKING:
         equations_without_mass,
         quasi_static_log_slip_rate,
     )
+    from rsfstudy.slider.field_name_hints import hint_for_unknown_field
     from rsfstudy.slider.fluid import BUILT_IN_PARTS
     from rsfstudy.slider.friction import FrictionFunctions
-    from rsfstudy.slider.hints import hint_for_unknown_field
     from rsfstudy.slider.loading import MIN_SEGMENT_DURATION
+    from rsfstudy.slider.motion_point import MotionPoint
     from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLIP_RATE
-    from rsfstudy.slider.parts import Function, Numbers, field_names
-    from rsfstudy.slider.point import MotionPoint
-    from rsfstudy.slider.protocols import SEGMENT_KEYS, Protocol, UserLoading, protocol
-    from rsfstudy.slider.registry import (
+    from rsfstudy.slider.part_registry import (
         FIELD_NAMES,
         FIELD_QUANTITIES,
         FIELD_TYPES,
@@ -102,13 +98,16 @@ if TYPE_CHECKING:
         scene_field_types,
         with_scene_field_signature,
     )
-    from rsfstudy.slider.sampled_history import (
+    from rsfstudy.slider.parts import Function, Numbers, field_names
+    from rsfstudy.slider.sampled_loading import (
         STRESS_RATE_COLUMN,
         SampledHistory,
         build_sampled_history,
         build_sampled_history_from_table,
     )
     from rsfstudy.slider.scene import ENDLESS_SEGMENT_TABLE, Scene
+    from rsfstudy.slider.scene_assembly import find_inapplicable_fields, replace_field_values
+    from rsfstudy.slider.scene_caching import cached_attribute, cached_per_scene
     from rsfstudy.slider.scene_functions import (
         LOG_RATE_PER_PATH_LENGTH,
         STOPPED_LOG_SLIP_RATE,
@@ -130,6 +129,7 @@ if TYPE_CHECKING:
         steady_friction_minus_reference,
         steady_sliding,
     )
+    from rsfstudy.slider.user_loadings import SEGMENT_KEYS, Protocol, UserLoading, protocol
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,

@@ -21,11 +21,11 @@ class ClosedForm:
     ----------
     formula : str
         The formula.
-    fields : tuple of str
+    scene_field_names : tuple of str
         Names of the fields it takes, in order.
     function : callable
         The formula as a function of those fields.
-    source : str
+    literature_citation : str
         Where it is published.
     """
 

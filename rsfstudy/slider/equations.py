@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from rsfstudy._deprecation import renamed_members
-from rsfstudy.slider.caching import cached_per_scene
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
+from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.slider.parts import Function, Numbers
-from rsfstudy.slider.point import MotionPoint
+from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_functions import RegimeFunctions, SceneFunctions, build_scene_functions
 from rsfstudy.slider.scene_view import SceneView
 
@@ -25,20 +25,20 @@ class Equations(NamedTuple):
     ----------
     regime : str
         Name of the form.
-    unknowns : tuple of str
+    unknown_names : tuple of str
         Names of the unknowns.
-    scales : tuple of float
+    unknown_scales : tuple of float
         The change of each unknown that weighs as much as a change of 1 in ln V.
     rate_function : callable
         ``rate(state, p) -> tuple``: derivatives of the unknowns.
     point_function : callable
-        ``point(state, derivatives, p) -> Point``.
+        ``point(state, derivatives, p) -> MotionPoint``.
     parameters : tuple of float
         The numbers of the scene.
     state_count : int
         How many states the scene has.
-    balance_function : callable or None
-        ``balance_function(spring, psis, p)``: ln(V/V_*), frictional stress and the state lost to
+    force_balance_function : callable or None
+        ``force_balance_function(spring, psis, p)``: ln(V/V_*), frictional stress and the state lost to
         stress; between ruptures only.
     """
 

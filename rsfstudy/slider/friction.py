@@ -39,7 +39,7 @@ from rsfstudy.slider.parameter_layout import (
     A,
 )
 from rsfstudy.slider.parts import Function, Numbers
-from rsfstudy.slider.states import (
+from rsfstudy.slider.state_functions import (
     append_auxiliary_evolutions,
     append_auxiliary_steady_states,
     build_state_contribution_function,
@@ -85,7 +85,7 @@ class FrictionFunctions(NamedTuple):
         its change, ``(changes)``.
     state_count : int
         How many states there are.
-    distance_indices : tuple of int
+    indices_of_states_in_distance : tuple of int
         Places of the states that count for the distance from steady sliding.
     """
 
@@ -199,7 +199,7 @@ def shear_stress_effect_on_state(
 ) -> tuple[float, float]:
     """State variable lost to the present shear stress, and its derivative.
 
-    ``dTheta = -c dtau/sigma`` integrates to a shift of ``c g ln(s)/(s - 1)`` where the normal
+    ``dTheta = -c dtau/sigma`` integrates to a shift of ``c frictional_stress ln(s)/(s - 1)`` where the normal
     stress ratio s changes in proportion to g, and of c g where it does not change.
 
     References
@@ -306,17 +306,17 @@ class FrictionTerms(NamedTuple):
 
     Attributes
     ----------
-    state_count : int
+    law_state_count : int
         How many states the law has.
     evolutions, steady_states : callable
         Of the law.
     state_effects : tuple of callable
         By how much stress lowers the state: of normal stress, of the law, of shear stress.
-    regularised : bool
+    allows_reversed_slip : bool
         Whether slip may reverse.
     normal_stress : callable or None
         Of the case of normal stress.
-    unknown_count : int
+    auxiliary_unknown_count : int
         How many states end in P.
     auxiliary_rates, auxiliary_steady_states : callable or None
         Theirs: auxiliary rates, and what they are in steady sliding.
@@ -325,7 +325,7 @@ class FrictionTerms(NamedTuple):
         their end: -1 where P is that; 0 where there is none.
     has_load_point_unknown : bool
         Whether the unknown that stands last is shear stress K D, and no pressure.
-    excluded_indices : tuple of int
+    state_indices_excluded_from_distance : tuple of int
         Places, among all states, of those that do not count for the distance from steady sliding.
     """
 

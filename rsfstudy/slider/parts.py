@@ -89,7 +89,7 @@ class Part:
     #: because their steady values are extremely large at the slip rate of a rupture. The criteria
     #: for settled motions and for limit cycles ignore these unknowns.
     excluded_from_distance: ClassVar[tuple[str, ...]] = ()
-    #: Names of the quantities in ``requirements.PART_QUANTITIES`` that the rates of the part need.
+    #: Names of the quantities in ``requirements.QUANTITIES_A_PART_MAY_NEED`` that the rates of the part need.
     #: A scene rejects the part if it cannot provide a quantity.
     needs: ClassVar[Collection[str]] = frozenset()
     #: Names of the quantities that the functions of the slot receive.
@@ -233,7 +233,7 @@ def number(
     scale : str, optional
         Scale of a dimensionless field, for example ``"sigma_*"``.
     rule : str, optional
-        Condition that values must satisfy, a key of ``RULES``.
+        Condition that values must satisfy, a key of ``VALUE_RULES``.
     remedy : str, optional
         Last sentence of the error message if a value violates the rule.
     omit_if_none : bool, default: False
@@ -315,9 +315,9 @@ def is_boolean_field(part_class: type[Part], field_name: str) -> bool:
 
     Parameters
     ----------
-    part : type
+    part_class : type
         Class of the part.
-    name : str
+    field_name : str
         Name of the field.
 
     Returns
@@ -333,7 +333,7 @@ def field_names(part_class: type[Part]) -> tuple[str, ...]:
 
     Parameters
     ----------
-    part : type
+    part_class : type
         Class of the part.
 
     Returns
@@ -388,7 +388,7 @@ def field_quantities(part_class: type[Part]) -> list[Quantity]:
 
     Parameters
     ----------
-    part : type
+    part_class : type
         Class of the part.
 
     Returns
@@ -415,9 +415,9 @@ def validate_field_value(part_class: type[Part], field_name: str, value: Any) ->
 
     Parameters
     ----------
-    part : type
+    part_class : type
         Class of the part.
-    name : str
+    field_name : str
         Name of the field.
     value : object
         Value to validate.
@@ -466,7 +466,7 @@ def discover_parts(package: str, package_path: Iterable[str]) -> dict[str, type[
     ----------
     package : str
         Name of the package.
-    path : iterable of str
+    package_path : iterable of str
         Folders of the package, as in the attribute ``__path__``.
 
     Returns

@@ -23,19 +23,19 @@ from rsfstudy.slider import (
     loading,
     normal_stress,
     parameter_layout,
-    registry,
+    part_registry,
     scene_functions,
     stability,
 )
-from rsfstudy.slider.assembly import SceneBase, SceneParts
-from rsfstudy.slider.caching import cached_attribute
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.fluid._boundary_pressure import FluidWithBoundaryPressure
 from rsfstudy.slider.loading.step import StepLoading
+from rsfstudy.slider.needed_quantities import check_needed_quantities
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.requirements import check_needed_quantities
+from rsfstudy.slider.scene_assembly import SceneBase, SceneParts
+from rsfstudy.slider.scene_caching import cached_attribute
 from rsfstudy.slider.slider_parameters import SliderParameters
-from rsfstudy.slider.states import check_steady_states
+from rsfstudy.slider.state_functions import check_steady_states
 
 #: Number of cached critical stiffnesses. Studies request the same values repeatedly along axes that
 #: do not affect friction.
@@ -218,7 +218,7 @@ class Scene(SceneBase):
     __signature__: ClassVar[Signature] = Signature(
         [
             Parameter(n, Parameter.KEYWORD_ONLY, default=d)
-            for n, d in registry.scene_field_defaults().items()
+            for n, d in part_registry.scene_field_defaults().items()
         ]
     )
 
@@ -287,7 +287,7 @@ class Scene(SceneBase):
 
         Parameters
         ----------
-        index : int
+        segment_index : int
             Index of the segment.
 
         Returns
@@ -492,7 +492,7 @@ class Scene(SceneBase):
         return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores)
 
 
-registry.RESERVED_NAMES.update(dir(Scene), Scene.__annotations__)
+part_registry.RESERVED_NAMES.update(dir(Scene), Scene.__annotations__)
 
 
 @lru_cache(_CRITICAL_STIFFNESS_CACHE_SIZE)

@@ -30,11 +30,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rsfstudy.slider import friction
 from rsfstudy.slider.friction import FrictionFunctions, build_friction_functions
+from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.slider.parameter_layout import LOAD_VELOCITY, LOG_LOAD_VELOCITY, MU_STAR, STIFFNESS, A
 from rsfstudy.slider.parts import Function, Numbers
-from rsfstudy.slider.point import MotionPoint
 from rsfstudy.slider.scene_view import SceneView
-from rsfstudy.slider.states import (
+from rsfstudy.slider.state_functions import (
     build_tuple_scaling_function,
     default_steady_state,
     wrap_single_state_evolution,
@@ -204,7 +204,7 @@ def build_rigid_rate_function(friction_functions: FrictionFunctions) -> Function
 
 
 def build_point_assembling_function(friction_functions: FrictionFunctions) -> Function:
-    """``(x, growth, forces, states, changes, shift, p) -> Point`` at x = ln(V/V_*), which grows so:
+    """``(x, growth, forces, states, changes, shift, p) -> MotionPoint`` at x = ln(V/V_*), which grows so:
     of forces, f and its change, g and its change; the states, their changes, and what stress has
     taken from them.
 
@@ -270,7 +270,7 @@ def build_point_function_between_ruptures(
     log_slip_rate_growth_function: Function,
     assemble_point: Function,
 ) -> Function:
-    """``(state, rates, p) -> Point`` between ruptures, where ``a dx = strength'(g) dg -
+    """``(state, rates, p) -> MotionPoint`` between ruptures, where ``a dx = strength'(g) dg -
     contribution`` says how g changes.
     """
     strength, contribution, end = (
@@ -294,7 +294,7 @@ def build_point_function_between_ruptures(
 def build_point_function_in_rupture(
     friction_functions: FrictionFunctions, assemble_point: Function
 ) -> Function:
-    """``(state, rates, p) -> Point`` of the full equations."""
+    """``(state, rates, p) -> MotionPoint`` of the full equations."""
     strength, states_at, end = (
         friction_functions.strength,
         friction_functions.states_from_strength,
@@ -313,7 +313,7 @@ def build_point_function_in_rupture(
 def build_rigid_point_function(
     friction_functions: FrictionFunctions, assemble_point: Function
 ) -> Function:
-    """``(state, rates, p) -> Point`` of a rigid slider, whose f is g."""
+    """``(state, rates, p) -> MotionPoint`` of a rigid slider, whose f is g."""
     strength, states_at = friction_functions.strength, friction_functions.states_from_strength
 
     def point(state: Numbers, rates: Numbers, p: Numbers) -> MotionPoint:
@@ -333,11 +333,11 @@ class RegimeFunctions(NamedTuple):
 
     Attributes
     ----------
-    clock_rates, path_rates, path_rates_with_time : callable
+    rates_against_clock, rates_along_path, rates_along_path_with_time : callable
         ``(state, p)``: derivatives of the unknowns against slip and load point displacement
         together, or inertial time; along the path; and so with time as a passenger.
-    point_function : callable
-        ``(state, derivatives, p) -> Point``.
+    build_point_assembling_function : callable
+        ``(state, derivatives, p) -> MotionPoint``.
     """
 
     rates_against_clock: Function
@@ -351,15 +351,15 @@ class SceneFunctions(NamedTuple):
 
     Attributes
     ----------
-    friction : FrictionFunctions
+    friction_functions : FrictionFunctions
         What they are made of.
-    balance_function : callable
+    force_balance_function : callable
         ``(spring, psis, p)``: ln(V/V_*), frictional stress and the state lost to stress, between
         ruptures.
-    between_ruptures : RegimeFunctions
-    in_rupture : RegimeFunctions or None
+    functions_between_ruptures : RegimeFunctions
+    functions_in_rupture : RegimeFunctions or None
         Where mass acts.
-    rigid_rate_function, rigid_point_function : callable
+    build_rigid_rate_function, build_rigid_point_function : callable
         Those of a rigid slider, against slip.
     """
 

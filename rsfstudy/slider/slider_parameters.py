@@ -99,7 +99,7 @@ def with_stiffness_default(field_values: dict[str, Any]) -> dict[str, Any]:
 
     Parameters
     ----------
-    values : dict of str to float
+    field_values : dict of str to float
         Values by field name.
 
     Returns

@@ -32,13 +32,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsfstudy.slider.caching import cached_per_scene
 from rsfstudy.slider.equations import build_friction_relation
-from rsfstudy.slider.law_slopes import (
+from rsfstudy.slider.evolution_derivatives import (
     Matrix,
     StateEvolutionDerivatives,
     compute_state_evolution_derivatives,
 )
+from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding, steady_sliding
 
@@ -219,8 +219,8 @@ def linear_friction_response(
     Parameters
     ----------
     scene : Scene
-    steady : SteadySliding
-    slopes : LawSlopes, optional
+    steady_state : SteadySliding
+    evolution_derivatives : LawSlopes, optional
         Derivatives of the state evolution. By default the derivatives are computed.
 
     Returns
@@ -396,7 +396,7 @@ def spring_response_to_normal_stress(
     scene : Scene
     log_slip_rate : float
         ln(V/V_*).
-    frequency : float
+    angular_frequency : float
         omega D_c/V_*.
 
     Raises

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
-from rsfstudy.slider.caching import cached_per_scene
 from rsfstudy.slider.equations import build_friction_relation, compute_steady_states
 from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
 
 #: Deviation of frictional stress, over sigma_*, beyond which none counts as steady.
@@ -36,7 +36,7 @@ class SteadySliding:
     log_slip_rate : float
     frictional_stress, spring_stress : float
         Deviations of frictional stress and of spring stress from tau_*, over sigma_*.
-    psis : tuple of float
+    states : tuple of float
         States freed of stress.
     """
 
@@ -99,14 +99,14 @@ def frictional_stress_for_friction(
     """Deviation of frictional stress from tau_*, over sigma_*, at which the friction coefficient is
     mu_* + `excess`; None where it never is.
 
-    ``(mu_* + g)/s(g) = mu_* + excess``, s being the normal stress ratio; where normal stress
+    ``(mu_* + g)/s(g) = mu_* + friction_minus_reference``, s being the normal stress ratio; where normal stress
     follows shear stress there is none below phi = atan(mu_ss), eq. 9 of
     doi:10.1007/s11589-014-0098-4.
 
     Parameters
     ----------
     scene : Scene
-    excess : float
+    friction_minus_reference : float
         Friction coefficient less mu_*.
     """
     relation = build_friction_relation(scene)
@@ -126,15 +126,15 @@ def frictional_stress_after_jump(
     """Deviation of frictional stress from tau_*, over sigma_*, just after a sudden change; None
     where there is none.
 
-    The states freed of stress stay as they are, so that ``strength(g) = excess`` with ``excess = a
+    The states freed of stress stay as they are, so that ``strength(g) = strength`` with ``excess = a
     ln(V/V_*) + sum of Psi_i`` (eqs. 12 and 13 of doi:10.1007/s11589-014-0098-4).
 
     Parameters
     ----------
     scene : Scene
-    excess : float
+    strength : float
         What strength becomes, over sigma_*.
-    psis : tuple of float, optional
+    states : tuple of float, optional
         States freed of stress, by which pore pressure is told; else that of steady sliding.
     """
     relation = build_friction_relation(scene, states)

@@ -9,17 +9,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy import lazy_exports
+from rsfstudy._lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from rsfstudy.storage.comparison import (
-        Comparison,
-        compare_results,
-        compare_same_lattice,
-        find_cell_number,
-    )
-    from rsfstudy.storage.dataset_scenes import scene_of_dataset
-    from rsfstudy.storage.journal import (
+    from rsfstudy.storage.cell_journal import (
         CellColumns,
         CellJournal,
         CellTimings,
@@ -28,8 +21,20 @@ if TYPE_CHECKING:
         find_fingerprint_differences,
         read_timings,
     )
-    from rsfstudy.storage.lattice import assemble_dataset
-    from rsfstudy.storage.rebuild import find_primary_output, rebuild_study, study_of_dataset
+    from rsfstudy.storage.comparison import (
+        Comparison,
+        compare_results,
+        compare_same_lattice,
+        find_cell_number,
+    )
+    from rsfstudy.storage.dataset_files import clean_attributes, read_dataset, write_dataset
+    from rsfstudy.storage.dataset_scenes import scene_of_dataset
+    from rsfstudy.storage.lattice_datasets import assemble_dataset
+    from rsfstudy.storage.rebuild_from_file import (
+        find_primary_output,
+        rebuild_study,
+        study_of_dataset,
+    )
     from rsfstudy.storage.schema import (
         build_axis_from_stored,
         build_scene_from_stored,
@@ -40,7 +45,6 @@ if TYPE_CHECKING:
         read_provenance,
         read_scene_fields,
     )
-    from rsfstudy.storage.store import clean_attributes, read_dataset, write_dataset
     from rsfstudy.storage.zarr_store import (
         check_store_does_not_exist,
         check_zarr_installed,

@@ -18,8 +18,8 @@ from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import format_list
 from rsfstudy.status import STATUS_LABELS, Status
-from rsfstudy.storage.journal import find_fingerprint_differences
-from rsfstudy.storage.rebuild import find_primary_output
+from rsfstudy.storage.cell_journal import find_fingerprint_differences
+from rsfstudy.storage.rebuild_from_file import find_primary_output
 from rsfstudy.storage.schema import is_of_single_scene, read_provenance
 from rsfstudy.vocabulary import TIMING_VARIABLES
 
@@ -126,19 +126,19 @@ class Comparison:
         Parts of the declarations that differ, by their paths; None where one has no such part.
     origin : mapping of str to (object, object)
         Versions and machines that differ.
-    points : mapping of str to (list, list)
+    differing_axis_points : mapping of str to (list, list)
         Points that only the first has, and only the second, of axes that differ.
-    cells : tuple of int
+    finished_cell_counts : tuple of int
         Finished cells that both have, that only the first has, and only the second.
     statuses : pandas.DataFrame
         One row for each cell that both have and that ended otherwise: its place on each axis,
         ``first`` and ``second``.
-    numbers : pandas.DataFrame
+    agreement_table : pandas.DataFrame
         One row a variable that both have, over the cells that both have: ``variable``, ``values``,
         ``identical``, ``largest_difference``, and ``beyond_errors``, how many differ by more than
         the sum of both error estimates (NaN where there are none; a headline without an estimate
         counts as exact).
-    left_out : mapping of str to str
+    uncompared_variables : mapping of str to str
         Variables that are not compared, and why.
     """
 

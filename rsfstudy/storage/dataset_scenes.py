@@ -15,7 +15,7 @@ from rsfstudy.slider import (
     normalise_field_value,
     protocol,
 )
-from rsfstudy.storage.lattice import build_lattice_coordinates
+from rsfstudy.storage.lattice_datasets import build_lattice_coordinates
 from rsfstudy.storage.schema import build_scene_from_stored, invalid_part_error, read_scene_fields
 from rsfstudy.study import Study
 

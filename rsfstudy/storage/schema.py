@@ -253,11 +253,11 @@ def build_scene_from_stored(
 
     Parameters
     ----------
-    plain : mapping
+    stored_scene : mapping
         Its fields.
-    own : mapping of str to type
+    user_parts : mapping of str to type
         Its parts that are a user's own, by name.
-    path : str
+    path_in_file : str
         Where it stands in its file.
 
     Raises
@@ -359,12 +359,12 @@ def convert_plain_data_to_type(plain_data: Any, annotated_type: Any, path_in_fil
 
     Parameters
     ----------
-    value : object
+    plain_data : object
         What JSON gives.
-    kind : type
+    annotated_type : type
         A type, or another annotation of a field. Of a typed dictionary what it does not name is
         left out.
-    path : str
+    path_in_file : str
         Where the value stands in its file.
 
     Raises

@@ -18,13 +18,13 @@ import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.status import Status
-from rsfstudy.storage.journal import CellColumns, OutputPacking
-from rsfstudy.storage.lattice import (
+from rsfstudy.storage.cell_journal import CellColumns, OutputPacking
+from rsfstudy.storage.dataset_files import ZARR_OPEN_OPTIONS, open_zarr_store, write_store_digest
+from rsfstudy.storage.lattice_datasets import (
     build_lattice_coordinates,
     build_lattice_variables,
     root_attributes,
 )
-from rsfstudy.storage.store import ZARR_OPEN_OPTIONS, open_zarr_store, write_store_digest
 from rsfstudy.study import Study
 
 #: Numbers in one piece, 32 MB of float64: whole rows along the first axis, one at least.

@@ -9,17 +9,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy import lazy_exports
+from rsfstudy._lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from rsfstudy.study.catalogue import load_study
-    from rsfstudy.study.cell import Cell, CellChanges
     from rsfstudy.study.claims import NOT_APPLICABLE_VERDICT, VERDICTS, Claim, build_verdict_table
     from rsfstudy.study.figure_declarations import DrawFunction, Figure, Panel, name_of_figure
+    from rsfstudy.study.lattice_cell import Cell, CellChanges
     from rsfstudy.study.reductions.base import failed_cell_mask, read_undocumented_quantities
-    from rsfstudy.study.rig_studies import convert_study_to_rig_units
+    from rsfstudy.study.studies_on_rig import convert_study_to_rig_units
     from rsfstudy.study.study import Study
     from rsfstudy.study.study_index import STUDIES_PACKAGE, study_names, study_titles
+    from rsfstudy.study.study_loader import load_study
     from rsfstudy.study.user_parts import find_named_user_parts
     from rsfstudy.study.verdict_table import format_verdict_row
 else:

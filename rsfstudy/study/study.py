@@ -42,13 +42,13 @@ from rsfstudy.slider import (
     replace_names_by_user_parts,
     scene_field_quantities,
 )
-from rsfstudy.study import checks
-from rsfstudy.study.cell import Cell, CellChanges
+from rsfstudy.study import declaration_checks
+from rsfstudy.study.axis_overrides import replace_field_values, select_axis_points, to_plain_values
 from rsfstudy.study.claims import Claim
 from rsfstudy.study.figure_declarations import check_figure, name_of_figure
-from rsfstudy.study.html import study_html
-from rsfstudy.study.overrides import replace_field_values, select_axis_points, to_plain_values
+from rsfstudy.study.lattice_cell import Cell, CellChanges
 from rsfstudy.study.reductions.application import Reduction
+from rsfstudy.study.study_html import study_html
 from rsfstudy.study.user_parts import find_named_user_parts, user_field_quantities
 
 #: Most bytes of the name of a study: a file name has at most 255, and endings follow.
@@ -138,18 +138,20 @@ class Study:
             raise InvalidValue("version", self.version, "must be a whole number, 1 or more")
         if not isinstance(self.overrides, Mapping):
             raise InvalidValue("overrides", self.overrides, "must map names to values")
-        checks.check_types(vars(self))
+        declaration_checks.check_types(vars(self))
         if self.rig is not None:
             object.__setattr__(
                 self, "axes", [convert_axis_to_stated_units(axis) for axis in self.axes]
             )
-        checks.check_name_clashes(self.measure, self.reductions, self.axes)
-        checks.check_user_fields(self.measure, self.reductions, self.scene_fields)
-        checks.check_axis_fields(self.measure, self.axes, self.scene_fields, self.scene_builder)
+        declaration_checks.check_name_clashes(self.measure, self.reductions, self.axes)
+        declaration_checks.check_user_fields(self.measure, self.reductions, self.scene_fields)
+        declaration_checks.check_axis_fields(
+            self.measure, self.axes, self.scene_fields, self.scene_builder
+        )
         varied = [axis.rows for axis in self.axes if not set(axis.fields) <= self.scene_field_names]
         changes = (self.split_rows(rows)[1] for rows in itertools.product(*varied))
-        checks.check_outputs_do_not_vary(self.measure, changes)
-        checks.check_axes_are_distinct(self.axes)
+        declaration_checks.check_outputs_do_not_vary(self.measure, changes)
+        declaration_checks.check_axes_are_distinct(self.axes)
         for name, value in self.describe().items():
             try:
                 json.dumps(value)
@@ -376,8 +378,8 @@ class Study:
             )
         ):
             rule = "is neither an axis nor a field of the scene or of the measure"
-            raise checks.unknown_name_error("override", field_name, rule, known)
-        checks.check_fields_not_solved_for(self.measure, [field_name])
+            raise declaration_checks.unknown_name_error("override", field_name, rule, known)
+        declaration_checks.check_fields_not_solved_for(self.measure, [field_name])
         if is_sequence_of_axis_values(value):
             return replace(self, axes=(self._make_axis(field_name, values), *self.axes))
         if self.rig is not None and of_rig:
@@ -398,7 +400,7 @@ class Study:
                 else select_axis_points(axis, values)
             )
         if field_name in axis.fields:
-            checks.check_override_of_partly_set_field(
+            declaration_checks.check_override_of_partly_set_field(
                 self.base, self.user_parts, axis, field_name, values
             )
             return replace_field_values(

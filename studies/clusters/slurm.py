@@ -16,8 +16,8 @@ import distributed
 from dask_jobqueue.slurm import SLURMCluster
 
 import rsfstudy
-from rsfstudy.cli import assignments, options
-from rsfstudy.study import catalogue
+from rsfstudy.cli import assignment_parsing, options
+from rsfstudy.study import study_loader
 
 #: Options of one job. Each of the 16 worker processes has one thread, because a cell uses its
 #: thread fully.
@@ -75,7 +75,7 @@ def main(
 @options.output_option
 def command(study: str, settings: tuple[str, ...], **choices: Any) -> None:
     """Run a named study or a study file (STUDY) on a SLURM cluster."""
-    overrides = assignments.parse_overrides(catalogue.load_study(study), settings)
+    overrides = assignment_parsing.parse_overrides(study_loader.load_study(study), settings)
     main(study, {**choices, **overrides, "command": shlex.join(sys.argv)})
 
 

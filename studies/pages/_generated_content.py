@@ -26,9 +26,9 @@ from rsfstudy.parts import Part
 from rsfstudy.quantities import html_symbol as in_html
 from rsfstudy.quantities import html_unit as unit_in_html
 from rsfstudy.reductions import Reduction
-from rsfstudy.rig import quantities
-from rsfstudy.slider import field_names, registry
-from rsfstudy.study import catalogue, study_index
+from rsfstudy.rig import rig_quantities
+from rsfstudy.slider import field_names, part_registry
+from rsfstudy.study import study_index, study_loader
 from rsfstudy.study.verdict_table import format_published_value
 from rsfstudy.vocabulary import QUANTITY_BY_NAME, find_quantity
 
@@ -206,8 +206,8 @@ def scene_fields() -> str:
     str
         Table in Markdown.
     """
-    abouts = {about.name: about for about in registry.FIELD_QUANTITIES}
-    defaults = registry.scene_field_defaults()
+    abouts = {about.name: about for about in part_registry.FIELD_QUANTITIES}
+    defaults = part_registry.scene_field_defaults()
     rows = (
         (
             f"`{name}`",
@@ -218,7 +218,7 @@ def scene_fields() -> str:
             strip_markup(about.long_name),
             _parts_with(name),
         )
-        for name, about in ((name, abouts[name]) for name in registry.FIELD_NAMES)
+        for name, about in ((name, abouts[name]) for name in part_registry.FIELD_NAMES)
     )
     return markdown_table(("field", "symbol", "unit", "default", "rule", "meaning", "of"), rows)
 
@@ -231,7 +231,7 @@ def _default(name: str, defaults: Mapping[str, Any]) -> object:
 
 def _rule(name: str) -> str:
     """Return the rule for the values of a field."""
-    owner = registry.PART_CLASS_BY_FIELD_NAME.get(name)
+    owner = part_registry.PART_CLASS_BY_FIELD_NAME.get(name)
     if owner is None:
         return ""
     return (
@@ -256,7 +256,7 @@ def _parts_with(name: str) -> str:
     """
     owners = [
         f"`{part.name}`"
-        for slot in registry.SLOTS
+        for slot in part_registry.SLOTS
         for part in slot.built_in_parts.values()
         if name in field_names(part)
     ]
@@ -271,10 +271,10 @@ def parts() -> str:
     str
         Sections in Markdown.
     """
-    return "\n\n".join(_slot(slot) for slot in registry.SLOTS)
+    return "\n\n".join(_slot(slot) for slot in part_registry.SLOTS)
 
 
-def _slot(slot: registry.Slot) -> str:
+def _slot(slot: part_registry.Slot) -> str:
     """Format the section of a slot."""
     rows = (
         (f"`{name}`" + (" (default)" if name == slot.default_part_name else ""), first_paragraph(part),
@@ -338,10 +338,12 @@ def rig() -> str:
     str
         Table in Markdown.
     """
-    must = {name: name in quantities.REQUIRED_QUANTITIES for name in quantities.RIG_QUANTITIES}
+    must = {
+        name: name in rig_quantities.REQUIRED_QUANTITIES for name in rig_quantities.RIG_QUANTITIES
+    }
     rows = (
         (f"`{name}`", units, must[name], f"{least:g} to {most:g}")
-        for name, (units, least, most, *_words) in quantities.RIG_QUANTITIES.items()
+        for name, (units, least, most, *_words) in rig_quantities.RIG_QUANTITIES.items()
     )
     return markdown_table(("quantity", "SI unit", "must be stated", "usual, in that unit"), rows)
 
@@ -406,7 +408,7 @@ def _measure(kind: type[Measure], example: Measure | None) -> str:
 @cache
 def _studies() -> dict[str, Study]:
     """Return the named studies by name."""
-    return {name: catalogue.load_study(name) for name in study_index.study_names()}
+    return {name: study_loader.load_study(name) for name in study_index.study_names()}
 
 
 def _format_call(kind: type[Any], stated: Iterable[Measure | Reduction]) -> str:
@@ -545,7 +547,7 @@ def vocabulary() -> str:
             strip_markup(about.long_name),
         )
         for about in QUANTITY_BY_NAME.values()
-        if about.name not in registry.FIELD_NAMES
+        if about.name not in part_registry.FIELD_NAMES
     )
     return markdown_table(("name", "symbol", "unit", "meaning"), rows)
 

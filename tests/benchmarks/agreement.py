@@ -24,7 +24,7 @@ from rsfstudy.named_studies._random_scenes import MOTION_QUESTIONS, random_scene
 from rsfstudy import Scene
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.study import catalogue
+from rsfstudy.study import study_loader
 
 #: What random scenes are like.
 RANDOM_SCENE_TEMPLATES = [
@@ -110,14 +110,14 @@ def random_scenes(
 
 def cells_of(name: str) -> Iterator[tuple[Measure, Scene, Accuracy]]:
     """The cells of a named study."""
-    study = catalogue.load_study(name)
+    study = study_loader.load_study(name)
     for scene, changes in study.cells():
         yield study.measure.with_(**changes), scene, study.accuracy
 
 
 def hard_cases() -> Iterator[tuple[Measure, Scene, Accuracy]]:
     """The scenes of the study of hard cases, each with the measure it is hard for."""
-    study: Any = catalogue.load_study("hard_cases")
+    study: Any = study_loader.load_study("hard_cases")
     for problem in study.measure.problems:
         yield problem.measure, problem.scene, study.accuracy
 

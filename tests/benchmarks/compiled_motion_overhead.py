@@ -19,7 +19,7 @@ from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Measure
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.compiled import machine
+from rsfstudy.motion.compiled import numba_backend
 
 ACCURACY = Accuracy(1e-7, engine="compiled")
 
@@ -41,13 +41,13 @@ def cases() -> dict[str, tuple[Measure, Scene]]:
 
 def record_calls(measure: Measure, scene: Scene) -> list[tuple[Any, ...]]:
     """Copies of the arguments of all calls of the loop in a measurement."""
-    run, kept = machine.get_compiled_loop(), list[tuple[Any, ...]]()
+    run, kept = numba_backend.get_compiled_loop(), list[tuple[Any, ...]]()
 
     def noting(*arguments: Any) -> Any:
         kept.append(copy_arguments(arguments))
         return run(*arguments)
 
-    with mock.patch.object(machine, "get_compiled_loop", return_value=noting):
+    with mock.patch.object(numba_backend, "get_compiled_loop", return_value=noting):
         measure(scene, ACCURACY)
     return kept
 
@@ -69,7 +69,7 @@ def measurement_time(measure: Measure, scene: Scene) -> float:
 
 def repeated_call_time(calls: list[tuple[Any, ...]]) -> float:
     """How long the calls of the loop take, without the copies."""
-    run = machine.get_compiled_loop()
+    run = numba_backend.get_compiled_loop()
     arguments = [copy_arguments(each) for each in calls]
     began = time.perf_counter()
     for each in arguments:

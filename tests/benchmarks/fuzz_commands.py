@@ -270,10 +270,10 @@ EXCLUDED_FLAGS = {("run", "every")}
 
 def field_names() -> tuple[str, ...]:
     """Return names that ``--set`` accepts, and a few unknown names."""
-    from rsfstudy.slider import registry
+    from rsfstudy.slider import part_registry
 
     return (
-        *registry.scene_field_defaults(),
+        *part_registry.scene_field_defaults(),
         "case",
         "sample",
         "stiffnes",

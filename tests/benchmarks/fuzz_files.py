@@ -38,9 +38,9 @@ from forked_calls import call_in_child
 import rsfstudy
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.reductions import LinearFit
-from rsfstudy.referee import external, problem_files
+from rsfstudy.referee import external_answers, problem_files
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.storage import store
+from rsfstudy.storage import dataset_files
 
 STUDY = rsfstudy.Study(
     name="small",
@@ -102,15 +102,15 @@ def open_results(path: Path) -> xr.Dataset:
 
 
 def open_dataset(path: Path) -> xr.Dataset:
-    return store.read_dataset(path).load()
+    return dataset_files.read_dataset(path).load()
 
 
 def show_html(path: Path) -> str:
-    return str(store.read_dataset(path).rsf._repr_html_())
+    return str(dataset_files.read_dataset(path).rsf._repr_html_())
 
 
 def draw_plot(path: Path) -> Any:
-    return store.read_dataset(path).rsf.plot()
+    return dataset_files.read_dataset(path).rsf.plot()
 
 
 def resume_run(path: Path) -> xr.Dataset:
@@ -118,7 +118,7 @@ def resume_run(path: Path) -> xr.Dataset:
 
 
 def answer_record(path: Path) -> Any:
-    return external.read_external_answer(
+    return external_answers.read_external_answer(
         path, problem_files.read_problem(problem_files.shipped_problem_files()[1])
     )
 
@@ -158,7 +158,7 @@ def rewrite(path: Path, chance: random.Random) -> bool:
         warnings.simplefilter("ignore")
         dataset = hostile_dataset(xr.load_dataset(path), chance)
         if chance.random() < 0.7:
-            store.write_dataset(dataset, path)
+            dataset_files.write_dataset(dataset, path)
         else:
             dataset.to_netcdf(path)
     return False
@@ -279,7 +279,7 @@ def write_valid_files(place: Path) -> dict[str, Any]:
     (place / "zarr" / "small.zarr").rename(place / "small.zarr")
     shutil.copy(place / "small.nc", place / "whole.nc")
     motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=0.5, rtol=1e-4)
-    store.write_dataset(motion, place / "motion.nc")
+    dataset_files.write_dataset(motion, place / "motion.nc")
     time = np.arange(600) * 0.2
     moved = np.where(time < 60.0, time, 10.0 * time - 540.0)
     stress = 0.6 + 1e-4 * np.random.default_rng(1).standard_normal(600)

@@ -26,10 +26,10 @@ import numpy as np
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
-from rsfstudy.execution import runner
+from rsfstudy.execution import study_run
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.status import Status
 
 
@@ -91,8 +91,8 @@ def time_phases(seconds: dict[str, float]) -> Iterator[None]:
 
     with contextlib.ExitStack() as stack:
         for name, phase in PHASE_OF_METHOD.items():
-            noted = noting(getattr(runner.StudyRun, name), phase)
-            stack.enter_context(mock.patch.object(runner.StudyRun, name, noted))
+            noted = noting(getattr(study_run.StudyRun, name), phase)
+            stack.enter_context(mock.patch.object(study_run.StudyRun, name, noted))
         yield
 
 

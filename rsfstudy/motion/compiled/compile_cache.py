@@ -34,7 +34,7 @@ from numba.core.caching import FunctionCache
 from numba.core.ccallback import CFunc
 from numba.core.sigutils import normalize_signature
 
-from rsfstudy.motion.compiled.array_calls import COMPILED_REPLACEMENT_BY_FUNCTION
+from rsfstudy.motion.compiled.array_operations import COMPILED_REPLACEMENT_BY_FUNCTION
 from rsfstudy.motion.engines import compilation_log
 
 _CACHE_ENTRY_FILE_NAME = "motion.py"

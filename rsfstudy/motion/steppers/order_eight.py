@@ -9,8 +9,8 @@ import math
 
 from scipy.integrate import DOP853
 
-from rsfstudy.motion.array_calls import evaluate_in_place, offset_pointer
-from rsfstudy.motion.longest_step import MAX_STEP_LENGTH
+from rsfstudy.motion.array_operations import evaluate_in_place, offset_pointer
+from rsfstudy.motion.max_step_length import MAX_STEP_LENGTH
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper
 from rsfstudy.motion.steppers.unrolled_step import (
     DENSE_ROW_COUNT,

@@ -18,10 +18,10 @@ from scipy.integrate import (
     Radau,
 )
 
-from rsfstudy.motion.layout import SLOW_REGIME
-from rsfstudy.motion.longest_step import MAX_STEP_LENGTH
-from rsfstudy.motion.meter import MotionStopped
+from rsfstudy.motion.array_layout import SLOW_REGIME
+from rsfstudy.motion.max_step_length import MAX_STEP_LENGTH
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper, order_eight
+from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.slider import Equations, Numbers
 from rsfstudy.status import Status
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy._deprecation import renamed_members
+from rsfstudy.slider.needed_quantities import QUANTITIES_A_PART_MAY_NEED
 from rsfstudy.slider.parts import Function, Part, discover_parts
-from rsfstudy.slider.requirements import QUANTITIES_A_PART_MAY_NEED
 from rsfstudy.slider.scene_view import SceneView
 
 
@@ -24,12 +24,12 @@ class Dynamics(Part):
     The dynamics are defined by functions that receive the friction of a scene, an instance of
     ``rsfstudy.slider.FrictionFunctions``, and return functions of floats:
 
-    - ``slip_rate(friction)`` returns two functions. The function ``balance(spring, psis, p)``
+    - ``build_slip_rate_functions(friction)`` returns two functions. The function ``balance(spring, psis, p)``
       returns :math:`\ln(V/V_*)`, the frictional stress g and the decrease of the state due to
       stress. The function ``growth(state, rates, x, g, p)`` returns the derivative of :math:`x =
       \ln(V/V_*)` along the motion. The argument ``state`` contains the spring stress and the states
       ``psis``, and ``rates`` contains the derivatives of ``state``.
-    - ``rupture_rate(friction)`` is optional. It returns a function ``rate(state, p)`` for the full
+    - ``build_rupture_rate_function(friction)`` is optional. It returns a function ``rate(state, p)`` for the full
       equations of motion during ruptures. This function returns the derivatives of the spring
       stress f, of x, of g and of all states except the first with respect to inertial time.
 

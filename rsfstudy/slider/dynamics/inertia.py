@@ -1,7 +1,7 @@
 """Inertia of the slider, defined by the period T of free oscillation.
 
-If inertia is weak, the motion follows the slow manifold of the full equations (``slip_rate``).
-During ruptures, the full equations are integrated (``rupture_rate``).
+If inertia is weak, the motion follows the slow manifold of the full equations (``build_slip_rate_functions``).
+During ruptures, the full equations are integrated (``build_rupture_rate_function``).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from rsfstudy.slider.parameter_layout import (
 from rsfstudy.slider.parts import Function, Numbers, flag
 from rsfstudy.slider.scene_functions import velocity_ratios
 from rsfstudy.slider.scene_view import SceneView
-from rsfstudy.slider.states import build_state_step_function
+from rsfstudy.slider.state_functions import build_state_step_function
 
 #: Upper limit of rates per inertial time. Larger rates occur only in trial steps, because a motion
 #: returns to the slow manifold long before its slip rate relaxes this fast.
@@ -41,7 +41,7 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
 
     Parameters
     ----------
-    friction : FrictionFunctions
+    friction_functions : FrictionFunctions
         Friction of the scene.
 
     Returns
@@ -221,14 +221,14 @@ def compute_inertia_weight(
     r"""Compute the weight of inertia.
 
     The weight is the lag of :math:`\ln V` behind its quasi-static value, divided by the derivative
-    of :math:`\ln V`. If possible, the function computes the slip rate from the ratio ``slower``,
+    of :math:`\ln V`. If possible, the function computes the slip rate from the ratio ``load_to_slip_velocity_ratio``,
     because this saves the evaluation of an exponential function.
 
     Parameters
     ----------
-    x : float
+    log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    slower : float
+    load_to_slip_velocity_ratio : float
         Ratio :math:`V_0/V`.
     p : tuple of float
         Parameters of the scene.
@@ -255,7 +255,7 @@ def build_rupture_rate_function(friction_functions: FrictionFunctions) -> Functi
 
     Parameters
     ----------
-    friction : FrictionFunctions
+    friction_functions : FrictionFunctions
         Friction of the scene.
 
     Returns
@@ -304,7 +304,7 @@ def build_rupture_rate_function(friction_functions: FrictionFunctions) -> Functi
 
 
 def clamp_rupture_rate(rate: float) -> float:
-    """Limit a rate to ``LARGEST_RUPTURE_RATE`` in magnitude.
+    """Limit a rate to ``MAX_RATE_PER_INERTIAL_TIME`` in magnitude.
 
     Parameters
     ----------

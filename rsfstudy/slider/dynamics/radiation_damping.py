@@ -51,7 +51,7 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
 
     Parameters
     ----------
-    friction : FrictionFunctions
+    friction_functions : FrictionFunctions
         Friction of the scene.
 
     Returns

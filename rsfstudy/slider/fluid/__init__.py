@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from rsfstudy.slider.needed_quantities import PORE_PRESSURE, SLIP_RATE
 from rsfstudy.slider.parts import Numbers, Part, discover_parts
-from rsfstudy.slider.requirements import PORE_PRESSURE, SLIP_RATE
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,7 +28,7 @@ def add_boundary_pressure_rate(fluid_auxiliary_rates: Function) -> Function:
 
     Parameters
     ----------
-    rates : callable
+    fluid_auxiliary_rates : callable
         Function ``auxiliary_rates`` of the fluid.
 
     Returns
@@ -66,7 +66,7 @@ def add_boundary_pressure_steady_state(fluid_auxiliary_steady_states: Function) 
 
     Parameters
     ----------
-    steady_states : callable
+    fluid_auxiliary_steady_states : callable
         Function ``auxiliary_steady_states`` of the fluid.
 
     Returns

@@ -28,9 +28,9 @@ def auxiliary_rates(
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     states : tuple of float
         Porosity :math:`(\varphi - \varphi_0)/(\beta \sigma_*)` and pore pressure :math:`P`.
-    fraction : float
+    slip_fraction : float
         Factor of the result, equal to the slip per unit of the independent variable. When slip
-        stops, the changes per unit slip are infinite, but their product with ``fraction`` remains
+        stops, the changes per unit slip are infinite, but their product with ``slip_fraction`` remains
         finite.
     p : tuple of float
         Parameters of the scene. The function reads the dilatancy :math:`\epsilon/(\beta \sigma_*)`
@@ -40,7 +40,7 @@ def auxiliary_rates(
     -------
     tuple of float
         Changes of porosity and pore pressure per unit slip in :math:`D_c`, multiplied by
-        ``fraction``.
+        ``slip_fraction``.
 
     Notes
     -----

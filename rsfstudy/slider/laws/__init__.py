@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rsfstudy._deprecation import renamed_members, renamed_names
+from rsfstudy.slider.needed_quantities import QUANTITIES_RECEIVED_BY_LAWS
 from rsfstudy.slider.parts import (
     NON_NEGATIVE,
     POSITIVE,
@@ -29,7 +30,6 @@ from rsfstudy.slider.parts import (
     flag,
     number,
 )
-from rsfstudy.slider.requirements import QUANTITIES_RECEIVED_BY_LAWS
 from rsfstudy.slider.scene_view import SceneView
 
 #: Upper limit of exponents in evolution laws. Larger exponents occur only in trial steps that the
@@ -280,8 +280,8 @@ class Law(LawBase):
         numbers(self, scene) -> tuple[float, ...]
         check(self, scene) -> None
 
-    Override ``numbers`` if ``evolution`` uses values other than the fields, such as logarithms of
-    the fields. The method must return ``(*super().numbers(scene), ...)``. Override ``check`` to
+    Override ``parameter_values`` if ``evolution`` uses values other than the fields, such as logarithms of
+    the fields. The method must return ``(*super().parameter_values(scene), ...)``. Override ``check`` to
     raise ``InvalidValue`` if field values contradict each other. The class attribute ``name`` is
     the name of the law. The attributes ``relaxation``, ``steady_states`` and ``state_effect`` are
     optional as well. A law with one b can have several states. Such a law defines ``evolutions``

@@ -26,7 +26,7 @@ def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbe
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    shift : float
+    state_shift : float
         Decrease of the sum of the states due to stress.
     p : tuple of float
         Parameters of the scene.

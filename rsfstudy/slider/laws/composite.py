@@ -76,7 +76,7 @@ def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbe
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    shift : float
+    state_shift : float
         Decrease of the state variable due to stress.
     p : tuple of float
         Parameters of the scene.
@@ -105,7 +105,7 @@ def healing_factor(log_slip_rate: float, log_cutoff_velocity: float) -> float:
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    log_cutoff : float
+    log_cutoff_velocity : float
         Natural logarithm of the cut-off velocity, :math:`\ln(V_c/V_*)`.
 
     Returns

@@ -66,7 +66,7 @@ def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbe
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    shift : float
+    state_shift : float
         Decrease of the state variable due to stress.
     p : tuple of float
         Parameters of the scene.
@@ -158,7 +158,7 @@ class CutOffLaw(Law):
 
         Parameters
         ----------
-        rate : float
+        log_slip_rate : float
             Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
         slip : float
             Slip since the velocity step from :math:`V_*`, in :math:`D_c`.

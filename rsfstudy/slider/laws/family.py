@@ -80,7 +80,7 @@ class LawFamily(Law):
 
         Parameters
         ----------
-        rate : float
+        log_slip_rate : float
             Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
         slip : float
             Slip since the velocity step from :math:`V_*`, in :math:`D_c`.

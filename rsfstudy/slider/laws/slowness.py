@@ -62,7 +62,7 @@ def relaxation(log_slip_rate: float, slip: float) -> float:
 
     Parameters
     ----------
-    rate : float
+    log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     slip : float
         Slip since the velocity step from :math:`V_*`, in :math:`D_c`.

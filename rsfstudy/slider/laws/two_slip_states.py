@@ -24,11 +24,11 @@ def evolutions(
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    psis : tuple of float
+    states : tuple of float
         States :math:`\Psi_1` and :math:`\Psi_2`, which exclude the effect of stress.
-    shift : float
+    state_shift : float
         Decrease of the sum of the states due to stress.
-    fraction : float
+    slip_fraction : float
         Factor of the result, equal to the slip per unit of the independent variable.
     p : tuple of float
         Parameters of the scene. The parameters of the law start at ``p[LAW]``.
@@ -36,7 +36,7 @@ def evolutions(
     Returns
     -------
     tuple of float
-        Rates :math:`D_c \, d\Theta_i/d\delta`, multiplied by ``fraction``.
+        Rates :math:`D_c \, d\Theta_i/d\delta`, multiplied by ``slip_fraction``.
 
     Notes
     -----

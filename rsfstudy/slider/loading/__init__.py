@@ -2,7 +2,7 @@
 
 Each module of this package defines one loading history. A loading history is a sequence of
 segments. Before the first segment, the slider slides steadily at the reference velocity
-:math:`V_*`. The base classes are ``Loading`` and ``LoadingAtVelocity``.
+:math:`V_*`. The base classes are ``Loading`` and ``LoadingWithFinalLoadVelocity``.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from rsfstudy._deprecation import renamed_members
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.needed_quantities import SLIP_RATE
 from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, Part, discover_parts, number
-from rsfstudy.slider.requirements import SLIP_RATE
 from rsfstudy.slider.scene_view import SceneView
 
 #: Minimum duration of a segment in D_c/V_*. The integrator cannot resolve shorter segments. At
@@ -196,7 +196,7 @@ class Loading(Part):
 
         Parameters
         ----------
-        index : int
+        segment_index : int
             Index of the segment.
 
         Returns

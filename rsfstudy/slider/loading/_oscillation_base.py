@@ -31,7 +31,7 @@ def auxiliary_rates(
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     states : tuple of float
         Unknowns :math:`y` and :math:`P`.
-    fraction : float
+    slip_fraction : float
         Factor of the result, equal to the slip per unit of the independent variable.
     p : tuple of float
         Parameters of the scene. The function reads :math:`\omega D_c/V_*` from ``p[LOADING]`` and
@@ -40,7 +40,7 @@ def auxiliary_rates(
     Returns
     -------
     tuple of float
-        Changes of :math:`y` and :math:`P` per unit slip in :math:`D_c`, multiplied by ``fraction``.
+        Changes of :math:`y` and :math:`P` per unit slip in :math:`D_c`, multiplied by ``slip_fraction``.
 
     Notes
     -----

@@ -30,7 +30,7 @@ def auxiliary_rates(
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     states : tuple of float
         Unknown :math:`P`, the remaining change of normal stress.
-    fraction : float
+    slip_fraction : float
         Factor of the result, equal to the slip per unit of the independent variable.
     p : tuple of float
         Parameters of the scene. The function reads the rate of imposed normal stress, in
@@ -39,7 +39,7 @@ def auxiliary_rates(
     Returns
     -------
     tuple of float
-        Change of :math:`P` per unit slip in :math:`D_c`, multiplied by ``fraction``.
+        Change of :math:`P` per unit slip in :math:`D_c`, multiplied by ``slip_fraction``.
 
     Notes
     -----

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsfstudy.slider.caching import cached_attribute
 from rsfstudy.slider.loading import (
     LoadingWithFinalLoadVelocity,
     Segment,
     declare_load_velocity_field,
 )
 from rsfstudy.slider.parts import number
+from rsfstudy.slider.scene_caching import cached_attribute
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy._deprecation import renamed_members
+from rsfstudy.slider.needed_quantities import SHEAR_STRESS
 from rsfstudy.slider.parts import Function, Part, discover_parts
-from rsfstudy.slider.requirements import SHEAR_STRESS
 from rsfstudy.slider.scene_view import SceneView
 
 

@@ -23,11 +23,11 @@ def linker_dieterich_effect(
 
     Parameters
     ----------
-    friction : float
+    frictional_stress : float
         Deviation of frictional stress from its reference value, in :math:`\sigma_*`.
-    ratio : float
+    normal_stress_ratio : float
         Normal stress ratio :math:`s = \sigma/\sigma_*`.
-    change : float
+    normal_stress_derivative : float
         Derivative :math:`s'` of the normal stress ratio with respect to frictional stress.
     p : tuple of float
         Parameters of the scene. The function reads :math:`\alpha` from ``p[NORMAL_STRESS]``.

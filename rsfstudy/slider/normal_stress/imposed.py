@@ -18,7 +18,7 @@ def normal_stress(frictional_stress: float, p: Numbers) -> tuple[float, float]:
 
     Parameters
     ----------
-    friction : float
+    frictional_stress : float
         Deviation of frictional stress. The function ignores this argument.
     p : tuple of float
         Parameters of the scene. The function reads the imposed change of normal stress from

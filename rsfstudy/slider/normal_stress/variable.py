@@ -25,7 +25,7 @@ def normal_stress(frictional_stress: float, p: Numbers) -> tuple[float, float]:
 
     Parameters
     ----------
-    friction : float
+    frictional_stress : float
         Deviation of frictional stress, :math:`(\tau - \tau_*)/\sigma_*`.
     p : tuple of float
         Parameters of the scene. The function reads :math:`\cot\phi` from ``p[NORMAL_STRESS + 1]``.

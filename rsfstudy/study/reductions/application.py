@@ -29,6 +29,7 @@ from rsfstudy.study.reductions.comparisons import (
     RelativeDifference,
 )
 from rsfstudy.study.reductions.fits import LinearFit, PowerLaw, ProportionalFit, SemilogFit
+from rsfstudy.study.reductions.result_units import describe_reduction_results
 from rsfstudy.study.reductions.sobol_indices import SobolIndices
 from rsfstudy.study.reductions.statistics import (
     Logarithm,
@@ -37,7 +38,6 @@ from rsfstudy.study.reductions.statistics import (
     StandardDeviation,
     StatusShares,
 )
-from rsfstudy.study.reductions.units import describe_reduction_results
 from rsfstudy.vocabulary import coverage_content_type, find_quantity
 
 __all__ = [

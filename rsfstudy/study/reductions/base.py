@@ -134,16 +134,16 @@ def mask_unusable_values(
 ) -> xr.Dataset:
     """Return a copy of the dataset in which values that must not be used are NaN.
 
-    The values of failed cells are replaced by NaN. If ``of`` is a standard error or the bound of a
+    The values of failed cells are replaced by NaN. If ``variable_name`` is a standard error or the bound of a
     confidence interval, values that are not valid are replaced by NaN as well.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-    of : str
+    variable_name : str
         Variable to reduce.
     status : xarray.DataArray
-        Status of the cells on which ``of`` depends. The status is added to the result.
+        Status of the cells on which ``variable_name`` depends. The status is added to the result.
     """
     bad = failed_cell_mask(status)
     if variable_name.endswith(_STATISTICAL_SUFFIXES):
@@ -256,7 +256,7 @@ def with_propagated_errors(
     reduction : Reduction
     dataset : xarray.Dataset
         What was reduced.
-    made : xarray.Dataset
+    reduction_results : xarray.Dataset
         The results.
     """
     of, name = f"{reduction.of}_error", f"{reduction.name}_error"

@@ -12,7 +12,11 @@ from scipy.interpolate import PchipInterpolator
 
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.quantities import Quantity
-from rsfstudy.study.reductions._crossing import MIN_SAMPLES_OF_CURVE, CrossingStatus, find_crossing
+from rsfstudy.study.reductions._level_crossing import (
+    MIN_SAMPLES_OF_CURVE,
+    CrossingStatus,
+    find_crossing,
+)
 from rsfstudy.study.reductions.base import (
     DerivativesByVariable,
     Reduction,

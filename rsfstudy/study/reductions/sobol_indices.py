@@ -118,7 +118,7 @@ def _indices_with_intervals(sample_values: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    points : ndarray, shape (2 + inputs, points)
+    sample_values : ndarray, shape (2 + inputs, points)
         Values at A, at B, and at A with one input after the other from B.
 
     Returns

@@ -28,7 +28,7 @@ from rsfstudy.study.reductions.base import (
     UnitFieldsBySuffix,
     refused_result_mask,
 )
-from rsfstudy.study.reductions.units import find_varying_scale
+from rsfstudy.study.reductions.result_units import find_varying_scale
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def standard_deviation(
 ) -> xr.DataArray:
     """Compute the standard deviation of samples, with n - ddof degrees of freedom.
 
-    The result is NaN if there are no more than ``ddof`` samples.
+    The result is NaN if there are no more than ``degrees_of_freedom_lost`` samples.
     """
     with warnings.catch_warnings():  # older versions of xarray let it through
         warnings.filterwarnings("ignore", "Degrees of freedom", RuntimeWarning)

@@ -18,15 +18,15 @@ from typing import Any
 import numpy as np
 
 from rsfstudy import Scene
-from rsfstudy.limit_cycles.cycle_search import LimitCycleSearch
-from rsfstudy.limit_cycles.cycles import _cycle_event_specifications, iterate_cycles
+from rsfstudy.limit_cycles.limit_cycle_search import LimitCycleSearch
+from rsfstudy.limit_cycles.stick_slip_cycles import _cycle_event_specifications, iterate_cycles
 from rsfstudy.motion.accuracy import MIN_RTOL, Accuracy
+from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
-from rsfstudy.motion.integrate import integrate_events
-from rsfstudy.motion.meter import WorkMeter
+from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.slider.dynamics.inertia import DIFFERENCE_STEP, NEGLIGIBLE_SECOND_ORDER_WEIGHT
 from rsfstudy.slider.equations import RUPTURE_REGIME, equations_between_ruptures
-from rsfstudy.slider.point import MotionPoint
+from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.slider.scene_functions import LOG_RATE_PER_PATH_LENGTH
 
 BUDGET = 10**9

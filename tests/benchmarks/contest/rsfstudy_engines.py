@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contest.hand_written_loops import CycleNumbers
 from contest.problem import BUDGET, Problem, meter
-from rsfstudy.limit_cycles.cycles import iterate_cycles
+from rsfstudy.limit_cycles.stick_slip_cycles import iterate_cycles
 from rsfstudy.motion.accuracy import Accuracy
 
 

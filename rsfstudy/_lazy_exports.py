@@ -1,0 +1,48 @@
+"""Lazy exports of packages: each module is imported when one of its names is first used."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from rsfstudy._deprecation import RENAMED, warn_renamed
+
+
+def lazy_exports(
+    package_name: str, names_by_module: Mapping[str, Iterable[str]]
+) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """Create the ``__getattr__`` and ``__dir__`` functions of a package.
+
+    Parameters
+    ----------
+    package_name : str
+        Name of the package. Its former names in ``RENAMED`` are looked up too.
+    names_by_module : mapping of str to iterable of str
+        Names that each module exports. Modules are given by their paths below ``rsfstudy``. Write
+        ``"name as other"`` to export a name as another one.
+
+    Returns
+    -------
+    __getattr__, __dir__ : callable
+        Functions to assign in the ``__init__`` module of the package.
+    """
+    sources: dict[str, tuple[str, str]] = {}
+    for module, names in names_by_module.items():
+        for name, _, other in (entry.partition(" as ") for entry in names):
+            sources[other or name] = f"rsfstudy.{module}", name
+    renamed = RENAMED.get(package_name, {})
+
+    def get(name: str) -> Any:
+        if name in renamed:
+            warn_renamed(name, renamed[name], package_name)
+            return getattr(sys.modules[package_name], renamed[name])
+        if name not in sources:
+            raise AttributeError(f"module {package_name!r} has no attribute {name!r}")
+        module, original = sources[name]
+        value = getattr(importlib.import_module(module), original)
+        setattr(sys.modules[package_name], name, value)
+        return value
+
+    return get, lambda: sorted(sources)

@@ -1,0 +1,113 @@
+"""Cost of a study, in words: as its cells took here last, else a guess that says it is one."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.execution import CellPlan, estimate_cost
+from rsfstudy.motion import COMPILED, SCIPY, check_engine_is_usable
+from rsfstudy.storage import CellTimings, read_timings
+
+#: How many times as long a call takes with SciPy as compiled, by measure. The page of benchmarks
+#: has 7 to 12 times, and 31 to 72 times, the more the more accurate.
+_COMPILED_SPEEDUP_BY_MEASURE = {"critical_step": 10, "limit_cycle": 30}
+#: The measure that compares integrators of SciPy.
+_SCIPY_ONLY_MEASURE = "work_precision"
+#: Time in s above which another engine is worth a word.
+_MIN_TIME_FOR_HINT = 60.0
+
+
+def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:
+    """Work and time of a study on one core.
+
+    Parameters
+    ----------
+    cell_plan : Plan
+    output_directory : Path
+        Directory of its results: what is kept there tells how long cells took.
+    """
+    work, guess = estimate_cost(cell_plan)
+    work = round(work, 2 - len(str(work)))  # more digits than two would claim too much
+    text = f"about {work:,} right-hand sides at rtol {cell_plan.study.accuracy.rtol:g}; "
+    kept = output_directory / f"{cell_plan.study.name}.cells.sqlite"
+    took = read_timings(kept)
+    if (
+        took is None
+        or not _timed_at_same_accuracy_and_engine(cell_plan, took)
+        or not took.seconds_by_cell_key
+    ):
+        return (
+            f"{text}at a guess {format_duration(guess)} on one core, "
+            "but ten times as long is possible"
+        )
+    cells = len(cell_plan.unique_cell_numbers)
+    known = [
+        took.seconds_by_cell_key[key]
+        for key in cell_plan.keys[cell_plan.unique_cell_numbers].tolist()
+        if key in took.seconds_by_cell_key
+    ]
+    if len(known) == cells:
+        return text + f"took {format_duration(math.fsum(known))} on one core here last ({kept})"
+    missing = (cells - len(known)) * float(np.mean(list(took.seconds_by_cell_key.values())))
+    by = f"by the {len(took.seconds_by_cell_key):,} cells in {kept}"
+    return text + f"about {format_duration(math.fsum(known) + missing)} on one core, {by}"
+
+
+def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
+    """Advice to take the compiled engine; empty where it is not installed, where cells of another
+    engine are kept, or where little time is to be saved.
+    """
+    measure, engine = cell_plan.study.measure.describe()["name"], cell_plan.study.accuracy.engine
+    kept = output_directory / f"{cell_plan.study.name}.cells.sqlite"
+    saves = (
+        engine == SCIPY
+        and measure != _SCIPY_ONLY_MEASURE
+        and estimate_cost(cell_plan)[1] > _MIN_TIME_FOR_HINT
+    )
+    if not saves or kept.exists() or missing_packages(COMPILED):
+        return ""
+    if measure in _COMPILED_SPEEDUP_BY_MEASURE:
+        return (
+            f"--engine compiled is about {_COMPILED_SPEEDUP_BY_MEASURE[measure]} times faster here"
+        )
+    each = ", ".join(
+        f"{times} times with {name}" for name, times in _COMPILED_SPEEDUP_BY_MEASURE.items()
+    )
+    return f"--engine compiled is faster as a rule: about {each}"
+
+
+def format_duration(seconds: float) -> str:
+    """A time as one says it."""
+    if seconds < 0.05:
+        return "less than 0.1 s"
+    if seconds < 9.95:
+        return f"{seconds:.1f} s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"
+
+
+def _timed_at_same_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellTimings) -> bool:
+    """True if cells were computed as accurately as they are to be now, and by the same engine."""
+    asked = cell_plan.study.accuracy
+    return cell_timings.fingerprint.get("rtol") == asked.rtol and cell_timings.fingerprint.get(
+        "engine"
+    ) == (asked.engine)
+
+
+def missing_packages(name: str) -> str:
+    """Packages that an engine lacks, in words; empty where none."""
+    try:
+        check_engine_is_usable(name)
+    except InvalidValue:
+        if name != COMPILED:
+            raise
+        return "needs Numba (pip install 'rsfstudy[fast]')"
+    return ""

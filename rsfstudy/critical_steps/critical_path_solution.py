@@ -1,0 +1,159 @@
+"""Boundary between stable and unstable steps, with its numerical error.
+
+The function ``find_boundary_by_critical_path`` computes the boundary from the critical path. The function
+``find_boundary_by_limit_cycle`` computes the boundary at which a limit cycle touches the norm.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+
+from rsfstudy.critical_steps.critical_path import CriticalPath
+from rsfstudy.critical_steps.motion_after_step import stability_margin
+from rsfstudy.critical_steps.shooting_steps import LOCAL_TOLERANCE_OF_FIRST_ROOT, StepFamily
+from rsfstudy.critical_steps.slow_manifold_accuracy import slow_manifold_relative_error
+from rsfstudy.motion import MIN_LOCAL_TOLERANCE, Accuracy, WorkMeter, estimate_error
+
+#: Error that two paths may share by chance, as a fraction of the requested relative accuracy.
+_ERROR_FLOOR_OVER_RTOL = 0.004
+
+#: Largest number of local tolerances with which a path is integrated.
+_MAX_TOLERANCES_PER_BOUNDARY = 5
+
+
+@dataclass(frozen=True)
+class StepBoundary:
+    """Boundary in step size before verification, with its numerical error.
+
+    Parameters
+    ----------
+    step_size : float
+        Size of the step. See ``StepFamily``.
+    relative_error : float
+        Relative error of the size.
+    found_from_motions : bool, default: False
+        True if the boundary follows from forward motions.
+    found_from_limit_cycle : bool, default: False
+        True if a limit cycle touches the norm at the boundary.
+    """
+
+    step_size: float
+    relative_error: float
+    found_from_motions: bool = False
+    found_from_limit_cycle: bool = False
+
+
+def find_boundary_by_critical_path(
+    step_family: StepFamily, accuracy: Accuracy, work_meter: WorkMeter
+) -> StepBoundary | None:
+    """Find the boundary that corresponds to the critical path.
+
+    The boundary is rejected if smaller steps may be unstable. Smaller steps may be unstable if
+    steady sliding is unstable, or if the next peak of the motion exceeds the norm.
+
+    Parameters
+    ----------
+    step_family : StepFamily
+        Steps among which the boundary is sought.
+    accuracy : Accuracy
+        Requested accuracy.
+    work_meter : WorkMeter
+        Counter of right-hand-side evaluations.
+
+    Returns
+    -------
+    StepBoundary or None
+        The boundary, or None if there is no critical path or if smaller steps may be unstable.
+    """
+    boundary = _find_boundary_with_error(
+        step_family, step_family.find_sizes_by_critical_path, accuracy, work_meter
+    )
+    if boundary is None or not step_family.motions_after_smaller_steps_decay(boundary.step_size):
+        return None
+    # If all orbits are closed at the critical stiffness, a motion never returns to a higher peak.
+    if step_family.scene.parts.law.has_closed_orbits:
+        return boundary
+    scene = step_family.scene_with_step(boundary.step_size)
+    if scene.log_load_velocity == -math.inf:
+        return boundary
+    return (
+        None
+        if CriticalPath.from_scene(scene, work_meter.engine).exceeds_norm_on_return(
+            LOCAL_TOLERANCE_OF_FIRST_ROOT, work_meter
+        )
+        else boundary
+    )
+
+
+def find_boundary_by_limit_cycle(
+    step_family: StepFamily, accuracy: Accuracy, work_meter: WorkMeter
+) -> StepBoundary | None:
+    """Find the boundary at which a limit cycle touches the norm.
+
+    A limit cycle can touch the norm if larger steps make steady sliding less stable, and if steady
+    sliding is unstable after the largest step.
+
+    Parameters
+    ----------
+    step_family : StepFamily
+        Steps among which the boundary is sought.
+    accuracy : Accuracy
+        Requested accuracy.
+    work_meter : WorkMeter
+        Counter of right-hand-side evaluations.
+
+    Returns
+    -------
+    StepBoundary or None
+        The boundary, or None if there is no such limit cycle.
+    """
+    small, large = (
+        stability_margin(step_family.scene_with_step(size))
+        for size in (step_family.min_size, step_family.max_size)
+    )
+    if large >= 0.0 or small - large < 10.0 * accuracy.rtol:
+        return None
+    boundary = _find_boundary_with_error(
+        step_family, step_family.find_sizes_by_limit_cycle, accuracy, work_meter
+    )
+    # A limit cycle attracts nearby motions weakly, so the errors of two runs may be similar.
+    error = 5.0 * boundary.relative_error if boundary else math.nan
+    return boundary and replace(boundary, relative_error=error, found_from_limit_cycle=True)
+
+
+def _find_boundary_with_error(
+    step_family: StepFamily,
+    find_sizes_by_tolerance: Callable[[Iterable[float], WorkMeter], Iterator[float]],
+    accuracy: Accuracy,
+    work_meter: WorkMeter,
+) -> StepBoundary | None:
+    """Find a boundary, and estimate its error from several tolerances.
+
+    The path is integrated with decreasing tolerances until the difference between two runs is
+    within the requested accuracy. A path has so few steps that a single underestimated local error
+    may dominate the result. The result is None if the search finds no size between the smallest and
+    the largest step.
+    """
+    boundary = None
+    of_path = slow_manifold_relative_error(step_family.scene) if step_family.scene.has_mass else 0.0
+    for size, refined in itertools.pairwise(
+        find_sizes_by_tolerance(_decreasing_local_tolerances(accuracy), work_meter)
+    ):
+        if not step_family.min_size <= size <= step_family.max_size:
+            break
+        error = estimate_error(size, refined, _ERROR_FLOOR_OVER_RTOL * accuracy.rtol) / size
+        boundary = StepBoundary(size, error + of_path)
+        if error <= step_family.size_rtol_for_value_rtol(size, accuracy.rtol):
+            break
+    return boundary
+
+
+def _decreasing_local_tolerances(accuracy: Accuracy) -> Iterator[float]:
+    """Yield local tolerances, each a tenth of the previous tolerance."""
+    for _ in range(_MAX_TOLERANCES_PER_BOUNDARY):
+        if accuracy.local_tolerance > MIN_LOCAL_TOLERANCE:
+            yield accuracy.local_tolerance
+        accuracy = accuracy.refined()

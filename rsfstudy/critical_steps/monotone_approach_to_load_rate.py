@@ -1,0 +1,157 @@
+"""Monotonic rise of slip rate to a fast load point velocity.
+
+If waves radiate most of the stress, V follows the spring over a slip of eta V_0/(K D_c), which is
+many times D_c, while the state stays close to its steady state. An explicit integrator would need
+steps of about D_c for the whole rise. The functions of this module test if the integration can end
+early, because the rest of the rise is monotonic.
+
+The test uses two curves in the plane of ln V and state, which meet only in steady sliding. The
+first curve is the steady state. The second curve is a lag behind the steady state that motions can
+cross only towards smaller lags. A motion between the curves remains there, and its slip rate rises.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from rsfstudy.motion import EventSpecification, rise
+from rsfstudy.slider import (
+    MotionPoint,
+    Scene,
+    build_friction_relation,
+    build_state_evolution_function,
+    compute_steady_states,
+    frictional_stress_for_friction,
+    steady_friction_minus_reference,
+)
+
+#: Distances of ln V below the load point velocity at which the motion is tested.
+_TESTED_LOG_RATE_DISTANCES = (10.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0, 0.5, 0.2)
+#: The first number is the lag of the second curve, relative to the lag that a state at rest would
+#: have after a slip of D_c. The second number is the fraction of the evolution that must remain to
+#: cross the curve. The third number is the smallest distance in ln V from the load point velocity
+#: at which the curves are tested, because all changes are proportional to the distance if the
+#: distance is small. The last two numbers are the largest spacing of the logarithms of the
+#: distances, and the step of the finite differences.
+(
+    _LAG_FACTOR,
+    _REQUIRED_EVOLUTION_FRACTION,
+    _MIN_TESTED_DISTANCE,
+    _MAX_TEST_SPACING,
+    _DIFFERENCE_STEP,
+) = 2.0, 0.25, 1e-4, 0.25, 1e-5
+#: Largest change of ln V over a slip of D_c, relative to the distance from the load point velocity,
+#: at which the test is worthwhile. Such a slow motion would take hundreds of steps.
+_MAX_LOG_RATE_GROWTH_OVER_DISTANCE = 0.02
+
+
+def monotone_rise_events(scene: Scene) -> list[EventSpecification]:
+    """Return the events at which ``rises_monotonically_to_load_rate`` should be called.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+
+    Returns
+    -------
+    list of EventSpecification
+        Levels of ln V below the load point velocity. The list is empty if the rise is not slow, or
+        if the scene has several states or inertia, for which the test is not valid.
+    """
+    load = scene.log_load_velocity
+    if scene.state_count > 1 or scene.has_mass:
+        return []
+    if not scene.stiffness < _MAX_LOG_RATE_GROWTH_OVER_DISTANCE * (
+        scene.a + scene.dynamics.radiated_stress_slope(load)
+    ):
+        return []
+    return [rise("log_slip_rate", load - below) for below in _TESTED_LOG_RATE_DISTANCES]
+
+
+def rises_monotonically_to_load_rate(scene: Scene, point: MotionPoint) -> bool:
+    """Return True if ln V rises to the load point velocity and not beyond.
+
+    The test is based on a finite number of points between the present slip rate and the load point
+    velocity.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    point : Point
+        Present point of the motion.
+
+    Returns
+    -------
+    bool
+        True if the motion is between the two curves, and if motions at all tested points cross the
+        curves inwards.
+    """
+    change, load = _build_rate_and_lag_change_function(scene), scene.log_load_velocity
+    distance = load - point.log_slip_rate
+
+    def farthest(x: float) -> float:
+        return _LAG_FACTOR * change(x, 0.0)[1]
+
+    lag = point.state - compute_steady_states(scene, point.log_slip_rate, 0.0)[0]
+    # The sign of the lag is the sign of b.
+    side = math.copysign(1.0, scene.b)
+    if not 0.0 <= side * lag <= side * farthest(point.log_slip_rate):
+        return False
+    several = max(2, round(np.log(distance / _MIN_TESTED_DISTANCE) / _MAX_TEST_SPACING))
+    for x in (load - np.geomspace(distance, _MIN_TESTED_DISTANCE, several)).tolist():
+        rising, growing = change(x, 0.0)
+        lag = farthest(x)
+        step = _DIFFERENCE_STEP * (load - x)
+        slope = (farthest(x + step) - farthest(x - step)) / (2.0 * step)
+        faster, behind = change(x, lag)
+        inwards = side * (slope * faster - behind) > _REQUIRED_EVOLUTION_FRACTION * side * lag
+        if not (rising > 0.0 and side * growing > 0.0 and faster > 0.0 and inwards):
+            return False
+    return True
+
+
+def _build_rate_and_lag_change_function(
+    scene: Scene,
+) -> Callable[[float, float], tuple[float, float]]:
+    """Build a function that computes the changes of ln V and of the lag.
+
+    The arguments of the function are ln(V/V_*) and the lag of the state behind the steady state.
+    The results are changes per D_c of slip, or NaN if no stress corresponds to this value of
+    friction.
+    """
+    relation, evolution = (
+        build_friction_relation(scene),
+        build_single_state_evolution_function(scene),
+    )
+
+    def at(x: float, lag: float) -> tuple[float, float]:
+        friction = frictional_stress_for_friction(
+            scene, steady_friction_minus_reference(scene, x) + lag
+        )
+        if friction is None:
+            return np.nan, np.nan
+        _value, slope, _shift, shift_slope = relation(friction)
+        rest, damping = (
+            compute_steady_states(scene, x, 0.0)[0],
+            scene.dynamics.radiated_stress_slope(x),
+        )
+        pulled = scene.stiffness * float(np.expm1(scene.log_load_velocity - x))
+        evolves = evolution(x, rest + lag)
+        faster = (slope * pulled - evolves) / (scene.a + slope * damping)
+        follows = (
+            compute_steady_states(scene, x + _DIFFERENCE_STEP, 0.0)[0] - rest
+        ) / _DIFFERENCE_STEP
+        return faster, evolves - shift_slope * (pulled - damping * faster) - follows * faster
+
+    return at
+
+
+def build_single_state_evolution_function(scene: Scene) -> Callable[[float, float], float]:
+    """The law of a scene with one state: (ln(V/V_*), Theta) -> dTheta per unit slip."""
+    evolve = build_state_evolution_function(scene)
+    return lambda log_slip_rate, state: evolve(log_slip_rate, (state,), 0.0)[0]

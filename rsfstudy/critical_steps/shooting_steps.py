@@ -1,0 +1,536 @@
+"""Families of steps, and the shooting method that finds critical steps.
+
+The base class ``StepFamily`` describes all steps of one type and direction, ordered by size. The
+class ``ShootingSteps`` adds the shooting method. The module ``step_types`` contains the concrete
+classes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
+from itertools import accumulate, pairwise, repeat, takewhile
+from typing import ClassVar
+
+import numpy as np
+from scipy.optimize import brentq
+
+from rsfstudy.critical_steps.critical_path import CriticalPath
+from rsfstudy.critical_steps.motion_after_step import is_linearly_stable
+from rsfstudy.motion import WorkMeter
+from rsfstudy.slider import Scene, quasi_static_log_slip_rate
+
+#: Smallest step size of the search, and its upper limit as a fraction of the largest step size.
+MIN_STEP_SIZE, _MIN_SIZE_FRACTION = 1e-3, 0.1
+#: Extension of the largest step, in ln V, if inertia delays the rise of slip rate.
+LOG_RATE_MARGIN_FOR_INERTIA = 5.0
+#: Largest effect of a delay by inertia that is neglected, as a fraction of the requested accuracy.
+INERTIA_TOLERANCE_FRACTION = 0.01
+#: Number of step sizes at which stability is tested, if stability may change repeatedly with size.
+_STABILITY_TESTED_SIZE_COUNT = 24
+#: Local tolerance of the approximate root.
+LOCAL_TOLERANCE_OF_FIRST_ROOT = 1e-5
+#: Smallest and largest distance in log size over which the slope of the misfit is computed. If a
+#: correction of the approximate root exceeds the largest distance, the refinement ends.
+_MIN_SLOPE_DISTANCE, _MAX_SLOPE_DISTANCE = 1e-3, 0.05
+_MAX_SECANT_ITERATIONS = 8
+#: Largest stride and upper end of the search for a sign change, in logit(size/largest size).
+_MAX_STRIDE, _MAX_POSITION = 0.7, 4.0
+#: Number of successive strides without a critical path after which the search is abandoned.
+_MAX_STRIDES_WITHOUT_PATH = 3
+
+
+class StepFamily:
+    """Base class of families of steps with one type and one direction.
+
+    The size of a step is a positive number that increases with the step.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene on which the steps are imposed.
+    sign : {1, -1}
+        Direction of the steps, 1 for upward and -1 for downward.
+
+    Attributes
+    ----------
+    min_size : float
+        Smallest size of the search.
+    max_size : float
+        Largest size of the search. If the loading itself reaches the norm, there are no sizes to
+        search, and the largest size does not exceed the smallest size.
+    """
+
+    #: Name of the critical step in the results.
+    critical_output_name: ClassVar[str]
+    #: Names of additional results for the critical step.
+    extra_output_names: ClassVar[tuple[str, ...]] = ()
+    #: True if the largest step itself raises the slip rate to the norm immediately.
+    largest_step_reaches_norm = False
+
+    def __init__(self, scene: Scene, sign: int) -> None:
+        self.scene, self.sign = scene, sign
+        self.max_size = self._compute_max_size() * (1.0 - 1e-9)
+        self.min_size = min(MIN_STEP_SIZE, _MIN_SIZE_FRACTION * self.max_size)
+
+    def scene_with_step(self, step_size: float) -> Scene:
+        """Return the scene with a step of a given size.
+
+        Parameters
+        ----------
+        step_size : float
+            Size of the step.
+
+        Returns
+        -------
+        Scene
+            Scene with the step.
+        """
+        raise TypeError(f"{type(self).__name__} steps nothing")
+
+    def user_value_of_step(self, step_size: float) -> float:
+        """Return the value of the scene field for a step of a given size.
+
+        Parameters
+        ----------
+        step_size : float
+            Size of the step.
+
+        Returns
+        -------
+        float
+            Value of the field.
+        """
+        raise TypeError(f"{type(self).__name__} steps nothing")
+
+    def user_value_error(self, step_size: float, relative_error: float) -> float:
+        """Return the error of the step value.
+
+        Parameters
+        ----------
+        step_size : float
+            Size of the step.
+        relative_error : float
+            Relative error of the size.
+
+        Returns
+        -------
+        float
+            Absolute error of ``user_value_of_step(step_size)``.
+        """
+        raise TypeError(f"{type(self).__name__} steps nothing")
+
+    def size_rtol_for_value_rtol(self, step_size: float, rtol: float) -> float:
+        r"""Return the size tolerance for a tolerance of the step value.
+
+        If the size has the returned relative error, the change of the step value has the relative
+        error ``rtol``. The size tolerance is at most ``rtol``.
+
+        Parameters
+        ----------
+        step_size : float
+            Size of the step.
+        rtol : float
+            Relative tolerance of the change of the step value.
+
+        Returns
+        -------
+        float
+            Relative tolerance of the size.
+
+        Notes
+        -----
+        With the step value :math:`v(s)` for the size :math:`s`, the tolerance of the size is
+
+        .. math:: \mathrm{rtol}\,\frac{|v(s) - v(0)|}{dv/d\ln s}.
+        """
+        change = abs(self.user_value_of_step(step_size) - self.user_value_of_step(0.0))
+        return min(rtol, rtol * change / self.user_value_error(step_size, 1.0))
+
+    def extra_output_values(self, step_size: float) -> dict[str, float]:
+        """Return the additional results for a critical step.
+
+        Parameters
+        ----------
+        step_size : float
+            Size of the critical step, or NaN if there is no critical step.
+
+        Returns
+        -------
+        dict of str to float
+            Values of the results in ``extra_output_names``.
+        """
+        return {}
+
+    def find_sizes_by_critical_path(
+        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+    ) -> Iterator[float]:
+        """Yield sizes of the step at which the critical path starts.
+
+        Parameters
+        ----------
+        local_tolerances : iterable of float
+            Local tolerances, in decreasing order.
+        work_meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Yields
+        ------
+        float
+            Size for the next tolerance. The iterator ends early if there is no critical path.
+        """
+        raise TypeError(f"{type(self).__name__} steps nothing")
+
+    def find_sizes_by_limit_cycle(
+        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+    ) -> Iterator[float]:
+        """Yield sizes of the step whose limit cycle touches the norm.
+
+        Parameters
+        ----------
+        local_tolerances : iterable of float
+            Local tolerances, in decreasing order.
+        work_meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        iterator of float
+            Size for each tolerance. The iterator is empty if there is no such step.
+        """
+        return iter(())
+
+    def inertia_shifts_critical_size(self, step_size: float, rtol: float) -> bool:
+        """Return True if inertia changes the critical size significantly.
+
+        With inertia, the slip rate after the step rises to the critical path only after a delay.
+
+        Parameters
+        ----------
+        step_size : float
+            Size at which the critical path starts.
+        rtol : float
+            Requested relative accuracy of the size.
+
+        Returns
+        -------
+        bool
+            True if the start of the critical path is not the critical step within the accuracy.
+        """
+        return False
+
+    def size_error_if_neutrally_stable(self, step_size: float, rtol: float) -> float:
+        """Return the size error if steady sliding is nearly neutral.
+
+        Close to neutral stability, forward motions cannot distinguish growth from decay.
+
+        Parameters
+        ----------
+        step_size : float
+            Size of the step.
+        rtol : float
+            Relative accuracy of the forward motions.
+
+        Returns
+        -------
+        float
+            Additional relative error of the size.
+        """
+        return 0.0
+
+    def motions_after_smaller_steps_decay(self, step_size: float) -> bool:
+        """Return True if steady sliding is stable after every smaller step.
+
+        If steady sliding is unstable after a smaller step, small oscillations grow, and the smaller
+        step may be critical. The critical stiffness decreases with the load point velocity, so a
+        test at the ends of the range is sufficient. If the law has a characteristic slip rate, more
+        sizes are tested.
+
+        Parameters
+        ----------
+        step_size : float
+            Size of the largest step.
+
+        Returns
+        -------
+        bool
+            True if all tested steps are linearly stable.
+        """
+        sizes = [self.min_size, step_size]
+        if self.scene.parts.law.steady_states is not None:
+            sizes = np.geomspace(self.min_size, step_size, _STABILITY_TESTED_SIZE_COUNT).tolist()
+        return all(is_linearly_stable(self.scene_with_step(each)) for each in sizes)
+
+    def _compute_max_size(self) -> float:
+        raise TypeError(f"{type(self).__name__} steps nothing")
+
+
+def slip_lag_due_to_inertia(scene: Scene) -> tuple[float, float]:
+    r"""Compute the delay of a slider with inertia after a step.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the step.
+
+    Returns
+    -------
+    lag : float
+        Upper bound :math:`(K/a) w^2` of the slip by which inertia delays the slider, in units of
+        D_c, with :math:`w = V T/(2 \pi D_c)` immediately after the step.
+    rate : float
+        Slip rate immediately after the step without inertia, in units of V_*.
+    """
+    rate = math.exp(quasi_static_log_slip_rate(scene, scene.spring_stress_step, 0.0))
+    return scene.stiffness / scene.a * (scene.inertial_time * rate) ** 2, rate
+
+
+class ShootingSteps(StepFamily):
+    """Base class of steps whose critical path depends on the step size.
+
+    The critical path depends on the size if the step changes friction or the load point velocity.
+    The critical size follows from a shooting method.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene on which the steps are imposed.
+    sign : {1, -1}
+        Direction of the steps, 1 for upward and -1 for downward.
+
+    Attributes
+    ----------
+    sign_of_triggering_steps : int
+        Direction of the steps whose misfit is positive if the step is too small to trigger an
+        instability.
+    """
+
+    sign_of_triggering_steps: ClassVar[int]
+
+    def user_value_error(self, step_size: float, relative_error: float) -> float:
+        """Return the error of the step value, whose logarithm is the size.
+
+        See the base class for the parameters.
+        """
+        return math.exp(self.sign * step_size) * step_size * relative_error
+
+    def find_sizes_by_critical_path(
+        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+    ) -> Iterator[float]:
+        """Yield sizes of the step at which the critical path starts.
+
+        The critical path of this step begins with the state before the step. An approximate root
+        and its slope are computed first, with a loose tolerance. Each smaller tolerance then needs
+        one to three paths. With several states, there are no critical paths. See the base class for
+        the parameters.
+        """
+        path_at = self.build_critical_path_factory(work_meter.engine)
+        loose = (
+            self._find_loose_misfit_root(path_at, work_meter)
+            if self.scene.state_count == 1
+            else None
+        )
+        if loose is not None:
+            yield from _refine_misfit_root(
+                *loose,
+                local_tolerances,
+                lambda size, tolerance: path_at(size).state_misfit_at_start(tolerance, work_meter),
+            )
+
+    def build_critical_path_factory(self, engine: str) -> Callable[[float], CriticalPath]:
+        """Return a function that computes the critical path after a step.
+
+        Parameters
+        ----------
+        engine : str
+            Name of the engine that integrates the paths.
+
+        Returns
+        -------
+        callable
+            Function ``size -> CriticalPath``.
+        """
+        return lambda size: CriticalPath.from_scene(self.scene_with_step(size), engine)
+
+    def find_sizes_by_limit_cycle(
+        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+    ) -> Iterator[float]:
+        """Yield the size of the step whose limit cycle touches the norm.
+
+        The step is the smallest step after which an orbit that touches the norm does not shrink.
+        Each misfit requires the integration of one orbit. See the base class for the parameters.
+        """
+        found, path_at = dict[float, float](), self.build_critical_path_factory(work_meter.engine)
+
+        @cache
+        def misfit(log_size: float, tolerance: float = LOCAL_TOLERANCE_OF_FIRST_ROOT) -> float:
+            higher = path_at(math.exp(log_size)).norm_misfit_of_next_peak(tolerance, work_meter)
+            if higher is None:
+                return math.nan
+            found[log_size] = higher
+            return higher
+
+        sizes = accumulate(repeat(math.log(1.5)), initial=math.log(self.min_size))
+        pairs = pairwise(takewhile(lambda log_size: log_size <= math.log(self.max_size), sizes))
+        bracket = next((pair for pair in pairs if misfit(pair[0]) < 0.0 <= misfit(pair[1])), None)
+        root = _find_misfit_root(misfit, found, *bracket) if bracket else None
+        if root is not None:
+            yield from _refine_misfit_root(
+                *root, local_tolerances, lambda size, tolerance: misfit(math.log(size), tolerance)
+            )
+
+    def _find_loose_misfit_root(
+        self, build_critical_path: Callable[[float], CriticalPath], work_meter: WorkMeter
+    ) -> tuple[float, float] | None:
+        """Return the log size at which the misfit vanishes, and its slope.
+
+        The misfit is computed with a loose tolerance. The result is None if there is no root.
+        """
+        found = dict[float, float]()
+
+        @cache
+        def misfit(log_size: float) -> float:
+            size = math.exp(log_size)
+            state = build_critical_path(size).state_misfit_at_start(
+                LOCAL_TOLERANCE_OF_FIRST_ROOT, work_meter
+            )
+            if state is None:
+                return self._misfit_without_path(self.scene_with_step(size), work_meter)
+            found[log_size] = state
+            return state
+
+        bracket = self._bracket_misfit_root(misfit)
+        return None if bracket is None else _find_misfit_root(misfit, found, *bracket)
+
+    def _bracket_misfit_root(
+        self, misfit_function: Callable[[float], float]
+    ) -> tuple[float, float] | None:
+        """Return two log sizes between which the misfit changes sign.
+
+        The search proceeds outwards from a guess, and first in the direction that the sign of the
+        misfit indicates. The misfit is NaN, and has no sign, if there is no critical path. The
+        independent variable of the search is logit(size/largest size), which resolves both ends of
+        the range. The result is None if the search finds no sign change.
+        """
+
+        def log_size(position: float) -> float:
+            return math.log(self.max_size) - math.log1p(math.exp(-position))
+
+        def position(size: float) -> float:
+            fraction = min(max(size, self.min_size) / self.max_size, 0.5)
+            return math.log(fraction / (1.0 - fraction))
+
+        lowest, guess = position(self.min_size), position(self._guess_size())
+
+        def outwards(*ways: int) -> tuple[float, float] | None:
+            ends = dict.fromkeys(ways, (guess, misfit_function(log_size(guess))))
+            last = {1: _MAX_POSITION, -1: lowest}
+            stride, failures = 0.2, 0
+            while failures < _MAX_STRIDES_WITHOUT_PATH and any(
+                ends[way][0] != last[way] for way in ways
+            ):
+                for way, (at, value) in ends.items():
+                    further = min(max(at + way * stride, lowest), _MAX_POSITION)
+                    beyond = misfit_function(log_size(further))
+                    if further != at and value * beyond <= 0.0:
+                        return log_size(min(at, further)), log_size(max(at, further))
+                    ends[way] = further, beyond
+                failures = failures + 1 if all(math.isnan(x) for _at, x in ends.values()) else 0
+                stride = min(1.5 * stride, _MAX_STRIDE)
+            return None
+
+        way = self._search_direction(misfit_function(log_size(guess)))
+        return outwards(way) or outwards(-way) if way else outwards(1, -1)
+
+    def _search_direction(self, misfit_at_guess: float) -> int:
+        """Return the direction in which the critical size is expected.
+
+        The result is 1 for larger sizes, -1 for smaller sizes, and 0 if the misfit does not
+        indicate a direction.
+        """
+        if self.sign != self.sign_of_triggering_steps or math.isnan(misfit_at_guess):
+            return 0
+        return int(math.copysign(1.0, misfit_at_guess))
+
+    def _guess_size(self) -> float:
+        """Return a size at which the search starts."""
+        raise TypeError(f"{type(self).__name__} steps nothing")
+
+    def _misfit_without_path(self, scene: Scene, work_meter: WorkMeter) -> float:
+        """Return the sign of the misfit if there is no critical path.
+
+        The sign is positive if the motion after the step is stable. The result is NaN if the sign
+        is unknown.
+        """
+        return math.nan
+
+
+def _find_misfit_root(
+    misfit_function: Callable[[float], float], known_misfits: Mapping[float, float], *bracket: float
+) -> tuple[float, float] | None:
+    """Find the log size at which a misfit vanishes, and its slope.
+
+    A misfit without a critical path has a sign but no magnitude. The root and the slope are
+    computed from misfits with a magnitude. The result is None if there are too few misfits with a
+    magnitude.
+    """
+    try:
+        brentq(misfit_function, *bracket, xtol=1e-4)
+    except ValueError:
+        # The misfit is NaN somewhere in the bracket.
+        return None
+    if not known_misfits:
+        return None
+    root = min(known_misfits, key=lambda log_size: abs(known_misfits[log_size]))
+
+    def others() -> list[float]:
+        return [
+            log_size
+            for log_size in known_misfits
+            if _MIN_SLOPE_DISTANCE <= abs(log_size - root) <= _MAX_SLOPE_DISTANCE
+        ]
+
+    for beside in (root + 2.0 * _MIN_SLOPE_DISTANCE, root - 2.0 * _MIN_SLOPE_DISTANCE):
+        if not others():
+            misfit_function(beside)
+    other = min(others(), key=lambda log_size: abs(log_size - root), default=None)
+    return (
+        None
+        if other is None
+        else (root, (known_misfits[root] - known_misfits[other]) / (root - other))
+    )
+
+
+def _refine_misfit_root(
+    log_size: float,
+    misfit_slope: float,
+    local_tolerances: Iterable[float],
+    misfit_function: Callable[[float, float], float | None],
+) -> Iterator[float]:
+    """Yield sizes at which a misfit vanishes, for decreasing local tolerances.
+
+    The refinement uses the secant method, starting from an approximate root and its slope with
+    respect to the log size. The iteration for each tolerance ends when the residual is below thirty
+    local tolerances. The iterator ends early if the secant method does not converge.
+    """
+    if not math.isfinite(misfit_slope) or misfit_slope == 0.0:
+        return
+    for tolerance in local_tolerances:
+        previous: tuple[float, float] | None = None
+        for _ in range(_MAX_SECANT_ITERATIONS):
+            # The error of V_0 is the error of its logarithm times V_0.
+            value = misfit_function(math.exp(log_size), tolerance / max(1.0, math.exp(log_size)))
+            if value is None or not math.isfinite(value):
+                return
+            if previous is not None and value != previous[1]:
+                misfit_slope = (value - previous[1]) / (log_size - previous[0])
+            previous = log_size, value
+            log_size -= value / misfit_slope
+            if abs(value) > _MAX_SLOPE_DISTANCE * abs(misfit_slope):
+                return
+            if min(abs(value), abs(value / misfit_slope)) < 30.0 * tolerance:
+                break
+        else:
+            return
+        yield math.exp(log_size)

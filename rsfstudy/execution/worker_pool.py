@@ -1,0 +1,317 @@
+"""Sends batches of cells to Dask workers, and finds a cell that kills its worker.
+
+When a worker dies, its batch is lost, and perhaps others that were waiting there. All these cells
+are then sent one at a time, while nothing else runs, so that only the cell that kills a worker on
+its own is blamed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import math
+import os
+import pickle
+import time
+import warnings
+from collections.abc import Generator, Iterable
+from concurrent.futures import CancelledError
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.defaults import CELL_TIME_LIMIT
+from rsfstudy.errors import InvalidValue, RunError
+from rsfstudy.execution.cell_computation import (
+    WALL_OVER_CPU_TIME_LIMIT,
+    CellBatchMapper,
+    CellTask,
+    StoredCellRows,
+    compute_batch,
+    compute_serially,
+    pack_cell_batch,
+    serialize_task,
+)
+from rsfstudy.execution.cell_plan import CellBatchIterator
+from rsfstudy.execution.clusters import check_script_has_main_guard, start_local_cluster
+from rsfstudy.measures import Outcome
+from rsfstudy.status import Status
+
+#: Longest time limit in s, three years; the system's timers take `WALL_TIME_FACTOR` times that, and
+#: not much more.
+_MAX_TIME_LIMIT = 1e8
+#: Most worker processes for each core, and most on a machine with few cores.
+_MAX_WORKERS_PER_CORE, _MAX_WORKERS_ON_SMALL_MACHINES = 4, 8
+#: Time in s without any worker after which a run warns, and after which it ends.
+WARN_AFTER_SECONDS_WITHOUT_WORKER, GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER = 30.0, 600.0
+_POLL_INTERVAL = 2.0
+#: How often a cell may kill its worker before it is recorded as the culprit.
+_MAX_WORKER_DEATHS_PER_CELL = 2
+_SCHEDULER_LOST_MESSAGE = "the Dask scheduler is lost"
+
+
+class WorkerPool(contextlib.ExitStack):
+    """A place where cells are computed, for one run after the other. Worker processes of this
+    machine are started when the first cell is needed, which takes seconds, and end where the
+    context does.
+
+    Parameters
+    ----------
+    process_count : int
+        Worker processes started on this machine; with 0, cells are computed in this process.
+    client : distributed.Client, optional
+        A Dask cluster to use instead.
+    cell_time_limit : float
+        CPU time in s that a cell may take on a worker.
+    log : Path, optional
+        Where processes of this machine write errors, whatever the run.
+
+    Raises
+    ------
+    InvalidValue
+        For what is none of these, and where worker processes would run the user's script again.
+    """
+
+    def __init__(
+        self,
+        process_count: int = 2,
+        dask_client: Any = None,
+        cell_time_limit: float = CELL_TIME_LIMIT,
+        log_path: Path | None = None,
+    ) -> None:
+        super().__init__()
+        if (
+            not isinstance(process_count, int)
+            or isinstance(process_count, bool)
+            or process_count < 0
+        ):
+            raise InvalidValue("workers", process_count, "must be a whole number, 0 or more")
+        if dask_client is None and process_count > 0:
+            most = max(
+                _MAX_WORKERS_ON_SMALL_MACHINES, _MAX_WORKERS_PER_CORE * (os.cpu_count() or 1)
+            )
+            if process_count > most:
+                rule = (
+                    f"must be at most {most} here: {_MAX_WORKERS_PER_CORE} for each core, "
+                    f"or {_MAX_WORKERS_ON_SMALL_MACHINES}"
+                )
+                remedy = "A cluster has room for more: --scheduler ADDRESS (client=)."
+                raise InvalidValue("workers", process_count, rule, remedy=remedy)
+            check_script_has_main_guard(process_count)
+        if dask_client is not None and not hasattr(dask_client, "submit"):
+            raise InvalidValue("client", dask_client, "must be a distributed.Client")
+        limit: object = cell_time_limit
+        if not isinstance(limit, int | float) or not 0.0 < limit <= _MAX_TIME_LIMIT:
+            rule = f"must be a number greater than 0, up to {_MAX_TIME_LIMIT:g} s"
+            raise InvalidValue("time_limit", limit, rule)
+        self.process_count, self.client, self.cell_time_limit, self._log_path = (
+            process_count,
+            dask_client,
+            cell_time_limit,
+            log_path,
+        )
+        self._mapper_of_started_processes: CellBatchMapper | None = None
+
+    def count_concurrent_cells(self) -> int:
+        """Number of cells that are computed at the same time."""
+        return max(
+            1, self.process_count if self.client is None else count_worker_threads(self.client)
+        )
+
+    def make_cell_batch_mapper(self, log_path: Path | None = None) -> CellBatchMapper:
+        """Mapper that computes batches of cells there; `log` is where processes of this machine
+        write errors, unless all runs have one file.
+        """
+        if self.client is not None:
+            return make_dask_batch_mapper(self.client)
+        return (
+            functools.partial(self._compute_batches_on_processes, self._log_path or log_path)
+            if self.process_count
+            else compute_serially
+        )
+
+    def _compute_batches_on_processes(
+        self, log_path: Path | None, task: CellTask, batches: CellBatchIterator
+    ) -> Generator[StoredCellRows]:
+        from rsfstudy.execution import worker_log
+
+        try:
+            if self._mapper_of_started_processes is None:
+                file = self.enter_context(worker_log.open_worker_log(log_path))
+                client = self.enter_context(start_local_cluster(self.process_count, file))
+                self._mapper_of_started_processes = make_dask_batch_mapper(client, str(file))
+            yield from self._mapper_of_started_processes(task, batches)
+        except RunError:
+            self.close()
+            self._mapper_of_started_processes = None  # whoever comes next starts others
+            raise
+
+
+def make_dask_batch_mapper(
+    dask_client: Any, log_path: str = "the log of that worker"
+) -> CellBatchMapper:
+    """Compute on the workers of a Dask client, which need no shared file system.
+
+    Parameters
+    ----------
+    dask_client : distributed.Client
+    log_path : str
+        Where workers write errors, for messages.
+    """
+
+    def map_cells(task: CellTask, batches: CellBatchIterator) -> Generator[StoredCellRows]:
+        sent, plan = serialize_task(task), batches.plan
+        left: list[np.ndarray] = []  # of batches that a worker returned before their end
+        running: dict[Any, np.ndarray] = {}
+        suspects: list[np.ndarray] = []
+
+        def submit(cells: np.ndarray) -> Any:
+            future = dask_client.submit(
+                compute_batch, sent, pack_cell_batch(plan, cells), pure=False
+            )
+            running[future] = cells
+            return future
+
+        def run_isolated(cell: np.ndarray) -> StoredCellRows:
+            """Compute a suspect alone; if its worker dies again, the cell is recorded as lost."""
+            (key,) = plan.keys[cell].tolist()
+            for _ in range(_MAX_WORKER_DEATHS_PER_CELL):
+                _wait_for_finished_futures(
+                    dask_client, [dask_client.submit(abs, 0, pure=False)]
+                )  # a worker is there
+                began = time.monotonic()
+                _wait_for_finished_futures(dask_client, [future := submit(cell)])
+                del running[future]
+                if (finished := _batch_result(future)) is not None:
+                    return finished
+                if (seconds := time.monotonic() - began) > task.time_limit:
+                    return [task.output_packing.pack_cell(key, _timeout_outcome(task), seconds)]
+            return [task.output_packing.pack_cell(key, _worker_lost_outcome(), math.nan)]
+
+        try:
+            while True:
+                # no more than keeps the workers busy: the rest would fill the scheduler's memory
+                for _ in range(
+                    0 if suspects else 4 + 2 * count_worker_threads(dask_client) - len(running)
+                ):
+                    some = left.pop() if left else next(batches, None)
+                    if some is None:
+                        break
+                    submit(some)
+                if running:
+                    for future in _wait_for_finished_futures(dask_client, running):
+                        cells = running.pop(future)
+                        finished = _batch_result(future)
+                        if finished is None:
+                            suspects += np.split(cells, len(cells))
+                        else:
+                            if len(finished) < len(cells):
+                                left.append(cells[len(finished) :])
+                            yield finished
+                elif suspects:
+                    warnings.warn(
+                        f"a worker ended: the cells it held ({len(suspects)}) are computed again, "
+                        f"one at a time (see {log_path})",
+                        stacklevel=2,
+                    )
+                    yield from map(run_isolated, suspects)
+                    suspects = []
+                else:
+                    return
+        finally:
+            dask_client.cancel(list(running))
+
+    return map_cells
+
+
+def _timeout_outcome(task: CellTask) -> Outcome:
+    """The outcome of a cell that took too long."""
+    text = (
+        f"no answer within {task.time_limit:g} s of CPU time, or {WALL_OVER_CPU_TIME_LIMIT:g} times "
+        "as long on the clock; the worker's log shows where it was, and --time-limit (time_limit=) "
+        "allows more"
+    )
+    return Outcome(Status.TIME_LIMIT_SPENT, message=text)
+
+
+def _worker_lost_outcome() -> Outcome:
+    """The outcome of a cell that killed its worker."""
+    text = (
+        f"its worker died {_MAX_WORKER_DEATHS_PER_CELL} times while it computed nothing else: a crash, "
+        "or more memory than a worker may use"
+    )
+    return Outcome(Status.WORKER_LOST, message=text)
+
+
+def count_worker_threads(dask_client: Any) -> int:
+    """Number of cells that the workers of a client compute at the same time."""
+    if dask_client.status == "connecting":  # again
+        raise RunError(_SCHEDULER_LOST_MESSAGE)
+    if dask_client.status != "running":
+        raise RunError(f"the Dask client is {dask_client.status}: connect one to a cluster")
+    try:
+        return sum(dask_client.nthreads().values())
+    except (OSError, TimeoutError) as error:
+        raise RunError(_SCHEDULER_LOST_MESSAGE) from error
+
+
+def _wait_for_finished_futures(dask_client: Any, running_futures: Iterable[Any]) -> Iterable[Any]:
+    """Wait for futures to finish, and give those that have.
+
+    Raises
+    ------
+    RunError
+        If the scheduler is lost, or there has been no worker for `GIVE_UP_AFTER` seconds.
+    """
+    from distributed import wait
+
+    seen, warned = time.monotonic(), False
+    while True:
+        try:
+            done: Iterable[Any] = wait(
+                list(running_futures), timeout=_POLL_INTERVAL, return_when="FIRST_COMPLETED"
+            ).done
+            return done
+        except TimeoutError:
+            waited = time.monotonic() - seen
+            if count_worker_threads(dask_client):
+                seen, warned = time.monotonic(), False
+            elif waited > WARN_AFTER_SECONDS_WITHOUT_WORKER and not warned:
+                warned = True
+                warnings.warn(
+                    f"the Dask cluster has no worker: waiting {GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:g} s for one",
+                    stacklevel=2,
+                )
+            elif waited > GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:
+                raise RunError(
+                    f"the Dask cluster has had no worker for {GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:g} s: start some"
+                ) from None
+        except CancelledError as error:
+            raise RunError(_SCHEDULER_LOST_MESSAGE) from error
+
+
+def _batch_result(future: Any) -> StoredCellRows | None:
+    """The finished cells of a batch, or None where its worker died.
+
+    Raises
+    ------
+    RunError
+        If the cluster failed in any other way.
+    """
+    from distributed import KilledWorker
+
+    try:
+        finished: StoredCellRows = pickle.loads(future.result())
+    except KilledWorker:
+        return None
+    except RunError:
+        raise
+    except CancelledError as error:
+        raise RunError(_SCHEDULER_LOST_MESSAGE) from error
+    except Exception as error:
+        raise RunError(
+            f"the Dask cluster gave up ({type(error).__name__}: {error}). "
+            "Its workers need the same rsfstudy"
+        ) from error
+    return finished

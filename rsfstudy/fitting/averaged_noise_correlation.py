@@ -1,0 +1,104 @@
+"""Noise correlation due to averaging by a data logger."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import cholesky_banded, solve_banded
+
+#: Variance added to the diagonal of the correlation matrix, so that frequencies without noise do
+#: not receive an infinite weight, and largest number of rows within an averaging time.
+_UNAVERAGED_NOISE_VARIANCE_FRACTION, _MAX_ROWS_PER_AVERAGING_TIME = 0.002, 200
+
+
+class AveragingCorrelation:
+    r"""Correlation matrix of rows with overlapping averaging times.
+
+    Parameters
+    ----------
+    time : ndarray, shape (rows,)
+        Times in s. If the time does not increase from one row to the next, the following rows
+        belong to another window, and are not correlated with the previous rows.
+    averaging_time : float
+        Averaging time in s.
+
+    Attributes
+    ----------
+    cholesky_factor : ndarray
+        Lower Cholesky factor of the correlation matrix, in banded form.
+    row_count_per_independent_sample : float
+        Number of correlated rows that contain as much information as one independent row.
+
+    Notes
+    -----
+    If white noise is averaged over a time :math:`T`, the correlation of the rows i and j is
+    :math:`\max(1 - |t_i - t_j|/T, 0)`.
+    """
+
+    def __init__(self, time: np.ndarray, averaging_time: float) -> None:
+        clock = np.concatenate([[0], np.cumsum(np.diff(time) <= 0.0)])
+        band = [np.full(len(time), 1.0 + _UNAVERAGED_NOISE_VARIANCE_FRACTION)]
+        for lag in range(1, min(_MAX_ROWS_PER_AVERAGING_TIME, len(time) - 1)):
+            apart = np.abs(time[lag:] - time[:-lag]) / averaging_time
+            overlap = np.where(clock[lag:] == clock[:-lag], np.maximum(1.0 - apart, 0.0), 0.0)
+            if not overlap.any():
+                break
+            band.append(np.append(overlap, np.zeros(lag)))
+        self.cholesky_factor = cholesky_banded(np.array(band), lower=True)
+        self.row_count_per_independent_sample = float(1.0 + 2.0 * np.sum(band[1:]) / len(time))
+
+    def whiten_columns(self, sample_columns: np.ndarray) -> np.ndarray:
+        """Remove the correlation from columns.
+
+        Parameters
+        ----------
+        sample_columns : ndarray, shape (rows, columns)
+            Columns with correlated rows.
+
+        Returns
+        -------
+        ndarray, shape (rows, columns)
+            Columns multiplied by the inverse of the Cholesky factor.
+        """
+        if not sample_columns.size:
+            return sample_columns
+        return np.asarray(
+            solve_banded((len(self.cholesky_factor) - 1, 0), self.cholesky_factor, sample_columns)
+        )
+
+    @property
+    def log_determinant(self) -> float:
+        """Logarithm of the determinant of the correlation matrix."""
+        return float(2.0 * np.sum(np.log(self.cholesky_factor[0])))
+
+
+def apply_running_mean(
+    time: np.ndarray, sample_columns: np.ndarray, averaging_time: float
+) -> np.ndarray:
+    """Average columns over a time interval centred at each row.
+
+    The columns are interpolated linearly between the rows. Before the first row and after the last
+    row, the columns are constant.
+
+    Parameters
+    ----------
+    time : ndarray, shape (rows,)
+        Times in s, in increasing order.
+    sample_columns : ndarray, shape (rows, columns)
+        Columns to average.
+    averaging_time : float
+        Averaging time in s.
+
+    Returns
+    -------
+    ndarray, shape (rows, columns)
+        Averaged columns.
+    """
+    at = np.concatenate([[time[0] - averaging_time], time, [time[-1] + averaging_time]])
+    padded = np.concatenate([sample_columns[:1], sample_columns, sample_columns[-1:]])
+    pieces = 0.5 * np.diff(at)[:, None] * (padded[1:] + padded[:-1])
+    sums = np.concatenate([np.zeros((1, sample_columns.shape[1])), np.cumsum(pieces, axis=0)])
+    ends = [
+        np.column_stack([np.interp(time + side, at, column) for column in sums.T])
+        for side in (0.5 * averaging_time, -0.5 * averaging_time)
+    ]
+    return np.asarray((ends[0] - ends[1]) / averaging_time)

@@ -1,0 +1,260 @@
+"""Confidence intervals of parameters from the profile likelihood.
+
+The profile likelihood of a parameter is the maximum likelihood with respect to all other
+parameters, at a fixed value of the parameter [1]_. The squared distance of a value is the resulting
+increase of the sum of squared whitened residuals, divided by the noise variance. At the ends of a
+confidence interval, the squared distance is :math:`t^2`, where :math:`t` is a quantile of Student's
+t distribution with the degrees of freedom of the fit. If the log-likelihood is nearly quadratic,
+the standard error determines the interval.
+
+References
+----------
+.. [1] Bates and Watts (1988), Nonlinear Regression Analysis and Its Applications, Wiley, section
+   6.1.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.stats import t as student
+
+from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
+from rsfstudy.fitting.window_model import coordinate_to_parameter
+
+#: Confidence level, relative deviation from a quadratic log-likelihood above which the profile
+#: likelihood is computed, largest number of iterations for an end of an interval, relative
+#: tolerance of the squared distance at an end, and tolerance of the minimum sum of squares in noise
+#: variances.
+(
+    CONFIDENCE_LEVEL,
+    _MAX_DEVIATION_FROM_PARABOLA,
+    _MAX_INTERVAL_END_ITERATIONS,
+    _INTERVAL_END_TOLERANCE,
+    _MINIMUM_SQUARES_TOLERANCE,
+) = (
+    0.95,
+    0.2,
+    6,
+    0.05,
+    0.02,
+)
+
+
+def student_t_multiplier(solution: FitSolution, confidence_level: float) -> float:
+    """Return the half width of confidence intervals in standard errors.
+
+    Parameters
+    ----------
+    solution : FitSolution
+        Solution of a fit.
+    confidence_level : float
+        Confidence level between 0 and 1.
+
+    Returns
+    -------
+    float
+        Quantile of Student's t distribution with the degrees of freedom of the fit.
+    """
+    return float(student.isf(0.5 * (1.0 - confidence_level), solution.degrees_of_freedom))
+
+
+def confidence_interval(
+    problem: FitProblem, solution: FitSolution, parameter_name: str
+) -> tuple[float, float]:
+    """Compute the 95 % confidence interval of a parameter.
+
+    The interval follows from the profile likelihood, and is limited to the bounds of the search.
+    Noise of load point displacement widens the interval by the same factor as the standard error.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        Problem with the model of the record.
+    solution : FitSolution
+        Solution of the problem.
+    parameter_name : str
+        Name of a free parameter.
+
+    Returns
+    -------
+    low : float
+        Lower end of the interval, in the unit of the parameter.
+    high : float
+        Upper end of the interval, in the unit of the parameter.
+    """
+    profile, far = (
+        LikelihoodProfile(problem, solution, parameter_name),
+        student_t_multiplier(solution, CONFIDENCE_LEVEL),
+    )
+    best = float(profile.best_coordinates[profile.parameter_index])
+    wider = float(solution.coordinate_stderr[profile.parameter_index]) / profile.stderr_from_noise
+    ends = [best + wider * (profile.find_interval_end(sign, far) - best) for sign in (-1.0, 1.0)]
+    bounds = (
+        problem.lower_bounds[profile.parameter_index],
+        problem.upper_bounds[profile.parameter_index],
+    )
+    low, high = (
+        coordinate_to_parameter(parameter_name, float(end)) for end in np.clip(ends, *bounds)
+    )
+    return low, high
+
+
+class LikelihoodProfile:
+    """Profile likelihood of a parameter.
+
+    The noise model of the fit is not changed.
+
+    Parameters
+    ----------
+    search : FitProblem
+        Problem with the model of the record.
+    found : FitSolution
+        Solution of the problem.
+    name : str
+        Name of a free parameter.
+
+    Attributes
+    ----------
+    best_coordinates : ndarray, shape (parameters,)
+        Coordinates of all free parameters at the maximum of the likelihood.
+    stderr_from_noise : float
+        Standard error of the coordinate due to friction noise.
+    coordinate_change_ratios : ndarray, shape (parameters,)
+        Changes of all coordinates per unit change of the coordinate of the parameter.
+    """
+
+    def __init__(self, problem: FitProblem, solution: FitSolution, parameter_name: str) -> None:
+        self.problem, self.solution, self.parameter_index = (
+            problem,
+            solution,
+            solution.free_parameters.index(parameter_name),
+        )
+        self.best_coordinates = problem.values_to_coordinates(solution.parameter_values)
+        variance = float(
+            solution.noise_caused_covariance[self.parameter_index, self.parameter_index]
+        )
+        self.stderr_from_noise = math.sqrt(variance)
+        self.coordinate_change_ratios = (
+            solution.noise_caused_covariance[:, self.parameter_index] / variance
+        )
+
+    def find_interval_end(self, direction_sign: float, stderr_count: float) -> float:
+        """Find the coordinate with a given squared distance.
+
+        Parameters
+        ----------
+        direction_sign : float
+            Direction of the search: -1 for the lower end and 1 for the upper end.
+        stderr_count : float
+            Square root of the squared distance, in standard errors.
+
+        Returns
+        -------
+        float
+            Coordinate, limited to the bounds of the search.
+        """
+        bound = (self.problem.lower_bounds if direction_sign < 0.0 else self.problem.upper_bounds)[
+            self.parameter_index
+        ]
+        most = abs(float(bound - self.best_coordinates[self.parameter_index]))
+        at, power, before = min(stderr_count * self.stderr_from_noise, most), 2.0, (0.0, 0.0)
+        for number in range(_MAX_INTERVAL_END_ITERATIONS):
+            squared = self.scaled_likelihood_decrease(
+                float(self.best_coordinates[self.parameter_index] + direction_sign * at)
+            )
+            if (at == most and squared < stderr_count**2) or abs(
+                squared / stderr_count**2 - 1.0
+            ) < _INTERVAL_END_TOLERANCE:
+                break
+            here = math.log(at), math.log(min(max(squared, 1e-9), 1e9))
+            if number:  # The log-likelihood may be flatter or steeper than a parabola.
+                power = min(max((here[1] - before[1]) / (here[0] - before[0]), 0.3), 6.0)
+            factor = math.exp((2.0 * math.log(stderr_count) - here[1]) / power)
+            at, before = min(most, at * min(max(factor, 0.3), 3.0)), here
+        return float(self.best_coordinates[self.parameter_index] + direction_sign * at)
+
+    def scaled_likelihood_decrease(self, coordinate: float) -> float:
+        """Compute the squared distance of a value of the parameter.
+
+        The squared distance is twice the decrease of the log-likelihood, which equals the increase
+        of the sum of squares in noise variances. If the log-likelihood is nearly quadratic, the
+        function returns the quadratic approximation.
+
+        Parameters
+        ----------
+        coordinate : float
+            Coordinate of the parameter.
+
+        Returns
+        -------
+        float
+            Squared distance, or infinity if the motion fails.
+        """
+        moved = coordinate - self.best_coordinates[self.parameter_index]
+        parabola = float(moved / self.stderr_from_noise) ** 2
+        # Without constraints on all parameters, the search would not converge.
+        if not parabola or self.solution.unidentified_parameters:
+            return parabola
+        x = np.clip(
+            self.best_coordinates + moved * self.coordinate_change_ratios,
+            self.problem.lower_bounds,
+            self.problem.upper_bounds,
+        )
+        x[self.parameter_index] = coordinate
+        nearly = self._compute_linearised_excess_squares(x)
+        if (
+            not math.isfinite(nearly)
+            or abs(nearly - parabola) < _MAX_DEVIATION_FROM_PARABOLA * parabola
+        ):
+            return parabola if math.isfinite(nearly) else nearly
+        others = np.arange(len(x)) != self.parameter_index
+        rest = FitProblem(
+            self.problem.model,
+            self.problem.coordinates_to_values(x),
+            [
+                name
+                for name in self.solution.free_parameters
+                if name != self.solution.free_parameters[self.parameter_index]
+            ],
+            self.problem.noise_model_name,
+        )
+        rest.lower_bounds, rest.upper_bounds = (
+            self.problem.lower_bounds[others],
+            self.problem.upper_bounds[others],
+        )
+        x[others], _ = rest.minimise_weighted_squares(
+            x[others], self.solution.noise_model, _MINIMUM_SQUARES_TOLERANCE / len(others)
+        )
+        left = self._whitened_residuals(x)
+        self.coordinate_change_ratios = (x - self.best_coordinates) / moved
+        return self._compute_excess_squares(left)
+
+    def _whitened_residuals(self, coordinates: np.ndarray) -> np.ndarray:
+        """Compute whitened residuals in standard deviations of the noise.
+
+        The residuals are NaN if the motion fails.
+        """
+        left = self.problem.residuals(
+            self.problem.coordinates_to_values(coordinates), require_stable=True
+        )
+        return (
+            self.solution.noise_model.whiten_columns(left[:, None])[:, 0] / self.solution.noise_sd
+        )
+
+    def _compute_excess_squares(self, residuals: np.ndarray) -> float:
+        """Return the sum of squares minus the minimum sum of squares."""
+        return float(residuals @ residuals - np.square(self.solution.whitened_residuals).sum())
+
+    def _compute_linearised_excess_squares(self, coordinates: np.ndarray) -> float:
+        """Compute the excess sum of squares with a linearised model.
+
+        The other parameters minimise the sum of squares of the linearised model.
+        """
+        left = self._whitened_residuals(coordinates)
+        if not np.isfinite(left).all():
+            return math.inf
+        others = np.delete(self.solution.jacobian, self.parameter_index, axis=1)
+        columns = self.solution.noise_model.whiten_columns(others) / self.solution.noise_sd
+        return self._compute_excess_squares(left - columns @ np.linalg.lstsq(columns, left)[0])

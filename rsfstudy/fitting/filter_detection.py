@@ -1,0 +1,139 @@
+"""Detection of friction that was filtered before it was recorded.
+
+A filter smooths the friction peak after a velocity step, and correlates the noise. A running mean
+over m rows also causes notches in the noise spectrum. The function ``detect_unspecified_filter`` compares
+linearised models with and without a filter. If a filter improves the AIC and changes a parameter
+noticeably, friction was probably filtered.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from rsfstudy.fitting import noise as noises
+from rsfstudy.fitting.averaged_noise_correlation import apply_running_mean
+from rsfstudy.fitting.filters import LOW_PASS_ORDERS, Filter
+from rsfstudy.fitting.fit_solution import FitSolution, compute_aic
+
+#: Number of rows of the running means that are tested, smallest decrease of the AIC, and smallest
+#: change of a parameter in standard errors.
+_TESTED_AVERAGE_LENGTHS_IN_ROWS, _MIN_AIC_GAIN_OF_RUNNING_MEAN, _MIN_PARAMETER_CHANGE_IN_STDERRS = (
+    range(2, 21),
+    20.0,
+    0.5,
+)
+#: Smallest decrease of the AIC for low-pass filters. The value is larger than for running means
+#: because an inaccurate step time or stiffness has a similar effect.
+_MIN_AIC_GAIN_OF_LOW_PASS = 60.0
+#: Corner frequencies of the low-pass filters that are tested, relative to the sampling rate.
+_TESTED_CORNER_OVER_SAMPLING_RATES = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.025, 0.015)
+#: Largest number of rows that are tested, and number of alternating estimates of the noise and the
+#: parameters.
+_MAX_ROWS_FOR_FILTER_TEST, _NOISE_ESTIMATION_PASSES = 20_000, 2
+
+
+def detect_unspecified_filter(
+    fit_solution: FitSolution, time: np.ndarray, noise: str
+) -> tuple[str, ...]:
+    """Test whether friction was filtered before it was recorded.
+
+    Running means are tested for all records. Low-pass filters are tested only if the noise is
+    correlated, because a low-pass filter correlates white noise.
+
+    Parameters
+    ----------
+    fit_solution : FitSolution
+        Result of a fit without a filter.
+    time : ndarray, shape (rows,)
+        Times in s.
+    noise : str
+        Noise model (see ``rsfstudy.fitting.noise.fit_noise``).
+
+    Returns
+    -------
+    tuple of str
+        Reason why the standard errors are not valid, with the filter that describes the record
+        best. The tuple is empty if no filter describes the record better than unfiltered friction.
+    """
+    windows = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) <= 0.0) + 1)
+    least = fit_solution.friction_rounding_quantum / math.sqrt(12.0)
+    # The delay caused by a filter is similar to an error of the step time.
+    delays = (
+        fit_solution.loading_error_sensitivity[:, :0]
+        if "step_time" in fit_solution.free_parameters
+        else fit_solution.loading_error_sensitivity
+    )
+    columns = np.column_stack([fit_solution.jacobian, delays, fit_solution.model_friction])
+    free = len(fit_solution.coordinate_stderr)
+
+    def describe(kind: str, size: float) -> tuple[float, float]:
+        """Return the AIC and the largest change of a parameter.
+
+        The change is relative to the standard error of the parameter.
+        """
+        parts = [
+            _apply_filter_to_columns(kind, size, time[rows], columns[rows]) for rows in windows
+        ]
+        filtered = np.concatenate(parts)
+        left = fit_solution.residuals + columns[:, -1] - filtered[:, -1]
+        jacobian, kept = filtered[:, :-1], fit_solution.noise_model.non_outlier_mask
+        averaging = size if kind == "mean" else 0.0
+        moved = np.zeros(jacobian.shape[1])
+        for _ in range(_NOISE_ESTIMATION_PASSES):
+            guessed = left - jacobian @ moved
+            there = noises.guess_noise_by_moments(noise, time, guessed, kept, least, averaging)[0]
+            whitened = there.whiten_columns(np.column_stack([jacobian, left]))
+            moved = np.linalg.lstsq(whitened[:, :-1], whitened[:, -1])[0]
+        innovations = whitened[:, -1] - whitened[:, :-1] @ moved
+        criterion = compute_aic(innovations, there, len(moved), len(time))
+        return criterion, float(np.max(np.abs(moved[:free]) / fit_solution.coordinate_stderr))
+
+    if len(time) > _MAX_ROWS_FOR_FILTER_TEST or not np.isfinite(columns).all():
+        return ()
+    # The noise model of the fit may describe unfiltered friction better than this estimate.
+    plain = min(describe("", 0.0)[0], fit_solution.aic)
+    interval = float(np.median(np.diff(time[windows[0]])))
+    tried = [
+        (*describe(kind, size), kind, size)
+        for kind, size in _iterate_candidate_filters(fit_solution, interval)
+    ]
+    best, change, kind, size = min(tried)
+    least_gain = _MIN_AIC_GAIN_OF_RUNNING_MEAN if kind == "mean" else _MIN_AIC_GAIN_OF_LOW_PASS
+    if not (plain - best > least_gain and change > _MIN_PARAMETER_CHANGE_IN_STDERRS):
+        return ()
+    if kind == "mean":
+        seems, remedy = f"averaged over about {size:.3g} s", "`averaging=` (`--averaging`)"
+    else:
+        seems, remedy = f"low-pass filtered at about {size:.3g} Hz", "`low_pass=` (`--low-pass`)"
+    return (
+        f"friction looks {seems}, which changes a parameter by {change:.1f} standard errors: "
+        f"pass {remedy}",
+    )
+
+
+def _iterate_candidate_filters(
+    fit_solution: FitSolution, sampling_interval: float
+) -> Iterator[tuple[str, float]]:
+    """Yield the kinds and sizes of the filters that are tested."""
+    for rows in _TESTED_AVERAGE_LENGTHS_IN_ROWS:
+        yield "mean", rows * sampling_interval
+    if fit_solution.noise_model.order:
+        for kind in LOW_PASS_ORDERS:
+            for corner in _TESTED_CORNER_OVER_SAMPLING_RATES:
+                yield kind, corner / sampling_interval
+
+
+def _apply_filter_to_columns(
+    filter_kind: str, filter_size: float, time: np.ndarray, columns: np.ndarray
+) -> np.ndarray:
+    """Return the filtered columns of a window, with shape (rows, columns)."""
+    if not filter_kind:
+        return columns
+    if filter_kind == "mean":
+        return apply_running_mean(time, columns, filter_size)
+    one = Filter(filter_kind, filter_size)
+    at = one.sample_times(time)
+    return np.column_stack([one.apply(time, np.interp(at, time, each)) for each in columns.T])

@@ -1,0 +1,113 @@
+"""Outputs of a fit, with their units and meanings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from rsfstudy.fitting.joint_model import strip_window_number
+from rsfstudy.fitting.record import RECORD_COLUMNS
+from rsfstudy.fitting.window_model import PARAMETERS, PARAMETERS_OF_SOME_LAWS_ONLY
+from rsfstudy.quantities import Output
+
+#: Outputs of every fit that do not depend on the rows.
+_SCALAR_OUTPUTS = (
+    Output("a_minus_b", "$a-b$", "1", "rate dependence of steady friction"),
+    Output("a_minus_b_stderr", "", "1", "standard error of a - b"),
+    Output("noise_size", "", "1", "standard deviation of the noise"),
+    Output("outliers", "", "1", "number of rows that were left out as outliers"),
+    Output("friction_quantum", "", "1", "quantum to which friction is rounded, 0 if it is not"),
+    Output("noise_order", "", "1", "order of the autoregressive process of the noise"),
+    Output("effective_samples", "", "1", "number of independent samples that tell as much"),
+    Output("degrees_of_freedom", "", "1", "degrees of freedom of the intervals"),
+    Output("whiteness", "", "1", "chance of as much correlation of near rows, freed of it"),
+    Output("criterion", "", "1", "Akaike's criterion, in which the noise counts; less is better"),
+    Output("r_squared", "$R^2$", "1", "share of the variance of friction that the fit explains"),
+    Output("velocity_before", "$V_0$", "um s-1", "load point velocity before the step"),
+    Output("velocity_after", "$V_1$", "um s-1", "load point velocity after the step"),
+    Output("window_begins", "", "um", "load point displacement where the window begins"),
+    Output("window_ends", "", "um", "load point displacement where the window ends"),
+    Output("load_point_noise", "", "um", "standard deviation of noise of the recorded load point"),
+    Output("rows_fitted", "", "1", "number of rows in the window"),
+    Output("normal_stress_before", r"$\sigma_*$", "Pa", "mean normal stress before the step"),
+    Output("window_stiffness", "$k$", "um-1", "stiffness over normal stress before the step"),
+    *(
+        Output(name, "", "1", f"{name} of parameters", dims=("parameter", "other_parameter"))
+        for name in ("covariance", "correlation")
+    ),
+)
+#: Outputs with one value per row.
+_OUTPUTS_PER_RECORD_ROW = tuple(
+    Output(*about, dims=("row",))
+    for about in (
+        *((f"record_{q.name}", q.symbol, q.units, q.long_name) for q in RECORD_COLUMNS[:3]),
+        ("fitted_friction", r"$\mu$", "1", "friction of the fit, with its trend"),
+        ("fitted_friction_stderr", "", "1", "standard error of the friction of the fit"),
+        ("detrended_friction", r"$\mu$", "1", "friction of the fit, without its trend"),
+        ("residual", "", "1", "friction less that of the fit"),
+        ("innovation", "", "1", "residual freed of correlation, over its standard deviation"),
+    )
+)
+#: Suffixes of the outputs that each parameter has in addition to its value.
+_DESCRIPTIONS_BY_NAME_SUFFIX = {
+    "stderr": "standard error",
+    "low": "lower end of the 95 % interval",
+    "high": "upper end of the 95 % interval",
+}
+#: Outputs of a fit with posterior draws.
+_POSTERIOR_OUTPUTS = (
+    Output("autocorrelation_time", "", "1", "steps after which a chain has forgotten where it was"),
+    Output(
+        "posterior",
+        "",
+        "1",
+        "draws of the parameters from their posterior",
+        dims=("draw", "parameter"),
+    ),
+)
+
+
+def fit_outputs(
+    parameter_names: Sequence[str], with_posterior: bool, window_count: int
+) -> tuple[Output, ...]:
+    """Return the outputs of a fit.
+
+    Parameters
+    ----------
+    parameter_names : sequence of str
+        Names of the free parameters.
+    with_posterior : bool
+        If True, include draws from the posterior.
+    window_count : int
+        Number of windows in the fit. If there are several windows, the outputs include the normal
+        stress before each step.
+
+    Returns
+    -------
+    tuple of Output
+        Outputs of the parameters, of the fit and of the rows.
+    """
+    found = [output for name in parameter_names for output in _parameter_outputs(name)]
+    stresses = [
+        Output(f"normal_stress_before_{n}", "", "Pa", f"mean normal stress before step {n}")
+        for n in range(1, window_count + 1 if window_count > 1 else 1)
+    ]
+    return (
+        *found,
+        *(_POSTERIOR_OUTPUTS if with_posterior else ()),
+        *_SCALAR_OUTPUTS,
+        *stresses,
+        *_OUTPUTS_PER_RECORD_ROW,
+    )
+
+
+def _parameter_outputs(parameter_name: str) -> Iterator[Output]:
+    """Yield the outputs of a parameter and of its errors."""
+    about = PARAMETERS[strip_window_number(parameter_name)]
+    optional = strip_window_number(parameter_name) in PARAMETERS_OF_SOME_LAWS_ONLY
+    yield Output(
+        parameter_name, about.symbol, about.units, about.long_name, error=True, optional=optional
+    )
+    for suffix, words in _DESCRIPTIONS_BY_NAME_SUFFIX.items():
+        yield Output(
+            f"{parameter_name}_{suffix}", "", about.units, f"{words} of the {about.long_name}"
+        )

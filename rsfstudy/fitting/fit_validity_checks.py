@@ -1,0 +1,316 @@
+"""Checks of the standard errors of a fit.
+
+If the standard errors are not valid, the status of the fit is ``errors_not_valid``, but the
+parameter values can still be used. Each check returns a reason, which is a string without a final
+full stop. The reason describes the violated condition and a remedy.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from rsfstudy.fitting.fit_solution import FitSolution
+from rsfstudy.fitting.joint_model import strip_window_number
+from rsfstudy.fitting.noise import ljung_box_p_value
+from rsfstudy.fitting.whiteness_test import LAG_COUNT
+from rsfstudy.fitting.window_model import LOGARITHMIC_PARAMETERS
+from rsfstudy.formatting import pluralize
+
+#: Names of the parameters that are slip distances.
+SLIP_DISTANCES = ("slip_distance", "slip_distance_2")
+#: Significance level of the test for autocorrelated whitened residuals.
+SIGNIFICANCE_LEVEL = 0.01
+#: Standard deviation of friction below which the residuals are numerical errors rather than noise.
+MIN_STATISTICAL_NOISE_SD = 1e-7
+#: Largest ratio of the residuals to the residuals of an ordinary least-squares fit.
+_MAX_RESIDUAL_SD_OVER_LEAST_SQUARES = 2.0
+#: Ratio of the noise to the quantum of friction below which rounding errors depend on friction, and
+#: largest fraction of rows that may be outliers.
+_MIN_FRICTION_NOISE_PER_QUANTUM, _MAX_OUTLIER_FRACTION = 0.4, 0.05
+#: Fewest rows per slip distance for which confidence intervals are reliable.
+_MIN_ROWS_PER_SLIP_DISTANCE = 1.5
+#: Largest ratio of the two sides of a 95 % confidence interval of the logarithm of a parameter.
+_MAX_CONFIDENCE_INTERVAL_ASYMMETRY = 3.0
+#: Largest number of outliers that a message lists.
+_MAX_LISTED_OUTLIERS = 10
+
+
+def find_validity_problems(solution: FitSolution, recorded_friction: np.ndarray) -> tuple[str, ...]:
+    """Return the reasons why the standard errors of a fit are not valid.
+
+    Parameters
+    ----------
+    solution : FitSolution
+        Result of the fit.
+    recorded_friction : ndarray, shape (rows,)
+        Recorded friction.
+
+    Returns
+    -------
+    tuple of str
+        Reasons. The tuple is empty if the standard errors are valid.
+    """
+    if solution.noise_sd < MIN_STATISTICAL_NOISE_SD:
+        return ()
+    return (
+        *_check_misfit_is_small(solution, recorded_friction),
+        *_check_rounding_is_below_noise(solution),
+        *_check_outlier_count(solution),
+        *_check_residuals_are_white(solution),
+    )
+
+
+def describe_asymmetric_intervals(
+    solution: FitSolution, interval_ends: Mapping[str, tuple[float, float]]
+) -> tuple[str, ...]:
+    """Describe the parameters with very asymmetric confidence intervals.
+
+    If a record constrains a parameter on one side only, such as the stiffness of a very stiff
+    machine, the standard errors of all correlated parameters are too small.
+
+    Parameters
+    ----------
+    solution : FitSolution
+        Result of the fit.
+    interval_ends : mapping of str to (float, float)
+        Ends of the 95 % confidence intervals of the free parameters.
+
+    Returns
+    -------
+    tuple of str
+        Reasons why the standard errors are not valid, one for each of these parameters.
+    """
+    reasons = []
+    for name in (
+        n
+        for n in solution.free_parameters
+        if strip_window_number(n) in LOGARITHMIC_PARAMETERS and min(interval_ends[n]) > 0.0
+    ):
+        below, above = (
+            abs(math.log(end / solution.parameter_values[name])) for end in interval_ends[name]
+        )
+        if max(below, above) > _MAX_CONFIDENCE_INTERVAL_ASYMMETRY * min(below, above):
+            low, high = interval_ends[name]
+            reasons.append(
+                f"the 95 % interval of {name} is asymmetric ({low:.3g} to {high:.3g}), so standard "
+                f"errors do not describe it: specify {name} instead of fitting it, or sample faster"
+            )
+    return tuple(reasons)
+
+
+def describe_outliers(outlier_rows: np.ndarray) -> str:
+    """Return a remark that lists the outliers.
+
+    Parameters
+    ----------
+    outlier_rows : ndarray of int
+        Indices of the outliers in the window. The remark numbers the rows from 1.
+
+    Returns
+    -------
+    str
+        Remark, or an empty string if there are no outliers.
+    """
+    if not len(outlier_rows):
+        return ""
+    names = ", ".join(str(row + 1) for row in outlier_rows[:_MAX_LISTED_OUTLIERS].tolist())
+    more = " and more" * (len(outlier_rows) > _MAX_LISTED_OUTLIERS)
+    count = pluralize(len(outlier_rows), "outlier")
+    verb = "was" if len(outlier_rows) == 1 else "were"
+    return f"{count} {verb} left out: rows {names}{more} of the window"
+
+
+def _check_misfit_is_small(solution: FitSolution, recorded_friction: np.ndarray) -> Iterator[str]:
+    """Yield a reason if the residuals are too large."""
+    size = float(np.sqrt(np.mean(solution.noise_model.drop_outliers(solution.residuals) ** 2)))
+    if not size < np.std(recorded_friction):
+        yield (
+            "the fit explains the record no better than its mean does (R2 is not positive): "
+            "check the step, the stiffness and the law"
+        )
+    elif size > _MAX_RESIDUAL_SD_OVER_LEAST_SQUARES * solution.ols_residual_rms:
+        yield (
+            f"the residuals ({size:.2g}) are {size / solution.ols_residual_rms:.1f} times as large "
+            "as those of an ordinary least-squares fit, so part of the response is taken for "
+            "noise: check the time of the step, the trend and the law"
+        )
+
+
+def _check_rounding_is_below_noise(solution: FitSolution) -> Iterator[str]:
+    """Yield a reason if the rounding of friction is too coarse."""
+    if is_rounding_too_coarse(solution):
+        yield (
+            f"friction is rounded to {solution.friction_rounding_quantum:.2g}, more than 2.5 times the noise, so "
+            "rounding errors are not random: export the record with more digits"
+        )
+
+
+def is_rounding_too_coarse(solution: FitSolution) -> bool:
+    """Return True if the rounding of friction is too coarse.
+
+    Rounding errors are random only if the standard deviation of the noise exceeds 0.4 times the
+    quantum of friction.
+
+    Parameters
+    ----------
+    solution : FitSolution
+        Result of the fit.
+
+    Returns
+    -------
+    bool
+        True if rounding errors are not random.
+    """
+    variance = (
+        solution.noise_sd * float(solution.noise_model.noise_level_standard_deviations.min())
+    ) ** 2 - solution.friction_rounding_quantum**2 / 12.0
+    return variance < (_MIN_FRICTION_NOISE_PER_QUANTUM * solution.friction_rounding_quantum) ** 2
+
+
+def _check_outlier_count(solution: FitSolution) -> Iterator[str]:
+    """Yield a reason if too many rows are outliers."""
+    count, rows = len(solution.outlier_rows), len(solution.residuals)
+    if count > _MAX_OUTLIER_FRACTION * rows:
+        yield f"{count} of {rows} rows are outliers: remove them from the record, or check the law"
+
+
+def _check_residuals_are_white(solution: FitSolution) -> Iterator[str]:
+    """Yield a reason if the whitened residuals are autocorrelated."""
+    p_value = ljung_box_p_value(solution.whitened_residuals, solution.noise_model.order)
+    if p_value < SIGNIFICANCE_LEVEL:
+        yield (
+            f"the whitened residuals are still autocorrelated (p = {p_value:.2g}): "
+            "the law, the trend or the noise model does not describe the record"
+        )
+
+
+def describe_load_point_noise(
+    solution: FitSolution, loading: str, displacement_noise_sd: float
+) -> str:
+    """Return a remark about the noise of load point displacement.
+
+    Parameters
+    ----------
+    solution : FitSolution
+        Result of the fit.
+    loading : {"steps", "recorded"}
+        Kind of loading.
+    displacement_noise_sd : float
+        Standard deviation of the load point noise in um.
+
+    Returns
+    -------
+    str
+        Remark, or an empty string if the noise has little effect on the parameters.
+    """
+    if loading == "steps":
+        moved = np.diag(solution.coordinate_covariance) > 2.0 * np.diag(
+            solution.noise_caused_covariance
+        )
+        pairs = zip(solution.free_parameters, moved.tolist(), strict=True)
+        names = ", ".join(n for n, most in pairs if most and strip_window_number(n) != "step_time")
+        remedy = (
+            "" if "step_time" in solution.free_parameters else ": looked for, step_time lessens it"
+        )
+        text = f"noise of load point displacement makes most of the error of {names}{remedy}"
+        return text if names else ""
+    if "slip_distance" not in solution.free_parameters:
+        return ""
+    # Displacement noise x changes ln V of a stiff slider by k x/a. The change of the slip
+    # distance is of second order.
+    shift = (
+        0.5
+        * (
+            solution.parameter_values["stiffness"]
+            * displacement_noise_sd
+            / solution.parameter_values["a"]
+        )
+        ** 2
+    )
+    if (
+        shift
+        < solution.parameter_stderr("slip_distance") / solution.parameter_values["slip_distance"]
+    ):
+        return ""
+    return (
+        f"noise of the recorded load point, {displacement_noise_sd:.2g} um, moves slip_distance by some "
+        f"{100.0 * shift:.2g} %, more than its standard error: see loading='steps'"
+    )
+
+
+def find_unidentified_parameters(
+    solution: FitSolution, displacement_per_row: float
+) -> tuple[str, ...]:
+    """Return the parameters that the record does not constrain.
+
+    A slip distance is also unconstrained if the record has fewer than 1.5 rows per slip distance.
+
+    Parameters
+    ----------
+    solution : FitSolution
+        Result of the fit.
+    displacement_per_row : float
+        Load point displacement in um between rows after the step.
+
+    Returns
+    -------
+    tuple of str
+        Names of the parameters.
+    """
+    sparse = [
+        n
+        for n in SLIP_DISTANCES
+        if solution.parameter_values.get(n, math.inf)
+        < _MIN_ROWS_PER_SLIP_DISTANCE * displacement_per_row
+    ]
+    return tuple(
+        n for n in solution.free_parameters if n in (*solution.unidentified_parameters, *sparse)
+    )
+
+
+def describe_unidentified_parameters(
+    solution: FitSolution,
+    parameter_names: tuple[str, ...],
+    displacement_per_row: float,
+    *,
+    is_a_at_bound: bool,
+) -> str:
+    """Return the message for parameters that the record does not constrain.
+
+    Parameters
+    ----------
+    solution : FitSolution
+        Result of the fit.
+    parameter_names : tuple of str
+        Names of the unconstrained parameters.
+    displacement_per_row : float
+        Load point displacement in um between rows after the step.
+    is_a_at_bound : bool
+        True if the direct effect is at its lower bound.
+
+    Returns
+    -------
+    str
+        Message that names the parameters, with possible reasons.
+    """
+    text = f"the record does not constrain {', '.join(parameter_names)}"
+    if sparse := set(parameter_names) - set(solution.unidentified_parameters):
+        rows = min(solution.parameter_values[name] for name in sparse) / displacement_per_row
+        text += f"; the record has {rows:.1f} rows per slip distance, and "
+        text += f"{_MIN_ROWS_PER_SLIP_DISTANCE:g} are needed: sample faster after the step"
+    if "a" in parameter_names and is_a_at_bound:
+        text += "; friction does not change at the step as velocity does: "
+        text += "see whether columns (time and displacement, say) are exchanged"
+    return text
+
+
+def describe_whiteness(p_value: float, noise_order: int, rows: int) -> str:
+    """Describe the result of the autocorrelation test of whitened residuals."""
+    verdict = (
+        "are still autocorrelated" if p_value < SIGNIFICANCE_LEVEL else "show no autocorrelation"
+    )
+    last = min(LAG_COUNT + noise_order, rows // 4)
+    return f"whitened residuals {verdict} up to lag {last} (p = {p_value:.2g})"

@@ -1,0 +1,449 @@
+"""Windows of a record around steps, with initial guesses of parameters.
+
+A ``FitWindow`` selects the rows around a step, and creates the model of the selected rows. The
+function ``guess_parameters`` estimates initial parameters from the recorded friction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from rsfstudy.fitting.linear_friction_before_step import find_start_of_linear_friction
+from rsfstudy.fitting.load_point_noise import integrate_displacement, shift_steps_by_their_errors
+from rsfstudy.fitting.record import Record, find_steps_between, loading_history, stepwise_loading
+from rsfstudy.fitting.stress_steps import MIN_RELATIVE_NORMAL_STRESS_CHANGE
+from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
+from rsfstudy.fitting.window_model import WindowModel, scene_to_parameters
+from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
+from rsfstudy.slider import Scene
+from rsfstudy.status import Status
+
+#: Fraction of the interval after the previous step that a window includes by default, and fewest
+#: rows per free parameter.
+_WINDOW_START_BEFORE_STEP_FRACTION, _MIN_ROWS_PER_PARAMETER = 0.5, 3
+#: Largest delay of the loading, as a fraction of the duration of the window before the step.
+_MAX_LOADING_DELAY_FRACTION = 0.2
+#: Smallest ratio of the actual extent of a window to its requested extent for which no remark is
+#: added.
+_MIN_INCLUDED_WINDOW_FRACTION = 0.98
+#: Names of the kinds of loading.
+LOADING_KINDS = ("steps", "recorded")
+#: Number of rows in the running median that reduces the noise of normal stress, quantile of the
+#: deviations that is compared with the limit, and allowance for noise in standard deviations.
+_RUNNING_MEDIAN_ROWS_OF_STRESS, _STRESS_DEPARTURE_QUANTILE, _MAX_STRESS_DEPARTURE_NOISE_SIGMAS = (
+    5,
+    0.99,
+    2.0,
+)
+#: Logarithm of the velocity ratio below which a step is too small for estimating the initial a and
+#: b.
+_MIN_LOG_VELOCITY_RATIO_FOR_GUESS = 0.02
+
+
+@dataclass(frozen=True)
+class FitWindow:
+    """Part of a record around a step.
+
+    Parameters
+    ----------
+    record : Record
+        Record that contains the step.
+    step_number : int
+        Number of the step, starting from 1.
+    displacement_before : float, default: 0.0
+        Load point displacement in um to include before the step. If 0, the window begins halfway
+        between the previous step and this step, or at the beginning of the record if there is no
+        previous step.
+    displacement_after : float, default: 0.0
+        Load point displacement in um to include after the step. If 0, the window ends at the next
+        step or at the end of the record.
+    fraction_of_displacement_after : float, default: 1.0
+        Fraction of the displacement after the step to include.
+    other_fitted_step_numbers : collection of int, optional
+        Numbers of other steps of the record in a joint fit. The window ends before the window of
+        the next step if this step is in ``other_fitted_step_numbers``.
+
+    Notes
+    -----
+    If friction before the step is not a linear function of time, the window begins later, with the
+    linear part. The window of a hold includes the sliding after the hold.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rsfstudy.fitting import FitWindow, Record
+    >>> time = np.arange(0.0, 100.0, 0.5)
+    >>> displacement = np.where(time < 50.0, time, 50.0 + 10.0 * (time - 50.0))
+    >>> friction = np.full(200, 0.6)
+    >>> record = Record({"time": time, "displacement": displacement, "friction": friction})
+    >>> window = FitWindow(record, step_number=1, displacement_before=30.2)
+    >>> float(record.time[window.rows[0]])
+    20.0
+    """
+
+    record: Record
+    step_number: int
+    displacement_before: float = 0.0
+    displacement_after: float = 0.0
+    fraction_of_displacement_after: float = 1.0
+    other_fitted_step_numbers: Collection[int] = ()
+
+    @property
+    def step(self) -> LoadingStep:
+        """Step of the window.
+
+        Raises
+        ------
+        MotionStopped
+            If the record has fewer steps than ``step_number``.
+        """
+        found = self.record.loading_steps
+        if self.step_number > len(found):
+            text = f"{self.record.name} has {len(found)} steps"
+            raise MotionStopped(Status.NO_STEP, text)
+        return found[self.step_number - 1]
+
+    @property
+    def record_row_indices(self) -> np.ndarray:
+        """Indices of the rows of the record in the window."""
+        time = self.record.time
+        return np.flatnonzero((time >= self._start_time(self.step)) & (time <= self._end_time()))
+
+    @property
+    def mean_normal_stress_before_step(self) -> float:
+        """Mean normal stress in Pa in the window before the step.
+
+        The mean is NaN if the normal stress was not recorded.
+        """
+        time, stress = self.record.time, self.record.columns.get("normal_stress")
+        if stress is None:
+            return math.nan
+        first, last = np.searchsorted(time, (self._start_time(self.step), self.step.start))
+        return float(stress[min(first, len(time) - 1) : max(first + 1, last)].mean())
+
+    @property
+    def window_properties(self) -> dict[str, float]:
+        """Velocities, limits, normal stress and noise of the window."""
+        record, rows = self.record, self.record_row_indices
+        moved, time = record.columns["displacement"][rows], record.time[rows]
+        return {
+            "load_point_noise": math.sqrt(noise_variance(time, moved)),
+            "velocity_before": self.step.velocity_before,
+            "velocity_after": self.step.velocity_after,
+            "window_begins": moved[0],
+            "window_ends": moved[-1],
+            "normal_stress_before": self.mean_normal_stress_before_step,
+        }
+
+    def with_machine_stiffness(self, scene: Scene, machine_stiffness: float) -> Scene:
+        """Return a scene with the stiffness of a machine.
+
+        The stiffness of the scene is the stiffness of the machine divided by the normal stress
+        before the step.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene with any stiffness.
+        machine_stiffness : float
+            Stiffness of the machine in Pa per slip distance. If 0, the scene is returned unchanged.
+
+        Returns
+        -------
+        Scene
+            Scene with the stiffness of the machine.
+        """
+        if not machine_stiffness:
+            return scene
+        return scene.with_(stiffness=machine_stiffness / self.mean_normal_stress_before_step)
+
+    def _end_time(self) -> float:
+        """Return the time in s at which the window ends."""
+        record, step = self.record, self.step
+        # The window of a hold includes the sliding after the hold.
+        later = [
+            s
+            for s in record.loading_steps
+            if s.start > step.end and (step.velocity_after or s.velocity_before)
+        ]
+        last = later[0].start if later else record.time[-1]
+        if later and record.loading_steps.index(later[0]) + 1 in self.other_fitted_step_numbers:
+            last = record.time[record.time < self._start_time(later[0])][-1]
+        moved = record.columns["displacement"]
+        at = np.interp(step.start, record.time, moved)
+
+        def reached(distance: float) -> float:
+            """Return the time in s when the load point reaches a distance.
+
+            The distance in um is measured from the step.
+             If the load point does not reach the distance, the function returns the current end of
+             the window.
+            """
+            beyond = (moved > at + distance) & (record.time > step.start)
+            return float(record.time[np.argmax(beyond)] if beyond.any() else last)
+
+        if self.displacement_after:
+            last = min(last, reached(self.displacement_after))
+        if self.fraction_of_displacement_after < 1.0:
+            last = reached(
+                self.fraction_of_displacement_after * (np.interp(last, record.time, moved) - at)
+            )
+        return float(last)
+
+    def _start_time(self, step: LoadingStep) -> float:
+        """Return the time in s at which the window of a step begins."""
+        return find_start_of_linear_friction(
+            self.record, self._earliest_start_time(step), step.start
+        )
+
+    @property
+    def truncation_remarks(self) -> list[str]:
+        """Remarks about parts of the requested window that are left out."""
+        record, step, moved = self.record, self.step, self.record.columns["displacement"]
+        nominal, begins, at, ends = np.interp(
+            [self._earliest_start_time(step), self._start_time(step), step.start, self._end_time()],
+            record.time,
+            moved,
+        )
+        found, later = (
+            [],
+            "next step" if self._end_time() < record.time[-1] else "end of the record",
+        )
+        if begins > nominal:
+            found.append(
+                f"the window begins {at - begins:.4g} um before the step, not {at - nominal:.4g}: "
+                "friction is not a straight line before"
+            )
+        elif at - begins < _MIN_INCLUDED_WINDOW_FRACTION * self.displacement_before:
+            found.append(
+                f"before= is cut from {self.displacement_before:.4g} to {at - begins:.4g} um: "
+                "the step before, or the beginning of the record, is nearer than twice that"
+            )
+        if (
+            self.fraction_of_displacement_after == 1.0
+            and ends - at < _MIN_INCLUDED_WINDOW_FRACTION * self.displacement_after
+        ):
+            cut = f"after= is cut from {self.displacement_after:.4g} to {ends - at:.4g} um"
+            found.append(f"{cut} by the {later}")
+        return found
+
+    def _earliest_start_time(self, step: LoadingStep) -> float:
+        """Return the earliest possible start of a window in s.
+
+        The window begins later if friction before the step is not linear.
+        """
+        record = self.record
+        earlier = [s.end for s in record.loading_steps if s.end < step.start]
+        first = max(earlier, default=record.time[0])
+        begins = step.start - (_WINDOW_START_BEFORE_STEP_FRACTION if earlier else 1.0) * (
+            step.start - first
+        )
+        if self.displacement_before:
+            moved = record.columns["displacement"]
+            at = np.interp(step.start, record.time, moved)
+            begins = max(begins, record.time[np.argmax(moved >= at - self.displacement_before)])
+        return float(begins)
+
+    def create_model(
+        self,
+        scene: Scene,
+        free_parameters: Collection[str],
+        loading_kind: str,
+        accuracy: Accuracy,
+        meter: WorkMeter,
+    ) -> WindowModel:
+        """Create the model of the window.
+
+        The displacement of the model is relative to the step.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene with the friction law and the fixed parameters.
+        free_parameters : collection of str
+            Names of the free parameters.
+        loading_kind : {"steps", "recorded"}
+            Loading by the steps of the record, or by its rows.
+        accuracy : Accuracy
+            Accuracy of the simulated motions.
+        meter : WorkMeter
+            Counter of right-hand-side evaluations.
+
+        Returns
+        -------
+        WindowModel
+            Model of the rows in the window.
+
+        Raises
+        ------
+        MotionStopped
+            If the window has too few rows, if the window begins in a hold, if the mean friction
+            before the step is not positive, or if the recorded normal stress differs from the
+            normal stress of the model.
+        """
+        record, step, rows = self.record, self.step, self.record_row_indices
+        time = record.time[rows]
+        friction = record.columns["friction"][rows]
+        if (
+            len(rows) < _MIN_ROWS_PER_PARAMETER * len(free_parameters)
+            or not step.start < self._end_time()
+        ):
+            text = (
+                f"the window holds {len(rows)} rows, too few for {len(free_parameters)} parameters"
+            )
+            raise MotionStopped(Status.NOT_APPLICABLE, text)
+        before = friction[time < step.start]
+        if before.size and not before.mean() > 0.0:
+            text = (
+                f"mean friction before the step is {before.mean():.3g}, and must be positive. If "
+                "shear stress has the opposite sign, reverse it with a scale of -1 behind its "
+                "heading: --columns 'friction=HEADING * -1' (columns=)"
+            )
+            raise MotionStopped(Status.NOT_APPLICABLE, text)
+        begins, ends = self._start_time(step), self._end_time()
+        pieces = loading_history(record, begins, ends, use_recorded_rows=loading_kind == "recorded")
+        if scene.parts.normal_stress.name == "constant":
+            # The scene treats variations of the recorded normal stress as noise.
+            pieces[:, 2:] = 1.0, 0.0
+        moves = (
+            self._build_loadings_with_step_errors(begins, ends) if loading_kind == "steps" else []
+        )
+        if "step_time" in free_parameters:
+            for each in (pieces, *moves):
+                each[0, 0] -= _MAX_LOADING_DELAY_FRACTION * (step.start - begins)
+        if not pieces[0, 1] > 0.0:
+            text = "the window begins in a hold: a fit begins with steady sliding"
+            raise MotionStopped(Status.NOT_APPLICABLE, text)
+        self._check_normal_stress_matches_loading(rows, pieces)
+        steady = stepwise_loading(begins, find_steps_between(record, begins, ends))
+        moved = integrate_displacement(steady, time, step.start)
+        return WindowModel(scene, time, moved, friction, pieces, accuracy, meter, moves)
+
+    def _build_loadings_with_step_errors(
+        self, start_time: float, end_time: float
+    ) -> list[np.ndarray]:
+        """Return loading histories with steps shifted by their errors."""
+        steps = find_steps_between(self.record, start_time, end_time)
+        others = [step for step in steps if not step.changes_velocity]
+        moved = shift_steps_by_their_errors(
+            self.record, [step for step in steps if step.changes_velocity]
+        )
+        return [stepwise_loading(start_time, sorted([*each, *others])) for each in moved]
+
+    def _check_normal_stress_matches_loading(
+        self, rows: np.ndarray, loading_segments: np.ndarray
+    ) -> None:
+        """Raise ``MotionStopped`` if the modelled normal stress is wrong.
+
+        The recorded normal stress may differ from the modelled normal stress by up to 2 % in
+        addition to noise.
+        """
+        record = self.record
+        if "normal_stress" not in record.columns:
+            return
+        time, before = record.time[rows], self.mean_normal_stress_before_step
+        stress = record.columns["normal_stress"][rows] / before
+        piece = np.maximum(np.searchsorted(loading_segments[:, 0], time, side="right") - 1, 0)
+        modelled = loading_segments[piece, 2] + loading_segments[piece, 3] * (
+            time - loading_segments[piece, 0]
+        )
+        apart = np.abs(
+            median_filter(stress - modelled, _RUNNING_MEDIAN_ROWS_OF_STRESS, mode="nearest")
+        )
+        noise = math.sqrt(noise_variance(time, stress))
+        varies = (
+            float(np.quantile(apart, _STRESS_DEPARTURE_QUANTILE))
+            - _MAX_STRESS_DEPARTURE_NOISE_SIGMAS * noise
+        )
+        if varies > MIN_RELATIVE_NORMAL_STRESS_CHANGE:
+            stress *= before * 1e-6
+            text = (
+                f"normal stress varies from {stress.min():.4g} to {stress.max():.4g} MPa within "
+                f"the window, and is {before * 1e-6:.4g} MPa before the step; the model accounts "
+                f"for changes of {100.0 * MIN_RELATIVE_NORMAL_STRESS_CHANGE:g} % at most. Shorten the window "
+                "with --before and --after (before=, after=), or model the normal stress: --set "
+                "normal_stress=imposed (normal_stress=) for its steps, with --loading recorded "
+                "(loading=) row by row; alpha is then free or stated"
+            )
+            raise MotionStopped(Status.NOT_APPLICABLE, text)
+
+
+def compute_stiffness_factors(windows: Sequence[FitWindow]) -> tuple[float, ...]:
+    """Compute the ratio of stiffness to normal stress in each window.
+
+    The stiffness of the machine is the same in all windows, and each ratio is relative to the ratio
+    in the first window.
+
+    Parameters
+    ----------
+    windows : sequence of FitWindow
+        Windows of a joint fit.
+
+    Returns
+    -------
+    tuple of float
+        One ratio per window. The tuple is empty if the normal stress of a window is unknown.
+    """
+    stresses = np.array([window.mean_normal_stress_before_step for window in windows])
+    known = bool(np.isfinite(stresses).all() and stresses.all())
+    return tuple((stresses[0] / stresses).tolist()) if known else ()
+
+
+def guess_parameters(
+    model: WindowModel,
+    step: LoadingStep,
+    free_parameters: Sequence[str],
+    slip_distance_guesses: tuple[float, float],
+) -> dict[str, float]:
+    r"""Estimate initial values of the parameters from a record.
+
+    Parameters that cannot be estimated keep the values of the scene.
+
+    Parameters
+    ----------
+    model : WindowModel
+        Model of a window.
+    step : LoadingStep
+        Step of the window.
+    free_parameters : sequence of str
+        Names of the free parameters. The fixed parameters have the values of the scene.
+    slip_distance_guesses : (float, float)
+        Slip distances in um of the first and the second state. The first slip distance is the unit
+        of slip in the scene.
+
+    Returns
+    -------
+    dict of {str: float}
+        Initial values of all parameters.
+
+    Notes
+    -----
+    Let :math:`\mu_0` be the mean friction before a velocity step by a factor :math:`r`,
+    :math:`\mu_p` the extreme value of friction after the step, and :math:`\mu_1` the friction at
+    the end of the window. The estimates of the direct effect and the evolution effect are
+
+    .. math:: a = (\mu_p - \mu_0)/\ln r, \qquad b = (\mu_p - \mu_1)/\ln r.
+    """
+    scene, friction = model.scene, model.friction
+    before, later = friction[model.time < step.start], friction[model.time >= step.end]
+    values = scene_to_parameters(scene, *slip_distance_guesses)
+    if "mu_star" in free_parameters and len(before):
+        values["mu_star"] = float(np.mean(before))
+    if step.velocity_after > 0.0 and len(before):
+        ratio = math.log(step.velocity_after / step.velocity_before)
+    else:
+        ratio = 0.0
+    if abs(ratio) > _MIN_LOG_VELOCITY_RATIO_FOR_GUESS:
+        peak = later.max() if ratio > 0.0 else later.min()
+        read_a = max((peak - values["mu_star"]) / ratio, 1e-3)
+        read_b = (peak - float(np.mean(later[-max(len(later) // 10, 1) :]))) / ratio
+        seen = {"a": read_a, "b": read_b, "b1": 0.7 * read_b, "b2": 0.3 * read_b}
+        values |= {
+            name: v for name, v in seen.items() if name in free_parameters and name in values
+        }
+    return dict.fromkeys(free_parameters, 0.0) | values

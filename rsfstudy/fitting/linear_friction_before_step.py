@@ -1,0 +1,100 @@
+"""Selection of the rows before a step in which friction is linear."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quantum
+from rsfstudy.fitting.record import Record
+from rsfstudy.fitting.velocity_steps import RunningLineFitSums
+
+#: Largest number of block averages that are tested, fewest block averages on each side of a break,
+#: and fewest rows of a part that is tested.
+_MAX_FITTED_ROW_MEANS, _MIN_ROW_MEANS_BESIDE_BREAK, _MIN_ROWS_OF_LINEAR_PORTION = 120, 6, 20
+#: Smallest decrease of the sum of squares by a second line, divided by the residual variance and by
+#: ln n for n block averages. The residual variance is increased if the residuals are correlated.
+_MIN_SQUARES_GAIN_OF_BREAK = 15.0
+#: Smallest deviation of friction from the line of the later part, as an absolute value and in
+#: standard deviations of the residuals. For comparison, a tenfold velocity step changes friction by
+#: about 0.02.
+_MIN_FRICTION_DEPARTURE_FROM_LINE, _MIN_FRICTION_DEPARTURE_SIGMAS = 4e-4, 4.0
+#: Fraction of the rows from which the noise is estimated. These rows are next to the step.
+_FRACTION_OF_ROWS_FOR_NOISE = 0.4
+#: Upper bound of the estimated correlation between successive block averages.
+_MAX_CORRELATION_OF_ROW_MEANS = 0.98
+
+
+@lru_cache(maxsize=256)
+def find_start_of_linear_friction(record: Record, start_time: float, end_time: float) -> float:
+    """Find the start of the linear part of friction before a step.
+
+    The earlier part of the rows is discarded if two conditions are met. First, two separate lines
+    must describe friction far better than a single line. The comparison accounts for the
+    correlation of the residuals. Second, friction in the earlier part must differ noticeably from
+    the line through the later part. The test is repeated with the remaining rows. Before the test,
+    outliers are replaced by interpolated values.
+
+    Parameters
+    ----------
+    record : Record
+        Record with time and friction.
+    start_time, end_time : float
+        Times in s between which friction is tested.
+
+    Returns
+    -------
+    float
+        Time in s. The result is ``start_time`` if friction is linear in the whole interval.
+    """
+    rows = np.flatnonzero((record.time >= start_time) & (record.time < end_time))
+    time, friction = record.time[rows], record.columns["friction"][rows]
+    kept = find_non_outlier_mask(friction, np.zeros(len(friction)), find_rounding_quantum(friction))
+    if kept is not None:
+        friction = np.interp(time, time[kept], friction[kept])
+    while len(time) >= max(_MIN_ROWS_OF_LINEAR_PORTION, 4 * _MIN_ROW_MEANS_BESIDE_BREAK):
+        every = max(1, len(time) // _MAX_FITTED_ROW_MEANS)
+        used = len(time) // every * every
+        of_means = (of[-used:].reshape(-1, every).mean(axis=1) for of in (time, friction))
+        break_at = _find_slope_break(*of_means)
+        if break_at == 0:
+            break
+        first = len(time) - used + break_at * every
+        time, friction = time[first:], friction[first:]
+    return float(time[0]) if len(time) and len(time) < len(rows) else start_time
+
+
+def _find_slope_break(row_times: np.ndarray, friction: np.ndarray) -> int:
+    """Find the row at which a split into two lines fits friction best.
+
+    Returns
+    -------
+    int
+        Index of the row, or 0 if a single line is sufficient.
+    """
+    count = len(row_times)
+    sums = RunningLineFitSums(row_times - row_times[0], friction - friction[0], np.ones(count))
+    places = np.arange(_MIN_ROW_MEANS_BESIDE_BREAK, count - _MIN_ROW_MEANS_BESIDE_BREAK + 1)
+    both = sums.line_residual_squares(0, places) + sums.line_residual_squares(places, count)
+    place = int(places[np.argmin(both)])
+    time, moved = row_times - row_times[0], friction - friction[0]
+    # Curvature in the earlier part is not noise, so the noise is estimated from the last rows.
+    last = count - max(int(_FRACTION_OF_ROWS_FOR_NOISE * count), _MIN_ROW_MEANS_BESIDE_BREAK)
+    (x0, v0), (x1, v1) = sums.fit_line(last, count), sums.fit_line(place, count)
+    left = (moved - x0 - v0 * time)[last:]
+    size = float(np.sqrt(left @ left / (len(left) - 2)))
+    rho = float(left[1:] @ left[:-1] / max(left @ left, 1e-300))
+    # Subtracting the fitted line reduces the estimated correlation.
+    rho += 4.0 * (1.0 + rho) / len(left)
+    rho = min(max(rho, 0.0), _MAX_CORRELATION_OF_ROW_MEANS)
+    gain = float(sums.line_residual_squares(0, count)) - float(both.min())
+    departs = float(np.abs(moved[:place] - x1 - v1 * time[:place]).max())
+    worth = _MIN_SQUARES_GAIN_OF_BREAK * math.log(count) * size**2 * (1.0 + rho) / (1.0 - rho)
+    return (
+        place
+        if gain > worth
+        and departs > max(_MIN_FRICTION_DEPARTURE_FROM_LINE, _MIN_FRICTION_DEPARTURE_SIGMAS * size)
+        else 0
+    )

@@ -1,0 +1,438 @@
+r"""Convergence of a motion to its limit cycle.
+
+If a scene has one state, use ``LimitCycleSearch``. The spring stress at a rise of V through V_0
+determines the subsequent motion, so two successive cycles determine the derivative of the return
+map. If the cycles converge slowly, the search leaps to a fixed point that is extrapolated from the
+derivative.
+
+If a scene has several states, use ``follow_to_periodic_orbit``. The function follows the motion cycle by
+cycle, and compares the cycles to find the number of cycles after which the motion repeats.
+
+Notes
+-----
+The section of a motion at a rise of V through V_0 is :math:`s = (f, \Psi)`, with the spring stress
+:math:`f` and the state :math:`\Psi`. The image :math:`P(s)` contains the section one cycle later,
+followed by the main results of the cycle. The derivative :math:`P'` has a column :math:`b` for
+:math:`f` and a column :math:`c` for :math:`\Psi`.
+
+Spring stress has a maximum at a section, so the motion passes the section in the direction
+:math:`(0, d\Psi/dt)`. If the motion starts a time :math:`dt` later, the cycle is shorter by
+:math:`dt`, and nothing else changes. Therefore :math:`c` is :math:`-1/(d\Psi/dt)` in the row of the
+recurrence interval, and 0 in all other rows. If the sections of two cycles differ by :math:`(df,
+d\Psi)` and their images differ by :math:`dP`, the other column is
+
+.. math:: b = (dP - c\,d\Psi)/df.
+
+The first two rows of :math:`P'` are the derivative :math:`A` of the next section. Column :math:`c`
+of :math:`A` is zero, so :math:`A` has rank one, and its nonzero eigenvalue is its trace. Therefore
+:math:`A^2 = (\mathrm{tr} A) A`, and the vector from :math:`s` to the fixed point is
+
+.. math:: (1 - A)^{-1} (P(s) - s) = P(s) - s + \frac{A (P(s) - s)}{1 - \mathrm{tr} A}.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from operator import sub
+
+import numpy as np
+
+from rsfstudy.limit_cycles.return_map import (
+    ORBIT_CLOSURE_TOLERANCE_OVER_RTOL,
+    PeriodicOrbit,
+    ReturnMap,
+    section_vector_at,
+)
+from rsfstudy.limit_cycles.stick_slip_cycles import (
+    LN10,
+    PRIMARY_OUTPUTS_PER_CYCLE,
+    Cycle,
+    iterate_cycles,
+    more_events_remedy,
+)
+from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
+from rsfstudy.slider import Scene, critical_stiffness
+from rsfstudy.status import Status
+
+#: Limits of the contraction ratio, the ratio of successive distances to the limit cycle. The motion
+#: leaps if the ratio is above the first limit, and does not converge if the ratio is above the
+#: second limit.
+_MIN_CONTRACTION_TO_LEAP, _MAX_CONTRACTION = 0.03, 0.98
+#: Largest leap, as a fraction of the range of ln V.
+_MAX_LEAP_OVER_LOG_RATE_RANGE = 0.1
+#: Largest number of cycles in a period.
+MAX_PERIOD_IN_CYCLES = 16
+#: Largest relative accuracy with which orbits are closed, because finite differences lose digits.
+_MAX_ORBIT_CLOSURE_RTOL = 1e-7
+#: Number of cycles after which a motion is first tested for a period.
+_MIN_CYCLES_BEFORE_RECURRENCE_TEST = 8
+#: Absolute value of a Floquet multiplier above which an orbit certainly repels, and largest
+#: difference between cycles that repeat, relative to a times the range of ln V.
+_REPELLING_MULTIPLIER, _MAX_RECURRENCE_MISFIT = 1.01, 0.02
+#: Relative difference from the critical stiffness below which oscillations grow or decay so slowly
+#: that the search cannot converge.
+_CRITICAL_STIFFNESS_TOLERANCE = 1e-5
+
+
+class LimitCycleSearch:
+    """Search for the limit cycle of a scene with one state.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with one state and a moving load point.
+    accuracy : Accuracy
+        Requested accuracy.
+    meter : WorkMeter
+        Counter of right-hand-side evaluations.
+
+    Attributes
+    ----------
+    cycles : list of Cycle
+        Cycles that were computed. If ``follow_until_converged`` has returned True, the last cycle is the limit cycle.
+    """
+
+    def __init__(self, scene: Scene, accuracy: Accuracy, work_meter: WorkMeter) -> None:
+        self._scene, self._accuracy, self._meter = scene, accuracy, work_meter
+        self._return_map = ReturnMap(scene, accuracy, work_meter)
+        self._noise = accuracy.local_tolerance * scene.a
+        self._work = 0
+        self.cycles: list[Cycle] = []
+        #: Columns b and c of P', the derivatives of the image with respect to spring stress and
+        #: state, and True if the derivatives are known.
+        self._derivatives, self._has_derivatives = (
+            2 * ([0.0] * (2 + PRIMARY_OUTPUTS_PER_CYCLE),),
+            False,
+        )
+        #: Section s at which the last cycle begins, its image P(s), and the difference dP from the
+        #: previous image.
+        self._section, self._image = (0.0, 0.0), [0.0] * (2 + PRIMARY_OUTPUTS_PER_CYCLE)
+        self._image_change = self._image
+        #: Vector from s to the fixed point, and the resulting change of the image.
+        self._correction, self._image_correction = self._section, self._image
+        #: Change of spring stress over the cycle before the last leap.
+        self._distance_at_leap = np.inf
+
+    def follow_until_converged(self, max_cycles: int) -> bool:
+        """Compute cycles until the motion reaches the limit cycle.
+
+        Parameters
+        ----------
+        max_cycles : int
+            Largest number of cycles.
+
+        Returns
+        -------
+        bool
+            True if the motion has reached the limit cycle, and False if the motion settles to
+            steady sliding.
+
+        Raises
+        ------
+        MotionStopped
+            With the status ``work_budget_spent`` if no cycle repeats within ``max_cycles`` cycles.
+        """
+        start = None
+        while True:
+            spent = self._meter.evaluations
+            for cycle in iterate_cycles(self._scene, self._accuracy, self._meter, start):
+                if cycle is None:
+                    return False
+                self._work, spent = self._meter.evaluations - spent, self._meter.evaluations
+                self.cycles.append(cycle)
+                self._update_map_derivatives()
+                if self._has_converged():
+                    return True
+                if len(self.cycles) >= max_cycles:
+                    remedy = self._critical_stiffness_text or more_events_remedy(max_cycles)
+                    text = f"no cycle repeats within {max_cycles} events; {remedy}"
+                    raise MotionStopped(Status.WORK_BUDGET_SPENT, text)
+                if self._should_leap_to_fixed_point():
+                    self._distance_at_leap = abs(
+                        cycle.end_point.spring_stress - cycle.start_point.spring_stress
+                    )
+                    start = self._return_map.point_at_section(
+                        section_vector_at(cycle.start_point) + np.array(self._correction)
+                    )
+                    break
+
+    @property
+    def _critical_stiffness_text(self) -> str:
+        """Explanation for the message if the stiffness is nearly critical.
+
+        The text is empty if the stiffness is not close to critical.
+        """
+        critical = critical_stiffness(self._scene, self._scene.log_load_velocity)
+        off = abs(self._scene.stiffness / critical - 1.0) if critical else math.inf
+        if off > _CRITICAL_STIFFNESS_TOLERANCE:
+            return ""
+        return f"stiffness is critical to {off:.0e}: swings take for ever to grow or to die out"
+
+    @property
+    def orbit(self) -> PeriodicOrbit:
+        """Last cycle, with its correction to the limit cycle."""
+        last, slopes = self.cycles[-1:], np.array(self._derivatives).T
+        return PeriodicOrbit(
+            tuple(last), (slopes,), np.array(self._correction), self._accuracy, self._work
+        )
+
+    @property
+    def _contraction_ratio_per_cycle(self) -> float:
+        """Trace of the derivative A of the map.
+
+        The trace is the ratio of successive distances to the limit cycle. The other eigenvalue of A
+        is zero, because a displacement of the section along the motion has no effect on the next
+        section.
+        """
+        return self._derivatives[0][0] + self._derivatives[1][1]
+
+    def _update_map_derivatives(self) -> None:
+        """Update the derivatives and the vector to the fixed point.
+
+        The derivatives follow from the last two cycles, unless numerical errors dominate the
+        difference between the cycles. The module docstring contains the formulas.
+        """
+        last = self.cycles[-1]
+        begin, end = last.start_point, last.end_point
+        start = begin.spring_stress, begin.psi
+        image = [end.spring_stress, end.psi, *last.primary_output_values()]
+        changes = list(map(sub, image, self._image))
+        if len(self.cycles) > 1:
+            by_stress, by_state = map(sub, start, self._section)
+            if abs(by_stress) > (1000.0 if self._has_derivatives else 1.0) * self._noise:
+                self._has_derivatives = True
+                # Spring stress does not change when the motion passes a section.
+                (_none, way), passed = self._return_map.motion_direction_and_effect(begin)
+                along = [change / way for change in passed]
+                pairs = zip(changes, along, strict=True)
+                self._derivatives = [(x - by_state * y) / by_stress for x, y in pairs], along
+        self._section, self._image, self._image_change = start, image, changes
+        off, kept = (
+            list(map(sub, image, start)),
+            1.0 - min(self._contraction_ratio_per_cycle, _MAX_CONTRACTION),
+        )
+        returned = self._predict_image_change(off)
+        self._correction = off[0] + returned[0] / kept, off[1] + returned[1] / kept
+        self._image_correction = self._predict_image_change(self._correction)
+
+    def _predict_image_change(self, section_change: Sequence[float]) -> list[float]:
+        """Compute the image change caused by a change of the section."""
+        by_stress, by_state = section_change
+        return [x * by_stress + y * by_state for x, y in zip(*self._derivatives, strict=True)]
+
+    def _has_converged(self) -> bool:
+        """Return True if all further cycles would be equal to the last cycle.
+
+        The cycles have converged if the derivatives predict a sufficiently small change, or if the
+        last two cycles agree.
+        """
+        allowed = [0.3 * self._accuracy.rtol * abs(number) for number in self._image[2:]]
+        if (
+            self._has_derivatives
+            and self._contraction_ratio_per_cycle < _MAX_CONTRACTION
+            and _are_within_tolerance(self._image_correction[2:], allowed)
+        ):
+            return True
+        if len(self.cycles) < 2 or self.cycles[-2].end_point != self.cycles[-1].start_point:
+            return False
+        if self._last_cycles_alternate():
+            return True
+        left = min(max(self._contraction_ratio_per_cycle, 0.0), _MAX_CONTRACTION)
+        left = max(1.0, left / (1.0 - left))
+        return _are_within_tolerance([change * left for change in self._image_change[2:]], allowed)
+
+    def _last_cycles_alternate(self) -> bool:
+        """Return True if the last two cycles alternate around the limit cycle.
+
+        An alternation around the limit cycle is caused by numerical errors. Trajectories in a plane
+        cannot cross, so exact cycles approach the limit cycle from one side.
+        """
+        before, last = (
+            cycle.end_point.spring_stress - cycle.start_point.spring_stress
+            for cycle in self.cycles[-2:]
+        )
+        near = (
+            ORBIT_CLOSURE_TOLERANCE_OVER_RTOL
+            * self._accuracy.rtol
+            * self._scene.a
+            * self.cycles[-1].log_slip_rate_range
+        )
+        return before * last <= 0.0 and abs(last) <= near
+
+    def _should_leap_to_fixed_point(self) -> bool:
+        """Return True if the motion should leap to the fixed point.
+
+        A leap is useless if the next cycle would come equally close to the fixed point. A long leap
+        is avoided, because the motion may settle to steady sliding after a long leap. A leap that
+        does not halve the distance is not repeated, because repeated leaps may form a loop.
+        """
+        cycle = self.cycles[-1]
+        left = abs(cycle.end_point.spring_stress - cycle.start_point.spring_stress)
+        if not 10.0 * self._noise <= left < 0.5 * self._distance_at_leap:
+            return False
+        if not _MIN_CONTRACTION_TO_LEAP < self._contraction_ratio_per_cycle < _MAX_CONTRACTION:
+            return False
+        slowest, fastest = self._image_correction[-2:]
+        return (
+            LN10 * abs(fastest - slowest)
+            < _MAX_LEAP_OVER_LOG_RATE_RANGE * cycle.log_slip_rate_range
+        )
+
+
+def _are_within_tolerance(changes: Sequence[float], tolerances: Sequence[float]) -> bool:
+    """Return True if no change exceeds its tolerance."""
+    return all(abs(change) <= most for change, most in zip(changes, tolerances, strict=True))
+
+
+@dataclass(frozen=True)
+class StickSlipSequence:
+    """Cycles of a motion, and the orbit that the motion approaches.
+
+    Parameters
+    ----------
+    cycles : list of Cycle
+        Cycles of the motion. A cycle is an event in the results of ``LimitCycle``.
+    orbit : Orbit or None
+        Periodic orbit that the motion approaches, or None if no orbit was found.
+    may_still_converge : bool
+        True if the motion may still approach a periodic orbit.
+    """
+
+    cycles: list[Cycle]
+    orbit: PeriodicOrbit | None
+    may_still_converge: bool
+
+
+def follow_to_periodic_orbit(
+    scene: Scene,
+    accuracy: Accuracy,
+    work_meter: WorkMeter,
+    max_cycles: int,
+    *,
+    follow_all_cycles: bool = False,
+) -> StickSlipSequence | None:
+    """Integrate a motion until it approaches an attracting periodic orbit.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with a moving load point.
+    accuracy : Accuracy
+        Requested accuracy.
+    work_meter : WorkMeter
+        Counter of right-hand-side evaluations.
+    max_cycles : int
+        Largest number of cycles.
+    follow_all_cycles : bool, default: False
+        If True, compute ``max_cycles`` cycles even if an orbit is found earlier.
+
+    Returns
+    -------
+    EventSequence or None
+        Cycles and orbit, or None if the motion settles to steady sliding.
+    """
+    seen, orbit, repels = list[Cycle](), None, False
+    fine = accuracy.with_rtol(min(accuracy.rtol, _MAX_ORBIT_CLOSURE_RTOL))
+    look = min(_MIN_CYCLES_BEFORE_RECURRENCE_TEST, max_cycles)
+    for cycle in iterate_cycles(scene, accuracy, work_meter, None):
+        if cycle is None:
+            return None
+        seen.append(cycle)
+        if len(seen) == look and not orbit:
+            look = min(2 * look, max_cycles)
+            found, off = None, math.inf
+            for counted in _state_index_sets_to_compare(scene):
+                period, off = find_recurrence_period(scene, seen, counted)
+                if off < _MAX_RECURRENCE_MISFIT:
+                    by = ReturnMap(scene, fine, work_meter, counted=counted)
+                    found = by.find_periodic_orbit(
+                        section_vector_at(cycle.end_point), period, cycle.log_slip_rate_range
+                    )
+                    break
+            repels = off >= _MAX_RECURRENCE_MISFIT or (
+                found is not None and abs(found.floquet_multipliers[0]) > _REPELLING_MULTIPLIER
+            )
+            orbit = found if found is not None and found.is_attracting else None
+        if len(seen) == max_cycles or (orbit and not follow_all_cycles):
+            break
+    return StickSlipSequence(
+        seen, orbit, may_still_converge=not repels or _may_still_converge(seen)
+    )
+
+
+def _may_still_converge(cycles: Sequence[Cycle]) -> bool:
+    """Return True if a motion may still approach a periodic orbit.
+
+    The result is True for motions with few cycles. For longer motions, the result is True if the
+    range of ln V, or a state, increases or decreases monotonically from cycle to cycle.
+    """
+    if len(cycles) < _MIN_CYCLES_BEFORE_RECURRENCE_TEST:
+        return True
+    latest = [
+        (cycle.log_slip_rate_range, *cycle.end_point.psis) for cycle in cycles[len(cycles) // 2 :]
+    ]
+    changes = np.diff(latest, axis=0)
+    return bool(((changes > 0.0).all(axis=0) | (changes < 0.0).all(axis=0)).any())
+
+
+def _state_index_sets_to_compare(scene: Scene) -> tuple[tuple[int, ...], ...]:
+    """Return the sets of states for the detection of a period.
+
+    The first set contains the states used for the distance from steady sliding. The second set
+    contains only the states of the law, because a slow unknown of the fluid may converge long after
+    the states of the law.
+    """
+    of_law = tuple(range(scene.parts.law.state_count))
+    return tuple(
+        dict.fromkeys(
+            (scene.equation_functions.friction_functions.indices_of_states_in_distance, of_law)
+        )
+    )
+
+
+def find_recurrence_period(
+    scene: Scene, cycles: Sequence[Cycle], compared_state_indices: Sequence[int] | None = None
+) -> tuple[int, float]:
+    r"""Find the number of cycles after which a motion nearly repeats itself.
+
+    The states at the ends of cycles i and i + n are compared over the second half of the motion.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    cycles : sequence of Cycle
+        Successive cycles.
+    compared_state_indices : sequence of int, optional
+        Indices of the states to compare. By default, all states are compared except states in the
+        attribute ``excluded_from_distance`` of a part.
+
+    Returns
+    -------
+    period : int
+        Smallest n with a difference of at most twice the smallest difference.
+    off : float
+        Difference after ``period`` cycles, or infinity if there are too few cycles.
+
+    Notes
+    -----
+    The difference after :math:`n` cycles is the largest :math:`|\Psi_{i+n} - \Psi_i|` of any state,
+    divided by :math:`a` times the range of :math:`\ln V`.
+    """
+    if len(cycles) < 4:
+        return 1, math.inf
+    places = list(
+        scene.equation_functions.friction_functions.indices_of_states_in_distance
+        if compared_state_indices is None
+        else compared_state_indices
+    )
+    states = np.array([cycle.end_point.psis for cycle in cycles])[:, places]
+    latest, scale = states[len(states) // 2 :], scene.a * cycles[-1].log_slip_rate_range
+    longest = min(MAX_PERIOD_IN_CYCLES, len(latest) // 2)
+    off = np.array(
+        [np.abs(latest[count:] - latest[:-count]).max() for count in range(1, longest + 1)]
+    )
+    period = int(np.argmax(off <= 2.0 * off.min())) + 1
+    return period, float(off[period - 1]) / scale

@@ -1,0 +1,305 @@
+"""Stick-slip cycles of a motion, assembled from its events.
+
+A cycle extends from one maximum of spring stress, at which V rises through V_0, to the next
+maximum. The main function is ``iterate_cycles``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from itertools import pairwise
+from operator import attrgetter
+from typing import NamedTuple
+
+import numpy as np
+
+from rsfstudy.measure_base import steady_sliding_is_linearly_stable
+from rsfstudy.motion import (
+    Accuracy,
+    Event,
+    EventKind,
+    EventSpecification,
+    Recording,
+    WorkMeter,
+    approach_to_steady_state,
+    fall,
+    integrate_events,
+    maximum,
+    minimum,
+    recorded_row,
+    rise,
+)
+from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, Scene
+
+LN10 = math.log(10.0)
+#: Number of main results of a cycle.
+PRIMARY_OUTPUTS_PER_CYCLE = 5
+#: Kinds of events. Module variables avoid the attribute lookup, which would take as long as the
+#: rest of the work per event.
+_START, _RISE, _FALL = EventKind.START, EventKind.RISE, EventKind.FALL
+_SEGMENT, _SETTLED = EventKind.SEGMENT, EventKind.SETTLED
+_get_log_slip_rate, _get_spring_stress = attrgetter("log_slip_rate"), attrgetter("spring_stress")
+
+#: Range of ln V below which a cycle is treated as steady sliding, and number of successive cycles
+#: with decreasing ranges after which a motion may be approaching steady sliding.
+MIN_LOG_SLIP_RATE_RANGE, _MIN_SHRINKING_CYCLES = 1e-3, 30
+#: Fraction of the largest distance from steady sliding below which a motion has settled.
+_SETTLED_FRACTION_OF_MAX_DISTANCE = 1e-6
+
+
+class Cycle(NamedTuple):
+    """One stick-slip cycle.
+
+    Times are in units of D_c/V_*, and stresses are in units of sigma_*.
+
+    Parameters
+    ----------
+    recurrence_interval : float
+        Time from the first to the second maximum of spring stress.
+    max_spring_stress : float
+        Deviation of spring stress from steady sliding at V_*, at the second maximum.
+    min_spring_stress : float
+        Deviation of spring stress at its minimum.
+    spring_stress_at_peak : float
+        Deviation of spring stress at the peak slip rate.
+    friction_at_peak : float
+        Friction coefficient at the peak slip rate.
+    min_log_slip_rate : float
+        Smallest ln(V/V_*).
+    max_log_slip_rate : float
+        Largest ln(V/V_*).
+    slip_arrest_point : Point
+        First point after the rupture at which V is below V_0 and friction balances the spring. If
+        there is no such point, the point with the lowest slip rate.
+    slowest_point : Point
+        Point with the lowest slip rate.
+    start_point : Point
+        Maximum of spring stress at which the cycle begins.
+    end_point : Point
+        Maximum of spring stress at which the cycle ends.
+    """
+
+    recurrence_interval: float
+    max_spring_stress: float
+    min_spring_stress: float
+    spring_stress_at_peak: float
+    friction_at_peak: float
+    min_log_slip_rate: float
+    max_log_slip_rate: float
+    slip_arrest_point: MotionPoint
+    slowest_point: MotionPoint
+    start_point: MotionPoint
+    end_point: MotionPoint
+
+    @property
+    def log_slip_rate_range(self) -> float:
+        """Range of ln V."""
+        return self.max_log_slip_rate - self.min_log_slip_rate
+
+    def primary_output_values(self) -> tuple[float, ...]:
+        """Return the main results of the cycle.
+
+        Stress drops are measured from the spring stress at the beginning of the cycle, because the
+        next cycle may begin at a different stress. The static stress drop extends to the lowest
+        spring stress, and the dynamic stress drop extends to the spring stress at the peak slip
+        rate.
+
+        Returns
+        -------
+        tuple of float
+            Recurrence interval, static stress drop, dynamic stress drop, and decimal logarithms of
+            the smallest and of the largest V/V_*.
+        """
+        highest = self.start_point.spring_stress
+        drops = highest - self.min_spring_stress, highest - self.spring_stress_at_peak
+        return (
+            self.recurrence_interval,
+            *drops,
+            self.min_log_slip_rate / LN10,
+            self.max_log_slip_rate / LN10,
+        )
+
+
+def iterate_cycles(
+    scene: Scene,
+    accuracy: Accuracy,
+    work_meter: WorkMeter,
+    start_point: MotionPoint | None,
+    recording: Recording | None = None,
+) -> Iterator[Cycle | None]:
+    """Iterate over the cycles of a motion.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with a moving load point.
+    accuracy : Accuracy
+        Requested accuracy.
+    work_meter : WorkMeter
+        Counter of right-hand-side evaluations.
+    start_point : Point or None
+        Point at which the motion starts. If None, the motion starts with the step of the scene, and
+        the part of the motion before the first maximum of spring stress is skipped.
+    recording : Recording, optional
+        Recording to which the motion is added.
+
+    Yields
+    ------
+    Cycle or None
+        The next cycle. None is the last item, and means that the motion has settled to steady
+        sliding.
+    """
+    begin, begun, fallen, seen = None, 0.0, start_point is None, list[Event]()
+    ahead = 0 if start_point else scene.parts.loading.reported_segment_count
+    swings, asked = list[float](), _cycle_event_specifications(scene.log_load_velocity)
+    motion = integrate_events(
+        scene, accuracy, work_meter, asked, start=start_point, with_time=True, recording=recording
+    )
+    for event in motion:
+        kind = event.kind
+        if kind is _SEGMENT:
+            begin, fallen, seen, ahead = None, True, [], ahead - 1
+        if ahead:
+            continue
+        if kind is _SETTLED and steady_sliding_is_linearly_stable(scene):
+            yield None
+            return
+        if kind is _START and start_point is not None:
+            begin = event.point
+        fallen = fallen or kind is _FALL
+        seen.append(event)
+        if kind is not _RISE or not fallen:
+            continue
+        if begin is not None:
+            cycle = _cycle_from_events(begin, begun, seen)
+            swings.append(cycle.log_slip_rate_range)
+            if (
+                swings[-1] < MIN_LOG_SLIP_RATE_RANGE or _log_rate_ranges_vanish(swings)
+            ) and steady_sliding_is_linearly_stable(scene):
+                yield None
+                return
+            yield cycle
+        begin, begun, fallen, seen = event.point, event.time, False, []
+
+
+def more_events_remedy(event_count: int, option_name: str = "events") -> str:
+    """Return the advice to allow more events, for use in a message.
+
+    Parameters
+    ----------
+    event_count : int
+        Present limit of the number of events.
+    option_name : str, default: "events"
+        Name of the field that holds the limit.
+
+    Returns
+    -------
+    str
+        Advice with the command-line option and the field.
+    """
+    return f"--set {option_name}={2 * event_count} ({option_name}=) waits for more"
+
+
+def recorded_rows_of_cycles(
+    scene: Scene, cycles: Sequence[Cycle], recording: Recording | None
+) -> np.ndarray:
+    """Return the record of successive cycles.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    cycles : sequence of Cycle
+        Successive cycles.
+    recording : Recording or None
+        Recording of the cycles. If None, the record contains only the beginning and the end of the
+        cycles.
+
+    Returns
+    -------
+    ndarray, shape (n, columns)
+        Recorded samples. The columns are documented in ``Recording.table``.
+
+    Notes
+    -----
+    The slip during the cycles is the load point displacement minus the increase of the spring
+    elongation, :math:`V_0 T - (f_1 - f_0)/K`, with the duration :math:`T` of the cycles and the
+    spring stresses :math:`f_0` and :math:`f_1` at the beginning and at the end.
+    """
+    begin, end = cycles[0].start_point, cycles[-1].end_point
+    passed = math.fsum(cycle.recurrence_interval for cycle in cycles)
+    slip = (
+        scene.load_velocity * passed - (end.spring_stress - begin.spring_stress) / scene.stiffness
+    )
+    last = recorded_row(scene, passed, slip, end, 0)
+    if recording is None:
+        return np.stack([recorded_row(scene, 0.0, 0.0, begin, 0), last])
+    # The last integration step extends beyond the end of the last cycle.
+    return recording.table_up_to_row(scene, last)
+
+
+@lru_cache(maxsize=256)
+def _cycle_event_specifications(log_load_velocity: float) -> tuple[EventSpecification, ...]:
+    """Return the events that delimit the cycles at ln(V_0/V_*)."""
+    return (
+        maximum("log_slip_rate", may_defer=True),
+        minimum("log_slip_rate", may_defer=True),
+        rise("log_slip_rate", log_load_velocity),
+        fall("log_slip_rate", log_load_velocity, may_defer=True),
+        approach_to_steady_state(_SETTLED_FRACTION_OF_MAX_DISTANCE),
+    )
+
+
+def _log_rate_ranges_vanish(log_slip_rate_ranges: list[float]) -> bool:
+    """Return True if the decreasing ranges of ln V approach zero.
+
+    The last three ranges, with differences d_1 and d_2, are extrapolated as a geometric series. The
+    extrapolated decrease is d_2**2/(d_1 - d_2). Near the onset of stick-slip, the ranges decrease
+    slowly towards a positive limit instead.
+    """
+    if len(log_slip_rate_ranges) <= _MIN_SHRINKING_CYCLES or not all(
+        y < x for x, y in pairwise(log_slip_rate_ranges[-_MIN_SHRINKING_CYCLES:])
+    ):
+        return False
+    previous, latest = (
+        log_slip_rate_ranges[-3] - log_slip_rate_ranges[-2],
+        log_slip_rate_ranges[-2] - log_slip_rate_ranges[-1],
+    )
+    still_to_come = latest * latest / (previous - latest) if previous > latest else math.inf
+    return log_slip_rate_ranges[-1] - still_to_come < 0.1 * log_slip_rate_ranges[-1]
+
+
+def _cycle_from_events(
+    start_point: MotionPoint, start_time: float, events: Sequence[Event]
+) -> Cycle:
+    """Assemble the cycle that ends with the last event."""
+    points, end = [event.point for event in events], events[-1]
+    fastest, rested = max(points, key=_get_log_slip_rate), min(points, key=_get_log_slip_rate)
+    return Cycle(
+        recurrence_interval=end.time - start_time,
+        max_spring_stress=end.point.spring_stress,
+        min_spring_stress=min(map(_get_spring_stress, points)),
+        spring_stress_at_peak=fastest.spring_stress,
+        friction_at_peak=fastest.friction_coefficient,
+        min_log_slip_rate=rested.log_slip_rate,
+        max_log_slip_rate=fastest.log_slip_rate,
+        slip_arrest_point=_find_arrest_point(events) or rested,
+        slowest_point=rested,
+        start_point=start_point,
+        end_point=end.point,
+    )
+
+
+def _find_arrest_point(events: Sequence[Event]) -> MotionPoint | None:
+    """Return the point at which friction balances the spring after rupture.
+
+    The result is None if the cycle has no such point.
+    """
+    fallen = False
+    for event in events:
+        fallen = fallen or event.kind is _FALL
+        if fallen and event.regime != RUPTURE_REGIME:
+            return event.point
+    return None

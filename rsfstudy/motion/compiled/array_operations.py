@@ -1,0 +1,127 @@
+"""Compiled forms of functions of the loop: pointers to numbers, calls of equations
+by their addresses, and the steps of order eight.
+
+The loop is compiled once, for all equations; the equations once for each combination of parts.
+Arrays would be passed from function to function as ten words each, and counted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from rsfstudy.motion import array_operations, recording, steppers
+from rsfstudy.motion.recording import (
+    HALF_SAMPLES,
+    INTERPOLATION_COEFFICIENTS,
+    SAMPLE_COLUMN,
+    SAMPLES_PER_STEP,
+)
+from rsfstudy.motion.steppers import order_eight
+
+_NUMBA_FLOAT_POINTER_TYPE = types.CPointer(types.float64)
+#: ``function(y, rates, p, result)``: all pointers to numbers, of which some are not read.
+_LLVM_DOUBLE_POINTER_TYPE = ir.DoubleType().as_pointer()
+_LLVM_FUNCTION_TYPE = ir.FunctionType(ir.VoidType(), [_LLVM_DOUBLE_POINTER_TYPE] * 4)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _call_function_at_address(
+    _context: Any, function: Any, y: Any, rates: Any, parameters: Any, result: Any
+) -> Any:
+    def code(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        function, *pointers = arguments
+        builder.call(builder.inttoptr(function, _LLVM_FUNCTION_TYPE.as_pointer()), pointers)
+        return target.get_dummy_value()
+
+    return types.void(types.int64, *[_NUMBA_FLOAT_POINTER_TYPE] * 4), code
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _array_data_pointer(_context: Any, array: Any) -> Any:
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return cgutils.create_struct_proxy(signature.args[0])(context, builder, arguments[0]).data
+
+    return _NUMBA_FLOAT_POINTER_TYPE(array), code
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _pointer_moved_by(_context: Any, pointer: Any, item_count: Any) -> Any:
+    def code(_target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        pointer, numbers = arguments
+        return builder.gep(pointer, [numbers])
+
+    return _NUMBA_FLOAT_POINTER_TYPE(_NUMBA_FLOAT_POINTER_TYPE, types.int64), code
+
+
+def evaluate_in_place(function, y, rates, parameters, result):
+    """Have a function of the equations fill `result`."""
+    _call_function_at_address(function, y, rates, parameters, result)
+
+
+def array_as_pointer(array):
+    """A pointer to the first number of an array, which its caller keeps alive."""
+    return _array_data_pointer(array)
+
+
+def offset_pointer(pointer, item_count):
+    """A pointer so many numbers further on."""
+    return _pointer_moved_by(pointer, item_count)
+
+
+def copy_values(source, target, item_count):
+    """Copy so many numbers."""
+    for i in range(item_count):
+        target[i] = source[i]
+
+
+def interpolate_rows(columns, row_positions, result):
+    """Fill in values of columns between rows (see `recording.interpolate_rows`)."""
+    last, weights = columns.shape[1] - 1, np.empty(SAMPLES_PER_STEP + 1)
+    for i in range(len(row_positions)):
+        if not 0.0 <= row_positions[i] <= last:  # of a record that is not finite
+            result[:, i] = math.nan
+            continue
+        after = math.ceil(row_positions[i])
+        within = int(columns[SAMPLE_COLUMN, after])
+        begin = after - (within or min(after, 1))
+        part = row_positions[i] - begin
+        row, share = begin + int(part), part - int(part)
+        if share == 0.0 or within == 0:
+            for c in range(len(result)):
+                result[c, i] = columns[c, row]
+                if share > 0.0:
+                    result[c, i] = (1.0 - share) * columns[c, row] + share * columns[c, row + 1]
+            continue
+        for k in range(SAMPLES_PER_STEP + 1):
+            weights[k] = 0.0
+            for power in range(SAMPLES_PER_STEP, -1, -1):
+                weights[k] = (
+                    weights[k] * (part / HALF_SAMPLES - 1.0) + INTERPOLATION_COEFFICIENTS[power][k]
+                )
+        for c in range(len(result)):
+            result[c, i] = 0.0
+            for k in range(SAMPLES_PER_STEP + 1):
+                result[c, i] += weights[k] * columns[c, min(begin + k, last)]
+
+
+#: What stands in place of which function.
+COMPILED_REPLACEMENT_BY_FUNCTION: Mapping[Any, Any] = {
+    array_operations.evaluate_in_place: evaluate_in_place,
+    array_operations.array_as_pointer: array_as_pointer,
+    array_operations.offset_pointer: offset_pointer,
+    array_operations.copy_values: copy_values,
+    recording.interpolate_rows: interpolate_rows,
+    steppers.begin_regime: order_eight.begin_regime,
+    steppers.attempt_step: order_eight.attempt_step,
+    steppers.step_to_segment_end: order_eight.step_to_segment_end,
+    steppers.interpolate_unknowns: order_eight.interpolate_unknowns,
+    steppers.retake_step: order_eight.retake_step,
+}

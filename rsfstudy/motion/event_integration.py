@@ -1,0 +1,208 @@
+"""The course of a motion, told as events: through segments of loading and regimes, in one time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.events import Event, EventKind, EventSpecification
+from rsfstudy.motion.initial_points import initial_point, point_after_loading_jump
+from rsfstudy.motion.motion_driver import find_events_at_jump, get_motion_driver
+from rsfstudy.motion.motion_driver import iterate_events_of_equations as iterate_events_of_equations
+from rsfstudy.motion.recording import Recording
+from rsfstudy.motion.regime_switching import compute_switch_thresholds
+from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.parts import (
+    LOADING,
+    LOG_LOAD_VELOCITY,
+    SEGMENT_END,
+    SEGMENT_LOG_VELOCITY,
+    SEGMENT_START,
+)
+from rsfstudy.slider import (
+    ENDLESS_SEGMENT_TABLE,
+    MotionPoint,
+    Numbers,
+    Scene,
+    largest_linear_growth_rate,
+)
+
+
+def integrate_events(
+    scene: Scene,
+    accuracy: Accuracy,
+    work_meter: WorkMeter,
+    event_specs: Sequence[EventSpecification] = (),
+    *,
+    start: MotionPoint | None = None,
+    with_time: bool = False,
+    recording: Recording | None = None,
+    until: float = math.inf,
+    resume_from: Event | None = None,
+) -> Iterator[Event]:
+    """Follow a scene from the instant after its first step, for as long as the caller asks.
+
+    Parameters
+    ----------
+    scene : Scene
+    accuracy : Accuracy
+    work_meter : WorkMeter
+        Charged with the work, by regime.
+    event_specs : sequence of EventSpecification
+        What to be told of.
+    start : Point, optional
+        Where to start, in the last segment of loading; else all begins with steady sliding at V_*.
+    with_time : bool
+        Carry time along: without it, times and slips are NaN, and work is saved.
+    recording : Recording, optional
+        Takes in what the motion does, step by step.
+    until : float
+        Time at which to end.
+    resume_from : Event, optional
+        End of an earlier motion of the scene, from which to go on.
+
+    Yields
+    ------
+    Event
+
+    Raises
+    ------
+    MotionStopped
+        With `normal_stress_lost`, `shear_stress_reversed`, `locked` or `slip_rate_unbounded` where
+        the equations end; `work_budget_spent`; or `integration_failed` where no step can be taken,
+        a step has no length, or a number is not finite.
+    """
+    chains: Sequence[tuple[Scene, np.ndarray]]
+    chains = (
+        scene.continuous_segments
+        if start is None
+        else ((scene.segment_scene(-1), ENDLESS_SEGMENT_TABLE),)
+    )
+    with_time = with_time or until < math.inf or len(chains) > 1 or len(chains[0][1]) > 1
+    time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.reported_segment_count
+    if resume_from is not None:
+        chains, start = _remaining_segment_chains(scene, resume_from)
+        time, slip = resume_from.time, resume_from.slip
+    for number, (acting, table) in enumerate(chains):
+        if start is None:
+            start = initial_point(acting)
+        elif number:
+            start = point_after_loading_jump(acting, start)
+        goes_on = number == len(chains) - 1 and not acting.parts.loading.unknowns
+        asked = (
+            event_specs
+            if goes_on and _steady_sliding_may_be_stable(scene, event_specs)
+            else _without_settling_events(event_specs)
+        )
+        table = _truncate_segments_at(table, until)
+        end = float(table[-1, SEGMENT_END])
+        motion = get_motion_driver(acting, work_meter.engine, with_time=with_time).iterate_events(
+            start,
+            work_meter,
+            asked,
+            accuracy.local_tolerance,
+            duration_start_time_and_slip=(
+                float(table[0, SEGMENT_END]) - time if with_time else math.inf,
+                time,
+                slip,
+            ),
+            switch_thresholds=compute_switch_thresholds(acting, accuracy),
+            recording=recording,
+            kinks_and_reported_count=(table[1:], told),
+            initial_imposed_stress=acting.parameter_values[LOADING + 2]
+            if acting.parts.loading.has_load_point_unknown
+            else None,
+        )
+        if before is None and end == math.inf:  # it has all there is to tell
+            yield from motion
+            return
+        for last in motion:
+            if before is not None and last.kind is EventKind.START:
+                for event in _segment_start_events(last, before, acting, asked):
+                    yield event
+                    if event.specification is not None and event.specification.terminal:
+                        return
+            elif last.kind is not EventKind.END:
+                yield last
+                if last.specification is not None and last.specification.terminal:
+                    return
+        if last.kind is EventKind.END:
+            # it was located to the spacing of numbers around the clock
+            last = last._replace(time=end)
+            if recording is not None:
+                recording.clip_times_to(end)
+        if end >= until:
+            yield last
+            return
+        numbers = list(acting.parameter_values)  # of the first segment of the chain
+        numbers[LOG_LOAD_VELOCITY] = float(table[-1, SEGMENT_LOG_VELOCITY])
+        start, before = last.point, (last.point, tuple(numbers))
+        time, slip = last.time, last.slip
+
+
+def _remaining_segment_chains(
+    scene: Scene, resume_from: Event
+) -> tuple[Sequence[tuple[Scene, np.ndarray]], MotionPoint]:
+    """The chains of segments that are left after the end of a motion, and the point to begin at:
+    behind the jump, where it ended at one.
+    """
+    first, point, left = 0, resume_from.point, []
+    for acting, table in scene.continuous_segments:
+        number = int(np.searchsorted(table[:, SEGMENT_START], resume_from.time, side="right")) - 1
+        if number > 0:
+            acting = scene.segment_scene(first + number)
+        if first and number == 0 and table[0, SEGMENT_START] == resume_from.time:
+            point = point_after_loading_jump(acting, point)
+        rest = table[max(number, 0) :].copy()
+        rest[0, SEGMENT_START] = max(rest[0, SEGMENT_START], resume_from.time)
+        if rest[-1, SEGMENT_END] > resume_from.time:
+            left.append((acting, rest))
+        first += len(table)
+    return left, point
+
+
+def _truncate_segments_at(segment_table: np.ndarray, end_time: float) -> np.ndarray:
+    """Those of the segments of a chain that begin before a time, the last of which ends then."""
+    if end_time == math.inf or segment_table[-1, SEGMENT_END] <= end_time:
+        return segment_table
+    count = max(int(np.searchsorted(segment_table[:, SEGMENT_START], end_time)), 1)
+    cut = segment_table[:count].copy()
+    cut[-1, SEGMENT_END] = min(end_time, cut[-1, SEGMENT_END])
+    return cut
+
+
+def _segment_start_events(
+    event: Event,
+    point_and_parameters_before: tuple[MotionPoint, Numbers],
+    segment_scene: Scene,
+    event_specs: Sequence[EventSpecification],
+) -> Iterator[Event]:
+    """Events where a later segment begins: that it does, and what happens there, after a point with
+    the numbers of the segment before.
+    """
+    yield event._replace(kind=EventKind.SEGMENT)
+    for spec, point in find_events_at_jump(
+        *point_and_parameters_before, event.point, segment_scene.parameter_values, event_specs
+    ):
+        # slip from the first point: the spring may have jumped with the load point
+        yield event._replace(kind=spec.kind, specification=spec, point=point)
+
+
+def _steady_sliding_may_be_stable(scene: Scene, event_specs: Sequence[EventSpecification]) -> bool:
+    """Return False if steady sliding is unstable under the last segment of loading.
+
+    The growth rate of small perturbations is computed only if a specification asks for settling.
+    """
+    if scene.log_load_velocity == -math.inf or all(
+        spec.kind is not EventKind.SETTLED for spec in event_specs
+    ):
+        return True
+    growth = largest_linear_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
+    return growth is None or not growth.is_positive
+
+
+def _without_settling_events(event_specs: Sequence[EventSpecification]) -> list[EventSpecification]:
+    return [spec for spec in event_specs if spec.kind is not EventKind.SETTLED]

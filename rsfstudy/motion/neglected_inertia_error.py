@@ -1,0 +1,180 @@
+"""Error estimate of the slow manifold approximation along a recorded motion.
+
+The comparison of two runs with different tolerances does not reveal this error, because both runs
+use the same approximation on the slow manifold.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator
+
+import numpy as np
+
+from rsfstudy.motion.recording import (
+    FIRST_STATE_COLUMN,
+    MOTION_VARIABLES,
+    REGIME_COLUMN,
+    SAMPLE_COLUMN,
+    SAMPLES_PER_STEP,
+    SHEAR_STRESS_COLUMNS,
+)
+from rsfstudy.parts import (
+    BOUNDARY_PRESSURE_RATE,
+    LOAD_VELOCITY,
+    LOADING,
+    LOG_LOAD_VELOCITY,
+    SEGMENT_LOG_VELOCITY,
+    SEGMENT_START,
+    SEGMENT_STRESS_RATE,
+    SEGMENT_VELOCITY,
+    A,
+)
+from rsfstudy.slider import (
+    NEGLIGIBLE_SECOND_ORDER_WEIGHT,
+    Numbers,
+    Scene,
+    equations_against_displacement,
+)
+
+#: Largest ratio of errors to estimates without this factor, rounded up: over random scenes with
+#: thresholds loosened three to ten times, friction errs by up to 1.4 times its estimate.
+_ERROR_SAFETY_FACTOR = 2.0
+_SLIP_COLUMN, _SLIP_RATE_COLUMN = (
+    MOTION_VARIABLES.index("slip"),
+    MOTION_VARIABLES.index("log10_slip_rate"),
+)
+
+
+def estimate_neglected_inertia_error(
+    scene: Scene, recorded_rows: np.ndarray, slow_regime_number: int, initial_log_slip_rate: float
+) -> np.ndarray:
+    """Estimate the error in ln V that the approximate treatment of inertia causes.
+
+    The estimate is the sum of two contributions:
+
+    - The residual of the full equation of motion on the slow manifold. If W is the weight of mass
+      and s is the displacement of slip and load point together, friction is smaller than spring
+      stress by ``a W d(ln V)/ds``. The residual divided by a is the local error e of ln V. The
+      resulting change of spring stress and state is at most the integral of e over
+      ``(1 + K/a) d(slip) + |dPsi|/a``. The motion is attracted to its course, so the largest e is
+      an upper bound as well.
+    - The slip, in units of D_c, that is neglected when ln V jumps to the slow manifold. The state
+      does not evolve over this slip.
+
+    Parameters
+    ----------
+    scene : Scene
+    recorded_rows : ndarray
+        Rows of a recording, as in ``Recording.table``.
+    slow_regime_number : int
+        Number of the slow-manifold regime in these rows.
+    initial_log_slip_rate : float
+        ln(V/V_*) before the first row.
+
+    Returns
+    -------
+    ndarray of shape (rows,)
+        Error estimate of ln V for the motion up to each row. The estimate is zero if the scene has
+        no inertia.
+    """
+    if not scene.has_mass:
+        return np.zeros(len(recorded_rows))
+    rates = np.append(initial_log_slip_rate, math.log(10.0) * recorded_rows[:, _SLIP_RATE_COLUMN])
+    norms = scene.inertial_time * np.exp(rates)
+    softness = scene.stiffness / scene.a
+    on_manifold = recorded_rows[:, REGIME_COLUMN] == slow_regime_number
+    arrives = on_manifold & (recorded_rows[:, SAMPLE_COLUMN] == 0.0)
+    slips = softness * np.maximum(norms[1:], norms[:-1]) ** 2 * np.abs(np.diff(rates))
+    # the middle and the end of each step, and the beginning of each regime
+    used = np.flatnonzero(
+        on_manifold & (recorded_rows[:, SAMPLE_COLUMN] % (SAMPLES_PER_STEP // 2) == 0.0)
+    )
+    jumps = np.cumsum(np.where(arrives, slips, 0.0))
+    if not used.size:
+        return _ERROR_SAFETY_FACTOR * jumps
+    left = np.maximum.accumulate(_accumulate_residuals(scene, recorded_rows[used], norms[1:][used]))
+    # rows in between count as the next one that is used, because residuals may rise steeply
+    numbers = np.arange(len(recorded_rows))
+    number = np.minimum(np.searchsorted(used, numbers), used.size - 1)
+    number -= (np.abs(used[number] - numbers) >= SAMPLES_PER_STEP // 2) & (number > 0)
+    return _ERROR_SAFETY_FACTOR * (jumps + left[number])
+
+
+def _accumulate_residuals(
+    scene: Scene, recorded_rows: np.ndarray, slip_rate_norms: np.ndarray
+) -> np.ndarray:
+    """Compute an upper bound of the change of ln V due to residuals up to each row.
+
+    The bound is the smaller of the integrated residual and the largest residual so far.
+    """
+    residuals = np.array(list(_iterate_residuals(scene, recorded_rows, slip_rate_norms)))
+    states = recorded_rows[
+        :, FIRST_STATE_COLUMN : FIRST_STATE_COLUMN + scene.parts.law.state_count
+    ].sum(axis=1)
+    softness = scene.stiffness / scene.a
+    ways = (1.0 + softness) * np.diff(recorded_rows[:, _SLIP_COLUMN]) + np.abs(
+        np.diff(states)
+    ) / scene.a
+    ways[recorded_rows[1:, SAMPLE_COLUMN] == 0.0] = 0.0  # a rupture may come between these two rows
+    sums = np.append(0.0, np.cumsum(0.5 * (residuals[1:] + residuals[:-1]) * ways))
+    found: np.ndarray = np.minimum(np.maximum.accumulate(residuals), sums)
+    return found
+
+
+def _iterate_residuals(
+    scene: Scene, recorded_rows: np.ndarray, slip_rate_norms: np.ndarray
+) -> Iterator[float]:
+    """Yield the residual of the equation of motion, divided by a, at each row.
+
+    The residual is set to zero where the mass is negligible.
+    """
+    segments = list(_iterate_segment_scenes(scene))
+    begins = [begin for begin, _acting, _p in segments]
+    for row, norm in zip(recorded_rows, slip_rate_norms.tolist(), strict=True):
+        # the last row of a segment has the time at which the next one begins
+        side = bisect_right if row[SAMPLE_COLUMN] == 0.0 else bisect_left
+        _begin, acting, p = segments[max(side(begins, row[0]) - 1, 0)]
+        load = acting.inertial_time * abs(p[LOAD_VELOCITY])
+        weight = acting.stiffness / acting.a * norm * (norm + load)
+        known = (
+            weight > NEGLIGIBLE_SECOND_ORDER_WEIGHT
+            and len(row) >= FIRST_STATE_COLUMN + acting.state_count
+        )
+        yield _compute_force_balance_residual(acting, p, row, weight) if known else 0.0
+
+
+def _compute_force_balance_residual(
+    segment_scene: Scene, parameters: Numbers, recorded_row: np.ndarray, inertia_weight: float
+) -> float:
+    """Compute the residual of the equation of motion, divided by a, at one row.
+
+    The row must be on the slow manifold.
+    """
+    equations = equations_against_displacement(segment_scene)
+    state = (
+        recorded_row[SHEAR_STRESS_COLUMNS][0] - segment_scene.mu_star,
+        *recorded_row[FIRST_STATE_COLUMN : FIRST_STATE_COLUMN + segment_scene.state_count].tolist(),
+    )
+    point = equations.point_function(state, equations.rate_function(state, parameters), parameters)
+    missing: float = point.spring_stress - point.frictional_stress
+    missing -= parameters[A] * inertia_weight * point.log_slip_rate_derivative
+    return abs(missing) / parameters[A]
+
+
+def _iterate_segment_scenes(scene: Scene) -> Iterator[tuple[float, Scene, Numbers]]:
+    """Yield the start time, the scene and the parameters of each segment of loading."""
+    for acting, table in scene.continuous_segments:
+        for n, row in enumerate(table.tolist()):
+            p = list(acting.parameter_values)
+            if n > 0:
+                p[LOAD_VELOCITY], p[LOG_LOAD_VELOCITY] = (
+                    row[SEGMENT_VELOCITY],
+                    row[SEGMENT_LOG_VELOCITY],
+                )
+            if n > 0 and not math.isnan(row[SEGMENT_STRESS_RATE]):
+                p[BOUNDARY_PRESSURE_RATE if acting.parts.fluid.unknowns else LOADING] = row[
+                    SEGMENT_STRESS_RATE
+                ]
+            yield row[SEGMENT_START], acting, tuple(p)

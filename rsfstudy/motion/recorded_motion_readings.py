@@ -1,0 +1,86 @@
+"""Readings of a rig along a motion, and motions that are resampled along their paths."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rsfstudy.motion.engine_factory import call_array_function_by_engine
+from rsfstudy.motion.engines import SCIPY
+from rsfstudy.motion.recording import (
+    MOTION_VARIABLES,
+    RECORDED_VARIABLES,
+    SAMPLE_COLUMN,
+    SAMPLES_PER_STEP,
+    resample_along_path,
+)
+from rsfstudy.slider import Scene
+
+#: Columns of a recorded motion that the length of its path depends on.
+_PATH_LENGTH_COLUMNS = tuple(
+    MOTION_VARIABLES.index(name) for name in ("time", "log10_slip_rate", "shear_stress")
+)
+
+
+def recorded_friction_coefficient(motion_table: np.ndarray) -> np.ndarray:
+    """The friction coefficient along a recorded motion."""
+    return motion_table[:, RECORDED_VARIABLES.index("friction_coefficient")]
+
+
+def recorded_load_point_displacement(scene: Scene, motion_table: np.ndarray) -> np.ndarray:
+    """Load point displacement along a recorded motion, since before its first step: slip, and by
+    how much the spring is longer.
+    """
+    longer = (
+        motion_table[:, MOTION_VARIABLES.index("shear_stress")] - scene.mu_star
+    ) / scene.stiffness
+    return np.asarray(motion_table[:, MOTION_VARIABLES.index("slip")] + longer)
+
+
+def resample_motion_along_path(
+    motion_table: np.ndarray,
+    point_count: int,
+    variable_names: Sequence[str] = MOTION_VARIABLES,
+    engine: str = SCIPY,
+) -> dict[str, np.ndarray]:
+    """Resample a recorded motion at points that are spread along its path.
+
+    Half of the points are spread evenly by path length in time, ln V and stress. The other half
+    follow the integration steps, which are short where the path bends. Each extremum of slip rate
+    and of stress is one of the points.
+
+    Parameters
+    ----------
+    motion_table : ndarray
+        Rows of a recorded motion.
+    point_count : int
+        Number of points.
+    variable_names : sequence of str
+        Names of the first columns, which are returned.
+    engine : str
+        Name of the engine that runs the resampling loop.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Values of each column at the points. The values are NaN if the table is empty.
+    """
+    if not len(motion_table):
+        return {name: np.full(point_count, np.nan) for name in variable_names}
+    columns, found = (
+        np.ascontiguousarray(motion_table.T),
+        np.empty((len(variable_names), point_count)),
+    )
+    path, at, room = (
+        np.zeros(len(motion_table)),
+        np.empty(point_count),
+        np.empty(SAMPLES_PER_STEP + 1),
+    )
+    seen = [columns[place] for place in (*_PATH_LENGTH_COLUMNS, SAMPLE_COLUMN)]
+    call_array_function_by_engine(
+        resample_along_path, engine, columns, *seen, path, at, room, found
+    )
+    # times of a rupture may differ by less than rounding
+    np.maximum.accumulate(found[0], out=found[0])
+    return dict(zip(variable_names, found, strict=True))

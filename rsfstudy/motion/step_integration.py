@@ -1,0 +1,155 @@
+"""Steps of one regime: taken, looked into, and cut short."""
+
+from __future__ import annotations
+
+import math
+
+from rsfstudy.motion.array_layout import (
+    BUDGET_EXCEEDED,
+    FAST_REGIME,
+    FIRST_STATE,
+    INVALID_STEP,
+    LOG_SLIP_RATE,
+    NO_STEP_POSSIBLE,
+    NORMAL_STRESS_RATIO,
+    STEP_TAKEN,
+)
+from rsfstudy.motion.array_operations import copy_values, evaluate_in_place
+from rsfstudy.motion.max_step_length import MAX_STEP_LENGTH, compute_max_step_length
+from rsfstudy.motion.steppers import (
+    attempt_step,
+    interpolate_unknowns,
+    retake_step,
+    step_to_segment_end,
+)
+from rsfstudy.motion.workspace import count_evaluations, fill_rates_by_step_clock
+from rsfstudy.parts import LOG_LOAD_VELOCITY
+
+#: What slopes of dense output may differ by from rates over a step, in local tolerances; how often
+#: a step is halved for that, and by how much the next may be longer; and how far apart, over the
+#: length of the step, values of dense output give its slopes.
+MAX_SLOPE_ERROR, MAX_HALVINGS, GROWTH_FACTOR, SLOPE_SPACING = 300.0, 6, 1.3, 5e-3
+
+
+def time_since_regime_start(motion, workspace, y):
+    """Time since the regime began, at some unknowns; NaN where nothing tells it."""
+    if not motion.has_clock:
+        return math.nan
+    unit = workspace.switch_thresholds.inertial_time if motion.regime == FAST_REGIME else 1.0
+    return unit * y[workspace.unknown_count - 1]
+
+
+def time_at_step_begin(motion, workspace):
+    """Time since the start, at the beginning of the step."""
+    return motion.regime_start_time + time_since_regime_start(motion, workspace, workspace.y)
+
+
+def time_at_step_end(motion, workspace):
+    """Time since the start, at the end of the step."""
+    return motion.regime_start_time + time_since_regime_start(motion, workspace, workspace.y_end)
+
+
+def take_step(motion, workspace):
+    """Take a step whose local error is allowed; why not, where there is none."""
+    longest = MAX_STEP_LENGTH
+    if motion.clock_is_path_length:
+        longest = compute_max_step_length(
+            workspace.point_at_begin[LOG_SLIP_RATE],
+            workspace.point_at_begin[NORMAL_STRESS_RATIO],
+            workspace.parameters[LOG_LOAD_VELOCITY],
+        )
+    longest *= motion.step_limit_factor
+    if motion.recording_mode:
+        longest = min(longest, motion.dense_output_limit)
+    length = 0.0
+    if motion.kinks_ahead > 0:
+        length = step_to_next_kink(motion, workspace, min(longest, motion.next_step_length))
+    if length == 0.0:
+        length = attempt_step(motion, workspace, longest)
+    motion.steps += 1
+    if length <= 0.0:
+        return NO_STEP_POSSIBLE if length == 0.0 else BUDGET_EXCEEDED
+    total = 0.0
+    for i in range(workspace.unknown_count):
+        total += workspace.y_end[i]
+    if motion.end == motion.clock or not math.isfinite(total):
+        return INVALID_STEP
+    return STEP_TAKEN
+
+
+def step_to_next_kink(motion, workspace, max_length):
+    """Length of a step that ends at the next kink, if that is not farther; else 0."""
+    left = motion.end_time - time_at_step_begin(motion, workspace)
+    length = left / time_since_regime_start(motion, workspace, workspace.rates)
+    return step_to_segment_end(motion, workspace, length) if 0.0 < length <= max_length else 0.0
+
+
+def halve_unresolved_step(motion, workspace):
+    """Halve the step of a recorded motion until what lies within it is known as well as its
+    end: where stability limits steps, and not accuracy, dense output is far less accurate.
+    """
+    for _ in range(MAX_HALVINGS):
+        if is_step_resolved(motion, workspace):
+            motion.dense_output_limit *= GROWTH_FACTOR
+            return
+        retake_step(motion, workspace, motion.clock + 0.5 * (motion.end - motion.clock))
+        motion.next_step_length = motion.dense_output_limit = abs(motion.step_length)
+
+
+def is_step_resolved(motion, workspace):
+    """True if the slopes of dense output are the rates there, as well as is wanted.
+
+    With an error e of dense output, they differ by its own slope, a few times e over the length of
+    the step, and by what the rates make of e, as much where stability limits the step.
+    """
+    for i in range(workspace.unknown_count):
+        workspace.rates_within[i] = 0.0
+    for part in (0.3, 0.7):
+        clock = motion.clock + part * motion.step_length
+        for i in range(workspace.unknown_count):
+            workspace.dense_slopes[i] = 0.0
+        for shift, weight in ((2.0, -1.0), (1.0, 8.0), (-1.0, -8.0), (-2.0, 1.0)):
+            interpolate_unknowns(
+                motion, workspace, clock + shift * SLOPE_SPACING * motion.step_length
+            )
+            for i in range(workspace.unknown_count):
+                workspace.dense_slopes[i] += weight / (12.0 * SLOPE_SPACING) * workspace.y_within[i]
+        interpolate_unknowns(motion, workspace, clock)
+        count_evaluations(motion, 1)
+        fill_rates_by_step_clock(motion, workspace, workspace.y_within, workspace.rates_within)
+        for i in range(workspace.unknown_count):
+            differ = abs(motion.step_length * workspace.rates_within[i] - workspace.dense_slopes[i])
+            size = workspace.scales[i] + max(abs(workspace.y[i]), abs(workspace.y_end[i]))
+            # a number that is none is not resolved
+            if not differ <= MAX_SLOPE_ERROR * motion.tolerance * size:
+                return False
+    return True
+
+
+def evaluate_point_at_clock(motion, workspace, clock):
+    """Fill in what the slider does at a clock within the step."""
+    interpolate_unknowns(motion, workspace, clock)
+    count_evaluations(motion, 1)
+    evaluate_in_place(
+        workspace.fill_rates,
+        workspace.y_within,
+        workspace.y_within,
+        workspace.parameters,
+        workspace.rates_within,
+    )
+    evaluate_in_place(
+        workspace.fill_point,
+        workspace.y_within,
+        workspace.rates_within,
+        workspace.parameters,
+        workspace.point_within,
+    )
+
+
+def truncate_step_at_clock(motion, workspace, clock):
+    """Let the step end at a clock within it."""
+    if clock != motion.end:
+        evaluate_point_at_clock(motion, workspace, clock)
+        copy_values(workspace.point_within, workspace.point_at_end, FIRST_STATE + motion.states)
+        copy_values(workspace.y_within, workspace.y_end, workspace.unknown_count)
+        motion.end = clock

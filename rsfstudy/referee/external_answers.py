@@ -1,0 +1,195 @@
+"""Tables with the answers of other codes.
+
+The headings and units of a table may differ from the headings and units of the problem. The
+function ``read_external_answer`` converts the columns to SI units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from decimal import Decimal
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.referee import reference_answers
+from rsfstudy.referee.problem_files import BenchmarkProblem
+from rsfstudy.rig import Column, convert_to_si, read_table
+
+#: Quantities that a file may contain instead of a requested quantity, and their units.
+_SUBSTITUTE_QUANTITY_AND_UNITS = {
+    "slip_rate": ("log10_slip_rate", "1"),
+    "friction": ("shear_stress", "Pa"),
+}
+_UNITS_BY_SUBSTITUTE_QUANTITY = dict(_SUBSTITUTE_QUANTITY_AND_UNITS.values())
+#: Tolerance of times, relative to the last time. The times in files are rounded to some decimals.
+_ANSWER_TIME_RTOL = 1e-9
+#: Largest allowed value in SI units. Larger values would cause an overflow in ratios.
+_MAX_REPORTED_VALUE = 1e100
+
+
+class ReportedQuantity(NamedTuple):
+    """Quantity that another code reports.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Values in SI units.
+    last_place_unit : float
+        One unit in the last decimal place of the values, in SI units. The resolution is 0 if all
+        values are zero, or if the quantity was computed from another quantity.
+    """
+
+    values: np.ndarray
+    last_place_unit: float
+
+
+def read_external_answer(
+    path: Path, problem: BenchmarkProblem, column_by_quantity: Mapping[str, str] | None = None
+) -> dict[str, ReportedQuantity]:
+    """Read the columns that a problem requests, in SI units.
+
+    Parameters
+    ----------
+    path : Path
+        Path of the table.
+    problem : BenchmarkProblem
+        Problem that the table answers.
+    column_by_quantity : mapping of str to str, optional
+        Heading and units of the columns in the file, as for ``rsfstudy.read_table``. By default,
+        the first line of the file must contain the names of the columns.
+
+    Returns
+    -------
+    dict of str to ReportedQuantity
+        Requested quantities by name.
+
+    Raises
+    ------
+    InvalidValue
+        If a column is missing, if units have the wrong dimension, if a value is missing, or if the
+        number of rows or the times differ from the problem.
+    DataError
+        If the file cannot be read.
+    """
+    table = read_table(path, column_by_quantity)
+    # The number of rows is checked first, because the conversion of columns uses the times of the
+    # problem.
+    rows, count = (
+        problem.index_values,
+        max((len(column.values) for column in table.values()), default=0),
+    )
+    if count != len(rows):
+        remedy = (
+            f"Give a row for each {problem.index_column} of the problem. Rows are not interpolated."
+        )
+        rule = f"must be {len(rows)}"
+        wrong = InvalidValue(
+            "number of rows", count, rule, remedy=remedy if problem.index_column else ""
+        )
+        raise wrong.with_location(str(path))
+    asked = {*problem.column_names, *_UNITS_BY_SUBSTITUTE_QUANTITY}
+    found = {
+        key: _convert_column_to_si(key, column, problem)
+        for key, column in table.items()
+        if key in asked
+    }
+    for name, (other, _units) in _SUBSTITUTE_QUANTITY_AND_UNITS.items():
+        # With radiation damping, the slip rate is required to convert shear stress to friction.
+        waits = name == "friction" and problem.radiation_damping and "slip_rate" not in found
+        if name in problem.quantity_units and name not in found and other in found and not waits:
+            found[name] = ReportedQuantity(
+                _derive_quantity_from_substitute(name, problem, found), 0.0
+            )
+    for name in reversed(problem.column_names):
+        if name not in found:
+            remedy = (
+                f"Head it {name} ({problem.quantity_units[name]}), or say --columns '{name}=...'."
+            )
+            wrong = InvalidValue("column", name, "is missing", choices=table, remedy=remedy)
+            raise wrong.with_location(str(path))
+    if problem.index_column:
+        _check_index_values(
+            table[problem.index_column], found[problem.index_column].values, rows, problem
+        )
+    return {name: found[name] for name in problem.column_names}
+
+
+def _derive_quantity_from_substitute(
+    quantity_name: str,
+    problem: BenchmarkProblem,
+    reported_quantities: Mapping[str, ReportedQuantity],
+) -> np.ndarray:
+    r"""Compute a requested quantity from its substitute.
+
+    The slip rate is computed from its decimal logarithm. The friction coefficient is computed from
+    the shear stress :math:`\tau` of the spring as :math:`\mu = (\tau - \eta V)/\sigma`.
+    """
+    if quantity_name == "slip_rate":
+        return np.asarray(10.0 ** reported_quantities["log10_slip_rate"].values)
+    radiated = (
+        problem.radiation_damping * reported_quantities["slip_rate"].values
+        if problem.radiation_damping
+        else 0.0
+    )
+    return np.asarray(
+        (reported_quantities["shear_stress"].values - radiated)
+        / reference_answers.compute_normal_stress(problem)
+    )
+
+
+def _convert_column_to_si(
+    quantity_name: str, column: Column, problem: BenchmarkProblem
+) -> ReportedQuantity:
+    """Convert a column to SI units."""
+    units = (
+        problem.quantity_units.get(quantity_name) or _UNITS_BY_SUBSTITUTE_QUANTITY[quantity_name]
+    )
+    one = "1" if column.units in ("", "1") else f"1 {column.units}"
+    if units != "1" and one == "1":
+        remedy = f"Write them in the header, or --columns '{quantity_name}=... ({units})'."
+        raise InvalidValue(
+            quantity_name, column.units, "has no units", remedy=remedy
+        ).with_location(column.path)
+    try:
+        factor = convert_to_si(quantity_name, 1.0 if one == "1" else one, units)
+    except InvalidValue as error:
+        raise error.with_location(column.path) from error
+    most = (
+        math.log10(_MAX_REPORTED_VALUE)
+        if quantity_name == "log10_slip_rate"
+        else _MAX_REPORTED_VALUE / factor
+    )
+    column.check_values(
+        quantity_name, ~(np.abs(column.values) <= most), f"must be a number, of {most:g} at most"
+    )
+    return ReportedQuantity(column.values * factor, factor * _find_last_place_unit(column.values))
+
+
+def _find_last_place_unit(values: np.ndarray) -> float:
+    """Return one unit in the last decimal place of the numbers.
+
+    The resolution of whole numbers is 1. If all numbers are zero, the result is 0.
+    """
+    exponents = [Decimal(repr(x)).normalize().as_tuple().exponent for x in values.tolist() if x]
+    return float(10.0 ** min(0, *map(int, exponents))) if exponents else 0.0
+
+
+def _check_index_values(
+    column: Column, values: np.ndarray, expected_values: np.ndarray, problem: BenchmarkProblem
+) -> None:
+    """Check that the index column has the values of the problem.
+
+    Raises
+    ------
+    InvalidValue
+        If a value differs, for example because the file contains other times.
+    """
+    wrong = np.abs(values - expected_values) > _ANSWER_TIME_RTOL * np.abs(expected_values).max()
+    wanted = f"{expected_values[np.argmax(wrong)]:g} {problem.quantity_units[problem.index_column]}"
+    column._replace(values=values).check_values(
+        problem.index_column, wrong, f"must be {wanted}: nothing is interpolated"
+    )

@@ -1,0 +1,193 @@
+"""Axes of studies of a rig, in units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+from rsfstudy.axes import Axis, AxisRow, fields_of_axis_point, to_plain_value
+from rsfstudy.errors import InvalidValue
+from rsfstudy.formatting import is_sequence_of_axis_values
+from rsfstudy.quantities import is_variable_name
+from rsfstudy.rig.rig_quantities import (
+    AXIS_NAME_BY_RIG_NAME,
+    RATIO_FIELD_BY_DIMENSIONAL_NAME,
+    RIG_NAME_BY_AXIS_NAME,
+    RIG_QUANTITIES,
+    SI_UNIT_BY_SCALE,
+    find_si_units_of_field,
+    is_friction_stiffness,
+)
+from rsfstudy.rig.units import (
+    convert_to_si_as_fraction,
+    expand_range,
+    split_number_and_units,
+    unit_factor,
+)
+
+
+def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, str] = "") -> Axis:
+    """An axis in the units that its first value states; a field that has none as it is.
+
+    Parameters
+    ----------
+    dimension : str
+        A quantity of a rig, or a field of a scene.
+    values : sequence of quantity, str, or mapping
+        A text is ``first:last:count``, or ``first:last:count:log``, and units. A mapping has the
+        fields of each label, or a rig, and each field is in SI units then; or it is a table, as
+        `Axis.cases` takes one.
+    units : str, or mapping of str to str
+        Of plain numbers; of the columns of a table. SI units by default.
+
+    Raises
+    ------
+    InvalidValue
+        For a value that is no quantity, of another kind, or of a rig and not positive.
+    """
+    if not is_variable_name(dimension):
+        return Axis(dimension, values)  # which refuses it
+    if hasattr(values, "keys"):
+        if isinstance(values, Mapping) and any(
+            isinstance(fields_of_axis_point(point), Mapping) for point in values.values()
+        ):
+            return convert_axis_to_stated_units(Axis(dimension, values))
+        stated: Any = units or None
+        return convert_axis_to_stated_units(Axis.cases(values, units=stated, dimension=dimension))
+    assert isinstance(units, str)
+    if isinstance(values, str) and ":" in values:
+        values = expand_range(dimension, values, values)
+    listed = [values] if isinstance(values, str) else values
+    if not is_sequence_of_axis_values(listed) or not len(listed):
+        return Axis(dimension, values)
+    return _single_field_axis([{dimension: value} for value in listed], {dimension: units})
+
+
+def convert_axis_to_stated_units(axis: Axis) -> Axis:
+    """An axis of a study of a rig, whose plain numbers are in SI units, as everywhere in a rig."""
+    if axis.is_single_field:
+        return _single_field_axis(axis.rows, axis.units)
+    rows, units = _convert_rows_to_axis_units(
+        axis.rows, axis.units, first_value_sets_units=axis.has_numbered_points
+    )
+    return axis.with_rows(rows, units, axis.sampling_info)
+
+
+def _single_field_axis(rows: Sequence[AxisRow], units: Mapping[str, str]) -> Axis:
+    """An axis of one field."""
+    found, stated = _convert_rows_to_axis_units(rows, units, first_value_sets_units=True)
+    (name,) = found[0]
+    return Axis(name, [row[name] for row in found], stated)
+
+
+def _convert_rows_to_axis_units(
+    rows: Sequence[AxisRow], units: Mapping[str, str], *, first_value_sets_units: bool
+) -> tuple[list[dict[str, Any]], dict[str, str]]:
+    """Rows whose fields have the names and units that they have on axes, and these units: those of
+    the axis, those of the first value of a column, or SI units.
+    """
+    found: list[dict[str, Any]] = [{} for _row in rows]
+    stated: dict[str, str] = {}
+    quantities: dict[str, list[tuple[dict[str, Any], Any]]] = {}
+    for row, new in zip(rows, found, strict=True):
+        for given, value in row.items():
+            example = rows[0][given] if first_value_sets_units else value
+            name, si = axis_name_and_units(given, example)
+            new[name if si else given] = value
+            if si:
+                quantities.setdefault(name, []).append((new, value))
+                ours = _parse_units_of_value(value) if first_value_sets_units else ""
+                stated.setdefault(name, units.get(given) or ours or si)
+            elif units.get(given):
+                factor_to_si(given, units[given])  # which refuses what is none of a rig
+    for name, held in quantities.items():
+        numbers = convert_values_to_units(name, [value for _row, value in held], stated[name])
+        for (row, _value), number in zip(held, numbers, strict=True):
+            row[name] = number
+    return found, stated
+
+
+def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: str) -> list[float]:
+    """Values of a quantity in some units, which those have that are plain numbers."""
+    scale, found = factor_to_si(quantity_name, units), []
+    kind = (
+        "1/m"
+        if quantity_name == "stiffness" and is_friction_stiffness(f"1 {units}")
+        else _axis_si_units(quantity_name, "1")
+    )
+    for value in values:
+        number, written = (
+            split_number_and_units(value)
+            if isinstance(value, str)
+            else (to_plain_value(quantity_name, value), units)
+        )
+        if isinstance(number, float) and written == units:
+            found.append(number)
+        else:
+            found.append(float(convert_to_si_as_fraction(quantity_name, value, str(kind)) / scale))
+    wrong = [
+        value
+        for number, value in zip(found, values, strict=True)
+        if not _is_allowed_rig_number(quantity_name, number)
+    ]
+    if wrong:
+        of = f", and {len(wrong)} of {len(found)} are not" if len(found) > 1 else ""
+        raise InvalidValue(quantity_name, wrong[0], f"must be positive{of}")
+    return found
+
+
+def _is_allowed_rig_number(quantity_name: str, number: Any) -> bool:
+    """False of a quantity of a rig that is not positive."""
+    return quantity_name not in RIG_NAME_BY_AXIS_NAME or (
+        isinstance(number, float) and number > 0.0
+    )
+
+
+def axis_name_and_units(name: str, value: Any) -> tuple[str, str | None]:
+    """The name and the SI units that a value has on an axis; the units are None where it is none in
+    units.
+    """
+    name = _axis_field_name(name, value)
+    return name, _axis_si_units(name, value)
+
+
+def _axis_field_name(name: str, value: Any) -> str:
+    """The name on an axis of what bears another in a rig or, as a ratio, in a scene."""
+    quantity = not isinstance(value, str) or split_number_and_units(value)[0] is not None
+    if name in AXIS_NAME_BY_RIG_NAME and quantity:
+        return AXIS_NAME_BY_RIG_NAME[name]
+    if not is_variable_name(name):
+        return name  # which a scene refuses
+    short = name.removesuffix("_ratio")
+    return (
+        short
+        if RATIO_FIELD_BY_DIMENSIONAL_NAME.get(short) == name
+        and find_si_units_of_field(name, value)
+        else name
+    )
+
+
+def _axis_si_units(name: str, value: Any) -> str | None:
+    """SI units of a value on an axis; None where it is none in units."""
+    if value is None or isinstance(value, bool):
+        return None
+    if name in RIG_NAME_BY_AXIS_NAME:
+        return RIG_QUANTITIES[RIG_NAME_BY_AXIS_NAME[name]].si_units
+    if name in RATIO_FIELD_BY_DIMENSIONAL_NAME:
+        return SI_UNIT_BY_SCALE["V_*"]
+    return find_si_units_of_field(name, value)
+
+
+def _parse_units_of_value(value: Any) -> str:
+    return split_number_and_units(value)[1] if isinstance(value, str) else ""
+
+
+def factor_to_si(quantity_name: str, units: str) -> Fraction:
+    """Factor to SI units; of a stiffness that is friction over displacement to 1/m."""
+    if quantity_name == "stiffness" and is_friction_stiffness(f"1 {units}"):
+        return unit_factor(quantity_name, units, "1/m")
+    si = _axis_si_units(quantity_name, f"1 {units}")
+    if si is None:
+        raise InvalidValue(quantity_name, units, "is no quantity of a rig, nor in units of one")
+    return unit_factor(quantity_name, units, si)

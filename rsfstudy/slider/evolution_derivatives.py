@@ -1,0 +1,171 @@
+"""Finite-difference derivatives of the state evolution in steady sliding."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple, cast
+
+from rsfstudy.slider.equations import build_friction_relation, compute_steady_states
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.scene_view import SceneView
+from rsfstudy.slider.steady_state import SteadySliding
+
+#: Largest step of the differences, relative to the scale of each argument, and the weights of
+#: central differences of order eight.
+_MAX_DIFFERENCE_STEP_OVER_SCALE = 0.05
+_DIFFERENCE_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
+#: Scale of a state relative to b, and the change of a steady state with ln V, relative to b, below
+#: which the scale of a state does not follow that change.
+_STATE_SCALE_OVER_B, _MIN_STATE_CHANGE = 0.05, 1e-9
+#: Most halvings of a step, the relative difference between two steps that counts as converged, and
+#: the rounding error of a difference in units of the machine precision.
+_MAX_HALVINGS, _CONVERGENCE_TOLERANCE, _ROUNDING_ERROR = 9, 1e-12, 8.0 * 2.0**-52
+
+Matrix = list[list[float]]
+
+
+class StateEvolutionDerivatives(NamedTuple):
+    """Derivatives of the state evolution per unit slip in steady sliding.
+
+    Attributes
+    ----------
+    with_respect_to_log_slip_rate, with_respect_to_state_shift : list of float
+        Derivatives with respect to ln V and to the shift, of shape (states,).
+    with_respect_to_states : list of list of float
+        Derivatives with respect to each state, of shape (states, states).
+    relative_error : float
+        Largest relative error estimate among the derivatives.
+    """
+
+    with_respect_to_log_slip_rate: list[float]
+    with_respect_to_state_shift: list[float]
+    with_respect_to_states: Matrix
+    relative_error: float
+
+    def with_relative_change(self, relative_change: float) -> StateEvolutionDerivatives:
+        """Return a copy in which all derivatives are changed by a relative amount.
+
+        The derivatives with respect to ln V and to the shift are multiplied by ``1 +
+        relative_change``. The derivatives with respect to the states are multiplied by ``1 -
+        relative_change``.
+        """
+        by_log_slip_rate, by_shift = (
+            [x * (1.0 + relative_change) for x in row] for row in self[:2]
+        )
+        by_state = [
+            [x * (1.0 - relative_change) for x in row] for row in self.with_respect_to_states
+        ]
+        return self._replace(
+            with_respect_to_log_slip_rate=by_log_slip_rate,
+            with_respect_to_state_shift=by_shift,
+            with_respect_to_states=by_state,
+        )
+
+
+def compute_state_evolution_derivatives(
+    scene: SceneView, steady_state: SteadySliding
+) -> StateEvolutionDerivatives:
+    """Compute the derivatives of the state evolution in steady sliding.
+
+    The step of the finite differences is halved until two successive estimates agree. Laws whose
+    evolution varies over a fraction of a unit of ln V are therefore resolved.
+    """
+    evolutions, p = (
+        scene.equation_functions.friction_functions.evolutions,
+        scene.friction_parameter_values,
+    )
+    shift = build_friction_relation(scene)(steady_state.frictional_stress)[2]
+    arguments = [steady_state.log_slip_rate, shift, *steady_state.states]
+    scales, columns, errors = _finite_difference_scales(scene, steady_state, shift), [], []
+    # changes that count as much as a unit of ln V, to which rounding errors are relative
+    units = [scales[0], *(scale / _STATE_SCALE_OVER_B for scale in scales[1:])]
+    rounding = _ROUNDING_ERROR * (
+        1.0 + max(abs(x) / y for x, y in zip(arguments, units, strict=True))
+    )
+    for place, (scale, unit) in enumerate(zip(scales, units, strict=True)):
+
+        def evolve(change: float, place: int = place) -> Numbers:
+            x, shift, *psis = (y + change * (n == place) for n, y in enumerate(arguments))
+            return cast(Numbers, evolutions(x, tuple(psis), shift, 1.0, p))
+
+        derivatives, error = _differentiate_at_zero(
+            evolve, _MAX_DIFFERENCE_STEP_OVER_SCALE * scale, rounding * unit
+        )
+        columns.append(derivatives)
+        errors.append(error)
+    by_rate, by_shift, *by_state = columns
+    rows = [list(row) for row in zip(*by_state, strict=True)]
+    return StateEvolutionDerivatives(by_rate, by_shift, rows, max(errors))
+
+
+def _differentiate_at_zero(
+    function: Callable[[float], Numbers], initial_step: float, rounding_error: float
+) -> tuple[list[float], float]:
+    """Differentiate a function at zero, and estimate the relative error.
+
+    The step is halved until the derivatives of two successive steps differ by no more than the
+    rounding error. The function then returns the derivatives of the longer step, which has the
+    smaller rounding error. If no two successive steps agree, the function uses the pair of steps
+    with the smallest difference, and returns the derivatives of the shorter step.
+    """
+    (coarse, _sizes), best, smallest = (
+        _central_differences_at_zero(function, initial_step),
+        list[float](),
+        math.inf,
+    )
+    for _ in range(_MAX_HALVINGS):
+        initial_step *= 0.5
+        fine, sizes = _central_differences_at_zero(function, initial_step)
+        pairs = zip(fine, coarse, sizes, strict=True)
+        error = max(abs(x - y) / size if x != y else 0.0 for x, y, size in pairs)
+        noise = _CONVERGENCE_TOLERANCE + rounding_error / initial_step
+        if error <= noise:
+            return coarse, noise
+        if not best or error + noise < smallest:
+            best, smallest = fine, error + noise
+        coarse = fine
+    return best, smallest
+
+
+def _central_differences_at_zero(
+    function: Callable[[float], Numbers], step: float
+) -> tuple[list[float], list[float]]:
+    """Differentiate a function at zero by central differences of order eight.
+
+    Returns
+    -------
+    derivatives : list of float
+        Derivative of each component of the function.
+    sizes : list of float
+        Largest ratio of a function value to its distance from zero, for each component. The
+        rounding error is relative to this size.
+    """
+    slopes = [0.0] * len(function(0.0))
+    sizes = slopes
+    for number, weight in _DIFFERENCE_WEIGHTS:
+        ahead, behind = function(number * step), function(-number * step)
+        changes = zip(slopes, ahead, behind, strict=True)
+        slopes = [slope + weight * (more - less) / step for slope, more, less in changes]
+        values, away = zip(sizes, ahead, behind, strict=True), number * step
+        sizes = [max(size, abs(more) / away, abs(less) / away) for size, more, less in values]
+    return slopes, sizes
+
+
+def _finite_difference_scales(
+    scene: SceneView, steady_state: SteadySliding, state_shift: float
+) -> list[float]:
+    """Return the scales of ln V, the shift and each state for finite differences."""
+    size = _STATE_SCALE_OVER_B * scene.a * scene.parts.law.state_change_over_a
+    # b of several states may be next to nothing where each has a large one
+    of_shift = (
+        size if scene.parts.law.state_count > 1 else _STATE_SCALE_OVER_B * abs(scene.b) or size
+    )
+    if len(steady_state.states) == 1:
+        return [1.0, of_shift, size]
+    slow, fast = (
+        compute_steady_states(scene, steady_state.log_slip_rate + x, state_shift)
+        for x in (-1.0, 1.0)
+    )
+    moved = [0.5 * abs(y - x) for x, y in zip(slow, fast, strict=True)]
+    return [1.0, of_shift, *(by if by > _MIN_STATE_CHANGE * size else size for by in moved)]

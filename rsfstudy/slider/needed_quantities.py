@@ -1,0 +1,175 @@
+"""Check that a scene provides the quantities that its parts need.
+
+The functions of a part receive the quantities in its attribute ``received_quantities``. If
+effective normal stress is constant, shear stress can be computed from the friction coefficient and
+the normal stress. A part can list further quantities in ``needs``. Scenes in which these quantities
+are unknown then reject the part, because the rates would be computed from wrong values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.scene_view import SceneView
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.parts import Part
+
+SLIP_RATE, STATE, FRICTION_COEFFICIENT = "slip_rate", "state", "friction_coefficient"
+SHEAR_STRESS, NORMAL_STRESS = "shear_stress", "normal_stress"
+PORE_PRESSURE, EFFECTIVE_NORMAL_STRESS = "pore_pressure", "effective_normal_stress"
+
+#: The quantities that a part may need.
+QUANTITIES_A_PART_MAY_NEED: Mapping[str, str] = {
+    SLIP_RATE: "ln(V/V_*)",
+    STATE: "the states of the law",
+    FRICTION_COEFFICIENT: "tau/sigma = mu_* + a ln(V/V_*) + the sum of the states",
+    SHEAR_STRESS: "frictional shear stress tau over sigma_*",
+    NORMAL_STRESS: "normal stress over sigma_*",
+    PORE_PRESSURE: "pore pressure above that of the surroundings, over sigma_*",
+    EFFECTIVE_NORMAL_STRESS: "normal stress less pore pressure, over sigma_*",
+}
+#: Quantities that the functions of a law receive. The friction coefficient is computed from the
+#: other two quantities.
+QUANTITIES_RECEIVED_BY_LAWS = frozenset({SLIP_RATE, STATE, FRICTION_COEFFICIENT})
+#: Quantities that can be computed from other quantities.
+_QUANTITIES_COMPUTED_FROM_OTHERS: Mapping[str, frozenset[str]] = {
+    EFFECTIVE_NORMAL_STRESS: frozenset({NORMAL_STRESS, PORE_PRESSURE}),
+    SHEAR_STRESS: frozenset({FRICTION_COEFFICIENT, NORMAL_STRESS, PORE_PRESSURE}),
+}
+
+
+def check_names_of_needed_quantities(slot_name: str, part_class: type[Part]) -> None:
+    """Raise ``InvalidValue`` if ``needs`` of a part is invalid.
+
+    The attribute must be a set of known quantities.
+
+    Parameters
+    ----------
+    slot_name : str
+        Name of the slot.
+    part_class : type
+        Class of the part.
+
+    Raises
+    ------
+    InvalidValue
+        If ``needs`` is a string or contains an unknown quantity.
+    """
+    needs: Any = part_class.needs
+    if isinstance(needs, str):
+        raise InvalidValue("needs", needs, "must be a set of names", remedy=f"Write {{{needs!r}}}.")
+    for name in needs:
+        if name not in QUANTITIES_A_PART_MAY_NEED:
+            rule = f"is not a quantity that rates of the {slot_name} {part_class.name} can need"
+            raise InvalidValue("needs", name, rule, choices=QUANTITIES_A_PART_MAY_NEED)
+
+
+def check_needed_quantities(scene: SceneView) -> None:
+    """Raise ``InvalidValue`` if a scene lacks a quantity that a part needs.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the functions of a part do not receive a needed quantity.
+    """
+    for slot, part in zip(scene.parts._fields, scene.parts, strict=True):
+        missing = (
+            sorted(set(part.needs) - quantities_known_to_part(scene, part)) if part.needs else []
+        )
+        if missing:
+            raise _missing_quantities_error(scene, slot, part, missing)
+
+
+def quantities_known_to_part(scene: SceneView, part: Part) -> frozenset[str]:
+    """Return the quantities that are known to the functions of a part.
+
+    The result contains the quantities that the functions receive, the quantities that are constant
+    in the scene, and all quantities that can be computed from both.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene that the part belongs to.
+    part : Part
+        Part of the scene.
+
+    Returns
+    -------
+    frozenset of str
+        Names of quantities in ``QUANTITIES_A_PART_MAY_NEED``.
+    """
+    constant = {NORMAL_STRESS, PORE_PRESSURE} - {
+        change.unknown_quantity_name for change in _causes_of_unknown_quantities(scene)
+    }
+    found = constant | part.received_quantities
+    if scene.parts.law.regularised and part is scene.parts.law:
+        # The friction coefficient of forward slip is not valid if slip reverses.
+        found -= {FRICTION_COEFFICIENT}
+    return frozenset(
+        found | {name for name, terms in _QUANTITIES_COMPUTED_FROM_OTHERS.items() if found >= terms}
+    )
+
+
+class _CauseOfUnknownQuantity(NamedTuple):
+    """Field of a scene that makes a quantity unavailable to the rates."""
+
+    unknown_quantity_name: str
+    cause_text: str
+    remedy: str
+
+
+def _causes_of_unknown_quantities(scene: SceneView) -> list[_CauseOfUnknownQuantity]:
+    """Return the fields of a scene that make a quantity unavailable."""
+    parts, found = scene.parts, []
+    if parts.normal_stress.normal_stress is not None:
+        cause = f"normal_stress={parts.normal_stress.name!r}"
+        found.append(_CauseOfUnknownQuantity(NORMAL_STRESS, cause, "set normal_stress='constant'"))
+    if parts.loading.changes_normal_stress:
+        cause = f"the loading {parts.loading.name!r}"
+        remedy = "leave normal stress and pore pressure out of the loading"
+        found += [
+            _CauseOfUnknownQuantity(name, cause, remedy) for name in (NORMAL_STRESS, PORE_PRESSURE)
+        ]
+    if parts.fluid.unknowns:
+        cause = f"fluid={parts.fluid.name!r}"
+        found.append(_CauseOfUnknownQuantity(PORE_PRESSURE, cause, "set fluid='drained'"))
+    if parts.law.regularised:
+        cause = "regularised=True"
+        found.append(_CauseOfUnknownQuantity(FRICTION_COEFFICIENT, cause, "set regularised=False"))
+    return found
+
+
+def _missing_quantities_error(
+    scene: SceneView, slot_name: str, part: Part, missing_quantity_names: list[str]
+) -> InvalidValue:
+    """Return the error for a part whose rates lack a needed quantity."""
+    known = quantities_known_to_part(scene, part)
+    # Determine the missing terms. A field of the scene may be the reason why they are missing.
+    wanted = (
+        set[str]().union(
+            *(_QUANTITIES_COMPUTED_FROM_OTHERS.get(name, {name}) for name in missing_quantity_names)
+        )
+        - known
+    )
+    changes = [
+        change
+        for change in _causes_of_unknown_quantities(scene)
+        if change.unknown_quantity_name in wanted
+    ]
+    causes = "with " + " and ".join(dict.fromkeys(change.cause_text for change in changes))
+    remedies = ", ".join(dict.fromkeys(change.remedy for change in changes))
+    if wanted > {change.unknown_quantity_name for change in changes}:
+        causes, remedies = "in any scene", "write the unknown as a state of a law"
+    named = " and ".join(missing_quantity_names)
+    rule = f"needs {named}, which its rates do not receive {causes}: they receive "
+    rule += ", ".join(sorted(known)) or "no quantity"
+    remedy = f"{remedies[:1].upper()}{remedies[1:]}, or use a part that does not need {named}."
+    return InvalidValue(slot_name, part.name, rule, remedy=remedy)

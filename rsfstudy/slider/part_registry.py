@@ -1,0 +1,486 @@
+"""Registry of the slots, parts and fields of scenes.
+
+The registry lists the parts that can fill each slot, and the fields that the parts add to a scene.
+A user-defined part is a class that is derived from the base class of a slot. The part is registered
+by its name when it is first used in a process. If a notebook cell with the class is run again, the
+new class replaces the old class. The registry rejects a name that belongs to another part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from inspect import Parameter, getattr_static, signature
+from types import FunctionType
+from typing import Any, TypeVar
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantities import Quantity, is_variable_name
+from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
+from rsfstudy.slider.field_name_hints import canonical_law_name
+from rsfstudy.slider.needed_quantities import check_names_of_needed_quantities
+from rsfstudy.slider.parts import Part, field_names, field_quantities, is_boolean_field
+from rsfstudy.slider.slider_parameters import SliderParameters
+from rsfstudy.slider.user_loadings import UserLoading
+
+F = TypeVar("F", bound=Callable[..., Any])
+#: User-defined part: the class of a part, or a loading object such as a protocol.
+UserPart = type[Part] | UserLoading
+
+
+@dataclass(frozen=True)
+class Slot:
+    """Slot of a scene, which is filled by one part.
+
+    Parameters
+    ----------
+    name : str
+        Name of the slot.
+    base_class : type
+        Base class of the parts.
+    built_in_parts : mapping of str to type
+        Built-in parts by name.
+    default_part_name : str
+        Name of the default part.
+    long_name : str
+        Description of the slot.
+    user_parts : dict of str to type or UserLoading, optional
+        User-defined parts by name that have been used in this process.
+    """
+
+    name: str
+    base_class: type[Part]
+    built_in_parts: Mapping[str, type[Part]]
+    default_part_name: str
+    long_name: str
+    user_parts: dict[str, UserPart] = field(default_factory=dict)
+
+    @property
+    def field_quantity(self) -> Quantity:
+        """Quantity that describes the slot as a field."""
+        return Quantity(self.name, "", "", self.long_name)
+
+    @cached_property
+    def parts_by_selecting_field(self) -> Mapping[str, type[Part]]:
+        """Mapping from field names to the parts that the fields select."""
+        return {part.selected_by: part for part in self.built_in_parts.values() if part.selected_by}
+
+
+SLOTS: tuple[Slot, ...] = (
+    Slot("law", laws.LawBase, laws.BUILT_IN_PARTS, "slip", "state evolution law"),
+    Slot(
+        "normal_stress",
+        normal_stress.NormalStress,
+        normal_stress.BUILT_IN_PARTS,
+        "variable",
+        "normal stress condition",
+    ),
+    Slot("fluid", fluid.Fluid, fluid.BUILT_IN_PARTS, "drained", "fluid in the pores of the fault"),
+    Slot(
+        "dynamics",
+        dynamics.Dynamics,
+        dynamics.BUILT_IN_PARTS,
+        "quasi_static",
+        "what balances the spring besides friction",
+    ),
+    Slot("loading", loading.Loading, loading.BUILT_IN_PARTS, "step", "what the load point does"),
+)
+#: Slots whose part is selected by name. In the other slots, the values of fields select the part.
+SLOTS_CHOSEN_BY_NAME = tuple(slot for slot in SLOTS if not slot.parts_by_selecting_field)
+_ALL_PART_CLASSES: tuple[type[Part], ...] = (
+    SliderParameters,
+    *(part for slot in SLOTS for part in slot.built_in_parts.values()),
+)
+#: Built-in part that owns each field.
+PART_CLASS_BY_FIELD_NAME: Mapping[str, type[Part]] = {
+    name: part for part in reversed(_ALL_PART_CLASSES) for name in field_names(part)
+}
+#: Quantities that describe the fields of a scene.
+FIELD_QUANTITIES: tuple[Quantity, ...] = (
+    *(slot.field_quantity for slot in SLOTS_CHOSEN_BY_NAME),
+    *(about for part in _ALL_PART_CLASSES for about in field_quantities(part)),
+)
+#: Names of the fields of a scene.
+FIELD_NAMES: tuple[str, ...] = tuple(dict.fromkeys(about.name for about in FIELD_QUANTITIES))
+#: Names of the fields that are included among the values of a scene only if the user sets them.
+FIELDS_OMITTED_IF_NONE: frozenset[str] = frozenset(
+    name
+    for name, part in PART_CLASS_BY_FIELD_NAME.items()
+    if part.__dataclass_fields__[name].metadata.get("omit_if_none")
+)
+#: Names of the slots.
+SLOT_NAMES: frozenset[str] = frozenset(slot.name for slot in SLOTS)
+#: Names of the fields whose values select a part.
+PART_SELECTING_FIELDS: tuple[str, ...] = tuple(
+    name for slot in SLOTS for name in slot.parts_by_selecting_field
+)
+
+
+def scene_field_defaults() -> dict[str, Any]:
+    """Return the default values of all fields of a scene.
+
+    Returns
+    -------
+    dict of str to object
+        Default values by field name. The default of a slot is None if other fields select the part.
+    """
+    choices = {
+        slot.name: slot.default_part_name if slot in SLOTS_CHOSEN_BY_NAME else None
+        for slot in SLOTS
+    }
+    fields = {
+        name: part.__dataclass_fields__[name].default
+        for name, part in PART_CLASS_BY_FIELD_NAME.items()
+    }
+    return {name: {**choices, **fields}[name] for name in dict.fromkeys((*FIELD_NAMES, *choices))}
+
+
+def with_scene_field_signature(*extra_field_names: str) -> Callable[[F], F]:
+    """Return a decorator that adds the fields of scenes to a signature.
+
+    The signature is used for code completion in editors. The decorated function takes the fields as
+    ``**kwargs``.
+
+    Parameters
+    ----------
+    *extra_field_names : str
+        Further names to add.
+
+    Returns
+    -------
+    callable
+        Decorator.
+    """
+
+    def decorate(function: F) -> F:
+        stated = signature(function)
+        *first, last = stated.parameters.values()
+        names = (*scene_field_defaults(), *extra_field_names)
+        fields = [Parameter(name, Parameter.KEYWORD_ONLY, default=...) for name in names]
+        function.__signature__ = stated.replace(parameters=[*first, *fields, last])  # type: ignore[attr-defined]
+        return function
+
+    return decorate
+
+
+# ---- user-defined parts --------------------------------------------------------------------------
+
+#: Names of the attributes of every scene, except for its fields. The module ``scene`` adds the
+#: names.
+RESERVED_NAMES: set[str] = set()
+#: Classes that have been checked.
+_CHECKED_PART_CLASSES: set[type[Part]] = set()
+
+
+def class_of_part(part: UserPart) -> type[Part]:
+    """Return the class of a part.
+
+    Parameters
+    ----------
+    part : type or UserLoading
+        Class of a part, or a loading object such as a protocol.
+
+    Returns
+    -------
+    type
+        The class itself, or the class of the loading.
+    """
+    return part if isinstance(part, type) else type(part)
+
+
+def find_slot_of_part_class(part_class: type[Part]) -> Slot:
+    """Return the slot that a class of parts fills.
+
+    Parameters
+    ----------
+    class_of_part : type
+        Class of a part.
+
+    Returns
+    -------
+    Slot
+        Slot with a base class of the part.
+    """
+    return next(slot for slot in SLOTS if issubclass(part_class, slot.base_class))
+
+
+def check_and_register_part(slot: Slot, part: Any) -> UserPart:
+    """Check and register a part that is passed as a class or an object.
+
+    Parameters
+    ----------
+    slot : Slot
+        Slot that the part should fill.
+    part : type or UserLoading
+        Part to check.
+
+    Returns
+    -------
+    type or UserLoading
+        The part.
+
+    Raises
+    ------
+    InvalidValue
+        If the part cannot fill the slot.
+    """
+    found: UserPart = part
+    if part in slot.built_in_parts.values() and slot in SLOTS_CHOSEN_BY_NAME:
+        return found
+    if isinstance(part, UserLoading) and slot.base_class is loading.Loading:
+        _check_part_name(slot, part)
+    elif part not in _CHECKED_PART_CLASSES or find_slot_of_part_class(part) is not slot:
+        _check_user_part(slot, part)
+    register_user_parts([found])
+    return found
+
+
+def _check_user_part(slot: Slot, part: Any) -> None:
+    """Raise ``InvalidValue`` if a class cannot fill a slot."""
+    if not isinstance(part, type) or not issubclass(part, slot.base_class):
+        rule = f"is no class that fills the slot {slot.name}"
+        remedy = f"Derive a class from {slot.base_class.__module__}.{slot.base_class.__name__}."
+        raise InvalidValue(slot.name, part, rule, remedy=remedy)
+    params = vars(part).get("__dataclass_params__")
+    if params is None or not params.frozen:
+        remedy = "Write @dataclass(frozen=True, kw_only=True) above its class."
+        raise InvalidValue(slot.name, part, "must be a frozen dataclass", remedy=remedy)
+    _check_part_name(slot, part)
+    _check_part_fields(slot, part)
+    _check_excluded_unknowns(slot, part)
+    check_names_of_needed_quantities(slot.name, part)
+    for name in part.required_functions():
+        function = getattr_static(part, name, None)
+        if not isinstance(getattr(function, "__func__", None), FunctionType):
+            rule, remedy = f"states no {name}", f"Write {name} = staticmethod(a plain function)."
+            raise InvalidValue(slot.name, part, rule, remedy=remedy)
+
+
+def _check_excluded_unknowns(slot: Slot, part: type[Part]) -> None:
+    """Raise ``InvalidValue`` if ``excluded_from_distance`` is invalid.
+
+    Each name must be the name of an unknown of the part.
+    """
+    excluded: Any = part.excluded_from_distance
+    unknowns = [about.name for about in part.unknowns]
+    if isinstance(excluded, str):
+        rule, remedy = "must be a tuple of names", f"Write ({excluded!r},)."
+        raise InvalidValue("excluded_from_distance", excluded, rule, remedy=remedy)
+    for name in excluded:
+        if name not in unknowns:
+            rule = f"is not an unknown of the {slot.name} {part.name}"
+            raise InvalidValue("excluded_from_distance", name, rule, choices=unknowns)
+
+
+def _check_part_name(slot: Slot, part: UserPart) -> None:
+    """Raise ``InvalidValue`` if the name of a part is invalid or in use."""
+    name: object = getattr(part, "name", None)
+    rule = "" if is_variable_name(name) else f"must be named by a Python identifier, not {name!r}"
+    for other in SLOTS:
+        if name in other.built_in_parts:
+            rule = f"takes the name of a part of rsfstudy, {name!r}"
+        elif name in other.user_parts and _definition_origin(
+            other.user_parts[name]
+        ) != _definition_origin(part):
+            rule = (
+                f"takes the name {name!r} of {'.'.join(_definition_origin(other.user_parts[name]))}"
+            )
+    if rule:
+        remedy = f'Write name = "..." in {_definition_origin(part)[1]}.'
+        raise InvalidValue(slot.name, part, rule, remedy=remedy)
+
+
+def _definition_origin(part: UserPart) -> tuple[str, str]:
+    """Return the module and the qualified name of the definition of a part.
+
+    The result is the same if a notebook cell with the definition is run again.
+    """
+    return class_of_part(part).__module__, class_of_part(part).__qualname__
+
+
+def _check_part_fields(slot: Slot, part: type[Part]) -> None:
+    """Raise ``InvalidValue`` if a field of a part is invalid.
+
+    A field must have a description, and its name must not be in use.
+    """
+    what = f"field of {part.__qualname__}"
+    for stated in fields(part):
+        name, about, owner = (
+            stated.name,
+            stated.metadata.get("about"),
+            PART_CLASS_BY_FIELD_NAME.get(stated.name),
+        )
+        if about is None:
+            rule, state = "says neither what it is nor its rule", "State it by number() or flag()."
+            raise InvalidValue(what, name, rule, remedy=state)
+        if not is_variable_name(name):
+            rule = "must be a Python identifier, its accents composed (NFC)"
+            raise InvalidValue(what, name, rule)
+        if owner is None:
+            taken = name in RESERVED_NAMES | SLOT_NAMES
+        else:  # Another part of the slot may have the same field with another rule.
+            known = owner.__dataclass_fields__[name].metadata["about"]
+            taken = about != known or owner not in slot.built_in_parts.values()
+        if taken:
+            rule = "is the name of something else, of "
+            rule += owner.name if owner else "every scene"
+            raise InvalidValue(what, name, rule, remedy="Give it another name.")
+
+
+def register_user_parts(parts: Iterable[UserPart]) -> None:
+    """Register the names of parts that have been checked.
+
+    An earlier part with the same name is replaced.
+
+    Parameters
+    ----------
+    parts : iterable of type or UserLoading
+        Parts to register.
+    """
+    for part in parts:
+        slot = find_slot_of_part_class(class_of_part(part))
+        if slot.user_parts.get(part.name) is not part:
+            slot.user_parts[part.name] = part
+            _CHECKED_PART_CLASSES.add(class_of_part(part))
+
+
+def normalise_field_value(field_name: str, value: Any) -> Any:
+    """Convert a part or the synonym of a law to a name.
+
+    Parameters
+    ----------
+    field_name : str
+        Name of the field.
+    value : object
+        Value of the field. A user-defined part is registered.
+
+    Returns
+    -------
+    object
+        Name of the part or law, or the value itself.
+
+    Raises
+    ------
+    InvalidValue
+        If the part cannot fill the slot.
+    """
+    for slot in SLOTS if isinstance(value, type | UserLoading) else ():
+        if slot.name == field_name:
+            return check_and_register_part(slot, value).name
+    return canonical_law_name(value) if field_name == "law" and isinstance(value, str) else value
+
+
+def replace_names_by_user_parts(
+    field_values: Mapping[str, Any], user_parts_by_name: Mapping[str, UserPart]
+) -> Mapping[str, Any]:
+    """Replace the names of user-defined parts by the parts themselves.
+
+    Parameters
+    ----------
+    field_values : mapping of str to object
+        Field values.
+    user_parts_by_name : mapping of str to type or UserLoading
+        User-defined parts by name.
+
+    Returns
+    -------
+    mapping of str to object
+        Field values with parts instead of names.
+    """
+    if not user_parts_by_name:
+        return field_values
+    texts = {
+        n: field_values[n]
+        for n in SLOT_NAMES & set(field_values)
+        if isinstance(field_values[n], str)
+    }
+    return {
+        **field_values,
+        **{name: user_parts_by_name.get(text, text) for name, text in texts.items()},
+    }
+
+
+def scene_field_quantities(user_parts: Iterable[UserPart]) -> dict[str, Quantity]:
+    """Return the fields of scenes that may contain the given parts.
+
+    Parameters
+    ----------
+    user_parts : iterable of type or UserLoading
+        User-defined parts.
+
+    Returns
+    -------
+    dict of str to Quantity
+        Quantities by field name.
+
+    Raises
+    ------
+    InvalidValue
+        If two parts have different fields with the same name.
+    """
+    found = {about.name: about for about in FIELD_QUANTITIES}
+    for kind in map(class_of_part, user_parts):
+        for about in (find_slot_of_part_class(kind).field_quantity, *field_quantities(kind)):
+            if found.setdefault(about.name, about) != about:
+                rule = "is the name of something else, of another part"
+                raise InvalidValue(f"field of {kind.name}", about.name, rule)
+    return found
+
+
+def scene_field_types(user_parts: Iterable[UserPart]) -> Mapping[str, Any]:
+    """Return the types of the fields of scenes.
+
+    Parameters
+    ----------
+    user_parts : iterable of type or UserLoading
+        User-defined parts that the scenes may contain.
+
+    Returns
+    -------
+    mapping of str to type
+        Types by field name. The type includes None if some parts of the slot lack the field.
+    """
+    kinds: dict[str, Any] = dict.fromkeys(SLOT_NAMES, str)
+    classes = tuple(map(class_of_part, user_parts))
+    filling: dict[str, list[type[Part]]] = {"": [SliderParameters]}
+    filling |= {slot.name: [*slot.built_in_parts.values()] for slot in SLOTS}
+    for own_kind in classes:
+        filling[find_slot_of_part_class(own_kind).name].append(own_kind)
+    for every in filling.values():
+        for part in every:
+            for name in field_names(part):
+                kind: Any = bool if is_boolean_field(part, name) else float
+                stated = name == part.selected_by or all(name in field_names(one) for one in every)
+                default = part.__dataclass_fields__[name].default
+                kinds[name] = kind if stated and default is not None else kind | None
+    return {name: kinds[name] for name in scene_field_quantities(classes)}
+
+
+#: Types of the fields of scenes without user-defined parts.
+FIELD_TYPES = scene_field_types(())
+
+
+def quantities_with_values(
+    field_values: Mapping[str, Any], user_parts: Iterable[UserPart] = ()
+) -> Iterator[tuple[Quantity, object]]:
+    """Iterate over the fields that have a value.
+
+    Parameters
+    ----------
+    field_values : mapping of str to object
+        Field values.
+    user_parts : iterable of type or UserLoading, optional
+        User-defined parts whose fields may be included.
+
+    Yields
+    ------
+    quantity : Quantity
+        Description of the field.
+    value : object
+        Value of the field, which is not None.
+    """
+    about = scene_field_quantities(user_parts)
+    for name, value in field_values.items():
+        if value is not None:
+            yield about.get(name, Quantity(name, "", "", "")), value

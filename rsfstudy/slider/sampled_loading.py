@@ -1,0 +1,286 @@
+"""Loading histories from sampled records.
+
+The samples contain the load point motion and normal stress as functions of time. Between samples,
+the load point velocity is constant and normal stress changes at a constant rate, so the record is
+interpolated linearly. In results, a history is identified by its name and by a digest of its
+samples.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.error_boundary import guard_methods
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantities import Quantity, is_variable_name
+from rsfstudy.slider.loading import Segment, ramp
+from rsfstudy.slider.parameter_layout import SEGMENT_LOG_VELOCITY, SEGMENT_STRESS_FALL
+from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.scene_view import SceneView
+from rsfstudy.slider.user_loadings import UserLoading
+
+#: Columns of the sample table: time since the first sample, load point velocity after the sample,
+#: decrease of normal stress from sigma_* at the sample, and rate of normal stress after the sample.
+TIME_COLUMN, VELOCITY_COLUMN, STRESS_FALL_COLUMN, STRESS_RATE_COLUMN = range(4)
+_NORMAL_STRESS_UNKNOWNS = (
+    Quantity("recorded_fall", "$P$", "1", "imposed fall of normal stress", "sigma_*"),
+)
+
+
+class LazySegmentSequence(Sequence[Segment]):
+    """Sequence of segments that are created on access.
+
+    Parameters
+    ----------
+    table : ndarray of shape (segments, 6)
+        Segment table of a loading.
+    """
+
+    def __init__(self, table: np.ndarray) -> None:
+        """Store the segment table."""
+        self._table = table
+
+    def __len__(self) -> int:
+        """Return the number of segments."""
+        return len(self._table)
+
+    def __getitem__(self, number: Any) -> Any:
+        """Return the segment with an index."""
+        begins, ends, velocity, *_others = self._table[number].tolist()
+        return Segment(velocity, duration=ends - begins)
+
+
+@guard_methods
+@dataclass(frozen=True, kw_only=True)
+class SampledHistory(UserLoading):
+    """Loading history that interpolates recorded samples.
+
+    Parameters
+    ----------
+    name : str
+        Name of the history in results.
+    samples : bytes
+        Array of shape (samples, 4) as bytes. The columns are time, load point velocity, and
+        decrease and rate of normal stress.
+    digest : str
+        Digest of the samples.
+    of_stress : bool
+        If True, the samples include normal stress or pore pressure.
+    of_pressure : bool, default: False
+        If True, the samples include pore pressure but not normal stress. If the scene has a fluid
+        with pore pressure, the samples are the pressure around the fault, and fluid flows until
+        both pressures are equal.
+    first_reversal : tuple of (str, float, str), optional
+        Name, value and position of the first sample that moves the load point backwards, for error
+        messages.
+    """
+
+    samples: bytes = field(repr=False)
+    digest: str
+    of_stress: bool
+    of_pressure: bool = False  # type: ignore[misc]
+    first_reversal: tuple[str, float, str] | None = field(default=None, compare=False, repr=False)
+
+    auxiliary_rates = staticmethod(ramp.auxiliary_rates)
+    auxiliary_steady_states = staticmethod(ramp.auxiliary_steady_states)
+
+    @property
+    def unknowns(self) -> tuple[Quantity, ...]:  # type: ignore[override]
+        """Unknowns of the loading.
+
+        If normal stress is sampled, its decrease is an unknown. Otherwise the loading has no
+        unknowns.
+        """
+        return _NORMAL_STRESS_UNKNOWNS if self.of_stress else ()
+
+    def locate_load_point_reversal(self, segment_index: int) -> tuple[str, float, str]:
+        """Describe the input value that moves the load point backwards.
+
+        See the base class.
+        """
+        velocity = float(self.sample_table[segment_index, VELOCITY_COLUMN])
+        return self.first_reversal or ("velocity", velocity, f"sample {segment_index + 1}")
+
+    def initial_unknowns(self, scene: SceneView) -> Numbers:
+        """Return the decrease of normal stress at the first sample.
+
+        See the base class.
+        """
+        return (float(self.sample_table[0, STRESS_FALL_COLUMN]),) if self.of_stress else ()
+
+    def parameter_values(self, scene: SceneView) -> Numbers:
+        """Return the rate of normal stress after the first sample.
+
+        See the base class.
+        """
+        return (float(self.sample_table[0, STRESS_RATE_COLUMN]),) if self.of_stress else ()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields for pickling, without cached attributes."""
+        return {f.name: vars(self)[f.name] for f in fields(self)}
+
+    @property
+    def sample_table(self) -> np.ndarray:
+        """Samples as an array of shape (samples, 4)."""
+        return np.frombuffer(self.samples).reshape(-1, STRESS_RATE_COLUMN + 1)
+
+    @cached_property
+    def segment_table(self) -> np.ndarray:
+        """Table of the segments, an array of shape (samples, 6)."""
+        columns = self.sample_table
+        table = np.full((len(columns), SEGMENT_STRESS_FALL + 1), math.nan)
+        table[:, : SEGMENT_LOG_VELOCITY + 1].T[:] = (
+            columns[:, TIME_COLUMN],
+            np.append(columns[1:, TIME_COLUMN], math.inf),
+            columns[:, VELOCITY_COLUMN],
+            _log_velocity(columns[:, VELOCITY_COLUMN]),
+        )
+        if self.of_stress:
+            table[:, SEGMENT_LOG_VELOCITY + 1 :] = columns[
+                :, [STRESS_RATE_COLUMN, STRESS_FALL_COLUMN]
+            ]
+        return table
+
+    @property
+    def segments(self) -> Any:
+        """Segments between the samples, with an infinite last segment."""
+        return LazySegmentSequence(self.segment_table)
+
+    @property
+    def jump_mask(self) -> np.ndarray:
+        """False for every segment, because the record has no jumps."""
+        return np.zeros(len(self.sample_table), dtype=bool)
+
+    @property
+    def reported_segment_count(self) -> int:
+        """Number of segments whose start is reported as an event.
+
+        Only the end of the record is reported, because otherwise every sample would be an event.
+        """
+        return min(1, len(self.sample_table) - 1)
+
+    def _check_segment_durations(self) -> None:
+        """Do nothing, because the samples are checked when they are read."""
+
+    def describe(self) -> dict[str, Any]:
+        """Return the digest of the samples.
+
+        See the base class.
+        """
+        return {"samples": self.digest}
+
+    @property
+    def duration(self) -> float:
+        """Duration of the record in D_c/V_*."""
+        return float(self.sample_table[-1, TIME_COLUMN])
+
+    @property
+    def changes_normal_stress(self) -> bool:
+        """True if the history changes normal stress."""
+        return self.of_stress
+
+    @property
+    def perturbs_steady_sliding(self) -> bool:
+        """True, because a record generally differs from steady sliding."""
+        return True
+
+    def isolate_segment(self, segment_index: int) -> SampledHistory:
+        """Return a history that consists of a single segment.
+
+        See the base class.
+        """
+        one = self.sample_table[segment_index].copy()
+        one[TIME_COLUMN] = 0.0
+        return replace(self, samples=one.tobytes())
+
+
+def build_sampled_history(
+    time: np.ndarray,
+    velocity: np.ndarray,
+    stress_fall: np.ndarray | None,
+    name: str,
+    *,
+    of_pressure: bool = False,
+    first_reversal: tuple[str, float, str] | None = None,
+) -> SampledHistory:
+    r"""Build a loading history from samples.
+
+    Parameters
+    ----------
+    time : ndarray
+        Sampling times in :math:`D_c/V_*`. The history starts at the first sample.
+    velocity : ndarray
+        Load point velocity between each sample and the next sample, in :math:`V_*`. The last
+        velocity has no end.
+    stress_fall : ndarray or None
+        Decrease of normal stress from :math:`\sigma_*` at the samples, in :math:`\sigma_*`. After
+        the last sample, normal stress remains constant.
+    name : str
+        Name of the history in results.
+    of_pressure : bool, default: False
+        If True, the decrease is caused by pore pressure only.
+    first_reversal : tuple of (str, float, str), optional
+        Name, value and position of the first sample that moves the load point backwards.
+
+    Returns
+    -------
+    SampledHistory
+        Loading history.
+
+    Raises
+    ------
+    InvalidValue
+        If the name is not a Python identifier.
+    """
+    if not is_variable_name(name):
+        raise InvalidValue("name", name, "must be a Python identifier: it names the history")
+    columns = np.zeros((len(time), STRESS_RATE_COLUMN + 1))
+    columns[:, TIME_COLUMN], columns[:, VELOCITY_COLUMN] = time - time[0], velocity
+    if stress_fall is not None:
+        columns[:, STRESS_FALL_COLUMN] = stress_fall
+        columns[:-1, STRESS_RATE_COLUMN] = -np.diff(stress_fall) / np.diff(time)
+    history = build_sampled_history_from_table(
+        columns, stress_fall is not None, name, of_pressure=of_pressure
+    )
+    return replace(history, first_reversal=first_reversal)
+
+
+def build_sampled_history_from_table(
+    sample_table: np.ndarray, of_stress: bool, name: str, *, of_pressure: bool = False
+) -> SampledHistory:
+    """Build a loading history from a table of samples.
+
+    Parameters
+    ----------
+    sample_table : ndarray of shape (samples, 4)
+        Samples with the columns of ``SampledHistory.sample_table``.
+    of_stress : bool
+        If True, the samples include normal stress or pore pressure.
+    name : str
+        Name of the history in results.
+    of_pressure : bool, default: False
+        If True, the samples include pore pressure but not normal stress.
+
+    Returns
+    -------
+    SampledHistory
+        Loading history.
+    """
+    samples = np.ascontiguousarray(sample_table, dtype=float).tobytes()
+    digest = hashlib.sha256(samples).hexdigest()[:16]
+    return SampledHistory(
+        name=name, samples=samples, digest=digest, of_stress=of_stress, of_pressure=of_pressure
+    )
+
+
+def _log_velocity(velocity: np.ndarray) -> np.ndarray:
+    """Return the logarithm of the magnitude of a velocity."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(abs(velocity)))

@@ -1,0 +1,514 @@
+"""Assembly of the parts of a scene from its fields.
+
+The function ``build_parts`` creates the parts, ``build_field_index`` assigns each field to its
+part, and ``SceneBase`` is the base class of ``Scene``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from functools import cache
+from typing import Any, NamedTuple, Self
+
+from rsfstudy._deprecation import renamed_value
+from rsfstudy.error_boundary import guard_methods
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantities import HtmlTableMixin, Quantity
+from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
+from rsfstudy.slider.field_name_hints import (
+    hint_for_unknown_choice,
+    hint_for_unknown_field,
+    hint_for_value_without_field_name,
+)
+from rsfstudy.slider.part_registry import (
+    FIELDS_OMITTED_IF_NONE,
+    PART_CLASS_BY_FIELD_NAME,
+    PART_SELECTING_FIELDS,
+    SLOT_NAMES,
+    SLOTS,
+    SLOTS_CHOSEN_BY_NAME,
+    Slot,
+    UserPart,
+    check_and_register_part,
+    class_of_part,
+    normalise_field_value,
+    quantities_with_values,
+    scene_field_quantities,
+    with_scene_field_signature,
+)
+from rsfstudy.slider.parts import Part, field_names, validate_field_value
+from rsfstudy.slider.scene_caching import cached_attribute
+from rsfstudy.slider.slider_parameters import (
+    STIFFNESS_FIELDS,
+    SliderParameters,
+    with_stiffness_default,
+)
+from rsfstudy.slider.user_loadings import UserLoading
+
+
+class SceneParts(NamedTuple):
+    """Parts of a scene, one per slot, and the slider parameters.
+
+    Parameters
+    ----------
+    slider : SliderParameters
+        Parameters that every slider has.
+    law : LawBase
+        State evolution law.
+    normal_stress : NormalStress
+        Normal stress condition.
+    fluid : Fluid
+        Pore fluid.
+    dynamics : Dynamics
+        Dynamics.
+    loading : Loading
+        Loading history.
+    """
+
+    slider: SliderParameters
+    law: laws.LawBase
+    normal_stress: normal_stress.NormalStress
+    fluid: fluid.Fluid
+    dynamics: dynamics.Dynamics
+    loading: loading.Loading
+
+
+def build_parts(field_values: Mapping[str, Any]) -> SceneParts:
+    """Build the parts of a scene from its fields.
+
+    Parameters
+    ----------
+    field_values : mapping of str to object
+        Values of the fields by name. Fields with the value None are ignored.
+
+    Returns
+    -------
+    SceneParts
+        Parts with the values of the fields.
+
+    Raises
+    ------
+    InvalidValue
+        If a name is not a field, or if a value violates its rule or has no meaning in this scene.
+    """
+    chosen = tuple(_select_part(slot, field_values) for slot in SLOTS)
+    layout = build_field_index(tuple(map(class_of_part, chosen)))
+    values = _group_values_by_part_index(field_values, layout)
+    made: list[Any] = [
+        part(**values.get(place, {})) if isinstance(part, type) else part
+        for place, part in enumerate(chosen, start=1)
+    ]
+    return SceneParts(SliderParameters(**with_stiffness_default(values.get(0, {}))), *made)
+
+
+def replace_field_values(
+    scene_parts: SceneParts, changed_field_values: Mapping[str, Any]
+) -> SceneParts:
+    """Return parts with new values of some fields.
+
+    Parameters
+    ----------
+    scene_parts : SceneParts
+        Parts of a scene.
+    changed_field_values : mapping of str to object
+        New values by field name. The fields must belong to these parts.
+
+    Returns
+    -------
+    SceneParts
+        Parts with the new values. Parts without a changed field are reused.
+
+    Raises
+    ------
+    InvalidValue
+        If a value violates its rule or has no meaning for these parts.
+    """
+    made: list[Any] = list(scene_parts)
+    for place, values in _group_values_by_part_index(
+        changed_field_values, build_field_index(tuple(map(type, scene_parts[1:])))
+    ).items():
+        if any(name in values for name in STIFFNESS_FIELDS):
+            values = {**dict.fromkeys(STIFFNESS_FIELDS), **with_stiffness_default(values)}
+        made[place] = replace(made[place], **values)
+    return SceneParts._make(made)
+
+
+def _group_values_by_part_index(
+    field_values: Mapping[str, Any], field_index: FieldIndex
+) -> dict[int, dict[str, Any]]:
+    """Validate field values and group them by the index of their part.
+
+    Fields with the value None are omitted.
+    """
+    values: dict[int, dict[str, Any]] = {}
+    kinds, places, idle = (
+        field_index.part_classes,
+        field_index.part_index_by_field,
+        field_index.values_of_inactive_fields,
+    )
+    for name, value in field_values.items():
+        place = places.get(name)
+        if place is not None:
+            if value is not None:
+                values.setdefault(place, {})[name] = validate_field_value(kinds[place], name, value)
+        elif name in idle:
+            # A field that selects another part is accepted if its value does not select the part.
+            if value is None or value is idle[name]:
+                continue
+            owner = PART_CLASS_BY_FIELD_NAME[name]
+            if name != owner.selected_by or validate_field_value(owner, name, value):
+                raise field_index.rejecting_part_class_by_field[name].rejection_error(name, value)
+        elif name not in SLOT_NAMES:
+            raise _unknown_field_error(name, value, field_index)
+    return values
+
+
+def _select_part(slot: Slot, field_values: Mapping[str, Any]) -> UserPart:
+    """Return the part that the fields select for a slot."""
+    value = field_values.get(slot.name)
+    if isinstance(value, type | UserLoading):
+        return check_and_register_part(slot, value)
+    if isinstance(value, str) and value in slot.user_parts and value not in slot.built_in_parts:
+        return slot.user_parts[value]
+    if not slot.parts_by_selecting_field:
+        name = normalise_field_value(slot.name, field_values.get(slot.name, slot.default_part_name))
+        if not isinstance(name, str) or name not in slot.built_in_parts:
+            choices = (*slot.built_in_parts, *slot.user_parts)
+            remedy = hint_for_unknown_choice(slot.name, name, choices)
+            raise InvalidValue(slot.name, name, "is unknown", choices=choices, remedy=remedy)
+        return slot.built_in_parts[name]
+    if value is not None:
+        others = ", ".join(slot.parts_by_selecting_field) or "the other fields"
+        remedy = f"Those of rsfstudy are called for by {others}."
+        raise InvalidValue(slot.name, value, "is unknown", choices=slot.user_parts, remedy=remedy)
+    for caller, part in slot.parts_by_selecting_field.items():
+        value = field_values.get(caller)
+        if value is not None and validate_field_value(part, caller, value):
+            return part
+    return slot.built_in_parts[slot.default_part_name]
+
+
+class FieldIndex(NamedTuple):
+    """Assignment of fields to the parts of a scene.
+
+    Parameters
+    ----------
+    part_classes : tuple of type
+        Classes of the parts, starting with ``SliderParameters``.
+    part_index_by_field : mapping of str to int
+        Index of the part that owns each field.
+    rejecting_part_class_by_field : mapping of str to type
+        For each field without an owner among the parts, the part that rejects the field.
+    values_of_inactive_fields : mapping of str to object
+        Values of these fields in the scene.
+    inapplicable_fields : frozenset of str
+        Names of these fields that have no meaning, whatever their value. Fields that would select
+        another part are not included.
+    slots_given_by_name : tuple of str
+        Names of the slots whose parts are selected by name.
+    all_field_names : tuple of str
+        Names of all fields, including the fields of user-defined parts.
+    plain_value_fields : frozenset of str
+        Names of the fields that do not select a part.
+    """
+
+    part_classes: tuple[type[Part], ...]
+    part_index_by_field: Mapping[str, int]
+    rejecting_part_class_by_field: Mapping[str, type[Part]]
+    values_of_inactive_fields: Mapping[str, Any]
+    inapplicable_fields: frozenset[str]
+    slots_given_by_name: tuple[str, ...]
+    all_field_names: tuple[str, ...]
+    plain_value_fields: frozenset[str]
+
+
+@cache
+def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
+    """Build the field index of scenes with the given parts.
+
+    Parameters
+    ----------
+    part_classes : tuple of type
+        Classes of the parts in the order of the slots.
+
+    Returns
+    -------
+    FieldIndex
+        Assignment of the fields to the parts.
+
+    Raises
+    ------
+    InvalidValue
+        If two parts have a field with the same name.
+    """
+    kinds: tuple[type[Part], ...] = (SliderParameters, *part_classes)
+    filled = list(zip(SLOTS, part_classes, strict=True))
+    owned = {slot.name: part for slot, part in filled if part not in slot.built_in_parts.values()}
+    places = {name: place for place, part in enumerate(kinds) for name in field_names(part)}
+    if len(places) < sum(len(field_names(part)) for part in kinds):
+        names = ", ".join(part.name for part in owned.values())
+        raise InvalidValue("parts", names, "have a field of one name", remedy="Rename one.")
+    refusing: dict[str, type[Part]] = {}
+    idle: dict[str, Any] = {}
+    foreign: set[str] = set()
+    for slot, part in filled:
+        for other in slot.built_in_parts.values():
+            for name in set(field_names(other)) - set(places):
+                refusing[name] = part
+                calls = name == other.selected_by
+                idle[name] = other.__dataclass_fields__[name].default if calls else None
+                if not calls or slot.name in owned:
+                    foreign.add(name)
+    named = tuple(slot.name for slot in SLOTS if slot in SLOTS_CHOSEN_BY_NAME or slot.name in owned)
+    fields = tuple(scene_field_quantities(owned.values()))
+    plain = frozenset(fields) - {*SLOT_NAMES, *PART_SELECTING_FIELDS}
+    return FieldIndex(kinds, places, refusing, idle, frozenset(foreign), named, fields, plain)
+
+
+def find_inapplicable_fields(
+    field_values: Mapping[str, Any], user_parts: Iterable[UserPart] = ()
+) -> frozenset[str]:
+    """Find the fields that have no meaning for the selected parts.
+
+    Parameters
+    ----------
+    field_values : mapping of str to object
+        Field values that select the parts.
+    user_parts : iterable of type or UserLoading, optional
+        User-defined parts whose fields are also examined.
+
+    Returns
+    -------
+    frozenset of str
+        Names of the fields that belong to other parts. The set is empty if the values do not select
+        valid parts.
+    """
+    try:
+        layout = build_field_index(
+            tuple(class_of_part(_select_part(slot, field_values)) for slot in SLOTS)
+        )
+    except InvalidValue:
+        return frozenset()
+    of_others = {name for part in user_parts for name in field_names(class_of_part(part))}
+    return layout.inapplicable_fields | (of_others - set(layout.part_index_by_field))
+
+
+def find_user_parts(scene_parts: SceneParts) -> dict[str, UserPart]:
+    """Find the user-defined parts of a scene.
+
+    Parameters
+    ----------
+    scene_parts : SceneParts
+        Parts of the scene.
+
+    Returns
+    -------
+    dict of str to type or UserLoading
+        User-defined parts by slot. Protocols and sampled histories are included as objects, and
+        other parts as classes.
+    """
+    filled = zip(SLOTS, scene_parts[1:], strict=True)
+    return {
+        slot.name: part if isinstance(part, UserLoading) else type(part)
+        for slot, part in filled
+        if type(part) not in slot.built_in_parts.values()
+    }
+
+
+#: Attributes of a scene that are used only inside the package. They are hidden from ``dir``.
+_ATTRIBUTES_HIDDEN_FROM_DIR = frozenset(
+    {
+        "field_index",
+        "cache",
+        "equation_functions",
+        "parameter_values",
+        "friction_parameter_values",
+        "with_segment",
+        "quantities_with_values",
+    }
+)
+
+
+@guard_methods
+class SceneBase(HtmlTableMixin):
+    """Base class of scenes, which provides the fields of the parts.
+
+    The fields of all parts are attributes of the scene.
+
+    Parameters
+    ----------
+    parts : SceneParts, optional
+        Parts of the scene. By default the parts are built from the fields.
+    **given : object
+        Values of the fields.
+    """
+
+    parts: SceneParts
+
+    def __init__(self, parts: SceneParts | None = None, /, **given: Any) -> None:
+        """Build and check the parts of the scene."""
+        if parts is None:
+            parts = build_parts(given)
+        elif not isinstance(parts, SceneParts):
+            raise value_without_field_name_error(parts)
+        object.__setattr__(self, "parts", parts)
+        self._check()
+
+    def _check(self) -> None:
+        """Raise ``InvalidValue`` if the parts are incompatible."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Return the value of a field of one of the parts."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        layout = self.field_index
+        if name in layout.part_index_by_field:
+            return getattr(self.parts[layout.part_index_by_field[name]], name)
+        if name in layout.slots_given_by_name:
+            return getattr(self.parts, name).name
+        if name in layout.values_of_inactive_fields:
+            return layout.values_of_inactive_fields[name]
+        if (new := renamed_value(SceneBase, name)) == name:
+            raise AttributeError(f"a {SceneBase.__name__} has no field or attribute {name!r}")
+        return getattr(self, new)
+
+    def __repr__(self) -> str:
+        """Return the call that creates the scene."""
+        return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
+
+    def __dir__(self) -> list[str]:
+        """Return the public attributes, without inapplicable fields."""
+        # Fields without a value may be properties that are computed from other fields.
+        stated = {name for name, value in self.as_dict().items() if value is not None}
+        names = {*super().__dir__(), *stated} - _ATTRIBUTES_HIDDEN_FROM_DIR
+        return [name for name in names if not name.startswith("_")]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return the arguments for unpickling."""
+        return type(self), (self.parts,)
+
+    @cached_attribute
+    def field_index(self) -> FieldIndex:
+        """Index that assigns the fields to the parts."""
+        return build_field_index(tuple(map(type, self.parts[1:])))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the fields as plain Python values.
+
+        Returns
+        -------
+        dict of str to object
+            Values by field name.
+        """
+        values = dict(self.field_index.values_of_inactive_fields)
+        for name in self.field_index.slots_given_by_name:
+            values[name] = getattr(self.parts, name).name
+        for part in self.parts:
+            values |= vars(part)
+        kept = (
+            n
+            for n in self.field_index.all_field_names
+            if n not in FIELDS_OMITTED_IF_NONE or values[n] is not None
+        )
+        return {name: values[name] for name in kept}
+
+    def describe(self) -> dict[str, Any]:
+        """Return the fields and the history of a user-defined loading.
+
+        Returns
+        -------
+        dict of str to object
+            Values by field name. A protocol adds its segments in the format of ``protocol``, and a
+            sampled history adds the digest of its samples.
+        """
+        history = (
+            self.parts.loading.describe()
+            if "loading" in self.field_index.slots_given_by_name
+            else {}
+        )
+        return self.as_dict() | history
+
+    @property
+    def user_parts(self) -> tuple[UserPart, ...]:
+        """User-defined parts of the scene."""
+        return tuple(find_user_parts(self.parts).values())
+
+    def quantities_with_values(self) -> Iterator[tuple[Quantity, object]]:
+        """Iterate over the fields that have a value.
+
+        Returns
+        -------
+        iterator of (Quantity, object)
+            Pairs of a quantity and the value of the field.
+        """
+        return quantities_with_values(self.as_dict(), self.user_parts)
+
+    @with_scene_field_signature()
+    def with_(self, **changes: Any) -> Self:
+        """Return a copy of the scene with new values of some fields.
+
+        The copy is checked like a new scene. If a change replaces a part, fields that lose their
+        meaning are dropped. Setting ``stiffness`` replaces ``stiffness_ratio``, and vice versa.
+
+        Parameters
+        ----------
+        **changes : object
+            New values by field name.
+
+        Returns
+        -------
+        Scene
+            New scene.
+
+        Raises
+        ------
+        InvalidValue
+            If a value is invalid in the new scene.
+        """
+        if all(
+            n in self.field_index.plain_value_fields and value is not None
+            for n, value in changes.items()
+        ):
+            return type(self)(replace_field_values(self.parts, changes))
+        theirs = find_user_parts(self.parts)
+        kept = {**self.as_dict(), **theirs}
+        dropped = find_inapplicable_fields({**kept, **changes}, theirs.values())
+        if any(changes.get(name) is not None for name in STIFFNESS_FIELDS):
+            dropped |= {*STIFFNESS_FIELDS}
+        return type(self)(**{name: kept[name] for name in kept if name not in dropped} | changes)
+
+
+def _unknown_field_error(name: str, value: Any, field_index: FieldIndex) -> InvalidValue:
+    """Return the error for an unknown field name."""
+    for slot, part in zip(SLOTS, field_index.part_classes[1:], strict=True):
+        known = map(class_of_part, slot.user_parts.values())
+        owner = next((other for other in known if name in field_names(other)), None)
+        if owner is not None:
+            rule = f"has no meaning for {slot.name}={part.name!r}"
+            remedy = f"Leave it out, or set {slot.name}={owner.name!r}."
+            return InvalidValue(name, value, rule, remedy=remedy)
+    remedy, rule = hint_for_unknown_field(name), "is not a field of a scene"
+    # Similar names would be misleading if the name is a known synonym of a field.
+    return InvalidValue(
+        "field", name, rule, choices=() if remedy else field_index.all_field_names, remedy=remedy
+    )
+
+
+def value_without_field_name_error(value: Any) -> InvalidValue:
+    """Return the error for a positional argument of ``Scene``.
+
+    Parameters
+    ----------
+    value : object
+        Value of the argument.
+
+    Returns
+    -------
+    InvalidValue
+        Error whose message suggests the name of the field.
+    """
+    remedy = hint_for_value_without_field_name(
+        value, {slot.name: slot.built_in_parts for slot in SLOTS_CHOSEN_BY_NAME}
+    )
+    return InvalidValue("Scene", value, "is given without a name", remedy=remedy)

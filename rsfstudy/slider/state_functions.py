@@ -1,0 +1,309 @@
+"""State variables of a scene: evolution, steady states and sums.
+
+The states of the law come first, and their sum acts on friction. The unknowns of a loading that
+changes normal stress and of a fluid follow. The last unknown is the pore pressure P, or the stress
+that the loading imposes. Most functions of this module return other functions, which are
+specialised for the number of states so that Numba can compile them.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.slider.parameter_layout import A, B
+from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.scene_view import SceneView
+
+#: Values of ln(V/V_*) at which steady states are checked, and the tolerance of the change of a
+#: state per unit slip in D_c, divided by a. The tolerance is far above rounding errors.
+_CHECKED_LOG_SLIP_RATES, _REST_TOLERANCE = (0.0, -0.5, 0.5), 1e-6
+
+
+@cache
+def wrap_single_state_evolution(single_state_evolution: Function) -> Function:
+    r"""Return the function ``evolutions`` of a law with one state.
+
+    Parameters
+    ----------
+    single_state_evolution : callable
+        Function ``single_state_evolution(log_slip_rate, state, p)`` of the law.
+
+    Returns
+    -------
+    callable
+        Function that returns the derivative of :math:`\Psi` with respect to slip, multiplied by a
+        fraction, as a tuple.
+    """
+
+    def evolutions(
+        log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
+    ) -> Numbers:
+        return (fraction * single_state_evolution(log_slip_rate, psis[0] - shift, p),)
+
+    return evolutions
+
+
+def default_steady_state(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
+    r"""Compute the default steady state of laws with one state.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    state_shift : float
+        Decrease of the state variable due to stress.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    tuple of float
+        State :math:`\Psi`. In steady sliding, :math:`\Theta = -b \ln(V/V_*)`.
+    """
+    return (state_shift - p[B] * log_slip_rate,)
+
+
+def append_auxiliary_evolutions(
+    law_evolutions: Function, auxiliary_rates: Function, law_state_count: int
+) -> Function:
+    """Append the rates of unknowns to the rates of the states of the law.
+
+    Parameters
+    ----------
+    law_evolutions : callable
+        Function ``law_evolutions`` of the law.
+    auxiliary_rates : callable
+        Function ``auxiliary_rates`` of the fluid or the loading.
+    law_state_count : int
+        Number of states of the law.
+
+    Returns
+    -------
+    callable
+        Function ``law_evolutions`` of all states.
+    """
+
+    def all_evolutions(
+        log_slip_rate: float, psis: Numbers, shift: float, fraction: float, p: Numbers
+    ) -> Numbers:
+        return (
+            *law_evolutions(log_slip_rate, psis[:law_state_count], shift, fraction, p),
+            *auxiliary_rates(log_slip_rate, psis[law_state_count:], fraction, p),
+        )
+
+    return all_evolutions
+
+
+def append_auxiliary_steady_states(
+    law_steady_states: Function, auxiliary_steady_states: Function
+) -> Function:
+    """Append the steady unknowns to the steady states of the law.
+
+    Parameters
+    ----------
+    law_steady_states : callable
+        Function ``law_steady_states`` of the law.
+    auxiliary_steady_states : callable
+        Function ``auxiliary_steady_states`` of the fluid or the loading.
+
+    Returns
+    -------
+    callable
+        Function ``law_steady_states`` of all states.
+    """
+
+    def all_steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
+        return (
+            *law_steady_states(log_slip_rate, shift, p),
+            *auxiliary_steady_states(log_slip_rate, p),
+        )
+
+    return all_steady_states
+
+
+@cache
+def build_sum_function(term_count: int) -> Function:
+    """Return a function that sums the first elements of a tuple.
+
+    Parameters
+    ----------
+    term_count : int
+        Number of elements to sum.
+
+    Returns
+    -------
+    callable
+        Function ``(numbers) -> float``.
+    """
+    return _evaluate_lambda_source("numbers", _sum_source_text("numbers", term_count))
+
+
+@cache
+def build_tuple_scaling_function(component_count: int) -> Function:
+    """Return a function that scales the first elements of a tuple.
+
+    Parameters
+    ----------
+    component_count : int
+        Number of elements to scale.
+
+    Returns
+    -------
+    callable
+        Function ``(numbers, by) -> tuple`` that multiplies each element by ``by``.
+    """
+    each = (f"by * numbers[{i}], " for i in range(component_count))
+    return _evaluate_lambda_source("numbers, by", f"({''.join(each)})")
+
+
+@cache
+def build_state_step_function(state_count: int) -> Function:
+    """Return a function that advances the states by a step.
+
+    Parameters
+    ----------
+    state_count : int
+        Number of states.
+
+    Returns
+    -------
+    callable
+        Function ``(psis, changes, by) -> tuple`` that returns ``psis + by * changes`` for each
+        state.
+    """
+    each = (f"psis[{i}] + by * changes[{i}], " for i in range(state_count))
+    return _evaluate_lambda_source("psis, changes, by", f"({''.join(each)})")
+
+
+def _sum_source_text(tuple_name: str, term_count: int) -> str:
+    """Return the source code of a sum of the first elements of a tuple."""
+    return " + ".join(f"{tuple_name}[{i}]" for i in range(term_count))
+
+
+def _evaluate_lambda_source(argument_names: str, expression: str) -> Function:
+    """Create a function from the source code of its arguments and value.
+
+    The code has no loop, because the compiler cannot iterate over tuples.
+    """
+    function: Function = eval(f"lambda {argument_names}: {expression}", {"__name__": __name__})
+    return function
+
+
+def build_state_contribution_function(
+    law_state_count: int, pressure_derivatives: Function | None
+) -> Function:
+    r"""Return a function for the contribution of the states to the slip rate.
+
+    Parameters
+    ----------
+    law_state_count : int
+        Number of states of the law.
+    pressure_derivatives : callable or None
+        Function ``(g, psis, p)`` that returns the derivative of the strength with respect to the
+        last unknown as its first value. None if the scene has no such unknown.
+
+    Returns
+    -------
+    callable
+        Function ``(changes, g, psis, p) -> float``. It returns the decrease of :math:`a \ln(V/V_*)`
+        due to changes of the states.
+    """
+    if pressure_derivatives is None:
+        return _evaluate_lambda_source(
+            "changes, g, psis, p", _sum_source_text("changes", law_state_count)
+        )
+    state_sum = build_sum_function(law_state_count)
+
+    def contribution_with_pressure(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
+        return state_sum(changes) - pressure_derivatives(g, psis, p)[0] * changes[-1]
+
+    return contribution_with_pressure
+
+
+def build_states_from_strength_function(law_state_count: int) -> Function:
+    """Return a function that computes the first state from the strength.
+
+    Parameters
+    ----------
+    law_state_count : int
+        Number of states of the law.
+
+    Returns
+    -------
+    callable
+        Function ``(strength, log_slip_rate, others, p) -> tuple`` that returns all states. The
+        argument ``others`` contains all states except the first.
+    """
+    if law_state_count == 1:
+
+        def single_law_state(
+            strength: float, log_slip_rate: float, others: Numbers, p: Numbers
+        ) -> Numbers:
+            return (strength - p[A] * log_slip_rate, *others)
+
+        return single_law_state
+
+    sum_of_others = build_sum_function(law_state_count - 1)
+
+    def several_law_states(
+        strength: float, log_slip_rate: float, others: Numbers, p: Numbers
+    ) -> Numbers:
+        return (strength - p[A] * log_slip_rate - sum_of_others(others), *others)
+
+    return several_law_states
+
+
+def check_steady_states(scene: SceneView) -> None:
+    """Check the steady states of a user-defined law.
+
+    The states must not change in steady sliding, must add up to zero at :math:`V_*` and must be
+    stable at constant slip rate. Otherwise the critical stiffness and the limit cycles would
+    contradict each other.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the law.
+
+    Raises
+    ------
+    InvalidValue
+        If the law violates one of the conditions.
+    """
+    law, p, still = scene.parts.law, scene.parameter_values, _REST_TOLERANCE * scene.a
+    evolutions = law.evolutions or wrap_single_state_evolution(law.evolution)
+    for rate in _CHECKED_LOG_SLIP_RATES:
+        psis = (law.steady_states or default_steady_state)(rate, 0.0, p)
+        change = max(map(abs, evolutions(rate, psis, 0.0, 1.0, p)))
+        if not change <= still:
+            rule = f"changes by {change:.3g} per D_c in steady sliding at ln(V/V_*) = {rate:g}"
+            remedy = "Write steady_states(log_slip_rate, shift, p) for it."
+            raise InvalidValue("law", law.name, rule, remedy=remedy)
+        if rate == 0.0 and not abs(sum(psis)) <= still:
+            rule = f"has states that add up to {sum(psis):.3g} at V_*, where friction is mu_*"
+            raise InvalidValue("law", law.name, rule, remedy="Measure them from V_*.")
+        away = np.linalg.eigvals(_evolution_jacobian(evolutions, rate, psis, scene.a, p)).real.max()
+        if away > _REST_TOLERANCE:
+            rule = f"moves away from steady sliding at ln(V/V_*) = {rate:g}, by {away:.3g} per D_c"
+            remedy = "See whether its evolution has the sign of dPsi/d(delta)."
+            raise InvalidValue("law", law.name, rule, remedy=remedy)
+
+
+def _evolution_jacobian(
+    evolutions: Function, log_slip_rate: float, states: Numbers, state_scale: float, p: Numbers
+) -> list[list[float]]:
+    """Compute the Jacobian matrix of the evolution by central differences.
+
+    The step is 1e-4 times ``state_scale``.
+    """
+    step, rows = 1e-4 * state_scale, list[list[float]]()
+    for n, psi in enumerate(states):
+        ahead, behind = (
+            evolutions(log_slip_rate, (*states[:n], psi + off, *states[n + 1 :]), 0.0, 1.0, p)
+            for off in (step, -step)
+        )
+        rows.append([(x - y) / (2.0 * step) for x, y in zip(ahead, behind, strict=True)])
+    return rows

@@ -1,0 +1,259 @@
+"""Protocols, which define a loading history by a list of segments.
+
+The main function is ``protocol``. In results, a protocol is identified by its name. The segments
+are part of the provenance of the results.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.error_boundary import error_boundary, guard_methods
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantities import is_variable_name
+from rsfstudy.slider.loading import Loading, Segment
+from rsfstudy.slider.parameter_layout import SEGMENT_VELOCITY
+from rsfstudy.slider.scene_view import SceneView
+
+#: Keys of a mapping that describes a segment.
+SEGMENT_KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
+
+
+@guard_methods
+@dataclass(frozen=True, kw_only=True)
+class UserLoading(Loading, ABC):
+    """Base class of protocols and sampled histories.
+
+    Parameters
+    ----------
+    name : str
+        Name of the loading in results.
+    """
+
+    name: str  # type: ignore[misc]  # The name belongs to the instance, not to the class.
+
+    def check(self, scene: SceneView) -> None:
+        """Check that the load point moves backwards only if slip may reverse.
+
+        See the base class.
+        """
+        back = np.asarray(self.segment_table)[:, SEGMENT_VELOCITY] < 0.0
+        if back.any() and not scene.parts.law.regularised:
+            name, value, place = self.locate_load_point_reversal(int(np.argmax(back)))
+            rule = "moves the load point back, and friction is that of forward slip"
+            remedy = "Set regularised=True, by which slip reverses with shear stress."
+            raise InvalidValue(name, value, rule, remedy=remedy).with_location(place)
+        super().check(scene)
+
+    def locate_load_point_reversal(self, segment_index: int) -> tuple[str, float, str]:
+        """Describe the input value that moves the load point backwards.
+
+        Parameters
+        ----------
+        segment_index : int
+            Index of the segment.
+
+        Returns
+        -------
+        name : str
+            Name of the input quantity.
+        value : float
+            Input value.
+        place : str
+            Position of the value in the input.
+        """
+        return (
+            "velocity",
+            self.segments[segment_index].load_velocity,
+            f"segment {segment_index + 1}",
+        )
+
+    @property
+    @abstractmethod
+    def duration(self) -> float:
+        """Total duration of the input in D_c/V_*."""
+
+
+@guard_methods
+@dataclass(frozen=True, kw_only=True)
+class Protocol(UserLoading):
+    """Loading history that consists of user-defined segments.
+
+    Parameters
+    ----------
+    name : str
+        Name of the protocol in results.
+    input_segments : tuple of Segment
+        Segments of the protocol. The last segment may have a finite duration.
+    """
+
+    input_segments: tuple[Segment, ...]
+
+    def describe(self) -> dict[str, Any]:
+        """Return the input segments as plain data.
+
+        See the base class. The duration of the last segment is included if it is finite.
+        """
+        return {"segments": [segment.as_dict() for segment in self.input_segments]}
+
+    @cached_property
+    def segments(self) -> tuple[Segment, ...]:
+        """Segments of the loading, with an infinite last segment."""
+        return *self.input_segments[:-1], self.input_segments[-1]._replace(duration=math.inf)
+
+    @property
+    def duration(self) -> float:
+        """Total duration of the segments with a finite duration.
+
+        The unit is :math:`D_c/V_*`.
+        """
+        return math.fsum(s.duration for s in self.input_segments if s.duration < math.inf)
+
+
+@error_boundary
+def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "protocol") -> Protocol:
+    r"""Create a loading history from a list of segments.
+
+    After the last segment, the load point continues at the same velocity.
+
+    Parameters
+    ----------
+    segments : sequence of Segment or mapping
+        Segments in chronological order. A mapping has the following keys:
+
+        - ``velocity`` is the load point velocity in :math:`V_*`. Negative values move the load
+          point backwards, which requires a scene with ``regularised=True``.
+        - ``duration`` is the duration in :math:`D_c/V_*`. Alternatively, ``distance`` is the load
+          point displacement in :math:`D_c`. Only the last segment may omit both.
+        - ``step`` is a sudden displacement of the load point at the start of the segment, in
+          :math:`D_c`. The default is 0.
+        - ``normal_stress`` is the imposed normal stress in :math:`\sigma_*`. The default is the
+          value of the previous segment, or 1 for the first segment.
+    name : str, default: "protocol"
+        Name of the protocol in results. The name must be a Python identifier.
+
+    Returns
+    -------
+    Protocol
+        Loading history for ``Scene(loading=...)``.
+
+    Raises
+    ------
+    InvalidValue
+        If there are no segments, or if a segment has an invalid duration, velocity or normal
+        stress.
+
+    Examples
+    --------
+    >>> import rsfstudy
+    >>> test = rsfstudy.protocol(
+    ...     [{"velocity": 10, "distance": 30}, {"velocity": 0, "duration": 100}, {"velocity": 1}]
+    ... )
+    >>> test.duration
+    103.0
+    >>> scene = rsfstudy.Scene(loading=test)
+    >>> scene.load_velocity
+    1.0
+    """
+    if not is_variable_name(name):
+        raise InvalidValue("name", name, "must be a Python identifier: it names the protocol")
+    if isinstance(segments, str | Mapping) or not isinstance(segments, Sequence):
+        remedy = "Read a file by rsfstudy.read_protocol."
+        raise InvalidValue("protocol", segments, "must be a list of segments", remedy=remedy)
+    if not segments:
+        remedy = 'State one at least, as in [{"velocity": 10}].'
+        raise InvalidValue("protocol", segments, "has no segments", remedy=remedy)
+    history: list[Segment] = []
+    for number, stated in enumerate(segments, start=1):
+        before = history[-1].normal_stress if history else 0.0
+        history.append(_parse_segment(stated, before, f"segment {number}"))
+    for number, segment in enumerate(history[:-1], start=1):
+        if segment.duration == math.inf:
+            remedy = "State its duration or its distance; only the last goes on for ever."
+            raise InvalidValue("duration", math.inf, "never ends", remedy=remedy).with_location(
+                f"segment {number}"
+            )
+    return Protocol(name=name, input_segments=tuple(history))
+
+
+def _parse_segment(declared_segment: Any, previous_normal_stress: float, location: str) -> Segment:
+    """Convert an input segment to a validated ``Segment``.
+
+    The argument ``previous_normal_stress`` is the value of the previous segment, and ``location`` is the
+    position of the segment in error messages.
+    """
+    try:
+        if isinstance(declared_segment, Segment):
+            return _build_validated_segment(*declared_segment)
+        if not isinstance(declared_segment, Mapping):
+            remedy = 'Write {"velocity": 10, "duration": 2}.'
+            raise InvalidValue("segment", declared_segment, "is no segment", remedy=remedy)
+        for key in declared_segment:
+            if key not in SEGMENT_KEYS:
+                raise InvalidValue("segment", key, "is unknown", choices=SEGMENT_KEYS)
+        if "normal_stress" in declared_segment:
+            previous_normal_stress = (
+                _read_positive_number(
+                    declared_segment, "normal_stress", "greater than 0, and finite"
+                )
+                - 1.0
+            )
+        velocity, duration = (
+            declared_segment.get("velocity"),
+            declared_segment.get("duration", math.inf),
+        )
+        if velocity is None:
+            raise InvalidValue("velocity", None, "must be stated", remedy="0 holds the load point.")
+        if "distance" in declared_segment:
+            distance = declared_segment["distance"]
+            if "duration" in declared_segment:
+                rule = f"give duration or distance (here {distance!r}), not both"
+                raise InvalidValue("duration", duration, rule)
+            distance = _read_positive_number(declared_segment, "distance", "positive and finite")
+            duration = distance / _read_positive_number(
+                declared_segment, "velocity", "positive where a distance is stated"
+            )
+        return _build_validated_segment(
+            velocity, declared_segment.get("step", 0.0), duration, previous_normal_stress
+        )
+    except InvalidValue as error:
+        raise error.with_location(location) from error
+
+
+def _read_positive_number(declared_segment: Mapping[str, Any], key: str, rule: str) -> float:
+    """Return a positive finite value of a mapping."""
+    value = declared_segment[key]
+    if not (_is_number(value) and 0.0 < value < math.inf):
+        raise InvalidValue(key, value, f"must be {rule}")
+    return float(value)
+
+
+def _build_validated_segment(
+    velocity: Any, step: Any, duration: Any, normal_stress: Any
+) -> Segment:
+    """Return a ``Segment`` whose values have been validated."""
+    if not _is_number(velocity) or not math.isfinite(velocity):
+        remedy = "0 holds the load point."
+        raise InvalidValue("velocity", velocity, "must be a finite number", remedy=remedy)
+    if not _is_number(step) or not math.isfinite(step):
+        raise InvalidValue("step", step, "must be a finite number")
+    if not _is_number(duration) or not duration > 0.0:
+        remedy = "Leave out what lasts no time."
+        raise InvalidValue("duration", duration, "must be positive", remedy=remedy)
+    if not _is_number(normal_stress) or not -1.0 < normal_stress < math.inf:
+        rule = "must be greater than -1: it is what imposed normal stress exceeds sigma_* by"
+        raise InvalidValue("normal_stress", normal_stress, rule)
+    return Segment(float(velocity), float(step), float(duration), float(normal_stress))
+
+
+def _is_number(value: Any) -> bool:
+    """Return True if a value is a real number but not a boolean."""
+    return isinstance(value, Real) and not isinstance(value, bool)

@@ -1,0 +1,375 @@
+"""The journal of a study: every finished cell, on disk as soon as it is finished.
+
+An SQLite file beside the results, for one run at a time. A cell is found again by the exact values
+of its scene and of its measure's fields; everything else that decides its numbers is the journal's
+fingerprint, and a journal with another fingerprint is refused.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import sqlite3
+import struct
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.errors import DataError, shorten_text
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.status import Status
+
+#: A finished cell: its key, status, message, right-hand sides, wall time in s, numbers, checksum.
+StoredCellRow = tuple[bytes, str, str, int, float, bytes, int]
+
+#: Raised when the tables, the checksum or what a cell is named by change.
+_FORMAT_VERSION = 4
+_CREATE_TABLES = """
+CREATE TABLE IF NOT EXISTS fingerprint (json TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS cells (
+    key BLOB PRIMARY KEY, status TEXT, message TEXT, work INTEGER, seconds REAL, numbers BLOB,
+    checksum INTEGER);
+"""
+#: What a journal has no need of, and might act when it is written to.
+_FOREIGN_OBJECTS_QUERY = """
+SELECT type || ' ' || name FROM sqlite_master
+WHERE type NOT IN ('table', 'index') OR tbl_name NOT IN ('fingerprint', 'cells')
+"""
+_KEYS_PER_QUERY = 900
+#: How long to wait for another run to end, in s.
+_LOCK_TIMEOUT = 5.0
+_UNUSABLE_JOURNAL_REMEDY = "Choose another --output, or start over with --fresh."
+
+
+class OutputPacking:
+    """The position of each number of a measure in a row of float64."""
+
+    def __init__(self, measure: Measure) -> None:
+        sizes = {name: len(values) for name, values in measure.inner_coordinates.items()}
+        self.shapes = {n: tuple(sizes[d] for d in dims) for n, dims in measure.variables.items()}
+        stops = np.cumsum([math.prod(shape) for shape in self.shapes.values()])
+        self.packed_number_count = int(stops[-1])
+        starts = [0, *stops[:-1]]
+        self.slices = {n: slice(*ends) for n, *ends in zip(self.shapes, starts, stops, strict=True)}
+
+        self._struct_format = "" if any(self.shapes.values()) else f"<{self.packed_number_count}d"
+
+    def pack_outputs(self, output_values: Mapping[str, Any]) -> bytes:
+        """Numbers as bytes; those that are missing become NaN."""
+        if self._struct_format:
+            return struct.pack(
+                self._struct_format, *(output_values.get(name, math.nan) for name in self.shapes)
+            )
+        row = np.full(self.packed_number_count, np.nan, dtype="<f8")
+        for name, value in output_values.items():
+            row[self.slices[name]] = np.ravel(value)
+        return row.tobytes()
+
+    def pack_cell(self, cell_key: bytes, outcome: Outcome, wall_time: float) -> StoredCellRow:
+        """A cell as the journal holds it."""
+        numbers, work = self.pack_outputs(outcome.values), outcome.rhs_evaluations
+        row = (outcome.status.name, outcome.message, work, wall_time, numbers)
+        return (cell_key, *row, _compute_checksum(cell_key, *row))
+
+
+@dataclass(frozen=True)
+class CellColumns:
+    """Columns of some cells: status, message, right-hand sides, wall time, and one row of
+    numbers each.
+    """
+
+    statuses: np.ndarray
+    messages: np.ndarray
+    rhs_evaluations: np.ndarray
+    wall_times: np.ndarray
+    packed_outputs: np.ndarray
+
+    @classmethod
+    def build_pending_cells(cls, cell_count: int, packed_number_count: int) -> CellColumns:
+        """Cells that are not computed yet."""
+        return cls(
+            np.full(cell_count, int(Status.PENDING), dtype=np.int8),
+            np.full(cell_count, "", dtype=object),
+            np.zeros(cell_count, dtype=np.int64),
+            np.full(cell_count, np.nan),
+            np.full((cell_count, packed_number_count), np.nan),
+        )
+
+
+class CellJournal:
+    """Finished cells of one study.
+
+    Parameters
+    ----------
+    path : Path or None
+        The SQLite file; None keeps them in memory.
+    fingerprint : mapping
+        All that decides the numbers of a cell, except what its key holds, as plain data.
+    packing : OutputPacking
+        The numbers of a cell.
+    fresh : bool
+        Forget what the file holds.
+
+    Raises
+    ------
+    DataError
+        If the file cannot be opened, another run uses it, or its fingerprint differs; the text says
+        where.
+    """
+
+    def __init__(
+        self,
+        path: Path | None,
+        fingerprint: Mapping[str, Any],
+        packing: OutputPacking,
+        *,
+        fresh: bool = False,
+    ) -> None:
+        self._path, self._packing = path or Path("memory"), packing
+        ours = {**fingerprint, "journal": _FORMAT_VERSION}
+        wanted = json.dumps(ours, sort_keys=True)
+        try:
+            if path is not None:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                if fresh:
+                    _remove_journal(path)
+            self._db = _open_exclusively(path or ":memory:")
+        except (OSError, sqlite3.Error) as error:
+            raise self._build_unusable_journal_error(error) from error
+        try:
+            theirs = self._read_stored_fingerprint(wanted)
+            if theirs != wanted:
+                self._accept_journal_with_smaller_budget(theirs, ours)
+        except sqlite3.Error as error:
+            self._db.close()
+            raise self._build_unusable_journal_error(error) from error
+        except BaseException:
+            self._db.close()  # an open connection would keep the journal locked
+            raise
+
+    def _build_unusable_journal_error(self, error: Exception) -> DataError:
+        if _is_database_locked_error(error):
+            rule = f"another run uses {self._path}: let it end, or choose another --output."
+            return DataError(rule)
+        return DataError(f"cannot use {self._path}: {error}. {_UNUSABLE_JOURNAL_REMEDY}")
+
+    def _read_stored_fingerprint(self, run_fingerprint: str) -> Any:
+        """Return the fingerprint stored in the journal.
+
+        If the journal is new, the function stores ``run_fingerprint`` and returns ``run_fingerprint``.
+        """
+        with self._db:
+            self._db.executescript(_CREATE_TABLES)
+            others = self._db.execute(_FOREIGN_OBJECTS_QUERY).fetchall()
+            if others:
+                found = shorten_text(others[0][0])
+                raise DataError(
+                    f"{self._path} holds {found}, which is not ours. {_UNUSABLE_JOURNAL_REMEDY}"
+                )
+            row = self._db.execute("SELECT json FROM fingerprint").fetchone()
+            if row is None:
+                self._db.execute("INSERT INTO fingerprint VALUES (?)", (run_fingerprint,))
+        return run_fingerprint if row is None else row[0]
+
+    def _accept_journal_with_smaller_budget(
+        self, stored_fingerprint: Any, run_fingerprint: Mapping[str, Any]
+    ) -> None:
+        """Accept a journal with a smaller work budget, and reject any other difference.
+
+        If the fingerprints differ only in the work budget and the new budget is larger, the new
+        fingerprint is stored. The results in the journal remain valid because no result depends on
+        the budget. Otherwise the method raises ``DataError``.
+        """
+        try:
+            differ = find_fingerprint_differences(
+                dict(json.loads(stored_fingerprint)), run_fingerprint
+            )
+            if differ.keys() == {"budget"} and differ["budget"][0] < differ["budget"][1]:
+                with self._db:
+                    wanted = json.dumps(run_fingerprint, sort_keys=True)
+                    self._db.execute("UPDATE fingerprint SET json = ?", (wanted,))
+                return
+            told = "; ".join(
+                f"{name}: {shorten_text(there, 70)} there, {shorten_text(now, 70)} now"
+                for name, (there, now) in differ.items()
+            )
+        except (AttributeError, RecursionError, TypeError, ValueError):
+            told = "its fingerprint is damaged"
+        raise DataError(
+            f"{self._path} holds cells computed differently: {told}. "
+            "Mixing them would be wrong: start over with --fresh (fresh=True), or choose "
+            "another --output (output=)."
+        )
+
+    def __enter__(self) -> CellJournal:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self._db.close()
+
+    def add_cells(self, cells: Iterable[StoredCellRow]) -> None:
+        """Record finished cells, all or none.
+
+        Raises
+        ------
+        DataError
+            If the disk takes no more.
+        """
+        try:
+            with self._db:
+                self._db.executemany(
+                    "INSERT OR REPLACE INTO cells VALUES (?, ?, ?, ?, ?, ?, ?)", cells
+                )
+        except sqlite3.Error as error:
+            raise DataError(f"cannot add to {self._path}: {error}.") from error
+
+    def statuses(self, cell_keys: np.ndarray) -> np.ndarray:
+        """The status of each cell; `pending` for a cell that is not in the journal."""
+        codes = {status.name: int(status) for status in Status}
+        statuses = np.full(len(cell_keys), int(Status.PENDING), dtype=np.int8)
+        for places, rows in self._query_rows_of_cells(cell_keys, "status"):
+            statuses[places] = [codes.get(name, int(Status.PENDING)) for (name,) in rows]
+        return statuses
+
+    def read_cells(self, cell_keys: np.ndarray) -> CellColumns:
+        """Columns of these cells, in the order of `keys`.
+
+        Raises
+        ------
+        DataError
+            If a row is not what was written.
+        """
+        columns = CellColumns.build_pending_cells(len(cell_keys), self._packing.packed_number_count)
+        what = "key, status, message, work, seconds, numbers, checksum"
+        for places, rows in self._query_rows_of_cells(cell_keys, what):
+            try:
+                _fill_cell_columns(columns, places, rows)
+            except (KeyError, OverflowError, TypeError, ValueError) as error:
+                raise DataError(
+                    f"{self._path} is damaged: a cell is not what was written. {_UNUSABLE_JOURNAL_REMEDY}"
+                ) from error
+        return columns
+
+    def _query_rows_of_cells(
+        self, cell_keys: np.ndarray, column_names: str
+    ) -> Iterator[tuple[list[int], list[Any]]]:
+        """The cells that are known, a group at a time: places of their keys, and their rows."""
+        for start in range(0, len(cell_keys), _KEYS_PER_QUERY):
+            wanted: list[bytes] = cell_keys[start : start + _KEYS_PER_QUERY].tolist()
+            marks = ", ".join("?" * len(wanted))
+            ask = f"SELECT key, {column_names} FROM cells WHERE key IN ({marks})"
+            try:
+                rows = {key: row for key, *row in self._db.execute(ask, wanted)}
+            except sqlite3.Error as error:
+                raise DataError(
+                    f"{self._path} is damaged: {error}. {_UNUSABLE_JOURNAL_REMEDY}"
+                ) from error
+            known = [number for number, key in enumerate(wanted) if key in rows]
+            if known:
+                yield [start + number for number in known], [rows[wanted[n]] for n in known]
+
+
+def _fill_cell_columns(
+    columns: CellColumns, cell_indices: list[int], stored_rows: list[Any]
+) -> None:
+    """Fill in rows; an error of Python's where one is not what was written."""
+    if any(_compute_checksum(*known) != checksum for *known, checksum in stored_rows):
+        raise ValueError("checksum")
+    _keys, status, message, work, seconds, numbers, _checksums = zip(*stored_rows, strict=True)
+    columns.statuses[cell_indices] = [Status[name] for name in status]
+    columns.messages[cell_indices], columns.rhs_evaluations[cell_indices] = message, work
+    columns.wall_times[cell_indices] = [math.nan if s is None else s for s in seconds]
+    found = np.frombuffer(b"".join(numbers), dtype="<f8")
+    columns.packed_outputs[cell_indices] = found.reshape(len(stored_rows), -1)
+
+
+@dataclass(frozen=True)
+class CellTimings:
+    """Times that cells took.
+
+    Attributes
+    ----------
+    fingerprint : mapping
+        What else decided their numbers.
+    seconds_by_cell_key : mapping of bytes to float
+        Wall time of each cell that was timed, by its key.
+    """
+
+    fingerprint: Mapping[str, Any]
+    seconds_by_cell_key: Mapping[bytes, float]
+
+
+def read_timings(path: Path) -> CellTimings | None:
+    """Times of the cells of a journal; None where there is none that can be read just now."""
+    try:
+        uri = f"{path.resolve().as_uri()}?mode=ro"
+        with contextlib.closing(sqlite3.connect(uri, uri=True, timeout=0.0)) as db:
+            (known,) = db.execute("SELECT json FROM fingerprint").fetchone()
+            seconds = db.execute("SELECT key, seconds FROM cells WHERE typeof(seconds) = 'real'")
+            return CellTimings(dict(json.loads(known)), dict(seconds))
+    except (OSError, RecursionError, sqlite3.Error, TypeError, ValueError):
+        return None
+
+
+def _open_exclusively(path: Path | str) -> sqlite3.Connection:
+    """Open a database for this process alone, until it is closed or the process ends."""
+    db = sqlite3.connect(path, timeout=_LOCK_TIMEOUT)
+    try:
+        db.execute("PRAGMA locking_mode = EXCLUSIVE")
+        db.execute("BEGIN EXCLUSIVE")
+        db.commit()
+    except sqlite3.Error:
+        db.close()
+        raise
+    return db
+
+
+def _is_database_locked_error(error: Exception) -> bool:
+    return getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY
+
+
+def _remove_journal(path: Path) -> None:
+    """Remove a journal, unless another run uses it, and the rollback file that an interrupted write
+    left beside it.
+    """
+    if path.exists():
+        try:
+            _open_exclusively(path).close()
+        except sqlite3.Error as error:
+            if _is_database_locked_error(error):
+                raise
+    for file in (path, path.with_name(f"{path.name}-journal")):
+        file.unlink(missing_ok=True)
+
+
+def _compute_checksum(
+    cell_key: bytes,
+    status: str,
+    message: str,
+    rhs_evaluations: int,
+    wall_time: float | None,
+    packed_outputs: bytes,
+) -> int:
+    known = math.nan if wall_time is None else wall_time
+    # repr keeps texts apart, whatever they hold
+    text = f"{cell_key!r} {status!r} {message!r} {rhs_evaluations} {known!r} "
+    return zlib.crc32(packed_outputs, zlib.crc32(text.encode()))
+
+
+def find_fingerprint_differences(
+    first: Mapping[str, Any], second: Mapping[str, Any]
+) -> dict[str, tuple[Any, Any]]:
+    """Entries in which two fingerprints differ: theirs and ours, by name. Either may come from a
+    file.
+    """
+    first, second = (json.loads(json.dumps(fingerprint)) for fingerprint in (first, second))
+    return {
+        name: (first.get(name), second.get(name))
+        for name in sorted({*first, *second})
+        if first.get(name) != second.get(name)
+    }

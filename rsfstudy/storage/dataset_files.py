@@ -1,0 +1,266 @@
+"""Reading and writing of NetCDF files.
+
+A file is written under a temporary name, read back and compared with the dataset. Only then is
+the file renamed. Each file ends with a digest of all its bytes, which HDF5 ignores. The digest is
+checked before HDF5 opens the file, because HDF5 may hang on damaged bytes. If the digest is
+missing, because another program saved the file or because the file was truncated, the file is
+checked against the digest of its contents (see ``content_digest``).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import dask
+import numpy as np
+import xarray as xr
+
+from rsfstudy.error_boundary import user_stacklevel
+from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, shorten_text
+from rsfstudy.netcdf_encoding import copy_with_cf_encoding, encoding_without_fill_values
+from rsfstudy.path_checks import check_path
+from rsfstudy.storage import content_digest, schema
+from rsfstudy.storage.attribute_checks import check_motion_variables, check_variable_attributes
+from rsfstudy.storage.schema import FILE_LAYOUT_VERSION
+
+#: How Zarr stores are opened: lazily, and none of an older format.
+ZARR_OPEN_OPTIONS: Mapping[str, Any] = {
+    "engine": "zarr",
+    "chunks": None,
+    "consolidated": False,
+    "cache": False,
+    "zarr_format": 3,
+}
+#: Codecs of our Zarr stores. Any other might run code that the store names.
+_ALLOWED_ZARR_CODECS = {"bytes", "vlen-utf8", "zstd"}
+_DIGEST_TRAILER_PREFIX = b"\nrsfstudy sha256 "
+_DIGEST_TRAILER_LENGTH = len(_DIGEST_TRAILER_PREFIX) + 64
+_STORE_DIGEST_ATTRIBUTE = "digest"
+
+
+def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
+    """Write a dataset so that `path` always holds either the old file or the complete new one.
+
+    A reader that has the old file open keeps its data. If a write is killed, the next one
+    overwrites the temporary file it left.
+
+    Returns
+    -------
+    xarray.Dataset
+        The dataset as the file holds it; ``encoding["source"]`` says where.
+
+    Raises
+    ------
+    DataError
+        If the directory cannot be written, or what is read back differs from what was written.
+    """
+    clean = clean_attributes(dataset.assign_attrs({"layout": FILE_LAYOUT_VERSION, **dataset.attrs}))
+    clean.attrs.pop(content_digest.DIGEST_ATTRIBUTE, None)
+    digest = {content_digest.DIGEST_ATTRIBUTE: content_digest.compute_content_digest(clean)}
+    stored = clean.assign_attrs(digest)
+    beside = path.with_name(f".{path.name}.new")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside.unlink(missing_ok=True)  # were it a link or a pipe, writing would go elsewhere
+        # with a Dask client, xarray would wait for a lock of the cluster, perhaps for ever
+        how: dict[str, Any] = {"engine": "netcdf4", "format": "NETCDF4"}
+        with dask.config.set(scheduler="synchronous"), warnings.catch_warnings():
+            # of older versions of Dask, although the client is set aside on purpose
+            warnings.filterwarnings("ignore", "Running on a single-machine scheduler", UserWarning)
+            stored.to_netcdf(beside, **how, encoding=encoding_without_fill_values(clean))
+        with open(beside, "ab") as file:
+            file.write(_DIGEST_TRAILER_PREFIX + _hash_file_contents(beside, beside.stat().st_size))
+        with xr.open_dataset(beside, engine="netcdf4") as back:
+            if not stored.identical(back.load()):
+                raise DataError(f"{path} was not written: what was read back differs.")
+        with open(beside, "rb") as file:
+            os.fsync(file.fileno())
+        os.replace(beside, path)
+    except (OSError, RuntimeError) as error:
+        # HDF5 reports a full disk as a RuntimeError
+        raise DataError(
+            f"cannot write {path}: {error}. Nothing was replaced; make room, or choose another "
+            "--output."
+        ) from error
+    finally:
+        with contextlib.suppress(OSError):  # where its directory is none, the error says so
+            beside.unlink(missing_ok=True)
+    clean.encoding["source"] = str(path)
+    return clean
+
+
+def _hash_file_contents(path: Path, byte_count: int) -> bytes:
+    digest = hashlib.sha256()
+    with open(path, "rb") as file:
+        while byte_count > 0 and (part := file.read(min(byte_count, 2**20))):
+            digest.update(part)
+            byte_count -= len(part)
+    return digest.hexdigest().encode()
+
+
+def open_zarr_store(path: Path) -> xr.Dataset:
+    """Open a Zarr store lazily.
+
+    Zarr stores attributes as JSON, which does not distinguish numeric types. The function therefore
+    converts flag values to the dtype of their variable. It also removes the dtype of strings from
+    the encoding, because older versions of xarray cannot write that dtype to a NetCDF file.
+    """
+    dataset = xr.open_dataset(path, **ZARR_OPEN_OPTIONS)
+    for variable in dataset.variables.values():
+        if getattr(variable.encoding.get("dtype"), "kind", "") == "T":
+            del variable.encoding["dtype"]
+        if "flag_values" in variable.attrs:
+            flags = np.asarray(variable.attrs["flag_values"], dtype=variable.dtype)
+            variable.attrs["flag_values"] = flags
+    return dataset
+
+
+def write_store_digest(store: Path) -> None:
+    """Write the digest of all files of a Zarr store among its attributes."""
+    root = store / "zarr.json"
+    about = json.loads(root.read_text())
+    about["attributes"][_STORE_DIGEST_ATTRIBUTE] = _hash_store(store)
+    root.write_text(json.dumps(about, indent=2))
+
+
+def _hash_store(store: Path) -> str:
+    """Digest of the files of a store, without the one that its root holds."""
+    digest = hashlib.sha256()
+    for file in sorted(file for file in store.rglob("*") if file.is_file()):
+        content = file.read_bytes()
+        if file == store / "zarr.json":
+            about = json.loads(content)
+            about["attributes"].pop(_STORE_DIGEST_ATTRIBUTE, None)
+            content = json.dumps(about, sort_keys=True).encode()
+        digest.update(f"{file.relative_to(store)} {len(content)}\n".encode() + content)
+    return digest.hexdigest()
+
+
+def _check_store_digest(path: Path) -> bool:
+    """Check a Zarr store against its digest; whether it has one."""
+    attributes = json.loads((path / "zarr.json").read_text())["attributes"]
+    if _STORE_DIGEST_ATTRIBUTE in attributes and attributes[_STORE_DIGEST_ATTRIBUTE] != _hash_store(
+        path
+    ):
+        raise DataError(f"{path} is damaged, or was edited: its files are not what was written.")
+    return _STORE_DIGEST_ATTRIBUTE in attributes
+
+
+def _check_file_digest(path: Path) -> bool:
+    """Check a file against the digest of its bytes; whether it has one."""
+    size = path.stat().st_size - _DIGEST_TRAILER_LENGTH
+    with open(path, "rb") as file:
+        file.seek(max(0, size))
+        trailer = file.read()
+    if not trailer.startswith(_DIGEST_TRAILER_PREFIX):
+        return False
+    if trailer != _DIGEST_TRAILER_PREFIX + _hash_file_contents(path, size):
+        raise DataError(f"{path} is damaged, or was edited: its bytes are not what was written.")
+    return True
+
+
+def read_dataset(path: Path) -> xr.Dataset:
+    """Load a results file, or that of one scene, into memory and close it; a Zarr store is opened,
+    not loaded.
+
+    Raises
+    ------
+    DataError
+        If it is missing, unreadable, not written by rsfstudy, or damaged.
+    """
+    where = shorten_text(path)
+    try:
+        _check_readable_path(path, where)
+        if path.is_dir():
+            _check_zarr_codecs(path)
+            sealed = _check_store_digest(path)
+            dataset = open_zarr_store(path)
+        else:
+            sealed = _check_file_digest(path)
+            dataset = xr.load_dataset(path, engine="netcdf4")
+            if not sealed:
+                content_digest.check_content(dataset, where)
+            dataset.attrs.pop(content_digest.DIGEST_ATTRIBUTE, None)
+    except RsfStudyError:
+        raise
+    except Exception as error:  # HDF5, Zarr and xarray raise almost anything on damaged data
+        raise DataError(f"{where} cannot be read: {shorten_text(error)}") from error
+    dataset = copy_with_cf_encoding(dataset)
+    try:
+        check_variable_attributes(dataset)
+        if schema.is_of_single_scene(dataset):
+            check_motion_variables(dataset)
+            return dataset  # which users write by xarray, without a digest
+        schema.check_results(dataset)
+    except DataError as error:
+        raise DataError(f"{where}: {error}") from error
+    if not sealed and not (path.is_dir() and "layout" not in dataset.attrs):
+        said = f"{where} has no digest: another program saved it, and may have changed it"
+        warnings.warn(said, RsfStudyWarning, stacklevel=user_stacklevel())
+    return dataset
+
+
+def _check_readable_path(path: Path, file_description: str) -> None:
+    """Raise ``DataError`` unless a path is a regular file or a Zarr store.
+
+    Opening a pipe could block forever.
+    """
+    check_path("file", path)
+    if not path.exists():
+        raise DataError(
+            f"{file_description} does not exist. Run the study first, or name another file."
+        )
+    if path.is_dir() and not (path / "zarr.json").is_file():
+        raise DataError(f"{file_description} is a directory, and no Zarr store.")
+    for part in path.rglob("*") if path.is_dir() else [path]:
+        if not (part.is_file() or part.is_dir()) or (part != path and part.is_symlink()):
+            raise DataError(f"{shorten_text(part)} is no file, but a pipe, a device or a link.")
+
+
+def _check_zarr_codecs(path: Path) -> None:
+    """Refuse a Zarr store with a codec that our stores do not use."""
+    for file in path.rglob("zarr.json"):
+        about = json.loads(file.read_text())
+        for codec in about.get("codecs", []):
+            if codec["name"] not in _ALLOWED_ZARR_CODECS:
+                raise DataError(
+                    f"{path} was not written by rsfstudy: {file.parent.name} is coded by "
+                    f"{codec['name']!r}, which may run code."
+                )
+
+
+def clean_attributes(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset with attributes of the types that NetCDF keeps unchanged: text, numbers, and
+    arrays of two or more.
+    """
+    clean = dataset.copy()
+    clean.attrs = _clean_attribute_mapping(dataset.attrs)
+    for name in clean.variables:
+        clean[name].attrs = _clean_attribute_mapping(dataset[name].attrs)
+    return clean
+
+
+def _clean_attribute_mapping(attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    return {
+        str(name): _to_netcdf_value(value)
+        for name, value in attributes.items()
+        if value is not None
+    }
+
+
+def _to_netcdf_value(value: Any) -> Any:
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    if isinstance(value, dict):
+        return json.dumps(value)
+    if isinstance(value, list | tuple | np.ndarray):
+        values = np.asarray(value)
+        return values if values.size > 1 else _to_netcdf_value(values.item()) if values.size else ""
+    return value

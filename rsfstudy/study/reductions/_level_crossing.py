@@ -1,0 +1,224 @@
+"""Level crossing of a sampled curve, with bounds on its position between samples."""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
+
+#: Number of samples at least.
+MIN_SAMPLES_OF_CURVE = 4
+#: Intervals on either side of the bracket in which the curve is examined.
+_EXAMINED_INTERVALS_PER_SIDE = 3
+#: Changes of slope, relative to the largest slope, that count as rounding errors.
+_MAX_ROUNDING_OF_SLOPE_CHANGES = 1e-9
+#: The same, relative to the largest change and to the smallest slope nearby, that count for an
+#: oscillation.
+_MIN_SLOPE_CHANGE_OF_OSCILLATION = 0.1
+
+
+class CrossingStatus(IntEnum):
+    """Outcome of the search for a crossing.
+
+    Files contain the integer value, so the values must not change.
+    """
+
+    OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW_POINTS = range(5)
+
+
+class Crossing(NamedTuple):
+    """Position of a level crossing, with lower and upper bounds and the verdict."""
+
+    position: float
+    lower_bound: float
+    upper_bound: float
+    status: CrossingStatus
+
+
+def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
+    """Find the position at which a sampled curve reaches a level.
+
+    The bounds allow for curves that differ from the straight chord between two samples. If the
+    slope changes by T in total within an interval of width h, the curve departs from the chord at
+    distance u from the first sample by at most ``T u (h - u)/h``. T is estimated by the change of
+    slope from the previous chord to the next chord. This estimate is exact for a single kink, and
+    for a parabola the estimate is twice the true value. In the first and the last interval, the
+    kink may also be located next to the end, and the curve then follows the neighbouring chord.
+
+    If the slope does not vary monotonically over the neighbouring intervals, changes of opposite
+    sign partly cancel. The largest T among these intervals is then doubled and used for all of
+    them. If the changes of slope alternate in sign, the samples may hide an oscillation. The bounds
+    then enclose at least the whole interval.
+
+    Parameters
+    ----------
+    x, y : ndarray
+        Samples, with x in ascending order.
+    level : float
+
+    Returns
+    -------
+    Crossing
+        The position and the bounds are NaN unless the samples cross the level exactly once. The
+        verdict is ``UNRESOLVED`` if a hidden oscillation could reach the level in other intervals.
+    """
+    if x.size < MIN_SAMPLES_OF_CURVE:
+        return _build_missing_crossing(CrossingStatus.TOO_FEW_POINTS)
+    places = find_all_crossings(x, y, level)
+    if len(places) != 1:
+        return _build_missing_crossing(
+            CrossingStatus.NOT_UNIQUE if places else CrossingStatus.OUT_OF_REACH
+        )
+    place, widths = places[0], np.diff(x)
+    slopes = np.diff(y) / widths
+    bracket = int(np.clip(np.searchsorted(x, place) - 1, 0, slopes.size - 1))
+    near = range(
+        max(bracket - _EXAMINED_INTERVALS_PER_SIDE, 0),
+        min(bracket + _EXAMINED_INTERVALS_PER_SIDE + 1, slopes.size),
+    )
+    turns, alternates = _estimate_slope_changes(slopes, near)
+    bounds, far = [place], False
+    for n in near if alternates else (bracket,):
+        span = _crossing_bounds(slopes[n], turns[n], widths[n], level - y[n])
+        if span:
+            bounds += [x[n] + end for end in span]
+            far |= abs(n - bracket) >= _EXAMINED_INTERVALS_PER_SIDE
+    if alternates:
+        bounds += [x[bracket], x[bracket + 1]]
+    if bracket in (0, slopes.size - 1):
+        span = _crossing_bounds_at_end(
+            slopes, widths, level - y[bracket], is_first_interval=bracket == 0
+        )
+        bounds += [x[bracket] + end for end in span]
+    verdict = CrossingStatus.UNRESOLVED if far else CrossingStatus.OK
+    return Crossing(place, float(min(bounds)), float(max(bounds)), verdict)
+
+
+def find_all_crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float]:
+    """Return all positions at which the interpolant of the samples reaches a level."""
+    off, curve = y - level, PchipInterpolator(x, y)
+    places: list[float] = x[off == 0.0].tolist()
+    # between two samples it is monotone, and at them it has their values but for rounding
+    known = dict(zip(x.tolist(), off.tolist(), strict=True))
+    for first in np.flatnonzero(off[:-1] * off[1:] < 0.0):
+        ends = x[first : first + 2].tolist()
+        places.append(brentq(lambda x: known.get(x, curve(x) - level), *ends, xtol=1e-15))
+    return places
+
+
+def _build_missing_crossing(crossing_status: CrossingStatus) -> Crossing:
+    return Crossing(math.nan, math.nan, math.nan, crossing_status)
+
+
+def _estimate_slope_changes(
+    slopes: np.ndarray, interval_numbers: range
+) -> tuple[dict[int, float], bool]:
+    """Estimate the total change of slope within each of the given intervals.
+
+    Returns
+    -------
+    turns : dict of int to float
+        Total change of slope, by the number of the interval.
+    alternates : bool
+        True if the changes of slope alternate in sign.
+    """
+    bends = np.diff(slopes)
+    sizes = np.abs(bends)
+    turns = {}
+    for n in interval_numbers:
+        beside = sizes[max(n - 1, 0) : n + 1]
+        turns[n] = 2.0 * float(beside.mean())  # at an end, the other change is not known
+    within = bends[interval_numbers.start : interval_numbers.stop - 1]
+    if not _count_sign_reversals(
+        within, _MAX_ROUNDING_OF_SLOPE_CHANGES * float(np.abs(slopes).max())
+    ):
+        return turns, False
+    largest = 2.0 * max(turns.values())
+    # the small changes on either side of a kink, or noise, do not make an oscillation
+    noticeable = _MIN_SLOPE_CHANGE_OF_OSCILLATION * float(np.abs(within).max())
+    steady = largest < 2.0 * _MIN_SLOPE_CHANGE_OF_OSCILLATION * float(
+        np.abs(slopes[interval_numbers.start : interval_numbers.stop]).min()
+    )
+    return dict.fromkeys(interval_numbers, largest), not steady and _count_sign_reversals(
+        within, noticeable
+    ) > 1
+
+
+def _count_sign_reversals(slope_changes: np.ndarray, min_slope_change: float) -> int:
+    """Count the sign reversals among changes of slope larger than a minimum."""
+    counted = slope_changes[np.abs(slope_changes) > min_slope_change]
+    return int((counted[1:] * counted[:-1] < 0.0).sum())
+
+
+def _crossing_bounds(
+    slope: float, slope_change: float, interval_width: float, level_above_first_sample: float
+) -> tuple[float, float] | None:
+    """Return the first and last possible position of a crossing in an interval.
+
+    Positions are relative to the first sample, and ``level_above_first_sample`` is the level minus the value of the
+    first sample. The result is None if the level cannot be reached.
+    """
+    if slope < 0.0:
+        slope, level_above_first_sample = -slope, -level_above_first_sample
+    if (
+        level_above_first_sample > slope * interval_width
+    ):  # seen from the other end, it is below the sample
+        mirrored = _crossing_bounds(
+            slope, slope_change, interval_width, slope * interval_width - level_above_first_sample
+        )
+        return (
+            None
+            if mirrored is None
+            else (interval_width - mirrored[1], interval_width - mirrored[0])
+        )
+    if level_above_first_sample < 0.0:
+        excess = slope_change - slope
+        root = excess**2 + 4.0 * slope_change / interval_width * level_above_first_sample
+        if excess <= 0.0 or root < 0.0:
+            return None
+        middle, half = (
+            0.5 * interval_width * excess / slope_change,
+            0.5 * interval_width * math.sqrt(root) / slope_change,
+        )
+        return middle - half, middle + half
+    rises, falls = slope + slope_change, slope - slope_change
+    steeper = math.sqrt(
+        max(rises**2 - 4.0 * slope_change / interval_width * level_above_first_sample, 0.0)
+    )
+    flatter = math.sqrt(falls**2 + 4.0 * slope_change / interval_width * level_above_first_sample)
+    first = 2.0 * level_above_first_sample / (rises + steeper) if rises else 0.0
+    last = (
+        2.0 * level_above_first_sample / (falls + flatter)
+        if falls > 0.0
+        else interval_width * (flatter - falls) / (2 * slope_change)
+    )
+    return min(first, interval_width), min(last, interval_width)
+
+
+def _crossing_bounds_at_end(
+    slopes: np.ndarray,
+    interval_widths: np.ndarray,
+    level_above_inner_sample: float,
+    is_first_interval: bool,
+) -> tuple[float, float]:
+    """Return the first and last possible position of a crossing in an end interval.
+
+    The curve may have one kink in this interval. Its distance from the chord is at most the
+    difference between the slopes of this chord and the neighbouring chord, multiplied by the
+    distance from the inner sample.
+    """
+    slope, following = (slopes[0], slopes[1]) if is_first_interval else (slopes[-1], slopes[-2])
+    width = float(interval_widths[0] if is_first_interval else interval_widths[-1])
+    if slope < 0.0:
+        slope, following, level_above_inner_sample = -slope, -following, -level_above_inner_sample
+    bend, climb = (
+        abs(following - slope),
+        level_above_inner_sample if is_first_interval else slope * width - level_above_inner_sample,
+    )
+    first = max((climb - bend * width) / (slope - bend), 0.0) if slope > bend else 0.0
+    last = min((climb + bend * width) / (slope + bend), width)
+    return (first, last) if is_first_interval else (width - last, width - first)

@@ -1,0 +1,68 @@
+"""A study as a notebook shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from rsfstudy.axes import Axis
+from rsfstudy.formatting import format_list
+from rsfstudy.measures import Measure
+from rsfstudy.quantities import HtmlMarkup, Quantity, escape_html, html_quantities_table
+from rsfstudy.slider import Scene, quantities_with_values
+from rsfstudy.vocabulary import find_quantity
+
+
+def study_html(
+    heading: str,
+    axes: Sequence[Axis],
+    base_scene: Scene,
+    measure: Measure,
+    known_quantities: Mapping[str, Quantity],
+) -> str:
+    """Format a study as HTML tables of its axes, its fixed fields and its results.
+
+    Parameters
+    ----------
+    heading : str
+        Heading of the first table.
+    axes : sequence of Axis
+    base_scene : Scene
+        Scene with the fixed fields, which are shown in a collapsed table.
+    measure : Measure
+    known_quantities : mapping of str to Quantity
+        Quantities that are not in the common vocabulary.
+
+    Returns
+    -------
+    str
+    """
+    varied = {name for axis in axes for name in axis.fields}
+    fixed = {name: v for name, v in base_scene.as_dict().items() if name not in varied}
+    shared = quantities_with_values(fixed, base_scene.user_parts)
+    along = [(_describe_axis_quantity(a, known_quantities), _format_axis_points(a)) for a in axes]
+    measured = [(find_quantity(name, known_quantities), None) for name in measure.variables]
+    return (
+        html_quantities_table(along, heading)
+        + _html_details("what all cells share", html_quantities_table(shared))
+        + _html_details(
+            f"what {measure.name} gives in each",
+            html_quantities_table(measured, with_values=False),
+        )
+    )
+
+
+def _html_details(caption: str, content: HtmlMarkup) -> HtmlMarkup:
+    """Content that is shown once its caption is clicked."""
+    return HtmlMarkup(f"<details><summary>{escape_html(caption)}</summary>{content}</details>")
+
+
+def _describe_axis_quantity(axis: Axis, known_quantities: Mapping[str, Quantity]) -> Quantity:
+    """The quantity along an axis, without symbol and scale where the axis is in units."""
+    about, units = find_quantity(axis.dimension, known_quantities), axis.units.get(axis.dimension)
+    return about if units is None else replace(about, symbol="", units=units, scale="")
+
+
+def _format_axis_points(axis: Axis) -> str:
+    """The points of an axis, a long list cut short."""
+    return f"{format_list(axis.point_names, ', ')} ({len(axis)})"

@@ -1,0 +1,118 @@
+"""Sources of studies: the named ones, found by file name, and files of a user's own."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import importlib.util
+import os
+import sys
+import traceback
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.path_checks import check_path
+from rsfstudy.study.study_index import STUDIES_PACKAGE, study_names
+
+if TYPE_CHECKING:
+    from rsfstudy.study.study import Study
+
+
+def load_study(name_or_file: str) -> Study:
+    """The declaration of a named study, or that of a Python file with a `study` in it.
+
+    Raises
+    ------
+    InvalidValue
+        For a name there is no study of, with close matches, and for a file that is not there,
+        raises, or declares no study.
+    """
+    check_path("study", name_or_file)
+    if name_or_file.endswith(".py"):
+        return replace(
+            _study_in_module(_import_study_file(Path(name_or_file)), name_or_file),
+            source_file=name_or_file,
+        )
+    if name_or_file not in study_names():
+        near = difflib.get_close_matches(name_or_file, study_names(), n=3, cutoff=0.5)
+        remedy = "`rsfstudy list` shows all; or name a file: path/to/study.py."
+        if os.path.isfile(f"{name_or_file}.py"):
+            near, remedy = [], f"There is a file {name_or_file}.py here: name it {name_or_file}.py."
+        raise InvalidValue("study", name_or_file, "is unknown", choices=near, remedy=remedy)
+    study: Study = importlib.import_module(f"{STUDIES_PACKAGE}.{name_or_file}").study
+    return study
+
+
+def _import_study_file(study_file: Path) -> ModuleType:
+    """The module that a file defines.
+
+    It is removed from `sys.modules` again, and so are the modules in its directory that it imports.
+    Worker processes, which cannot import them, then receive their contents by value, and another
+    file may import other modules of the same names.
+    """
+    try:
+        path = study_file.resolve(strict=True)
+        if not path.is_file():  # reading a pipe or a device may never end
+            raise InvalidValue("study", str(study_file), "is no file, but a directory or the like")
+        path.read_bytes()
+    except (OSError, RuntimeError) as error:  # links in a circle are a RuntimeError
+        reason = getattr(error, "strerror", None) or error
+        raise InvalidValue("study", str(study_file), f"is no file ({reason})") from error
+    spec = importlib.util.spec_from_file_location(f"study_file_{path.stem}", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    known = set(sys.modules)
+    sys.modules[spec.name] = module
+    sys.path.insert(0, str(path.parent))  # a file may have helpers beside it
+    try:
+        spec.loader.exec_module(module)
+    except InvalidValue as error:
+        raise error.with_location(f"{path}{_describe_error_line(error, path)}") from error
+    except SyntaxError as error:
+        place = f"{error.filename or path}, line {error.lineno}"
+        raise InvalidValue("study", str(path), f"{place}: {error.msg}") from error
+    except (Exception, SystemExit) as error:
+        rule = f"raises {type(error).__name__}{_describe_error_line(error, path)}: {error}"
+        raise InvalidValue("study", str(path), rule) from error
+    finally:
+        sys.path.remove(str(path.parent))
+        for name in [
+            n for n in sys.modules if n not in known and _is_module_in_directory_of(n, path)
+        ]:
+            del sys.modules[name]
+    return module
+
+
+def _is_module_in_directory_of(module_name: str, study_file: Path) -> bool:
+    """True if a module is a file, or in a package, in the same directory."""
+    top = sys.modules.get(module_name.partition(".")[0])
+    places = [getattr(top, "__file__", None), *getattr(top, "__path__", ())]
+    return any(Path(place).parent == study_file.parent for place in places if place)
+
+
+def _describe_error_line(error: BaseException, study_file: Path) -> str:
+    """Line of the file where an error arose, in words."""
+    lines = [
+        frame.lineno
+        for frame in traceback.extract_tb(error.__traceback__)
+        if Path(frame.filename) == study_file
+    ]
+    return f", line {lines[-1]}" if lines else ""
+
+
+def _study_in_module(module: ModuleType, study_name: str) -> Study:
+    from rsfstudy.study.study import Study  # here, because names and titles need none of it
+
+    study = getattr(module, "study", None)
+    if not isinstance(study, Study):
+        raise InvalidValue(
+            "study", study_name, "declares no study", remedy="Write study = Study(...)."
+        )
+    if study.name in study_names():
+        rule = f"calls its study {study.name!r}, the name of a named study: their files would mix"
+        raise InvalidValue("study", study_name, rule, remedy="Give it a name of its own.")
+    return study
