@@ -82,7 +82,7 @@ def coverage_content_type(variable_name: str) -> str:
 def find_quantity(
     variable_name: str, extra_quantities: Mapping[str, Quantity] = MappingProxyType({})
 ) -> Quantity:
-    """Look a quantity up, deriving ``<variable_name>_error`` and its like from ``<variable_name>``.
+    """Look a quantity up, deriving ``<name>_error`` and its like from ``<name>``.
 
     Names that neither `extra_quantities` nor the vocabulary holds describe themselves.
 

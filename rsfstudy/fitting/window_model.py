@@ -345,7 +345,7 @@ class WindowModel:
         Parameters
         ----------
         values : mapping of str to float
-            Values of all parameters. The coefficient ``compute_friction_trend<n>`` has the unit um^-n.
+            Values of all parameters. The coefficient ``trend<n>`` has the unit um^-n.
 
         Returns
         -------

@@ -17,7 +17,7 @@ from rsfstudy.slider import Equations, Function, Numbers
 
 
 class InPlaceFunctions(NamedTuple):
-    """Functions ``(y, fill_rates, p, result)`` that fill arrays, in the order of the table of functions
+    """Functions ``(y, rates, p, result)`` that fill arrays, in the order of the table of functions
     (`layout`); `attempt` is ``(y, stages, p, step)``, and the last is missing in ruptures.
     """
 

@@ -199,7 +199,7 @@ def shear_stress_effect_on_state(
 ) -> tuple[float, float]:
     """State variable lost to the present shear stress, and its derivative.
 
-    ``dTheta = -c dtau/sigma`` integrates to a shift of ``c frictional_stress ln(s)/(s - 1)`` where the normal
+    ``dTheta = -c dtau/sigma`` integrates to a shift of ``c g ln(s)/(s - 1)`` where the normal
     stress ratio s changes in proportion to g, and of c g where it does not change.
 
     References

@@ -99,7 +99,7 @@ def frictional_stress_for_friction(
     """Deviation of frictional stress from tau_*, over sigma_*, at which the friction coefficient is
     mu_* + `excess`; None where it never is.
 
-    ``(mu_* + g)/s(g) = mu_* + friction_minus_reference``, s being the normal stress ratio; where normal stress
+    ``(mu_* + g)/s(g) = mu_* + excess``, s being the normal stress ratio; where normal stress
     follows shear stress there is none below phi = atan(mu_ss), eq. 9 of
     doi:10.1007/s11589-014-0098-4.
 
@@ -126,7 +126,7 @@ def frictional_stress_after_jump(
     """Deviation of frictional stress from tau_*, over sigma_*, just after a sudden change; None
     where there is none.
 
-    The states freed of stress stay as they are, so that ``strength(g) = strength`` with ``excess = a
+    The states freed of stress stay as they are, so that ``strength(g) = excess`` with ``excess = a
     ln(V/V_*) + sum of Psi_i`` (eqs. 12 and 13 of doi:10.1007/s11589-014-0098-4).
 
     Parameters
