@@ -1,4 +1,8 @@
-"""Hostile files are refused by a rule, in bounded time, and leave nothing locked."""
+"""Tests of hostile files.
+
+Hostile files are rejected in bounded time, with an error that contains the rule, and leave
+no locks.
+"""
 
 from __future__ import annotations
 
@@ -116,7 +120,7 @@ def test_a_journal_with_a_hostile_fingerprint_is_refused_and_not_locked(
         database.execute("UPDATE fingerprint SET json = ?", (fingerprint,))
     with pytest.raises(DataError, match="its fingerprint is damaged") as refused:
         Journal(path, {"rtol": 1e-7}, LAYOUT)
-    assert refused.value.__traceback__ is not None  # which keeps its frames alive
+    assert refused.value.__traceback__ is not None  # The traceback keeps its frames alive.
     assert read_timings(path) is None
     with Journal(path, {"rtol": 1e-7}, LAYOUT, fresh=True) as again:
         assert again.statuses(np.empty(0, dtype="V16")).size == 0

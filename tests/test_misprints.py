@@ -1,5 +1,6 @@
-"""Misprints that `studies/MISPRINTS.md` corrects: the corrected formula holds, the printed one does
-not.
+"""Tests of the misprints in `studies/MISPRINTS.md`.
+
+The corrected formulas hold, and the printed formulas do not.
 """
 
 import math
@@ -18,11 +19,14 @@ PAGE = (Path(__file__).parent.parent / "studies" / "MISPRINTS.md").read_text()
 
 
 def test_eq_3():
-    """A jump of normal stress at V = V_*, by the assembled relation of stress, state and rate."""
+    """Corrected eq. 3 describes a jump of normal stress at V = V_*.
+
+    The reference is the assembled friction relation.
+    """
     scene = Scene(alpha=0.56, phi=60.0)
-    stress = 0.3  # of shear stress; normal stress follows
+    stress = 0.3  # Change of shear stress, which also changes the normal stress.
     change = cot_phi(scene) * stress
-    psi = friction_relation(scene)(stress)[0]  # the state at which V stays V_* under that stress
+    psi = friction_relation(scene)(stress)[0]  # State at which V = V_* at this stress.
     state_change = psi - friction_relation(scene)(stress)[2]
     friction = scene.mu_star + state_change
     assert (1.0 + change) * friction == pytest.approx(scene.mu_star + stress, rel=1e-14)
@@ -35,7 +39,10 @@ def test_eq_3():
 
 
 def test_eq_4b():
-    """dTheta per unit slip is b dtheta/theta per unit slip, with dtheta/dt = 1 - theta V."""
+    """The state evolves by dTheta = b dtheta/theta per slip.
+
+    The reference is dtheta/dt = 1 - theta V.
+    """
     b, theta, rate = 0.029, 0.7, 3.0
     per_slip = single_state_evolution(Scene(law="slowness", a=b / 2.0))(
         math.log(rate), b * math.log(theta)
@@ -44,7 +51,10 @@ def test_eq_4b():
 
 
 def test_eq_11():
-    """Exact at k = k_cr, and too high elsewhere by what the page says."""
+    """Eq. 11 is exact at k = k_cr and too high at other stiffnesses.
+
+    The differences agree with the page.
+    """
     run = {"workers": 0, "output": None, "progress": False}
     ratios = [1.0, 1.1, 1.25, 1.5, 2.0]
     dataset = rsfstudy.run(
