@@ -1,7 +1,7 @@
 """Frozen motions, whose events are stored in ``frozen_events.json``.
 
 The motions cover every law, every selector field, every loading and every reason for
-termination, with a few rows each. `test_frozen_events.py` compares all engines with the
+termination, with a few rows each. ``test_frozen_events.py`` compares all engines with the
 stored events. No motion amplifies rounding errors: a change in the last bit of any field
 changes the stored numbers by less than a tenth of the tolerances of the tests. Run ``python
 tests/frozen_motion_comparison.py sensitivity`` to measure the changes.
@@ -202,7 +202,7 @@ NORMAL_STRESS_PROTOCOL = protocol(
     name="presses",
 )
 
-#: Frozen motions by name. The combinations of parts match the combinations in `test_compiled` if
+#: Frozen motions by name. The combinations of parts match the combinations in ``test_compiled`` if
 #: possible, so that both modules share compiled code.
 MOTIONS: dict[str, Motion | Track] = {
     # Steps of load velocity, for each law.

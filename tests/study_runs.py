@@ -195,7 +195,7 @@ REDUCED_AXES = {
 }
 
 
-#: Studies whose motions use the compiled engine, which `test_compiled` compares with SciPy.
+#: Studies whose motions use the compiled engine, which ``test_compiled`` compares with SciPy.
 COMPILED_ONLY_STUDIES = (
     "bounded_slip", "coverage", "dilatant_cycles", "dilatant_steps", "displacement_boundary",
     "injection", "normal_stress_steps", "rate_step_lattice", "resonance", "rig_recurrence",
@@ -249,8 +249,7 @@ def have_same_numbers(ours: xr.Dataset, theirs: xr.Dataset) -> None:
 def call_main(*words, encoding: str = "utf-8") -> SimpleNamespace:
     """Run the command in this process through its entry point.
 
-    Exceptions propagate instead of being printed. This includes encoding errors of the
-    output.
+    Exceptions, including encoding errors of the output, propagate instead of being printed.
     """
     out = io.TextIOWrapper(io.BytesIO(), encoding, write_through=True)
     said = io.TextIOWrapper(io.BytesIO(), "utf-8", "backslashreplace", write_through=True)

@@ -97,7 +97,7 @@ def friction_and_sensitivities(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return friction at the given times, and its derivatives.
 
-    The derivatives by `SENSITIVITY_PARAMETERS` have shape (times, parameters).
+    The derivatives by ``SENSITIVITY_PARAMETERS`` have shape (times, parameters).
     """
     h, first = LAW_FUNCTIONS[law], loading[0][1]
     a, b, distance = truth["a"], truth["b"], truth["slip_distance"]

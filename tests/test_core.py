@@ -110,9 +110,10 @@ def test_requested_tolerance_is_met_by_stick_slip_cycles(law, rtol):
 
 
 def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
-    """The error estimate of `Accuracy.max_inertia_correction` is verified.
+    """The error of the slow manifold is of third order in the weight.
 
-    At the switch, ln V increases by 12.2 per slip of D_c.
+    ``Accuracy.max_inertia_correction`` relies on this order. At the switch, ln V increases by
+    12.2 per slip of D_c.
     """
 
     @dataclasses.dataclass(frozen=True)

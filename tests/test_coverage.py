@@ -52,7 +52,7 @@ def test_shares_worst_and_typical_are_counted():
     )
     np.testing.assert_allclose(found.c_share, [1.0, 2.0 / 3.0])
     np.testing.assert_allclose(found.c_worst, [1.0, 2.0])
-    # Means of 10 and 1, and of 2, 0.5 and 4.
+    # Medians of (10, 1) and of (2, 0.5, 4).
     np.testing.assert_allclose(found.c_typical, [5.5, 2.0])
     assert found.c_numbers.values.tolist() == [2, 3]
 

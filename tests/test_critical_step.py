@@ -320,8 +320,7 @@ def test_a_limit_cycle_that_touches_the_norm_is_found_at_once():
 def test_a_displacement_step_may_jump_to_the_norm_at_once():
     """A step is critical if its jump of slip rate reaches the norm.
 
-    This applies to a slider that slows down from the start, and the step follows from eq.
-    13.
+    For a slider that slows down from the start, the critical step follows from eq. 13.
     """
     scene = Scene(law="slowness", stiffness_ratio=5.0, instability_norm=0.01)
     value, _error, outcome = found(scene, DISPLACEMENT)

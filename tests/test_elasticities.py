@@ -105,7 +105,10 @@ def test_errors_are_told_without_closed_forms_too(measure, scene):
 
 
 def extrapolated(measure, scene, name, steps=(0.004, 0.002, 0.001)):
-    """Compute an elasticity by Richardson extrapolation of central differences at rtol 1e-11."""
+    """Compute an elasticity by Richardson extrapolation.
+
+    The central differences are computed with rtol = 1e-11.
+    """
     accuracy = Accuracy(1e-11, engine="compiled", budget=20_000_000)
 
     def level(by):
@@ -137,7 +140,7 @@ NEAR_NEUTRAL = [
 def test_error_covers_the_truncation_near_b_equal_to_a(measure, scene, rtol):
     """The error estimate covers the truncation error.
 
-    The reference is accurate to 1e-7 of the elasticity by `b_over_a`, which grows like 1/(b
+    The reference is accurate to 1e-7 of the elasticity by ``b_over_a``, which grows like 1/(b
     - a).
     """
     accuracy = Accuracy(rtol, engine="compiled")

@@ -84,7 +84,7 @@ def eigenvalues(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
 @pytest.mark.parametrize("fields", SCENES, ids=str)
 @pytest.mark.parametrize(("ratio", "log_slip_rate"), [(0.8, -3.0), (1.2, 0.0), (0.9, 2.0)])
 def test_growth_rates_are_eigenvalues_of_the_assembled_equations(fields, ratio, log_slip_rate):
-    """Growth rates equal the eigenvalues divided by two.
+    """The eigenvalues equal half of the growth rates.
 
     The independent variable of the equations is the sum of slip and load point
     displacement, which grows twice as fast as slip.

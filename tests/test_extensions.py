@@ -147,8 +147,8 @@ def test_a_stepper_of_a_users_own(outside):
     """A user-defined stepper agrees with V_0/V_* = 1 + a/(b - a).
 
     The closed form holds at the critical stiffness, constant normal stress and infinite
-    norm. The norm of 5e-4 lowers the value by 5e-3 at b/a = 1.5, and by 2e-5 at b/a = 2.
-    The requested accuracy is 1e-4.
+    norm. The norm of 5e-4 lowers the value by a fraction of 5e-3 at b/a = 1.5, and of 2e-5
+    at b/a = 2. The requested accuracy is 1e-4.
     """
     found = outside["order_four"]
     bias = {1.5: 0.02, 2.0: 1e-4}

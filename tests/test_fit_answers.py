@@ -1,8 +1,7 @@
 """Tests of the results of fits.
 
 The tests compare intervals with closed forms and repeated fits, and cover skipped work,
-ramps and noise of the load point. They also repeat the fit of basalt from the
-documentation.
+ramps, noise of the load point, and the fit of basalt in the documentation.
 """
 
 from __future__ import annotations
@@ -75,8 +74,8 @@ def test_a_spring_softer_than_critical_is_not_followed(law: str) -> None:
     assert meter.evaluations > 0
 
 
-#: A ramp of 0.4 s, during which the load point moves by 2.2 um. A single step would have an
-#: error of up to 0.45 um.
+#: A ramp of 0.4 s, during which the load point moves by 2.2 um. A constant velocity during the
+#: ramp would have a displacement error of up to 0.45 um.
 RAMP = ((0.0, 1.0), *((40.0 + 0.002 * n, 1.0225 + 0.045 * n) for n in range(200)), (40.4, 10.0))
 
 

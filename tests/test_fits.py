@@ -99,7 +99,7 @@ def test_derivatives_by_offset_trend_and_time_of_a_step() -> None:
     exact = -(ahead - behind) / (2.0 * late)
     away = np.abs(times - 40.0) > 0.03  # Friction has a kink at the step.
     off = np.abs(found[:, 2] - exact)[away].max() / np.abs(exact).max()
-    # The truncation error is of second order in `late` relative to D_c/V = 1 s of the peak.
+    # The truncation error is of second order in ``late`` relative to D_c/V = 1 s of the peak.
     assert off < 2e-5
 
 

@@ -21,7 +21,7 @@ from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import EventKind
 from rsfstudy.slider.registry import SLOTS
 
-#: Tolerance of the differences from `frozen_motion_comparison.largest_differences`. The last
+#: Tolerance of the differences from ``frozen_motion_comparison.largest_differences``. The last
 #: bits depend on the CPU, for example on its exponentials, the order of sums, and fused
 #: multiplication and addition. According to ``frozen_motion_comparison.py sensitivity``, these
 #: effects move an event by at most a tenth of the tolerance, even if a root search ends one

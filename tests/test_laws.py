@@ -121,7 +121,7 @@ def test_lambert_w(value):
 def test_steady_sliding_of_a_cut_off_keeps_its_digits_however_far_from_it():
     """The steady state is ln[(1 + r/V)/(1 + r)] with r = V_c/V_*.
 
-    Near V_*, it is -r/(1 + r) ln V.
+    Near V_*, the steady state is -r/(1 + r) ln V.
     """
     for cutoff in (1e-6, 1.0, 1e6):
         scene = Scene(law="cut_off", cutoff_velocity_ratio=cutoff, stiffness=0.01)

@@ -198,7 +198,8 @@ def test_a_leap_lands_where_time_is_counted_from(rtol):
 def test_the_healing_exponent_is_that_of_theta_where_there_is_one(fields, known):
     """The healing exponent is defined if the state is b ln(theta/theta_*).
 
-    This is not the case for several states or a cut-off. With two states, b may be 0.
+    The exponent is undefined for several states and for a cut-off. With two states, b may
+    be 0.
     """
     found = LimitCycle(phases=2)(
         scene(normal_stress="constant", **{"stiffness_ratio": 0.7, **fields}), Accuracy(1e-4)

@@ -1,4 +1,4 @@
-"""Tests of the misprints in `studies/MISPRINTS.md`.
+"""Tests of the misprints in ``studies/MISPRINTS.md``.
 
 The corrected formulas hold, and the printed formulas do not.
 """

@@ -21,7 +21,7 @@ def evolution(log_slip_rate, state, p):
 
 
 def steady_states(log_slip_rate, shift, p):
-    """Return the zero of `evolution`, which is linear in the state."""
+    """Return the zero of ``evolution``, which is linear in the state."""
     heated = 1e-4 * math.exp(log_slip_rate)
     rest = -log_slip_rate * (p[LAW] + heated * p[A]) / (1.0 + heated)
     return (shift + rest,)

@@ -202,7 +202,10 @@ def test_every_public_function_that_returns_a_dataset_is_tried():
 
 
 def test_no_encoding_of_a_store_prevents_netcdf(tmp_path):
-    """Older versions of xarray cannot write the string dtype of Zarr stores."""
+    """The encoding of a Zarr store does not prevent writing NetCDF files.
+
+    Older versions of xarray cannot write the string dtype of Zarr stores.
+    """
     pytest.importorskip("zarr")
     stored = run(STABILITY, output=tmp_path, format="zarr")
     dtypes = [variable.encoding.get("dtype") for variable in stored.variables.values()]

@@ -34,7 +34,7 @@ def correlations(coefficients: np.ndarray, lags: int) -> np.ndarray:
 def partial(coefficients: np.ndarray) -> np.ndarray:
     """Return the partial autocorrelations of a process.
 
-    They are the last coefficients of the predictors of every order.
+    The partial autocorrelations are the last coefficients of the predictors of every order.
     """
     seen = correlations(coefficients, len(coefficients) + 1)
     orders = range(1, len(coefficients) + 1)

@@ -31,7 +31,7 @@ OPTIONS: dict[str, Any] = {
 def record_at(stress: float, seed: int, name: str, later: float | None = None) -> Record:
     """Return a record of a velocity step at a normal stress in MPa.
 
-    If `later` is given, the normal stress changes to this value 60 um after the step, when
+    If ``later`` is given, the normal stress changes to this value 60 um after the step, when
     friction is steady. Friction stays constant, so the fit depends on the normal stress
     within the window only.
     """

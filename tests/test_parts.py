@@ -23,8 +23,8 @@ from rsfstudy.status import Status
 def test_orbits_of_another_law_need_not_close_at_critical_stiffness():
     """Orbits at the critical stiffness need not be closed for every law.
 
-    They are closed for the laws of the paper. For other laws, they may grow, so the
-    boundary at the critical stiffness is not verified.
+    Orbits are closed for the laws of the paper, but orbits of other laws may grow.
+    Therefore, the boundary at the critical stiffness is not verified for other laws.
     """
     critical = {"normal_stress": "constant", "load_velocity_ratio": 1.05}
     grown = {}
@@ -76,8 +76,8 @@ class LeakyFault(DilatantFluid):
 def test_a_part_with_equations_of_its_own_inherits_no_conclusions():
     """User-defined equations do not inherit properties of other equations.
 
-    These properties are d sigma/d tau and alpha, which published formulas and the Coulomb
-    stress use, and a bound of pore pressure.
+    Examples of such properties are d sigma/d tau and alpha, which published formulas and
+    the Coulomb stress use, and a bound of pore pressure.
     """
     own, half = Scene(normal_stress=HalfEffect, alpha=0.4), Scene(alpha=0.2)
     assert own.critical_stiffness == pytest.approx(half.critical_stiffness, rel=1e-12)

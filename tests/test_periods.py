@@ -167,10 +167,10 @@ def test_swings_that_still_shrink_are_not_called_aperiodic():
 def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
     """The Lyapunov exponent is independent of the initial deviation.
 
-    The reference uses derivatives of each event over more events. The error per event is of
-    second order in a step of 1e-4 times the oscillation, which is 1e-4 on a scale of a
-    hundredth. The reference has a smaller step, because derivatives in all directions have
-    a larger curvature.
+    The reference uses derivatives of each event over more events. The derivatives vary over
+    about 1 % of the oscillation, so steps of 1e-4 times the oscillation cause an error of
+    about 1e-4. The reference uses a smaller step, because the curvature is larger in other
+    directions.
     """
     scene, transient, events = slow(0.853), 24, 16
     found = Bifurcation(transient=transient, events=events)(scene, quick(1e-7)).values

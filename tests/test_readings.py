@@ -58,7 +58,7 @@ def test_a_step_back_is_the_step_down_from_there(law):
 def test_what_is_read_adds_up_and_a_minus_b_is_true(law, normal_stress):
     """The measured friction changes by (a - b) ln V between steady states.
 
-    This holds for constant and variable normal stress.
+    The change is the same for constant and variable normal stress.
     """
     scene = Scene(law=law, normal_stress=normal_stress, stiffness_ratio=4.0, load_velocity_ratio=2)
     found = read(VelocityStep(record=25.0, phases=50), scene)

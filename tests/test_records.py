@@ -82,8 +82,8 @@ def test_one_column_is_named_and_the_others_are_known() -> None:
 def test_headings_that_may_mean_the_same_are_refused(key: str, other: str, one: str) -> None:
     """Ambiguous headings are rejected.
 
-    They are accepted if the units differ, if one heading is the exact name, or if the call
-    selects a column.
+    Two similar headings are accepted if their units differ, if one heading is the exact
+    name, or if the call selects a column.
     """
     arrays = {"Time (s)": TIME, "Disp (um)": MOVED, "tau (MPa)": SHEAR, "sigma (MPa)": NORMAL}
     del arrays["Disp (um)" if key == "displacement" else "sigma (MPa)"]

@@ -104,7 +104,7 @@ def digits_of_ours(number: int, rtol: float, engine: str) -> AnswerComparison:
 def test_ours_has_the_digits_it_promises(number, rtol):
     """The digits of rsfstudy agree with rtol.
 
-    The tolerance `rtol` is the accuracy of ln V, which these problems amplify by up to 2.5.
+    The tolerance ``rtol`` is the accuracy of ln V, which these problems amplify by up to 2.5.
     """
     assert digits_of_ours(number, rtol, COMPILED).digits >= -math.log10(4.0 * rtol)
 
@@ -480,7 +480,7 @@ def test_the_number_of_peaks_is_bounded(tmp_path):
 def test_the_example_passes_a_third_with_plain_scipy(tmp_path):
     """The example solves at least a third of the problems with SciPy only.
 
-    It runs in a new process, and all answers pass with a figure.
+    The example runs in a new process, and all its answers pass with a figure.
     """
     place = tmp_path / "referee"
     assert call_main("problems", place).returncode == 0

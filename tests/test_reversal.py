@@ -63,7 +63,7 @@ def test_friction_is_odd_in_slip_rate():
 def test_steady_friction_stays_positive(stress, load):
     """Steady friction is ``a arcsinh{exp[(mu_* + Theta_ss)/a] V/(2 V_*)}``.
 
-    It is positive even if mu_* + (a - b) ln V is negative.
+    Steady friction is positive even if mu_* + (a - b) ln V is negative.
     """
     scene = Scene(
         law="slip", b_over_a=2.0, mu_star=0.05, regularised=True, stiffness=0.01,

@@ -138,7 +138,11 @@ if __name__ == "__main__":
 
 
 def test_a_lost_resource_tracker_causes_no_traceback(tmp_path):
-    """A new resource tracker ignores the semaphores of the lost tracker."""
+    """A lost resource tracker causes no traceback.
+
+    Python starts a new resource tracker, which does not know the semaphores of the lost
+    tracker.
+    """
     script = tmp_path / "script.py"
     script.write_text(LOSES_TRACKER)
     words = [sys.executable, str(script), str(tmp_path / "workers.log")]

@@ -1,4 +1,7 @@
-"""Tests of valid scenes; `test_wordings` tests the errors of other scenes."""
+"""Tests of valid scenes.
+
+The module ``test_wordings`` tests the errors of invalid scenes.
+"""
 
 import dataclasses
 import inspect

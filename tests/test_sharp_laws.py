@@ -53,7 +53,8 @@ class Bent(Law):
 def test_critical_stiffness_of_a_law_that_bends_sharply(width, place):
     """The critical stiffness is -d(a x + Theta_ss)/dx.
 
-    This relation holds because the law relaxes exponentially.
+    The law relaxes exponentially, so the critical stiffness is determined by the steady
+    states.
     """
     scene = Scene(law=Bent, normal_stress="constant", a=0.01, stiffness=1e-3, bend_width=width)
     log_slip_rate = BEND + place * width

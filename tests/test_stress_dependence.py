@@ -118,7 +118,7 @@ def test_small_steps_look_like_another_slider_without_it(law, c, ratio):
 def test_by_the_slip_law_all_motions_are_those_of_that_slider():
     """For the linear slip law, all motions agree with the equivalent scene.
 
-    This includes critical steps and limit cycles with inertia.
+    The test compares critical steps and limit cycles with inertia.
     """
     scene = Scene(stress_dependence=1.5, stiffness_ratio=1.3, **CONSTANT)
     other, accuracy = equivalent(scene), Accuracy(1e-8)

@@ -50,7 +50,7 @@ def test_every_verdict_is_the_expected_one(result):
     assert not (table.verdict == "not applicable").any()
 
 
-#: Claims with a tolerance larger than `called_for`, and the reasons.
+#: Claims with a tolerance larger than ``called_for``, and the reasons.
 WIDE = {
     "accuracy_cost A1": "what a user can plan with, not what integrators happen to do",
     "coverage T3": "two standard errors of a median",
@@ -105,7 +105,10 @@ def called_for(claim, study, dataset) -> float:
 
 
 def test_claims_could_fail(result):
-    """A claim with an unnecessarily large tolerance has a reason in `WIDE`."""
+    """A claim with an unnecessarily large tolerance has a reason.
+
+    The reasons are listed in ``WIDE``.
+    """
     study = reduced_study(result[1].stem)
     for claim in study.claims:
         named = f"{study.name} {claim.id}"

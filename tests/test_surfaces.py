@@ -1,4 +1,4 @@
-"""Surfaces of packages: their exports, imports that use them, and import cycles."""
+"""Tests of the public names of packages: exports, imports and cycles."""
 
 import ast
 import importlib
@@ -108,7 +108,7 @@ def test_a_surface_says_what_the_package_never_does(package):
 
 
 def test_surfaces_load_no_module():
-    """Importing all packages loads neither NumPy nor any other large library."""
+    """Importing all packages loads neither NumPy nor other large libraries."""
     source = (
         f"import importlib, sys\nfor name in {[p for p in PACKAGES if p != 'api']}:\n"
         "    importlib.import_module(f'rsfstudy.{name}')\n"

@@ -1,6 +1,6 @@
 """Tests of all engines against an independent integration in time.
 
-Motions and events must agree with `time_domain_reference`.
+Motions and events must agree with ``time_domain_reference``.
 """
 
 from __future__ import annotations

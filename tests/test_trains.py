@@ -127,9 +127,9 @@ def test_a_record_of_whole_cycles_moves_the_slider_alike(of, law, dynamics):
 
 @pytest.mark.parametrize("amplitude", [0.9, 4.0])
 def test_records_come_to_an_oscillation_of_the_load_point(amplitude):
-    """The error of records decreases with the square of their samples.
+    """The error of a sampled record is of second order in the spacing.
 
-    This also holds if the load point moves back in each cycle and the shear stress
+    In one of the cases, the load point moves back in each cycle and the shear stress
     reverses.
     """
     slider = {"law": "slowness", "a": 0.01, "b_over_a": 1.4, "mu_star": 0.1, "stiffness": 0.02,

@@ -62,7 +62,7 @@ def test_what_is_said_to_rise_to_the_load_point_does(law, normal_stress, ratio):
         if event.kind is EventKind.SETTLED:
             break
     assert told[-1]
-    # The prediction is made early in the motion.
+    # The final slip rate is close to the load velocity.
     assert event.point.log_slip_rate > scene.log_load_velocity - 0.1
 
 

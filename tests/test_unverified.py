@@ -1,6 +1,6 @@
 """Tests of results whose error estimate exceeds 100 times the accuracy.
 
-Such results do not have the status OK.
+Results with such a large error do not have the status OK.
 """
 
 from __future__ import annotations
@@ -51,9 +51,10 @@ RESOLVED_OTHERWISE = {"distortion"}
 
 @dataclass(frozen=True)
 class Known(Measure):
-    """Measure with an output known to 1 %, and with an optional scale.
+    """Measure with an output whose error estimate is 0.01.
 
-    A second output has an error without a scale.
+    The field ``relative_to`` is the scale of this error, or 0 for an output without a
+    scale.
     """
 
     relative_to: float = 1.0

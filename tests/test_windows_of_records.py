@@ -26,9 +26,9 @@ OPTIONS: dict[str, Any] = {
 
 
 def run_in(seed: int = 1, depth: float = 0.5) -> Record:
-    """Return a record whose friction rises by `depth` before a velocity step.
+    """Return a record whose friction rises before a velocity step.
 
-    The rise has a length scale of 25 um.
+    The rise has a size of ``depth`` and a length scale of 25 um.
     """
     times = np.append(np.arange(0.0, 150.0, 0.5), np.arange(150.0, 159.0, 0.05))
     moved = synthetic.load_point_displacement(LOADING, times)

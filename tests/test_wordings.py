@@ -1,6 +1,6 @@
 """Tests of the error messages of invalid input.
 
-Each field is tested against the rule in its declaration. The file `wordings.txt` contains
+Each field is tested against the rule in its declaration. The file ``wordings.txt`` contains
 messages that a person should read, each below the call or command that causes it. Run
 ``python tests/test_wordings.py`` to update the file, and read the differences.
 """

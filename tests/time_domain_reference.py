@@ -67,7 +67,7 @@ class TimeDomainMotion:
     Parameters
     ----------
     scene : Scene
-        Scene whose law is in `EVOLUTION_FUNCTIONS`, or has two states that evolve by such a law.
+        Scene whose law is in ``EVOLUTION_FUNCTIONS``, or has two states that evolve by such a law.
     velocity_ramp : float, optional
         Increase of the load velocity over a time of 4. This ramp is the limit of many stairs.
     """

@@ -1,11 +1,11 @@
 """Comparison of error estimates with the errors relative to reference values.
 
 Usage: ``python tests/benchmarks/error_estimates.py KIND COUNT SEED``, where KIND is
-`elasticities`, `inertia`, `inverse` or `all`. COUNT is the number of random cases. The reference
-values of elasticities are extrapolated differences, computed with rtol = 1e-11. The reference
-values of motions with inertia are computed with tolerances a thousand times smaller. The exact
-curves are known for `Inverse`. The script prints each error that exceeds its estimate. The exit
-status is 1 if the estimates cover too few of the errors.
+``elasticities``, ``inertia``, ``inverse`` or ``all``. COUNT is the number of random cases.
+The reference values of elasticities are extrapolated differences, computed with rtol =
+1e-11. The reference values of motions with inertia are computed with tolerances a thousand
+times smaller. The exact curves are known for ``Inverse``. The script prints each error that
+exceeds its estimate. The exit status is 1 if the estimates cover too few of the errors.
 """
 
 from __future__ import annotations
@@ -38,7 +38,10 @@ CURVES = {"smooth": 0.0, "kinked": 0.2, "oscillating": 0.2}
 
 
 class Number(NamedTuple):
-    """Computed value with its error estimate, and reference value with its uncertainty."""
+    """Computed value and reference value of an output.
+
+    The computed value has an error estimate, and the reference value has an uncertainty.
+    """
 
     label: str
     value: float
@@ -49,7 +52,7 @@ class Number(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Absolute error that exceeds rounding and the uncertainty of the reference value."""
+        """Absolute error in excess of rounding and reference uncertainty."""
         rounding = 1e-12 * abs(self.reference)
         return max(abs(self.value - self.reference) - self.uncertainty - rounding, 0.0)
 
@@ -167,7 +170,7 @@ def inertia_numbers(random: Random) -> Iterator[Number]:
 
 
 def draw_curve(kind: str, random: Random, length: float, cells: int) -> Callable[[Any], Any]:
-    """Draw an increasing curve of ln y against ln x, from 0 to `length`."""
+    """Draw an increasing curve of ln y against ln x, from 0 to ``length``."""
     slope, bend = random.uniform(0.3, 3.0), random.uniform(-0.4, 0.5)
     if kind == "smooth" and random.uniform() < 0.5:
         rate = random.uniform(0.3, 4.0) / length
@@ -186,7 +189,7 @@ def draw_curve(kind: str, random: Random, length: float, cells: int) -> Callable
 
 
 def inverse_numbers(kind: str, random: Random) -> tuple[list[Number], int]:
-    """Apply `Inverse` to a random curve, and compare it with exact crossings.
+    """Apply ``Inverse`` to a random curve, and compare the exact crossings.
 
     The second return value is the status of the result.
     """
@@ -232,7 +235,7 @@ def print_coverage(title: str, numbers: list[Number], least: float) -> bool:
 
 
 def check_inverse(count: int, random: Random) -> bool:
-    """Check `Inverse` for each kind of curve.
+    """Check ``Inverse`` for each kind of curve.
 
     Flagged results count as covered.
     """

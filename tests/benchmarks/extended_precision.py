@@ -2,12 +2,12 @@
 
 The unknowns are those of the paper: the stress deviation f, x = ln(V/V_*) and Theta. The
 integrator uses extrapolated modified midpoint steps (Gragg, Bulirsch and Stoer) of order 14
-in `numpy.longdouble`, whose mantissa has 64 bits. Below a slip rate norm w, the motion
+in ``numpy.longdouble``, whose mantissa has 64 bits. Below a slip rate norm w, the motion
 follows the slow manifold. At constant normal stress, the error of this approximation is
 proportional to w**4, and Richardson extrapolation with two values of w removes it.
 
 ``python tests/benchmarks/extended_precision.py`` prints the reference values of
-`studies/_reference_values.py`. The computation takes minutes.
+``studies/_reference_values.py``. The computation takes minutes.
 """
 
 from __future__ import annotations
@@ -340,7 +340,7 @@ def make_slider(
     )
 
 
-#: Critical velocities of `hard_cases`: parameters that differ from the slip law with k = k_cr
+#: Critical velocities of ``hard_cases``: parameters that differ from the slip law with k = k_cr
 #: and b/a = 2.
 _ANGLE_60 = {"cot_phi": 1 / np.sqrt(LongDouble(3)), "alpha": "0.56"}
 _STEEP_COT_PHI = 1 / np.tan(np.arctan(_MU) + LongDouble("0.01") * np.arccos(LongDouble(-1)) / 180)
@@ -356,14 +356,14 @@ HARD_STEPS = {
     "T = 1e-6 s": {**_ANGLE_60, "period": "1e-6"},
     "T = 1e4 s": {**_ANGLE_60, "period": "1e4"},
 }
-#: Limit cycles of `hard_cases` for the slip law at constant normal stress.
+#: Limit cycles of ``hard_cases`` for the slip law at constant normal stress.
 HARD_CYCLES = {
     "k = 0.99 k_cr": {"ratio": "0.99"},
     "V_0 = V_*": {"ratio": "0.8", "load": "1"},
     "T = 1e-6 s": {"ratio": "0.8", "period": "1e-6"},
     "T = 1e4 s": {"ratio": "0.8", "period": "1e4"},
 }
-#: Limit cycles of `hard_cases` with arbitrary parameters. Each entry contains the number of the
+#: Limit cycles of ``hard_cases`` with arbitrary parameters. Each entry contains the number of the
 #: cycle and two switch norms. At variable normal stress, the error of the switch is proportional
 #: to the square of the norm.
 DEEP_CYCLES = {

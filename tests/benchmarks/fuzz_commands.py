@@ -340,7 +340,7 @@ def draw_line(seed: int, index: int) -> Line:
         words = [chance.choice((*HOSTILE, *names, "--version", "--help")) for _ in range(2)]
     else:
         words = _command_line(chance.choice(names), chance)
-    # arguments of a process cannot contain NUL
+    # Arguments of a process cannot contain NUL.
     return Line(tuple(word.replace("\0", "") for word in words), chance.random() < 0.4)
 
 
@@ -476,7 +476,7 @@ SETUP_COMMANDS = (
 
 
 def write_input_files(place: Path) -> None:
-    """Write files of all kinds to `place`, which must be the working directory."""
+    """Write files of all kinds to the working directory ``place``."""
     texts = {
         "tiny.py": TINY_STUDY_SOURCE,
         "own.py": USER_STUDY_SOURCE,
@@ -520,7 +520,7 @@ def write_input_files(place: Path) -> None:
         if ending != ".html":
             os.symlink(f"loop{ending}", f"loop{ending}")
             os.symlink("nowhere/at/all", f"dangling{ending}")
-        # root could replace the device that a link points to
+        # The root user could replace the device to which a link points.
         os.symlink("/dev/null", f"device{ending}") if os.getuid() else os.mknod(
             f"device{ending}", 0o020666, os.makedev(1, 3)
         )
@@ -622,7 +622,7 @@ class Server:
         self._receive(60.0 * limit)  # Wait until the process is ready.
 
     def _receive(self, seconds: float) -> tuple[dict[str, Any] | None, bytes]:
-        """Wait for the next message, and return it with the output in the meantime.
+        """Return the next message, and the output in the meantime.
 
         The message is None if the time limit is reached.
         """
@@ -648,7 +648,7 @@ class Server:
         return output
 
     def run(self, words: Sequence[str], place: Path) -> Answer:
-        """Run a command line in the directory `place`."""
+        """Run a command line in the directory ``place``."""
         self._link.sendall(json.dumps([words, str(place)]).encode() + b"\n")
         began, _output = self._receive(60.0 * self.limit)
         assert began is not None
@@ -678,7 +678,7 @@ def _serve(link: socket.socket, output: int, home: Path, limit: float) -> None:
     nothing = os.open(os.devnull, os.O_RDONLY)
     for number, stream in enumerate((nothing, output, output)):
         os.dup2(stream, number)
-    # the standard streams of Python still refer to the old descriptors
+    # The standard streams of Python still refer to the old descriptors.
     sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
     sys.stderr = open(2, "w", encoding="utf-8", closefd=False, buffering=1)  # noqa: SIM115
     os.environ |= {"MPLBACKEND": "agg", "TERM": "xterm-256color"}

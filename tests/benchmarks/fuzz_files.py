@@ -80,7 +80,7 @@ class Kind(NamedTuple):
 def command_reader(*words: str) -> Callable[[Path], Any]:
     """Return a reader that runs a command.
 
-    In `words`, ``{0}`` is replaced by the path of the file, and ``{1}`` by its directory.
+    In ``words``, ``{0}`` is replaced by the path of the file, and ``{1}`` by its directory.
     """
 
     def read(path: Path) -> str:
@@ -197,7 +197,10 @@ def tamper(path: Path, chance: random.Random) -> bool:
 
 
 def rename(path: Path, chance: random.Random) -> bool:
-    """Replace the file by the name of an invalid or missing study file, and return False."""
+    """Replace the file by the name of an invalid study file.
+
+    The return value is False.
+    """
     names = ("a" * 300, "\x1b[31m", "nul\0", "", " ", "..", "a/b", "*", "\udcff", "é" * 200, "-x")
     path.write_text(chance.choice(names) + chance.choice((".py", "", ".PY", ".py.py")), "utf-8",
                     "surrogateescape")  # fmt: skip
@@ -283,7 +286,7 @@ KINDS = {
 
 
 def write_valid_files(place: Path) -> dict[str, Any]:
-    """Write a valid file of each kind, and return the true datasets by kind."""
+    """Write a valid file of each kind, and return the datasets by kind."""
     results = rsfstudy.run(STUDY, output=place, workers=0, progress=False)
     rsfstudy.run(STUDY, output=place / "zarr", workers=0, progress=False, format="zarr")
     (place / "zarr" / "small.zarr").rename(place / "small.zarr")
@@ -320,7 +323,7 @@ def _xlook(*columns: np.ndarray) -> bytes:
 
 
 class Answer(NamedTuple):
-    """Answer of a reader, with its kind, its text, the output and the first difference."""
+    """Answer of a reader: kind, text, printed output and first difference."""
 
     kind: str
     text: str

@@ -154,7 +154,7 @@ def record() -> Any:
 
 
 def valid_inputs(place: Path) -> dict[str, Any]:
-    """Create the scenes, studies, datasets, records and files for valid calls."""
+    """Create scenes, studies, datasets, records and files for valid calls."""
     quick = {"rtol": 1e-2, "engine": "scipy"}
     scene = Scene(stiffness_ratio=1.5, load_velocity_ratio=2.0, normal_stress="constant")
     cycling = Scene(stiffness_ratio=0.8, normal_stress="constant")
@@ -475,7 +475,7 @@ def alter_dataset(dataset: xr.Dataset, draw: random.Random) -> xr.Dataset:
         made[name].attrs[attribute] = draw.choice(junk_values())
         return made
     if way == 5:
-        # xarray itself rejects another shape for a coordinate of a dimension
+        # The library xarray rejects another shape for a coordinate of a dimension.
         name = draw.choice([name for name in names if name not in dims] or ["x"])
         return dataset.assign({name: draw.choice([5.0, ("q", [1.0])])})
     if way == 6:

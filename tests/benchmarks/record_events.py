@@ -1,4 +1,4 @@
-"""Test of `rsfstudy.events` with synthetic records of known drops.
+"""Test of ``rsfstudy.events`` with synthetic records of known drops.
 
 Usage: ``python tests/benchmarks/record_events.py``. The script generates 30 records of each kind,
 with seeds from 0 to 29. For each kind, it prints a row of a table with
@@ -23,7 +23,7 @@ import rsfstudy
 
 
 class Catalogue(NamedTuple):
-    """Synthetic record, with the start times, durations and sizes of its drops."""
+    """Synthetic record with start times, durations and sizes of its drops."""
 
     time: np.ndarray
     stress: np.ndarray
@@ -101,7 +101,7 @@ def draw_record(
     durations, sizes = rng.uniform(*lasts, count), rng.uniform(*size, count)
     share = (time[:, None] - begins) / np.maximum(durations, 1e-9)
     fallen = (np.clip(share, 0.0, 1.0) * sizes).sum(axis=1)
-    # loading compensates the drops, and stops during each drop
+    # The loading compensates the drops, and stops during each drop.
     rests = np.clip(time[:, None] - begins, 0.0, durations).sum(axis=1)
     loading = sizes.sum() / (time[-1] - time[0] - durations.sum())
     white = rng.standard_normal(len(time) + 500)
@@ -192,7 +192,7 @@ KINDS: dict[str, Callable[[np.random.Generator], Catalogue]] = {
 
 
 def score_record(catalogue: Catalogue) -> Score:
-    """Compare the events of `rsfstudy.events` with the drops of a record."""
+    """Compare the events of ``rsfstudy.events`` with the drops of a record."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = rsfstudy.events(time=catalogue.time, shear_stress=catalogue.stress)

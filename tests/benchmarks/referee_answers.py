@@ -6,7 +6,7 @@ answers take a quarter of an hour.
 The first method, in this module, solves the equations of the problem statements in SI
 units. The unknowns are spring stress, theta in s, and slip. The slip rate follows from the
 friction law, or from a root search if there is radiation damping. The integrator has order
-20 and works with 30 digits (mpmath). The second method is in `second_referee_way.py`.
+20 and works with 30 digits (mpmath). The second method is in ``second_referee_way.py``.
 """
 
 from __future__ import annotations

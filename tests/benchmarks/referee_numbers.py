@@ -1,4 +1,7 @@
-"""Numbers and rows of the answers of the referee; see `second_referee_way`."""
+"""Numbers and rows of the answers of the referee.
+
+The module ``second_referee_way`` contains the equations of the second method.
+"""
 
 from __future__ import annotations
 

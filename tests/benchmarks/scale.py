@@ -132,7 +132,7 @@ def measure_run(
 
 
 def measure_in_subprocess(*words: int | str) -> dict[str, float]:
-    """Return the result of `measure_run` from a new process."""
+    """Return the result of ``measure_run`` from a new process."""
     command = [sys.executable, __file__, *map(str, words)]
     said = subprocess.run(command, capture_output=True, text=True, check=True)
     found: dict[str, float] = json.loads(said.stdout)

@@ -1,7 +1,7 @@
 """Second method for the answers of the referee, independent of the package.
 
 The method shares neither equations nor arithmetic with the first method in
-`referee_answers.py`. The friction law is differentiated. The unknowns are ln(V/V_*), the
+``referee_answers.py``. The friction law is differentiated. The unknowns are ln(V/V_*), the
 logarithms of theta, the stress deviation and the slip, all dimensionless and in double
 precision. The integrator uses extrapolated modified midpoint steps (Gragg, Bulirsch and
 Stoer) of order 14.

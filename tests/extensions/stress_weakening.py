@@ -4,7 +4,7 @@ The stress dependence follows Nagata et al. (2012).
 
 The variable ``Psi = Theta + c (mu - mu_*)`` evolves by the slowness law, and the state
 effect defines the shift between Psi and Theta, and the slope of the shift. At constant
-normal stress, the field `stress_dependence` of every law has the same effect.
+normal stress, the field ``stress_dependence`` of every law has the same effect.
 """
 
 from dataclasses import dataclass

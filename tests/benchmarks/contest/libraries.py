@@ -1,6 +1,6 @@
 """Solver libraries, used as their documentation recommends.
 
-See `problem.cycle_function`.
+See ``problem.cycle_function``.
 
 All libraries use explicit methods of high order on non-stiff equations, and no library has
 to detect events. If a library is not installed, ``prepare`` raises ImportError, and the

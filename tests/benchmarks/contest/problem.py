@@ -1,7 +1,7 @@
 """Stick-slip cycles as benchmark problems, with exact results.
 
-The module implements the equations of the package again, for any library that has `exp`,
-`log` and `expm1`. All participants integrate the same non-stiff form, which suits explicit
+The module implements the equations of the package again, for any library that has ``exp``,
+``log`` and ``expm1``. All participants integrate the same non-stiff form, which suits explicit
 methods: along the slow manifold to a first mark, through the rupture to a second mark, and
 along the slow manifold again. The marks are known in advance, so that the other
 participants need no event detection. The engines of rsfstudy detect the events themselves.
@@ -75,7 +75,7 @@ class Problem:
 
     @property
     def marks(self) -> tuple[float, ...]:
-        """Arguments of `cycle_function` that describe the marks."""
+        """Arguments of ``cycle_function`` that describe the marks."""
         paths = self.leave, self.rupture, self.rest
         return self.initial_spring_stress_rate, *paths, self.duration, self.fall, self.creep
 
